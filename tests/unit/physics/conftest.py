@@ -1,4 +1,4 @@
-"""One suite for every physics under the scene: the common behavior of robots, sensors and supervisors."""
+"""Fixtures for tests that run once per physics: the behavior of robots, sensors and supervisors."""
 
 import math
 
@@ -21,7 +21,7 @@ def physics(request):
 
 @pytest.fixture
 def load(physics):
-    """`load(source)` returns the simulation of a world, by default of the arena."""
+    """`load(source)` returns the simulation of a world; without a source, of the built-in arena."""
 
     def load(source=None):
         return Simulation.load(source or builtin("arena"), physics(), "world", Mode.FAST)
@@ -31,7 +31,7 @@ def load(physics):
 
 @pytest.fixture
 def drive():
-    """`drive(simulation, vx, vy, omega, steps)` commands the first robot, and steps."""
+    """`drive(simulation, vx, vy, omega, steps)` drives the first robot and returns its body."""
 
     def drive(simulation, vx, vy, omega, steps=1):
         robot = simulation.robots[0]

@@ -32,7 +32,7 @@ DEF FRAME Solid {
 
 @pytest.fixture
 def load():
-    """`load(text)` returns the arena with more nodes, under MuJoCo."""
+    """`load(text)` returns the built-in arena with the nodes of `text` added, under MuJoCo."""
 
     def load(text=DOOR):
         return Simulation.load(builtin("arena") + text, MujocoPhysics(), "doors", Mode.FAST)
@@ -46,7 +46,7 @@ def angle(simulation, name="DOOR"):
 
 
 def test_a_robot_pushes_a_door_open(load, drive):
-    """The knob moves with the door; a door without a push stays shut in its frame."""
+    """Without a push the door stays shut in its frame. Its knob moves together with it."""
     simulation = load()
     simulation.step(1920)
     assert angle(simulation) == pytest.approx(0.0, abs=1e-3)
@@ -60,7 +60,7 @@ def test_a_robot_pushes_a_door_open(load, drive):
 
 
 def test_rays_meet_a_door_where_it_is(load):
-    """A supervisor opens a door that has been at rest for long, and it stays open."""
+    """A supervisor opens a door that has long been at rest, and the door stays open."""
     simulation = load()
     simulation.step(1920)
     ahead = simulation.robots[0].sensors["ir1"]
@@ -74,7 +74,7 @@ def test_rays_meet_a_door_where_it_is(load):
 
 
 def test_a_door_stops(load):
-    """The stops of its joint hold it."""
+    """The joint has stops at 2 rad, so a door that is pushed hard stays within them."""
     simulation = load()
     simulation.tree.of_def("DOOR").place.joint.follow(0.0, 8.0)
 
@@ -84,7 +84,7 @@ def test_a_door_stops(load):
 
 
 def test_a_reset_shuts_a_door(load, drive):
-    """After the reset every value is the same, bit for bit."""
+    """The same commands after each of two resets move the door by the same angles, bit for bit."""
     simulation = load()
 
     def course():
@@ -101,7 +101,7 @@ def test_a_reset_shuts_a_door(load, drive):
 
 
 def test_reset_physics_stops_a_door(load):
-    """The door stays at its position."""
+    """A supervisor's `reset_physics` takes the door's velocity, so the door stays at its angle."""
     simulation = load()
     simulation.tree.of_def("DOOR").place.joint.follow(0.5, 2.0)
     simulation.step(32)
@@ -114,7 +114,10 @@ def test_reset_physics_stops_a_door(load):
 
 
 def test_an_imported_door_swings_and_another_keeps_its_angle(load, drive):
-    """When the model is compiled again, no state changes; the removal of a door removes its joint."""
+    """Importing a door compiles the model again, and the other door keeps its angle.
+
+    Removing a door removes its joint too.
+    """
     simulation = load()
     drive(simulation, 0.3, 0.0, 0.0, steps=12)
     before = angle(simulation)
@@ -133,7 +136,7 @@ def test_an_imported_door_swings_and_another_keeps_its_angle(load, drive):
 
 
 def test_a_pendulum_hangs_from_nothing():
-    """The joint is at the top of the world, whose y axis points up."""
+    """The pendulum's joint is a child of the world itself, and the y axis of this world points up."""
     world = b"""#VRML_SIM R2023b utf8
     WorldInfo { basicTimeStep 8 coordinateSystem "NUE" }
     HingeJoint { jointParameters HingeJointParameters { axis 0 0 1 anchor 0 2 0 dampingConstant 1 }
@@ -147,7 +150,7 @@ def test_a_pendulum_hangs_from_nothing():
 
 
 def test_a_lid_swings_on_a_crate(load):
-    """A joint on a dynamic solid falls with it."""
+    """The lid's joint belongs to a dynamic solid, so the lid falls together with the crate."""
     crate = b"""DEF CRATE Solid {
       translation 0 1.2 1 boundingObject Box { size 0.3 0.3 0.3 } physics Physics { density -1 mass 5 }
       children [ HingeJoint {
@@ -163,6 +166,6 @@ def test_a_lid_swings_on_a_crate(load):
 
 
 def test_the_stub_refuses_doors():
-    """They would be as immovable as walls."""
+    """The stub would make doors immovable, like walls, so it rejects the world."""
     with pytest.raises(WorldError, match="a Solid with physics moves when it is pushed"):
         Simulation.load(builtin("arena") + DOOR, StubPhysics())

@@ -1,4 +1,4 @@
-"""Dynamic solids under MuJoCo: Solids with physics, and stand-ins with a mass."""
+"""Dynamic solids under MuJoCo: Solids with physics, and stand-ins that have a mass."""
 
 import math
 
@@ -22,7 +22,7 @@ DEF CRATE Solid {
 
 @pytest.fixture
 def load():
-    """`load(text)` returns the arena with more nodes, under MuJoCo."""
+    """`load(text)` returns the built-in arena with the nodes of `text` added, under MuJoCo."""
 
     def load(text=CRATE):
         return Simulation.load(builtin("arena") + text, MujocoPhysics(), "loose", Mode.FAST)
@@ -36,7 +36,7 @@ def position(simulation, name="CRATE"):
 
 
 def test_a_robot_pushes_a_crate(load, drive):
-    """The crate moves along; the robot hardly slows down, because the crate is light."""
+    """The robot pushes the crate ahead and hardly slows down, because the crate is light."""
     simulation = load()
 
     body = drive(simulation, 0.3, 0.0, 0.0, steps=15)
@@ -46,7 +46,7 @@ def test_a_robot_pushes_a_crate(load, drive):
 
 
 def test_a_heavy_crate_holds_a_robot(load, drive):
-    """Its motors cannot move two tons."""
+    """The robot's motors cannot move a crate of two tons."""
     simulation = load(CRATE.replace(b"mass 2", b"mass 2000"))
 
     body = drive(simulation, 0.3, 0.0, 0.0, steps=15)
@@ -56,7 +56,7 @@ def test_a_heavy_crate_holds_a_robot(load, drive):
 
 
 def test_a_crate_falls_to_the_floor_and_rests(load):
-    """It stays at that position, to a millimeter."""
+    """After two seconds the crate lies on the floor, within 2 mm."""
     simulation = load(CRATE.replace(b"0.6 0 0.15", b"0.6 0 1.5"))
 
     simulation.step(192 * 10)
@@ -65,7 +65,7 @@ def test_a_crate_falls_to_the_floor_and_rests(load):
 
 
 def test_sensors_see_a_crate_where_it_is_now(load, drive):
-    """Rays meet dynamic solids too, and contacts have their nodes."""
+    """The ray of an infra-red sensor meets the crate, and `contact_points` reports the crate's contacts."""
     simulation = load(CRATE.replace(b"0.6 0 0.15", b"0.5 0 0.15"))
     simulation.step(192)
     values = simulation.robots[0].sensors
@@ -80,7 +80,7 @@ def test_sensors_see_a_crate_where_it_is_now(load, drive):
 
 
 def test_a_supervisor_puts_a_crate_elsewhere(load):
-    """It rests at the new position; the unwritten part of its pose stays."""
+    """The supervisor writes only the translation; the crate rests there and keeps its rotation."""
     simulation = load()
     simulation.step(192)
     node = simulation.tree.of_def("CRATE")
@@ -93,7 +93,7 @@ def test_a_supervisor_puts_a_crate_elsewhere(load):
 
 
 def test_a_push_moves_a_crate_until_friction_stops_it(load):
-    """A supervisor sets velocities of dynamic solids as it does of robots."""
+    """A supervisor can set the velocity of a dynamic solid, as it sets the velocity of a robot."""
     simulation = load()
     place = simulation.tree.of_def("CRATE").place
     place.push((1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
@@ -107,7 +107,7 @@ def test_a_push_moves_a_crate_until_friction_stops_it(load):
 
 
 def test_a_reset_brings_a_crate_back(load, drive):
-    """The crate is at its position in the world file, at rest; later values are the same, bit for bit."""
+    """The reset puts the crate back at rest; the same commands then give the same positions, bit for bit."""
     simulation = load()
 
     def course():
@@ -127,7 +127,7 @@ def test_a_reset_brings_a_crate_back(load, drive):
 
 
 def test_what_is_fixed_to_a_crate_goes_with_it(load):
-    """A handle is a part of the crate, and both masses count."""
+    """The handle moves with the crate as one body, whose mass is the sum of both masses."""
     handle = b"DEF HANDLE Solid { translation 0 0 0.2 boundingObject Box { size 0.1 0.1 0.1 } }"
     simulation = load(CRATE.rstrip().removesuffix(b"}") + b"children [" + handle + b"] }")
     simulation.tree.of_def("CRATE").place.push((0.0, 0.0, 0.0), (0.0, 0.0, 3.0))
@@ -140,7 +140,7 @@ def test_what_is_fixed_to_a_crate_goes_with_it(load):
 
 
 def test_a_crate_inside_a_pose_is_where_the_pose_puts_it(load):
-    """Clients read a translation relative to the enclosing frame."""
+    """Clients read the crate's translation relative to the Pose, as the world file has it."""
     inside = b"Pose { translation 0 1 0 rotation 0 0 1 1.5708 children [" + CRATE + b"] }"
     simulation = load(inside)
 
@@ -151,7 +151,7 @@ def test_a_crate_inside_a_pose_is_where_the_pose_puts_it(load):
 
 
 def test_a_crate_that_is_imported_is_loose_too(load, drive):
-    """The robot and the other dynamic solids keep their state meanwhile."""
+    """The imported crate falls; the import does not move the first crate."""
     simulation = load()
     drive(simulation, 0.3, 0.0, 0.0, steps=10)
     before = position(simulation)
@@ -164,7 +164,7 @@ def test_a_crate_that_is_imported_is_loose_too(load, drive):
 
 
 def test_a_stand_in_with_a_mass_is_loose(tmp_path):
-    """A box of Webots moves if its `mass` is more than 0, and is fixed if it is 0."""
+    """A `WoodenBox` falls if its `mass` is more than 0; with a mass of 0 the box is fixed."""
     world = tmp_path / "boxes.wbt"
     boxes = b"""
     DEF LIGHT WoodenBox { translation 0 0 2 mass 1 name "light" }
@@ -180,7 +180,7 @@ def test_a_stand_in_with_a_mass_is_loose(tmp_path):
 
 
 def test_a_slope_lets_a_ball_roll(load):
-    """MuJoCo accepts shapes of any rotation."""
+    """The slope is a tilted box: MuJoCo accepts shapes of any rotation."""
     slope = b"""
     Solid { translation 0 1.5 0.3 rotation 0 1 0 0.3 boundingObject Box { size 1 0.5 0.1 } }
     DEF BALL Solid {
@@ -196,9 +196,9 @@ def test_a_slope_lets_a_ball_roll(load):
 
 
 def test_crates_at_rest_sleep(load):
-    """They stay at the same position, bit for bit, even on a floor that is an obstacle.
+    """Crates at rest keep their positions bit for bit, even on a floor that is an obstacle.
 
-    200 of them then cost little.
+    Two hundred sleeping crates then cost little time.
     """
     crates = [
         CRATE.replace(b"0.6 0 0.15", f"{-1.5 + 0.5 * i} 1.5 0.15".encode()).replace(
@@ -242,7 +242,7 @@ def test_an_obstacle_that_moves_wakes_what_lies_on_it(load):
 
 @pytest.mark.parametrize("physics", ["", "physics Physics { density -1 mass 3 }"])
 def test_a_solid_inside_another_is_one_body_with_it(load, physics):
-    """As in Webots, a lamp hangs from its shelf and legs carry a table; nothing falls off."""
+    """As in Webots, the shelf, its lamp and its legs move as one body, so no part falls off."""
     lamp = """DEF LAMP Solid { translation 0.5 0 0 boundingObject Box { size 0.1 0.1 0.1 }
       physics Physics { density -1 mass 1 } name "lamp" }"""
     legs = """DEF LEGS Solid { translation 0 0 -0.5 boundingObject Box { size 0.4 0.4 0.9 }

@@ -1,4 +1,4 @@
-"""Torques and forces of motors under MuJoCo: clients set and read them."""
+"""Clients set and read the torques and forces of motors, under MuJoCo."""
 
 import math
 
@@ -36,13 +36,13 @@ def crane():
 
 
 def rows(robot, name):
-    """Return the services of a motor, by path, and its topics."""
+    """Return the services of a motor, by path, and its list of topics."""
     kind, motor = robot.parts.devices.rows[name]
     return {path: handler for path, _, handler in kind.services(motor)}, kind.topics(motor)
 
 
 def test_a_torque_speeds_a_cylinder_up(crane):
-    """2 N m on m r^2 / 2 = 0.04 kg m2 give 50 rad/s2."""
+    """A torque of 2 N m on an inertia of m r^2 / 2 = 0.04 kg m2 gives 50 rad/s2."""
     simulation, motors = crane
     motors["turn"].set_effort(2.0)
 
@@ -53,7 +53,7 @@ def test_a_torque_speeds_a_cylinder_up(crane):
 
 
 def test_a_torque_is_clamped_and_lasts_until_a_position(crane):
-    """As in Webots, a velocity alone does not end it."""
+    """As in Webots, a new velocity does not end the torque; only a new position does."""
     simulation, motors = crane
     motors["turn"].set_effort(1000.0)
     motors["turn"].set_velocity(0.0)
@@ -68,7 +68,7 @@ def test_a_torque_is_clamped_and_lasts_until_a_position(crane):
 
 
 def test_a_force_that_carries_the_weight_keeps_it_at_rest(crane):
-    """One newton more lifts it with a third of a meter per second squared."""
+    """With one newton more than its weight, the load rises with a third of a meter per second squared."""
     simulation, motors = crane
     motors["lift"].set_effort(3.0 * G)
     simulation.step(400)
@@ -81,7 +81,7 @@ def test_a_force_that_carries_the_weight_keeps_it_at_rest(crane):
 
 
 def test_the_feedback_of_a_lift_is_the_weight_that_it_holds(crane):
-    """It is in newtons, against gravity, and 0 without an available force."""
+    """The feedback is the force in newtons against gravity; without an available force it is 0."""
     simulation, motors = crane
     simulation.step(800)
     assert motors["lift"].feedback_nm == pytest.approx(3.0 * G, rel=1e-6)
@@ -94,7 +94,7 @@ def test_the_feedback_of_a_lift_is_the_weight_that_it_holds(crane):
 
 
 def test_a_motor_publishes_its_feedback(crane):
-    """The service `enable` is below the feedback sensor, the topic below the motor."""
+    """The service `enable` has the path of the feedback sensor; the topic has the path of the motor."""
     simulation, _ = crane
     robot = simulation.robots[0]
     simulation.step(800)
@@ -108,7 +108,7 @@ def test_a_motor_publishes_its_feedback(crane):
 
 
 def test_a_reset_ends_a_torque(crane):
-    """The motor is as in a new world."""
+    """A reset clears the torque that a client set, so the motor is as in a new world."""
     simulation, motors = crane
     motors["turn"].set_effort(2.0)
     simulation.step(80)
@@ -131,7 +131,7 @@ def test_a_driving_wheel_refuses_a_torque():
 
 
 def test_the_stub_has_no_feedback():
-    """Its services return failure."""
+    """The stub computes no forces, so the feedback services of a motor return failure."""
     services, topics = rows(Simulation.load(ARM, StubPhysics()).robots[0], "lift")
 
     with pytest.raises(UnsimulatedError, match="forces are not simulated; set a position or velocity"):

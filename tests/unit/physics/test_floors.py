@@ -24,7 +24,10 @@ CRATE = """DEF CRATE Solid { translation 2 0 -0.5 boundingObject Box { size 0.2 
 
 
 def test_a_ray_meets_the_floor_where_the_world_has_it(physics):
-    """This holds also after a supervisor has moved the floor; the sensor is 0.5 m above height 0."""
+    """The sensor is 0.5 m above height 0.
+
+    Its ray also meets the floor after a supervisor has moved the floor.
+    """
     simulation = Simulation.load(WORLD.format("").encode(), physics(), "world", Mode.FAST)
     sensor = simulation.robots[0].sensors["down"]
     simulation.step(16)
@@ -38,7 +41,7 @@ def test_a_ray_meets_the_floor_where_the_world_has_it(physics):
 
 
 def test_a_crate_falls_to_the_floor_of_the_world():
-    """The floor is at its height in the world, not at height 0."""
+    """The crate comes to rest on the floor of the world, which is not at height 0."""
     simulation = Simulation.load(WORLD.format(CRATE).encode(), MujocoPhysics(), "world", Mode.FAST)
 
     simulation.step(1600)

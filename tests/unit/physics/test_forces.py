@@ -23,7 +23,10 @@ DEF PUCK Solid {
 
 @pytest.fixture
 def thrown():
-    """`thrown(push)` returns velocity and rotation of a falling puck, one step after `push(motion, node)`."""
+    """`thrown(push)` returns the motion of a falling puck one step after `push(motion, node)`.
+
+    The motion is the puck's velocity and rotation.
+    """
 
     def thrown(push):
         simulation = Simulation.load(WORLD, MujocoPhysics(), "puck", Mode.FAST)
@@ -36,21 +39,21 @@ def thrown():
 
 
 def test_a_force_acts_for_one_basic_step(thrown):
-    """Ten newtons on two kilograms give 0.16 m/s after 32 ms."""
+    """A force of ten newtons acts on two kilograms for one step of 32 ms, which gives 0.16 m/s."""
     velocity, _ = thrown(lambda motion, node: motion.add_force(node, (10.0, 0.0, 0.0), relative=False))
 
     assert velocity == pytest.approx((0.16, 0.0, -9.81 * 0.032), abs=1e-6)
 
 
 def test_a_relative_force_turns_with_the_node(thrown):
-    """The node's x axis points along y of the world."""
+    """The node is turned, so that its x axis, along which the force acts, points along y of the world."""
     velocity, _ = thrown(lambda motion, node: motion.add_force(node, (10.0, 0.0, 0.0), relative=True))
 
     assert velocity[:2] == pytest.approx((0.0, 0.16), abs=1e-6)
 
 
 def test_a_force_beside_the_center_turns(thrown):
-    """As in Webots, the offset is in the frame of the node."""
+    """As in Webots, the offset of the force is in the frame of the node."""
     _, turning = thrown(
         lambda motion, node: motion.add_force(node, (1.0, 0.0, 0.0), relative=False, offset=(0.1, 0.0, 0.0))
     )
@@ -59,7 +62,7 @@ def test_a_force_beside_the_center_turns(thrown):
 
 
 def test_a_torque_turns_in_place(thrown):
-    """The inertia of a cube of 2 kg and 0.2 m is 1/75 kg m2."""
+    """The inertia of a cube of 2 kg with sides of 0.2 m is 1/75 kg m2."""
     velocity, turning = thrown(lambda motion, node: motion.add_torque(node, (0.0, 0.0, 0.5), relative=False))
 
     assert velocity[:2] == pytest.approx((0.0, 0.0), abs=1e-6)
@@ -67,7 +70,7 @@ def test_a_torque_turns_in_place(thrown):
 
 
 def test_a_velocity_of_a_loose_thing_is_what_was_set(thrown):
-    """Only the fall of one step is added."""
+    """The velocity that a supervisor sets changes in one step only by the fall."""
     velocity, turning = thrown(
         lambda motion, node: motion.set_velocity(node, (1.0, 2.0, 0.0), (0.0, 0.0, math.pi))
     )
@@ -77,7 +80,7 @@ def test_a_velocity_of_a_loose_thing_is_what_was_set(thrown):
 
 
 def test_halting_stops_a_loose_thing(thrown):
-    """A supervisor's `reset_physics` does this."""
+    """A supervisor's `reset_physics` stops the puck."""
 
     def push(motion, node):
         motion.set_velocity(node, (1.0, 2.0, 0.0), (0.0, 0.0, 1.0))
@@ -87,7 +90,7 @@ def test_halting_stops_a_loose_thing(thrown):
 
 
 def test_the_stub_refuses_forces():
-    """A successful response without a motion would be false."""
+    """If the stub reported success but nothing moved, the client would be misled."""
     simulation = Simulation.load(WORLD.replace(b"physics Physics { density -1 mass 2 }", b""), StubPhysics())
     node = simulation.tree.of_def("PUCK")
 

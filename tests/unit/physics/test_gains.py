@@ -27,20 +27,20 @@ DEF R Robot {
 
 @pytest.fixture
 def arm(physics):
-    """`arm(fields)` returns a simulation whose robot has an arm with such a motor."""
+    """`arm(fields)` returns a simulation of a robot with an arm, whose motor has these fields."""
     return lambda fields="": Simulation.load(
         ARMS.replace("FIELDS", fields).encode(), physics(), "world", Mode.FAST
     )
 
 
 def angle(simulation):
-    """Return the angle of the arm."""
+    """Return the reading of the position sensor of the arm, in radians."""
     return simulation.robots[0].sensors["angle"].value
 
 
 @pytest.mark.parametrize("fields", ["controlPID 1 0 0", ""])
 def test_a_small_gain_needs_longer_to_a_target(arm, fields):
-    """The gain is from the file or from a client."""
+    """With a small gain the motor moves slower. The gain comes from the world file or from a client."""
     simulation = arm(fields)
     motor = simulation.robots[0].motors["arm"]
     if not fields:
@@ -54,7 +54,7 @@ def test_a_small_gain_needs_longer_to_a_target(arm, fields):
 
 
 def test_a_multiplier_moves_the_arm_further(arm):
-    """Only the file sets it: no service does."""
+    """A multiplier of 2 doubles the target position. Only the world file can set the multiplier."""
     simulation = arm("multiplier 2")
     simulation.robots[0].motors["arm"].set_position(0.25)
 
@@ -64,7 +64,7 @@ def test_a_multiplier_moves_the_arm_further(arm):
 
 
 def test_a_motor_without_torque_moves_nothing(arm):
-    """It follows neither a target nor a velocity."""
+    """With an available torque of 0 the motor follows neither a target position nor a velocity."""
     simulation = arm()
     motor = simulation.robots[0].motors["arm"]
     motor.set_available_torque(0.0)

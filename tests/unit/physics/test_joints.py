@@ -32,7 +32,7 @@ def arm(device=MOTOR, length=1.0, mass_kg=2.0, parameters="", more="", *, physic
 
 
 def carrying(part):
-    """Return the arena, whose robot has one more part."""
+    """Return the built-in arena, whose robot has one more part."""
     return builtin("arena").replace(b"supervisor TRUE\n  children [", b"children [" + part.encode(), 1)
 
 
@@ -58,7 +58,7 @@ def test_a_motor_holds_a_rod_with_the_torque_of_its_weight(length, mass_kg):
 
 
 def test_a_weak_motor_does_not_hold_a_rod():
-    """Ten newton meters are needed, and it has five."""
+    """The rod needs a torque of ten newton meters, and the motor has five."""
     simulation, robot = load(arm('RotationalMotor { name "motor" maxTorque 5 }'))
 
     simulation.step(320)
@@ -88,7 +88,10 @@ def test_a_rod_without_a_motor_swings_as_a_pendulum(length, mass_kg):
 
 
 def test_damping_and_friction_slow_a_pendulum():
-    """With damping it comes to rest below; with enough static friction it does not begin to fall."""
+    """A damped rod comes to rest pointing down.
+
+    With enough static friction the rod does not begin to fall.
+    """
     damped, swinging = load(arm("", parameters="dampingConstant 5"))
     damped.step(8000)
     stuck, held = load(arm("", parameters="staticFriction 15"))
@@ -99,7 +102,7 @@ def test_damping_and_friction_slow_a_pendulum():
 
 
 def test_a_spring_holds_a_rod_where_the_torques_are_equal():
-    """It rests at the angle a where 100 a equals m g l / 2 times the cosine of a."""
+    """The rod rests at the angle a where 100 a equals m g l / 2 times the cosine of a."""
     simulation, robot = load(arm("", parameters="springConstant 100 dampingConstant 10"))
 
     simulation.step(4000)
@@ -109,7 +112,7 @@ def test_a_spring_holds_a_rod_where_the_torques_are_equal():
 
 
 def test_stops_hold_what_a_motor_turns():
-    """The stops yield by less than half a degree."""
+    """MuJoCo's stops are soft: under the motor's torque they yield by less than half a degree."""
     simulation, robot = load(arm(parameters="minStop -0.5 maxStop 0.5"))
     motor = robot.motors["motor"]
     motor.set_position(math.inf)
@@ -122,7 +125,10 @@ def test_stops_hold_what_a_motor_turns():
 
 @pytest.mark.parametrize("acceleration", [-1.0, 10.0])
 def test_an_arm_follows_its_commands_as_in_the_stub(acceleration):
-    """It follows a new position every two seconds to two degrees, and the last one to 2 mrad."""
+    """Every two seconds a new position is commanded.
+
+    The arm reaches each position within two degrees, and the last one within 2 mrad.
+    """
     pair = [load(arm(), physics) for physics in (MujocoPhysics, StubPhysics)]
     motors = [robot.motors["motor"] for _, robot in pair]
     for motor in motors:
@@ -140,7 +146,7 @@ def test_an_arm_follows_its_commands_as_in_the_stub(acceleration):
 
 
 def test_a_strong_motor_does_not_pass_a_stop():
-    """With MuJoCo's default softness, 1 kg stood a centimeter beyond its stop, against 500 N."""
+    """With MuJoCo's default softness, a motor of 500 N pushed 1 kg a centimeter beyond its stop."""
     lift = """SliderJoint { jointParameters JointParameters { axis 0 0 1 minStop -0.1 maxStop 0.3 }
       device [ LinearMotor { name "lift" maxVelocity 1 maxForce 500 } ]
       endPoint Solid { translation 0 0 1 boundingObject Box { size 0.1 0.1 0.1 }
@@ -154,7 +160,7 @@ def test_a_strong_motor_does_not_pass_a_stop():
 
 
 def test_a_joint_whose_end_has_no_physics_follows_exactly():
-    """As in Webots, such a joint is kinematic."""
+    """As in Webots, a joint is kinematic if its end has no `physics`."""
     (mujoco, strong), (stub, exact) = (load(arm(physics=False), it) for it in (MujocoPhysics, StubPhysics))
     for robot in (strong, exact):
         robot.motors["motor"].set_position(1.0)
@@ -167,7 +173,7 @@ def test_a_joint_whose_end_has_no_physics_follows_exactly():
 
 
 def test_links_on_links_move_together():
-    """The frame of the outer link follows both joints."""
+    """The position of the outer link follows the angles of both joints."""
     outer = """DEF WRIST HingeJoint {
       jointParameters HingeJointParameters { axis 0 1 0 anchor 0.5 0 0 }
       device RotationalMotor { name "wrist" maxTorque 50 }
@@ -185,7 +191,7 @@ def test_links_on_links_move_together():
 
 
 def test_an_arm_pushes_a_crate_and_not_its_own_robot():
-    """The rod sweeps over the robot's own base, which it would touch, and knocks a ball away."""
+    """The rod sweeps through its own robot's base, which does not stop it, and knocks a ball away."""
     ball = b"""DEF BALL Solid { translation 0.6 0 0.1 boundingObject Sphere { radius 0.1 }
       physics Physics { density -1 mass 0.1 } }"""
     simulation, robot = load(arm(length=1.45).replace(b"size 0.2 0.2 0.2", b"size 0.6 0.2 1.2") + ball)
@@ -199,7 +205,7 @@ def test_an_arm_pushes_a_crate_and_not_its_own_robot():
 
 
 def test_rays_pass_the_links_of_their_own_robot():
-    """They also pass its body, but another robot's rays meet the links."""
+    """A robot's own links and body do not stop its rays, but the links stop the rays of another robot."""
     sensor = b"""DistanceSensor { name "ray" type "laser" translation 0.3 0 0.5
       lookupTable [ 0 0 0, 10 10 0 ] } """
     wall = b"Solid { translation 4 0 1.5 boundingObject Box { size 0.2 4 3 } }"
@@ -214,7 +220,10 @@ def test_rays_pass_the_links_of_their_own_robot():
 
 
 def test_a_supervisor_puts_a_joint_where_it_stays():
-    """A motor holds it there; a joint without a motor falls from there, starting at rest."""
+    """A motor holds its joint at the position that a supervisor sets.
+
+    A joint without a motor falls from there.
+    """
     simulation, robot = load(arm())
     simulation.set_joint_position(simulation.tree.of_def("HINGE"), -1.0, 1)
 
@@ -224,7 +233,7 @@ def test_a_supervisor_puts_a_joint_where_it_stays():
 
 
 def test_a_saved_state_brings_an_arm_back():
-    """The arm is at rest at its saved position."""
+    """After `load_state` the arm is at its saved angle and at rest."""
     simulation, robot = load(arm(""))
     node = robot.parts.node
     simulation.step(80)
@@ -241,7 +250,7 @@ def test_a_saved_state_brings_an_arm_back():
 
 @pytest.mark.parametrize("device", [MOTOR, ""], ids=["motor", "pendulum"])
 def test_a_reset_repeats_the_course_of_an_arm(device):
-    """The same commands give the same values, bit for bit, as in a new simulation."""
+    """The same commands after a reset give the same values, bit for bit, as in a new simulation."""
 
     def course(simulation, robot):
         simulation.reset()
@@ -261,7 +270,7 @@ def test_a_reset_repeats_the_course_of_an_arm(device):
 
 
 def test_a_pole_falls_when_its_cart_drives_off(drive):
-    """Only forces move a joint without a motor, so the pole tilts against the motion."""
+    """The pole's joint has no motor, so when the cart speeds up, the pole tilts against the motion."""
     pole = """HingeJoint { jointParameters HingeJointParameters { axis 0 1 0 anchor 0 0 0.3 }
       device PositionSensor { name "tilt" }
       endPoint Solid { translation 0 0 0.6 boundingObject Box { size 0.02 0.02 0.5 }
@@ -276,7 +285,10 @@ def test_a_pole_falls_when_its_cart_drives_off(drive):
 
 
 def test_a_caster_on_the_floor_follows_without_forces(drive):
-    """Its contact forces would hold a robot whose wheels touch no floor."""
+    """The base moves as a whole.
+
+    Its wheels touch no floor, so contact forces of a caster would hold it back.
+    """
     caster = """HingeJoint { jointParameters HingeJointParameters { axis 0 0 1 anchor -0.1 0 0.05 }
       endPoint Solid { translation -0.12 0 0.02 boundingObject Sphere { radius 0.02 }
         physics Physics { density -1 mass 0.2 } } }"""
@@ -289,7 +301,7 @@ def test_a_caster_on_the_floor_follows_without_forces(drive):
 
 
 def test_an_arm_does_not_slow_its_robot():
-    """The servos of a base get stronger with the mass on it."""
+    """The servos that move a base get stronger with the mass of the arm on it."""
     crane = """HingeJoint { jointParameters HingeJointParameters { axis 0 0 1 }
       device RotationalMotor { name "crane" maxTorque 200 }
       endPoint Solid { translation 0.2 0 0.6 boundingObject Box { size 0.6 0.1 0.1 }
@@ -307,7 +319,7 @@ def test_an_arm_does_not_slow_its_robot():
 
 
 def test_an_arm_on_a_table_holds_its_weight():
-    """A robot inside another node has no body, but its joints still have forces."""
+    """A robot inside another node has no body of its own, but the forces on its joints are still computed."""
     source = arm().replace(b"Robot {", b"Pose { translation 1 2 0.5 rotation 0 0 1 1 children [ Robot {")
     simulation, robot = load(source + b"] }")
     assert robot.body is None

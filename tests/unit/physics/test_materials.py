@@ -43,7 +43,7 @@ def slide(simulation, name, speed=2.0):
 @settings(max_examples=8, deadline=None)
 @given(coefficient=st.floats(0.1, 0.6))
 def test_a_box_slides_as_far_as_its_friction_lets_it(coefficient):
-    """From 2 m/s the distance is v^2 / 2 mu g; the box is flat, so it does not tip."""
+    """A box that starts with 2 m/s slides v^2 / 2 mu g; it is flat, so it does not tip over."""
     flat = box("PUCK", "ice", "0 0 0.025", "0.3 0.3 0.05")
 
     distance = slide(load(flat, contacts=[contact("ice", "default", coefficient)]), "PUCK")
@@ -52,7 +52,7 @@ def test_a_box_slides_as_far_as_its_friction_lets_it(coefficient):
 
 
 def test_each_pair_of_materials_has_its_own_friction():
-    """Ice slides on the floor but not on rubber, so a friction per material would not suffice."""
+    """Ice slides on the floor but not on rubber, so one friction value per material would not be enough."""
     contacts = [
         contact("ice", "default", 0.1),
         contact("ice", "rubber", 3.0),
@@ -71,7 +71,7 @@ def test_each_pair_of_materials_has_its_own_friction():
 
 
 def test_the_floor_has_a_material():
-    """The material is that of the Plane in its boundingObject."""
+    """The material of the floor is that of the Plane in the floor's boundingObject."""
     floor = 'Solid { boundingObject Plane { size 20 20 } contactMaterial "lino" name "floor" }'
     puck = box("PUCK", "default", "0 0 0.025", "0.3 0.3 0.05")
 
@@ -91,7 +91,7 @@ def test_things_fall_as_the_gravity_of_the_world_says():
 
 @pytest.mark.parametrize(("mass_kg", "moves"), [(5.0, False), (200.0, True)])
 def test_a_heavy_robot_pushes_what_a_light_one_does_not(drive, mass_kg, moves):
-    """The servos of a base get stronger with its mass."""
+    """The servos that move a base get stronger with the robot's mass, so the heavy robot moves the box."""
     crate = b"""DEF CRATE Solid { translation 0.6 0 0.15 boundingObject Box { size 0.3 0.3 0.3 }
       physics Physics { density -1 mass 100 } }"""
     source = builtin("arena").replace(b"mass 20\n", f"mass {mass_kg}\n".encode())

@@ -26,7 +26,7 @@ Robot {
 
 
 def place(simulation, x, y, heading_rad=0.0):
-    """Place the first robot, as a supervisor does."""
+    """Put the first robot at a pose, as a supervisor does."""
     robot = simulation.robots[0].place
     robot.translation = (x, y, robot.translation[2])
     robot.rotation = (0.0, 0.0, 1.0, heading_rad)
@@ -38,7 +38,7 @@ def distances(simulation):
 
 
 def test_a_robot_drives_as_it_is_commanded(load, drive):
-    """At half a meter a second it drives half a meter in a second, less the acceleration at the start."""
+    """Half a meter a second gives half a meter in a second, less the distance lost while it accelerates."""
     body = drive(load(), 0.25, 0.0, 0.0, steps=5)
 
     assert (body.x, body.y) == pytest.approx((0.25 * 0.96, 0.0), abs=0.02)
@@ -46,14 +46,14 @@ def test_a_robot_drives_as_it_is_commanded(load, drive):
 
 
 def test_a_robot_turns_as_it_is_commanded(load, drive):
-    """The heading stays in (-pi, pi]."""
+    """The robot turns past pi, and its heading stays in (-pi, pi]."""
     body = drive(load(), 0.0, 0.0, 1.5, steps=13)
 
     assert body.heading_rad == pytest.approx(math.remainder(1.5 * 13 * 0.192, 2.0 * math.pi), abs=0.05)
 
 
 def test_a_wall_holds_a_robot_and_its_bumper_feels_it(load, drive):
-    """Its wheels keep turning."""
+    """The robot stops at the wall with its wheels still turning, and the bumper reports the contact."""
     simulation = load()
     place(simulation, 1.5, 0.0)
 
@@ -65,7 +65,7 @@ def test_a_wall_holds_a_robot_and_its_bumper_feels_it(load, drive):
 
 
 def test_a_robot_slides_along_a_wall(load, drive):
-    """It keeps the part of its motion that the wall leaves free."""
+    """The wall stops the motion toward it; the motion along the wall continues."""
     simulation = load()
     place(simulation, 1.7, -0.5)
 
@@ -76,7 +76,10 @@ def test_a_robot_slides_along_a_wall(load, drive):
 
 
 def test_sensors_see_walls_and_not_their_robot(load):
-    """Every physics gives the same voltages for the same distances, and draws the same noise."""
+    """For the same distance each physics gives the same voltage and draws the same noise.
+
+    The rays do not meet their own robot.
+    """
     simulation = load()
     place(simulation, 1.6, 0.0)
     simulation.step(192)
@@ -87,7 +90,7 @@ def test_sensors_see_walls_and_not_their_robot(load):
 
 
 def test_both_physics_see_alike():
-    """A policy that was trained in one reads the same values in the other."""
+    """A policy that was trained with one physics reads the same values with the other."""
     readings = []
     for physics in (StubPhysics, MujocoPhysics):
         simulation = Simulation.load(builtin("arena"), physics(), "arena", Mode.FAST)
@@ -102,7 +105,7 @@ def test_both_physics_see_alike():
 
 
 def test_an_obstacle_that_a_supervisor_moves_is_met_where_it_is(load, drive):
-    """Each episode has a new layout."""
+    """An environment moves obstacles at each episode, so rays and contacts must follow them."""
     simulation = load()
     node = simulation.tree.of_def("CYLINDER_0")
     translation = simulation.tree.field_of(node, "translation", simulation)
@@ -114,7 +117,7 @@ def test_an_obstacle_that_a_supervisor_moves_is_met_where_it_is(load, drive):
 
 
 def test_an_obstacle_that_comes_out_of_the_floor_holds_a_robot(load, drive):
-    """An environment hides its cylinders below the floor until an episode needs them."""
+    """An environment hides its cylinders below the floor, and raises them when an episode needs them."""
     simulation = load(builtin("arena").replace(b"translation 0.8 0.8 0.2", b"translation 0.8 0.8 -0.7"))
     node = simulation.tree.of_def("CYLINDER_0")
     translation = simulation.tree.field_of(node, "translation", simulation)
@@ -126,7 +129,7 @@ def test_an_obstacle_that_comes_out_of_the_floor_holds_a_robot(load, drive):
 
 
 def test_contact_points_name_both_sides(load, drive):
-    """A supervisor needs to know which wall it is."""
+    """A supervisor reads from a contact point which wall the robot touches."""
     simulation = load()
     place(simulation, 1.7, 0.0)
     drive(simulation, 0.4, 0.0, 0.0, steps=5)
@@ -140,7 +143,7 @@ def test_contact_points_name_both_sides(load, drive):
 
 
 def test_a_push_fades(load, drive):
-    """The motors return the robot to its commanded velocity."""
+    """After a push, the motors return the robot to its commanded velocity."""
     simulation = load()
     body = simulation.robots[0].body
     body.push(0.5, 0.0, 0.0)
@@ -151,7 +154,7 @@ def test_a_push_fades(load, drive):
 
 
 def test_a_reset_forgets_everything(load, drive):
-    """The same commands then give the same values, bit for bit, as in a new simulation."""
+    """After a reset, the same commands give the same values as in a new simulation, bit for bit."""
 
     def course(simulation):
         trace = []
@@ -171,7 +174,7 @@ def test_a_reset_forgets_everything(load, drive):
 
 
 def test_an_imported_crate_is_an_obstacle_until_the_reset(load, drive):
-    """The import does not change the state of anything else."""
+    """The import changes no state of the robot; the reset removes the crate."""
     simulation = load()
     drive(simulation, 0.2, 0.0, 0.0, steps=2)
     before = simulation.robots[0].place.translation
@@ -188,7 +191,7 @@ def test_an_imported_crate_is_an_obstacle_until_the_reset(load, drive):
 
 
 def test_robots_run_into_each_other(load, drive):
-    """Each robot is an obstacle for the other one and for its rays."""
+    """Each robot is an obstacle for the other robot and for the other robot's rays."""
     simulation = load(builtin("arena") + OTHER)
 
     body = drive(simulation, 0.3, 0.0, 0.0, steps=15)
@@ -198,7 +201,7 @@ def test_robots_run_into_each_other(load, drive):
 
 
 def test_a_robot_inside_a_pose_stands_where_the_pose_puts_it(load, drive):
-    """Such a robot has no body of its own, so it is an obstacle."""
+    """A robot inside a Pose has no body of its own, so it is a fixed obstacle."""
     simulation = load(builtin("arena") + b"Pose { translation 0.5 0 0 children [" + OTHER + b"] }")
     standing = simulation.scene.solids[-1].pose.position
 
@@ -210,7 +213,7 @@ def test_a_robot_inside_a_pose_stands_where_the_pose_puts_it(load, drive):
 
 @pytest.fixture
 def free_pair():
-    """Return the arena without walls and cylinders, under the stub and under MuJoCo."""
+    """Return two simulations of the arena without walls and cylinders: one of the stub, one of MuJoCo."""
     source = builtin("arena").decode()
     for name in ("WALL", "CYLINDER"):
         source = re.sub(rf"(DEF {name}_\d Solid \{{\s*translation )\S+ \S+ ", r"\g<1>90 90 ", source)
@@ -218,7 +221,7 @@ def free_pair():
 
 
 def test_mujoco_follows_the_stub_through_each_change_of_speed(drive, free_pair):
-    """A policy that stands still in a period under one of them does so under the other."""
+    """A policy trained under one of them then finds the same accelerations under the other."""
     pair = free_pair()
     for simulation in pair:
         place(simulation, 0.0, 0.0, 2.5)
@@ -230,7 +233,10 @@ def test_mujoco_follows_the_stub_through_each_change_of_speed(drive, free_pair):
 
 
 def test_a_robot_that_was_held_back_does_not_jump(load, drive):
-    """The servos compensate for their own delay, not for an obstacle."""
+    """The servos compensate for their own delay.
+
+    If they compensated for an obstacle too, the robot would jump when released.
+    """
     simulation = load()
     place(simulation, 1.5, 0.0)
     drive(simulation, 0.4, 0.0, 0.0, steps=10)
@@ -242,9 +248,9 @@ def test_a_robot_that_was_held_back_does_not_jump(load, drive):
 
 
 def test_mujoco_follows_the_stub_in_free_space(drive, free_pair):
-    """Ten random drives of ten seconds agree within 1 cm and half a degree.
+    """Ten random drives of ten seconds end within 1 cm and half a degree of each other.
 
-    A new command comes every 192 ms.
+    Each drive has a new command every 192 ms.
     """
     for seed in range(10):
         draw = random.Random(seed)

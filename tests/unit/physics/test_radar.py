@@ -42,7 +42,7 @@ def solid(x, y=0.0, z=0.5, fields=BALL):
 
 
 def test_a_target_has_the_distance_azimuth_and_power_of_webots(radar):
-    """The azimuth is positive to the right; the power is that of the radar equation, in dBm."""
+    """The azimuth is positive to the right; the power follows the radar equation, in dBm."""
     (echo,) = seen(radar, solid(4, -1))
     wavelength, distance = 299_792_458.0 / 24e9, math.hypot(4, 1)
     power_w = 0.001 * 10**0.1 * 100**2 * wavelength**2 * 2 / ((4 * math.pi) ** 3 * distance**4)
@@ -81,12 +81,15 @@ def test_a_target_has_the_distance_azimuth_and_power_of_webots(radar):
     ],
 )
 def test_a_target_is_seen_within_the_limits_of_the_radar(radar, objects, fields, count):
-    """The fields of the node set these limits."""
+    """The fields of the Radar node limit distance, angle and speed."""
     assert len(seen(radar, objects, fields)) == count
 
 
 def test_a_target_at_the_edge_is_where_its_visible_part_is(radar):
-    """A part of the target is enough; the azimuth stays in the field of view."""
+    """The radar detects a target of which only a part is in view.
+
+    The azimuth that it reports is inside the field of view.
+    """
     (echo,) = seen(
         radar, solid(2, 0.88, fields="boundingObject Box { size 0.1 0.2 0.2 } radarCrossSection 1")
     )
@@ -105,14 +108,14 @@ def test_a_target_at_the_edge_is_where_its_visible_part_is(radar):
     ids=["box", "cylinder", "ball"],
 )
 def test_a_target_is_hidden_only_if_the_radar_knows_occlusion(radar, obstacle):
-    """Only an object between the two hides it."""
+    """With `occlusion`, an object hides the target behind it, but not a target next to it."""
     assert len(seen(radar, obstacle + solid(3))) == 1
     assert seen(radar, obstacle + solid(3), f"{ANY} occlusion TRUE") == []
     assert len(seen(radar, obstacle + solid(3, 1.1), f"{ANY} occlusion TRUE")) == 1
 
 
 def test_a_speed_is_the_change_of_distance_between_two_samples(radar):
-    """This includes a Solid that a supervisor moves; the speed is positive if the target moves away."""
+    """The speed counts also for a Solid that a supervisor moves; it is positive if the target moves away."""
     simulation, device = radar(f"DEF IT {solid(2)}")
     simulation.step(32)
     assert device.seen[0].speed == 0.0
@@ -124,7 +127,7 @@ def test_a_speed_is_the_change_of_distance_between_two_samples(radar):
 
 
 def test_a_reset_begins_anew(radar):
-    """The return to the start is not a motion."""
+    """The jump of a target back to its start is not a motion, so the speed after the reset is 0."""
     simulation, device = radar(f"DEF IT {solid(2)}")
     simulation.step(64)
     simulation.tree.of_def("IT").place.translation = (3.0, 0.0, 0.5)
@@ -136,7 +139,7 @@ def test_a_reset_begins_anew(radar):
 
 
 def test_a_target_that_is_imported_or_removed_comes_and_goes(radar):
-    """A supervisor may randomize a scene."""
+    """A supervisor may add and remove targets while it randomizes a scene."""
     simulation, device = radar("")
     children = simulation.tree.field_of(simulation.tree.root, "children", simulation)
     simulation.add(f"DEF IT {solid(2)}", children, -1)
@@ -150,7 +153,10 @@ def test_a_target_that_is_imported_or_removed_comes_and_goes(radar):
 
 
 def test_targets_in_one_cell_are_one_with_the_mean_by_power():
-    """Both distance and speed must be near, if the radar distinguishes speeds."""
+    """Targets merge if their distances are within one cell.
+
+    If the radar distinguishes speeds, their speeds must be near each other too.
+    """
     near, far, fast = Echo(2.0, 3.0, 0.0, 0.1), Echo(2.4, 1.0, 0.4, 0.5), Echo(2.2, 1.0, 9.0, 0.0)
 
     assert merged([near, far], (0.5, 0.0)) == [Echo(2.1, 4.0, pytest.approx(0.1), pytest.approx(0.2))]
@@ -159,7 +165,7 @@ def test_targets_in_one_cell_are_one_with_the_mean_by_power():
 
 
 def test_noise_is_drawn_for_each_reading(radar):
-    """The deviations are those of the node."""
+    """The standard deviations are the noise fields of the Radar node."""
     (echo,) = seen(radar, solid(3), f"{ANY} rangeNoise 0.1 speedNoise 0.1 angularNoise 0.1")
 
     assert 0.0 < abs(echo.distance - 3.0) < 1.0
@@ -168,7 +174,7 @@ def test_noise_is_drawn_for_each_reading(radar):
 
 
 def test_noise_to_a_distance_of_nothing_is_no_error(radar):
-    """The received power at distance 0 was infinite, and ended the simulator."""
+    """With noise the distance can become 0; an infinite received power would end the simulator."""
     simulation, device = radar(solid(0.2), f"{ANY} minRange 0 rangeNoise 0.2")
     readings = []
     for _ in range(50):

@@ -1,4 +1,4 @@
-"""A robot with steered wheels drives as the geometry of a car says, in every physics."""
+"""A robot with steered wheels drives as the steering geometry of a car requires, in every physics."""
 
 import math
 
@@ -20,7 +20,7 @@ MOTOR = 'RotationalMotor { name "NAME" maxVelocity 40 maxTorque 100 }'
 
 
 def wheel(name, place, *, driven):
-    """Return a wheel with its axle to the left, at a place."""
+    """Return a wheel at a position in its frame, with its axle to the left."""
     text = WHEEL.replace("DEVICES", MOTOR if driven else "").replace("PHYSICS", PHYSICS)
     return text.replace("NAME", name).replace("PLACE", place)
 
@@ -51,7 +51,7 @@ DEF CAR Robot {{ translation 0 0 0 children [ {" ".join(parts)} ]
 
 @pytest.fixture
 def drive(physics):
-    """`drive(world, angles, speed)` returns the body after the wheels are turned, and after 2 s more."""
+    """`drive(world, angles, speed)` returns the poses before and after a drive of 2 s with steered wheels."""
 
     def driven(world, angles, speed=8.0):
         simulation = Simulation.load(world.encode(), physics(), "car", Mode.FAST)
@@ -72,18 +72,18 @@ def drive(physics):
 
 
 def ackermann(radius_m):
-    """Return the angles of the left and the right front wheel on a circle to the left."""
+    """Return the steering angles of the left and the right front wheel for a circle to the left."""
     return (math.atan2(BASE_M, radius_m - TRACK_M / 2), math.atan2(BASE_M, radius_m + TRACK_M / 2))
 
 
 def turned_rad(radius_m, speed=8.0, seconds=2.0):
-    """Return how far the car turns; the rear axle runs along the circle."""
+    """Return the angle by which the car turns. The middle of the rear axle runs along the circle."""
     return speed * RADIUS_M * seconds / radius_m
 
 
 @pytest.mark.parametrize("radius_m", [0.6, 1.0, -0.8])
 def test_a_car_drives_on_the_circle_that_its_front_wheels_give(drive, radius_m):
-    """The axles of all wheels meet in the middle of the circle, on the line of the rear axle."""
+    """The lines of all axles meet in the center of the circle, which lies on the line of the rear axle."""
     angles = ackermann(radius_m) if radius_m > 0.0 else [-it for it in reversed(ackermann(-radius_m))]
     (x0, y0, h0), (x, y, heading) = drive(car(), angles)
 
@@ -95,7 +95,7 @@ def test_a_car_drives_on_the_circle_that_its_front_wheels_give(drive, radius_m):
 
 
 def test_a_car_with_straight_wheels_drives_straight_on(drive):
-    """Also if its wheels were turned before, which a differential drive would not notice."""
+    """A car keeps its heading exactly, like a robot with a differential drive."""
     _, (x, y, heading) = drive(car(), (0.0, 0.0))
 
     assert x == pytest.approx(8.0 * RADIUS_M * 2.0, rel=0.03)
@@ -103,7 +103,7 @@ def test_a_car_with_straight_wheels_drives_straight_on(drive):
 
 
 def test_the_axis_of_the_steering_gives_its_direction(drive):
-    """The cars of Webots have an axis that points down: a positive angle is a turn to the right."""
+    """Cars of Webots have a steering axis that points down, so a positive angle turns them to the right."""
     _, (_, y, heading) = drive(car(axis=-1), ackermann(1.0)[::-1])
 
     assert math.remainder(heading, math.tau) < -0.5
@@ -111,7 +111,10 @@ def test_the_axis_of_the_steering_gives_its_direction(drive):
 
 
 def test_driven_front_wheels_run_faster_than_the_rear_axle(drive):
-    """Each runs along its own circle, which is larger, so the same speed of the motors turns the car less."""
+    """A front wheel runs along a larger circle than the rear axle.
+
+    At the same motor speed the car therefore turns less.
+    """
     left, right = ackermann(1.0)
     _, (_, _, heading) = drive(car(front=True, rear=False), (left, right))
 
@@ -121,7 +124,7 @@ def test_driven_front_wheels_run_faster_than_the_rear_axle(drive):
 
 
 def test_wheels_that_steer_do_not_make_an_arm_a_wheel(physics):
-    """An arm on a vertical axis above the floor leaves the drive of its robot as it is."""
+    """A motor that turns an arm about a vertical axis does not steer, so the robot's drive is unchanged."""
     arm = (
         car().replace('name "steer front 1"', 'name "arm"').replace(f"{BASE_M} 0.1 0.05", f"{BASE_M} 0.1 0.5")
     )
@@ -132,7 +135,7 @@ def test_wheels_that_steer_do_not_make_an_arm_a_wheel(physics):
 
 
 def test_the_car_that_ships_turns_to_the_right_at_a_positive_angle(physics):
-    """Its hubs are 2.995 m before the rear axle, and 1.628 m apart."""
+    """In this car the steered hubs are 2.995 m before the rear axle, and 1.628 m apart."""
     world = """#VRML_SIM R2023b utf8
     WorldInfo { basicTimeStep 16 }
     Solid { boundingObject Plane { size 100 100 } }

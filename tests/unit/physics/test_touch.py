@@ -14,7 +14,7 @@ G = 9.81
 
 
 def scale(kind, table="lookupTable [ ]", matter="physics Physics { density -1 mass 1 }", weight_kg=4.0):
-    """Return a world with a robot whose upper side is a sensor of 1 kg, with a weight on it."""
+    """Return a world with a robot whose top plate is a force sensor of 1 kg, with a weight on the plate."""
     return f"""#VRML_SIM R2023b utf8
     WorldInfo {{ basicTimeStep 8 }}
     Robot {{ name "scale" translation 0 0 0.1 boundingObject Box {{ size 0.5 0.5 0.2 }} children [
@@ -26,21 +26,27 @@ def scale(kind, table="lookupTable [ ]", matter="physics Physics { density -1 ma
 
 
 def weigh(source):
-    """Return the sensor, after the weight has come to rest."""
+    """Return the type and the sensor of the plate, after the weight has come to rest."""
     simulation = Simulation.load(source, MujocoPhysics(), "scale", Mode.FAST)
     simulation.step(1600)
     return simulation.robots[0].parts.devices.rows["plate"]
 
 
 def test_a_plate_weighs_what_lies_on_it():
-    """Its own mass counts too: as in Webots, the sensor measures the force on its joint to the robot."""
+    """As in Webots, the sensor measures the force on its joint to the robot.
+
+    So the plate's own mass counts.
+    """
     _, plate = weigh(scale("force"))
 
     assert plate.value == pytest.approx(5.0 * G, rel=1e-3)
 
 
 def test_a_force_goes_through_the_lookup_table():
-    """The node's default table has ten steps a newton; this one also has a resolution."""
+    """Without a `lookupTable`, the node's default reads ten per newton.
+
+    The field `resolution` rounds the value.
+    """
     _, plate = weigh(scale("force", table=""))
     assert plate.value == pytest.approx(50.0 * G, rel=1e-3)
 
@@ -49,7 +55,7 @@ def test_a_force_goes_through_the_lookup_table():
 
 
 def test_a_pull_is_no_pressure():
-    """A plate that hangs below reads 0; one with three axes reads the pull."""
+    """A plate that hangs below the robot is pulled: with one axis it reads 0, with three axes the pull."""
     above, below = b"0 0 0.15 rotation 0 1 0 -1.5707963", b"0 0 0.35 rotation 0 1 0 1.5707963"
     weight, elsewhere = b"Solid { translation 0 0 0.35", b"Solid { translation 3 0 0.05"
     low = scale("force").replace(above, below).replace(weight, elsewhere)
@@ -60,7 +66,7 @@ def test_a_pull_is_no_pressure():
 
 
 def test_three_axes_are_published_as_a_wrench():
-    """Its torque is 0; the type of the sensor is 2."""
+    """The wrench has the force and a torque of 0; `get_type` returns 2."""
     kind, plate = weigh(scale("force-3d"))
     (topic,) = kind.topics(plate)
     codec = message_type(topic.type_name).codec
@@ -74,12 +80,12 @@ def test_three_axes_are_published_as_a_wrench():
 
 
 def test_a_sensor_without_physics_measures_nothing():
-    """Webots warns of it."""
+    """Webots prints a warning for such a sensor; here it reads 0."""
     assert weigh(scale("force", matter=""))[1].value == 0.0
 
 
 def test_a_bumper_on_an_arm_feels_what_the_arm_touches():
-    """The rod falls to the floor, and its tip is a bumper."""
+    """The bumper is at the tip of a rod, which falls to the floor."""
     arm = b"""#VRML_SIM R2023b utf8
     Robot { name "arm" boundingObject Box { size 0.1 0.1 0.2 } children [ HingeJoint {
       jointParameters HingeJointParameters { axis 0 1 0 anchor 0 0 0.5 }
@@ -99,7 +105,7 @@ def test_a_bumper_on_an_arm_feels_what_the_arm_touches():
 
 
 def test_the_stub_refuses_sensors_of_force():
-    """This holds on a robot that a client can reach."""
+    """The stub computes no forces, and a client of this robot would read a wrong value."""
     served = b'name "scale" controller "ros" controllerArgs [ "--name=scale" "--synchronize" ]'
     source = scale("force").partition(b"Solid {")[0].replace(b'name "scale"', served)
 
@@ -108,7 +114,7 @@ def test_the_stub_refuses_sensors_of_force():
 
 
 def test_the_bumper_of_a_robotino_is_as_before():
-    """Its type is 0, and its topic has a bool."""
+    """The built-in robot's bumper still publishes a bool; other touch sensors publish a wrench."""
     robot = Simulation.load(builtin("arena"), MujocoPhysics()).robots[0]
     kind, bumper = robot.parts.devices.rows["touch sensor"]
 

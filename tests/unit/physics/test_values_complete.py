@@ -1,4 +1,4 @@
-"""Every device type and every shape has rows among the values that are compared with formulas."""
+"""Every device type and every shape appears among the values that are compared with formulas."""
 
 import re
 from pathlib import Path
@@ -33,12 +33,12 @@ ROWS = "".join(
 
 
 def nodes(geometry):
-    """Return the text of a geometry of a type: that of its row, if it has one."""
+    """Return the text of a geometry of a type: the text in `SHAPES`, or an empty node of the type."""
     return next((shape.node for shape in SHAPES if shape.type == geometry), f"{geometry} {{ }}")
 
 
 def accepted(physics, geometry):
-    """Return whether a simulator takes a geometry in a boundingObject."""
+    """Return whether a simulator accepts a geometry in a boundingObject."""
     try:
         Setting(physics).load(f"Solid {{ boundingObject {nodes(geometry)} }}")
     except WorldError:
@@ -48,14 +48,14 @@ def accepted(physics, geometry):
 
 @pytest.mark.parametrize("name", DEVICES)
 def test_a_device_type_has_rows_or_a_reason_to_have_none(name):
-    """A new device type without rows would read whatever its author thinks."""
+    """A device type without values to compare with would read whatever its author believed to be right."""
     has_rows = re.search(rf"\b{name} \{{", ROWS) is not None
 
     assert has_rows != (name in WITHOUT_VALUES), WITHOUT_VALUES.get(name, "add rows to tests/values")
 
 
 def test_each_type_of_distance_and_touch_sensor_has_rows():
-    """The types measure in different ways."""
+    """Each type of these sensors measures differently, so each needs its own values."""
     kinds = {kind.name.lower().replace("_", "-") for kind in DistanceSensorType}
 
     assert [kind for kind in (*kinds, "bumper", "force", "force-3d") if f'"{kind}"' not in ROWS] == []
@@ -63,14 +63,14 @@ def test_each_type_of_distance_and_touch_sensor_has_rows():
 
 @pytest.mark.parametrize("physics", PHYSICS)
 def test_a_shape_that_a_bounding_object_may_have_has_rows(physics):
-    """A shape that is accepted, and met by rays elsewhere than in Webots, would teach a policy wrongly."""
+    """If rays met an accepted shape elsewhere than in Webots, a policy would learn from wrong distances."""
     taken = {geometry for geometry in GEOMETRIES if accepted(physics, geometry)}
 
     assert taken == {shape.type for shape in SHAPES if shape.bounding}
 
 
 def test_a_shape_that_is_visible_has_rows():
-    """Infra-red rays, lidars and cameras see it."""
+    """Infra-red rays, lidars and cameras see every visible shape, so each shape needs its own values."""
     shapes = " ".join(f"Shape {{ geometry {nodes(geometry)} }}" for geometry in GEOMETRIES)
     simulation = Setting("stub").load(f"Solid {{ children [ {shapes} ] }}")
     seen = {thing.node.nodes("geometry")[0].type_name for thing in drawn(simulation.tree.root)}

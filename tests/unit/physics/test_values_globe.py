@@ -1,4 +1,4 @@
-"""A GPS reads latitude, longitude and altitude where the world's reference is on the globe."""
+"""With a reference on the globe, a GPS reads latitude, longitude and altitude."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,8 @@ from tests.values.globe import moved
 from tests.values.standing import MOUNT, POSES
 from tests.values.worlds import SETTINGS, STEP_MS, cached, device, move, robot
 
-# Latitude, longitude and altitude: on each side of the equator and of Greenwich, and at the edge of a zone.
+# Latitude, longitude and altitude: on each side of the equator and of Greenwich, and at the edge of a UTM
+# zone.
 REFERENCES = (
     (46.5191, 6.5668, 400.0),
     (-33.8568, 151.2153, 5.0),
@@ -29,7 +30,7 @@ def simulation_of(setting, reference):
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
 @pytest.mark.parametrize("reference", REFERENCES, ids=str)
 def test_a_gps_reads_degrees(setting, reference):
-    """A drone flies to a place on a map. The axes of the world decide where north and east are."""
+    """A drone flies to a position on a map, so north and east must follow the axes of the world."""
     simulation = simulation_of(setting, reference)
     latitude, longitude, altitude_m = reference
     for pose in POSES:
@@ -46,7 +47,7 @@ def test_a_gps_reads_degrees(setting, reference):
 
 @pytest.mark.parametrize("setting", SETTINGS[:1], ids=str)
 def test_the_noise_of_a_gps_is_correlated_from_step_to_step(setting):
-    """A drift of minutes is what a filter must find; independent noise averages out."""
+    """A filter must find a drift that lasts minutes; independent noise would average out."""
     kept = 0.48  # correlation of the noise between one step and the next
     correlation = kept ** (1000.0 / STEP_MS)
     fields = f'name "gps" accuracy 2 noiseCorrelation {correlation:.20f}'

@@ -1,4 +1,4 @@
-"""Motors, brakes and joints: the positions of parts on them and the readings of sensors, by formulas."""
+"""Motors, brakes and joints: poses of parts and readings of sensors, compared with formulas."""
 
 import math
 
@@ -13,8 +13,8 @@ from tests.values.worlds import SETTINGS, STEP_MS, Setting, cached, device, move
 STEP_S = STEP_MS / 1000.0
 AXIS = np.array([0.36, 0.48, 0.8])
 ANCHOR = np.array([0.1, -0.2, 0.3])
-END = frame((0.4, 0.1, 0.2), (0.0, 0.6, 0.8), 0.5)  # where the end of each joint is in the file
-BEGIN = {"hinge": 0.4, "slider": 0.15}  # the position of the joint there
+END = frame((0.4, 0.1, 0.2), (0.0, 0.6, 0.8), 0.5)  # the pose of the end of each joint in the file
+BEGIN = {"hinge": 0.4, "slider": 0.15}  # the position of each joint in the file
 SENSORS = """GPS {{ name "{0} gps" {1} }} Gyro {{ name "{0} gyro" {1} }}
   InertialUnit {{ name "{0} unit" {1} }}"""
 PARTS = f"""
@@ -51,7 +51,10 @@ def simulation_of(setting):
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
 @pytest.mark.parametrize("joint", JOINTS)
 def test_a_motor_puts_the_end_of_its_joint_where_the_formula_says(joint, setting):
-    """Turned about the axis through the anchor, or moved along the axis, however the robot leans."""
+    """A hinge turns its end about the axis through the anchor. A slider moves its end along the axis.
+
+    The robot may lean.
+    """
     simulation = simulation_of(setting)
     for pose, target in zip(POSES, (1.3, -0.7, BEGIN[joint], 2.0), strict=True):
         move(simulation, "R", setting.put(pose))
@@ -70,7 +73,7 @@ def test_a_motor_puts_the_end_of_its_joint_where_the_formula_says(joint, setting
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
 @pytest.mark.parametrize("joint", JOINTS)
 def test_a_motor_at_a_velocity_moves_its_end_by_the_formula(joint, setting):
-    """The sensors on the end read its position, its velocity and its angular velocity."""
+    """The GPS, the gyro and the position sensor on the end read the values of the formula."""
     simulation = simulation_of(setting)
     motor = device(simulation, joint)
     for pose, speed in zip(POSES, (0.5, -1.0, 2.0, -0.3), strict=True):
@@ -106,7 +109,7 @@ SliderJoint {{
   endPoint Solid {{ translation 0 0 -0.5 name "load" boundingObject Box {{ size 0.1 0.1 0.1 }}
     physics Physics {{ density -1 mass 3 }} }} }}
 """
-# The axis of the hinge, where the middle of its end is, and the moment of inertia about the axis in kg m2.
+# The axis of the hinge, the center of its end, and the moment of inertia about the axis in kg m2.
 BOXES = [
     ("0 0 1", "0 0 0.5", 8.0 / 12.0 * (0.2**2 + 0.3**2)),
     ("0 0 -1", "0.5 0 0.5", 8.0 / 12.0 * (0.2**2 + 0.3**2) + 8.0 * 0.5**2),
@@ -116,7 +119,7 @@ BOXES = [
 
 @pytest.mark.parametrize(("axis", "away", "inertia"), BOXES)
 def test_a_torque_and_a_force_speed_up_what_they_move(axis, away, inertia):
-    """MuJoCo: half the acceleration times the square of the time; the stub refuses torques and forces."""
+    """MuJoCo only: half the acceleration times the time squared. The stub rejects torques and forces."""
     base = "translation 0 0 1 boundingObject Box { size 0.1 0.1 0.1 }"
     simulation = Setting("mujoco").load(robot(HEAVY.format(axis=axis, away=away), base))
     device(simulation, "turn").set_effort(1.5)
@@ -138,7 +141,10 @@ SLEDGE = """SliderJoint {{
 
 @pytest.mark.parametrize("shape", [it for it in SHAPES if it.volume_m3], ids=str)
 def test_a_shape_has_the_mass_of_its_volume(shape):
-    """MuJoCo: 200 kg/m3, by the acceleration that a force of 100 N gives it; a hull would be heavier."""
+    """MuJoCo only: a force of 100 N gives the shape the acceleration for 200 kg/m3.
+
+    A convex hull would be heavier.
+    """
     base = "translation 0 0 1 boundingObject Box { size 0.1 0.1 0.1 }"
     simulation = Setting("mujoco").load(robot(SLEDGE.format(shape.node), base))
     device(simulation, "push").set_effort(100.0)
@@ -151,7 +157,7 @@ def test_a_shape_has_the_mass_of_its_volume(shape):
 @pytest.mark.parametrize("damping", [0.5, 2.0, 8.0])
 @pytest.mark.parametrize("physics", ["stub", "mujoco"])
 def test_a_brake_limits_a_motor_to_its_torque_over_the_damping(physics, damping):
-    """Beyond that speed the damper takes more than the motor has: 20 N m; a slower command is not limited."""
+    """At the limit the damper takes the motor's whole 20 N m; slower commands are not limited."""
     axis, away, _ = BOXES[0]
     base = "translation 0 0 1 boundingObject Box { size 0.1 0.1 0.1 }"
     simulation = Setting(physics).load(robot(HEAVY.format(axis=axis, away=away), base))
@@ -176,7 +182,7 @@ TURNS = [
 
 @pytest.mark.parametrize("mounted", TURNS, ids=lambda it: it.fields[20:])
 def test_a_sensor_of_force_measures_its_own_weight_in_its_own_axes(mounted):
-    """MuJoCo: with three axes the sensor reads the force on its robot, with one axis the part along x."""
+    """MuJoCo only: `force-3d` reads the weight in the sensor's frame, `force` the part along x."""
     weight = mounted.rotation.T @ [0.0, 0.0, -2.0 * 9.81]
     rotation = mounted.fields.partition("rotation")[2]
     for kind, expected in (("force-3d", weight), ("force", [max(0.0, -weight[0])])):

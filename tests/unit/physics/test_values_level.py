@@ -11,12 +11,12 @@ from tests.values.shapes import ELL, SHAPES
 from tests.values.worlds import SETTINGS, STEP_MS, cached, device, move, robot
 
 REACH_M = 6.0
-HEIGHTS_M = (0.15, 0.5, 0.9)  # where the sensors are
+HEIGHTS_M = (0.15, 0.5, 0.9)  # the heights of the sensors
 AZIMUTHS = (0.0, 0.6, -2.0)
 ELL_FORMULA = next(shape.formula for shape in SHAPES if shape.type == "IndexedFaceSet")
 QUARTER = np.pi / 2.0
-# The objects around the robot, in the axes of the ground: the place, the shape, and how far a ray in its
-# frame travels to it.
+# The objects around the robot, in the axes of the ground: the pose, the shape, and a function that returns
+# how far a ray in the shape's frame travels.
 AROUND = [
     (
         frame((3.0, 0.0, 0.15), (0, 0, 1), 0.3),
@@ -51,7 +51,7 @@ AROUND = [
         partial(rays.cylinder, radius=0.5, height=0.8),
     ),
 ]
-# One other robot is low; the other one is long, with a mast in its middle.
+# Two other robots: `OTHER` is low, the one at `MAST` is long and has a mast in its middle.
 OTHER = frame((2.0, 2.5, 0.0))
 OTHER_SHAPE = "Pose { translation 0 0 0.15 children [ Cylinder { radius 0.4 height 0.3 } ] }"
 OTHER_FORMULA = partial(rays.cylinder, radius=0.4, height=0.3)
@@ -79,7 +79,7 @@ WHEEL = """HingeJoint { jointParameters HingeJointParameters { axis 0 1 0 anchor
 
 @cached
 def simulation_of(setting):
-    """Return a simulation of a robot on two wheels among shapes."""
+    """Return a simulation of a robot on two wheels among these objects and robots."""
     wheels = WHEEL % (0.1, "left", 0.1) + WHEEL % (-0.1, "right", -0.1)
     mounts = {(z, a): frame((0.05, -0.02, z), (0, 0, 1), a or 1e-9) for z in HEIGHTS_M for a in AZIMUTHS}
     sensors = " ".join(
@@ -99,7 +99,7 @@ def simulation_of(setting):
 
 
 def expected(pose, height, azimuth, other):
-    """Return the distance to the nearest of all shapes."""
+    """Return the distance to the nearest of all shapes along the ray of a sensor."""
     sensor = pose @ frame((0.05, -0.02, height), (0, 0, 1), azimuth)
     distances = [REACH_M]
     shapes = [(place, formula) for place, _, formula in AROUND]
@@ -114,7 +114,7 @@ def expected(pose, height, azimuth, other):
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
 @pytest.mark.parametrize("lifted", [0.0, 0.35], ids=["on the floor", "lifted"])
 def test_each_level_ray_meets_what_stands_at_its_height(setting, lifted):
-    """A sensor above a low step does not see it, also after a supervisor has lifted the robot."""
+    """A sensor above a low step does not see the step, also after a supervisor has lifted the robot."""
     simulation = simulation_of(setting)
     wrong = []
     for x, y, heading in PLACES:
@@ -132,7 +132,7 @@ def test_each_level_ray_meets_what_stands_at_its_height(setting, lifted):
 
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
 def test_a_ray_passes_below_a_robot_that_was_lifted(setting):
-    """The other robot is met at the heights where it is now."""
+    """A ray meets the other robot only at the heights to which a supervisor has lifted it."""
     simulation = simulation_of(setting)
     pose = frame((0.0, 0.0, 0.0), (0, 0, 1), np.arctan2(2.5, 2.0))
     move(simulation, "R", setting.put(pose))

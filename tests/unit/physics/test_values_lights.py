@@ -1,4 +1,4 @@
-"""A LightSensor measures the irradiance of all lights by the formulas of Webots' manual."""
+"""A LightSensor measures the irradiance of all lights by the formulas in the manual of Webots."""
 
 import math
 
@@ -14,8 +14,8 @@ from tests.values.worlds import SETTINGS, STEP_MS, cached, device, enable, move,
 FILTER = np.array([0.9, 0.5, 0.1])
 COLOR = np.array([1.0, 0.4, 0.2])
 COLORED = "color 1 0.4 0.2"
-PLACE = np.array([0.5, 2.0, 1.5])  # where the lights are, in the axes of the file
-TURNED = frame((1.0, -2.0, 0.5), (0.2, 0.9, -0.4), 1.3)  # the Pose that some of them are in
+PLACE = np.array([0.5, 2.0, 1.5])  # the position of the lights, in the axes of the file
+TURNED = frame((1.0, -2.0, 0.5), (0.2, 0.9, -0.4), 1.3)  # a Pose that encloses some of the lights
 DOWN = np.array([0.3, -0.2, -1.0])
 CUT_RAD, BEAM_RAD = 1.2, 0.2
 SENSOR = f"""LightSensor {{ name "NAME" {MOUNT.fields} colorFilter {" ".join(map(str, FILTER))}
@@ -23,29 +23,29 @@ SENSOR = f"""LightSensor {{ name "NAME" {MOUNT.fields} colorFilter {" ".join(map
 
 
 def facing(sensor, way):
-    """Return the cosine of the angle between a sensor's x axis and a direction; 0 behind it."""
+    """Return the cosine between a sensor's x axis and a direction; 0 for light from behind."""
     return max(0.0, float(sensor.rotation[:, 0] @ way) / np.linalg.norm(way))
 
 
 def directional(sensor, _setting):
-    """Light from far away; the ambient part comes from everywhere."""
+    """Return the irradiance of a DirectionalLight; its ambient part comes from everywhere."""
     return COLOR * (0.25 + 3.0 * facing(sensor, -DOWN))
 
 
 def point(sensor, _setting):
-    """Light in all directions that does not weaken, which is the default."""
+    """Return the irradiance of a PointLight with the default attenuation, which is none."""
     return np.ones(3) * (0.5 + 2.0 * facing(sensor, PLACE - sensor.position))
 
 
 def weakening(sensor, _setting):
-    """Its location is in a frame; with an attenuation there is no ambient light."""
+    """Return the irradiance of a PointLight in a Pose; a light with an attenuation has no ambient part."""
     way = TURNED @ PLACE - sensor.position
     far = np.linalg.norm(way)
     return COLOR * 4.0 * facing(sensor, way) / (0.1 + 0.2 * far + 0.3 * far**2)
 
 
 def spot(sensor, _setting):
-    """A cone, whose light decreases from the beam to the edge."""
+    """Return the irradiance of a SpotLight, which decreases from the beam to the edge of the cone."""
     way = PLACE - sensor.position
     off = math.acos(-DOWN @ way / np.linalg.norm(DOWN) / np.linalg.norm(way))
     share = np.clip((CUT_RAD - off) / (CUT_RAD - BEAM_RAD), 0.0, 1.0)
@@ -53,17 +53,20 @@ def spot(sensor, _setting):
 
 
 def mountains(sensor, setting):
-    """The light of a PROTO, from the south-east and above; each export of such a world has these numbers."""
+    """Return the irradiance of a TexturedBackgroundLight, from the south-east and above.
+
+    Webots writes these numbers into every export of a world with this PROTO.
+    """
     return np.ones(3) * (1.0 + 2.7 * 0.5 * facing(sensor, setting.axes @ [-0.55, 0.6, 1.0]))
 
 
 def dark(_sensor, _setting):
-    """A light that is switched off."""
+    """Return the irradiance of a light that is switched off."""
     return np.zeros(3)
 
 
 def words(vector):
-    """Return the numbers as a world file has them."""
+    """Return numbers as text for a world file."""
     return " ".join(map(repr, map(float, vector)))
 
 
@@ -93,7 +96,7 @@ def simulation_of(setting, name):
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
 @pytest.mark.parametrize("name", WORLDS)
 def test_a_light_sensor_adds_what_each_light_contributes(setting, name):
-    """An e-puck that looks for the light, or fears it, learns the same in each simulator."""
+    """A robot that learns to seek or avoid light must read the same irradiance in each simulator."""
     simulation = simulation_of(setting, name)
     for pose in POSES:
         move(simulation, "R", setting.put(pose))
@@ -105,7 +108,7 @@ def test_a_light_sensor_adds_what_each_light_contributes(setting, name):
 
 
 def test_a_light_that_a_supervisor_switches_on_is_seen():
-    """Its fields count as they are at each step."""
+    """The sensor reads the light's fields at each step, so a change counts at once."""
     simulation = SETTINGS[0].load(LIGHTS[dark] + robot(SENSOR.replace("NAME", "eye")))
     enable(simulation)
     simulation.step(STEP_MS)
@@ -121,7 +124,7 @@ def test_a_light_that_a_supervisor_switches_on_is_seen():
 
 
 def test_a_light_that_a_supervisor_adds_is_seen():
-    """It is gone after a reset, which removes it."""
+    """The sensor measures the added light until a reset removes it."""
     simulation = SETTINGS[0].load("DEF G Group { }" + robot(SENSOR.replace("NAME", "eye")))
     enable(simulation)
     place = simulation.tree.field_of(simulation.tree.of_def("G"), "children", simulation)
@@ -145,6 +148,6 @@ def test_a_light_that_a_supervisor_adds_is_seen():
     ],
 )
 def test_what_a_light_sensor_cannot_measure_is_refused(world, fields, fact):
-    """A dark reading would be a wrong number without a word."""
+    """Reading 0 for an unsupported light would be a wrong value without an error."""
     with pytest.raises(WorldError, match=fact):
         SETTINGS[0].load(world + robot(SENSOR.replace("NAME", f'eye" {fields} model "')))

@@ -1,4 +1,4 @@
-"""What robots that drive, and the sensors on them, do and read: formulas of wheels that roll without slip."""
+"""Driving robots and their motion sensors, compared with formulas for wheels that roll without slip."""
 
 import math
 
@@ -24,7 +24,7 @@ STARTS = [
 
 
 def wheel(name, hub, azimuth_rad):
-    """Return a wheel whose axle points to an azimuth, with its motor and its sensor."""
+    """Return a wheel with a motor and a position sensor, whose axle points to an azimuth."""
     c, s = math.cos(azimuth_rad), math.sin(azimuth_rad)
     x, y = hub
     return f"""HingeJoint {{
@@ -35,7 +35,7 @@ def wheel(name, hub, azimuth_rad):
           children [ Cylinder {{ radius {RADIUS_M} height 0.02 }} ] }} }} }}"""
 
 
-# Each wheel: where its hub is, in the frame of the robot, and the azimuth of its axle.
+# Each wheel: the position of its hub in the frame of the robot, and the azimuth of its axle.
 TWO = [((0.03, 0.12), math.pi / 2.0), ((0.03, -0.12), math.pi / 2.0)]
 THREE = [
     ((0.2 * math.cos(azimuth), 0.2 * math.sin(azimuth)), azimuth)
@@ -49,10 +49,10 @@ COMMANDS = {  # speeds of the wheels in rad/s
 
 
 def twist(wheels, speeds):
-    """Return vx, vy in m/s and omega in rad/s, in the frame of the robot.
+    """Return the robot's vx, vy in m/s and omega in rad/s, in its own frame.
 
-    The hub of a wheel moves, along the direction in which it rolls, at its radius times its speed. Two wheels
-    on one axle do not slide along it.
+    The hub of each wheel moves in its rolling direction at radius times wheel speed. Two wheels on one axle
+    cannot slide along that axle.
     """
     rows, values = [], []
     for ((x, y), azimuth), speed in zip(wheels, speeds, strict=True):
@@ -80,7 +80,7 @@ def after(start, moved, time_s):
 
 
 def velocity(pose, moved):
-    """Return the velocity in m/s of the place where sensors are mounted, in the axes of the ground."""
+    """Return the velocity in m/s of the point where the sensors are mounted, in the axes of the ground."""
     vx, vy, omega = moved
     return pose.rotation @ (np.array([vx, vy, 0.0]) + omega * np.cross(UP, MOUNT.position))
 
@@ -94,7 +94,7 @@ def simulation_of(setting, base):
 
 
 def drive(simulation, start, speeds):
-    """Put the robot somewhere, and let it reach speeds; return the angles of its wheels."""
+    """Put the robot at a pose, drive until the wheels have these speeds, and return the wheel angles."""
     move(simulation, "R", start)
     for index, speed in enumerate(speeds):
         motor = device(simulation, f"wheel {index}")
@@ -105,7 +105,7 @@ def drive(simulation, start, speeds):
 
 
 def here(simulation, setting):
-    """Return the position of the robot in the axes of the ground."""
+    """Return the pose of the robot in the axes of the ground."""
     place = simulation.tree.of_def("R").place
     *axis, angle_rad = place.rotation
     posed = frame(place.translation, axis, angle_rad or 1e-15)
@@ -116,7 +116,10 @@ def here(simulation, setting):
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
 @pytest.mark.parametrize("base", BASES)
 def test_wheels_take_a_robot_where_they_roll(base, setting):
-    """Along the arc of the formula, from every start; and their sensors measure how far they turned."""
+    """From every start the robot follows the arc of the formula.
+
+    The wheel sensors measure how far the wheels turned.
+    """
     simulation = simulation_of(setting, base)
     for start, speeds in zip(STARTS, COMMANDS[base], strict=True):
         angles = drive(simulation, setting.put(start), speeds)
@@ -136,7 +139,10 @@ def test_wheels_take_a_robot_where_they_roll(base, setting):
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
 @pytest.mark.parametrize("base", BASES)
 def test_sensors_of_motion_read_what_the_circle_gives(base, setting):
-    """Off the middle and turned, on a robot that drives along a circle at a constant speed."""
+    """The sensors are turned and off the robot's center.
+
+    The robot drives along a circle at a constant speed.
+    """
     simulation = simulation_of(setting, base)
     for start, speeds in zip(STARTS, COMMANDS[base], strict=True):
         drive(simulation, setting.put(start), speeds)
@@ -159,7 +165,7 @@ def test_sensors_of_motion_read_what_the_circle_gives(base, setting):
 
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
 def test_a_battery_loses_the_power_of_the_robot_times_the_time(setting):
-    """In joules; motors take nothing, and an empty battery stays empty."""
+    """The loss is in joules. Motors take nothing, and an empty battery stays empty."""
     body = "battery [ 50 60 10 ] cpuConsumption 7"
     simulation = setting.load(robot("", body))
     for steps in (10, 100, 1000):
@@ -175,7 +181,10 @@ BUMPER = """TouchSensor { name "bumper" type "bumper" translation 0.1 0 0.2
 
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
 def test_a_bumper_touches_a_wall_where_its_rim_reaches_it(setting):
-    """0.3 m before the middle of the robot, in each heading: the wall is a millimeter nearer, or farther."""
+    """The rim is 0.3 m from the robot's center.
+
+    A wall one millimeter nearer touches it, one millimeter farther does not.
+    """
     wheels = " ".join(wheel(f"wheel {index}", *it) for index, it in enumerate(TWO))
     wall = 'DEF WALL Solid { name "wall" boundingObject Box { size 0.2 2 1 } }'
     simulation = setting.load(robot(wheels + BUMPER, setting.put(frame()).fields) + wall)

@@ -1,4 +1,4 @@
-"""Devices that measure others: what connectors and radars read of things at known places."""
+"""Devices that measure other objects: readings of connectors and radars with objects at known positions."""
 
 import numpy as np
 import pytest
@@ -8,9 +8,9 @@ from tests.values.standing import MOUNT, POSES
 from tests.values.worlds import SETTINGS, STEP_MS, cached, device, enable, move, robot
 
 HALF_TURN = np.pi
-# A connector in the frame of another one, and whether it is in reach: they face each other along their x
-# axes, at most 5 cm apart, tilted by at most 0.2 rad, and turned by multiples of a quarter turn give or take
-# 0.3 rad.
+# The frame of a connector in the frame of the other connector, and whether both fit. They fit if they face
+# each other along their x axes, at most 5 cm apart, tilted by at most 0.2 rad, and turned by a multiple of a
+# quarter turn within 0.3 rad.
 CONNECTORS = [
     (frame((0.0, 0.0, 0.0), (0, 0, 1), HALF_TURN - 1e-6), 1),
     (frame((0.03, 0.03, -0.02), (0, 0, 1), HALF_TURN - 0.19), 1),
@@ -24,13 +24,13 @@ CONNECTOR = 'Connector {{ name "{}" {} distanceTolerance 0.05 axisTolerance 0.2 
 RADAR = """Radar {{ name "radar" {} minRange 1 maxRange 20 horizontalFieldOfView 1.5 verticalFieldOfView 1.2
   minRadialSpeed 0 maxRadialSpeed 0 antennaGain 15 frequency 20 transmittedPower 2 }}"""
 TARGETS = [(3.0, 0.5, 0.4), (7.0, -4.0, -1.0), (19.0, 0.0, 6.0)]  # in the frame of the radar, in meters
-# Points that the radar cannot see.
+# Points outside the radar's field of view or range.
 HIDDEN = [(3.0, 4.0, 0.0), (-3.0, 0.0, 0.0), (3.0, 0.0, 2.5), (25.0, 0.0, 0.0)]
 
 
 @cached
 def simulation_of(setting):
-    """Return a simulation of two robots with a connector each, a radar, and a target without a size."""
+    """Return a simulation of two robots with a connector each, a radar, and a target of no size."""
     first = robot(CONNECTOR.format("mine", MOUNT.fields) + RADAR.format(MOUNT.fields))
     second = robot(CONNECTOR.format("theirs", ""), name="other")
     target = 'DEF TARGET Solid { name "target" radarCrossSection 2.5 }'
@@ -41,7 +41,7 @@ def simulation_of(setting):
 
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
 def test_a_connector_feels_another_one_where_both_fit(setting):
-    """The robots may lean: only their positions in each other's frames count."""
+    """Only the pose of one connector in the frame of the other counts, so the robots may lean."""
     simulation = simulation_of(setting)
     for pose in POSES:
         move(simulation, "R", setting.put(pose))
@@ -54,7 +54,10 @@ def test_a_connector_feels_another_one_where_both_fit(setting):
 
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
 def test_a_radar_measures_distance_azimuth_and_power_of_a_point(setting):
-    """Power by the radar equation, in dBm; the azimuth is positive to the right of a radar with z up."""
+    """The power follows the radar equation, in dBm.
+
+    For a radar with z up, the azimuth is positive to the right.
+    """
     wavelength, gain = 299_792_458.0 / 20e9, 10.0**1.5
     simulation = simulation_of(setting)
     for pose in POSES:
@@ -72,7 +75,7 @@ def test_a_radar_measures_distance_azimuth_and_power_of_a_point(setting):
 
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
 def test_a_radar_sees_nothing_beyond_its_field_of_view(setting):
-    """The targets are beside, behind and above the radar, and beyond its range."""
+    """The targets are to the side of the radar, behind it, above it, or beyond its range."""
     simulation = simulation_of(setting)
     for pose in POSES:
         move(simulation, "R", setting.put(pose))
@@ -84,7 +87,7 @@ def test_a_radar_sees_nothing_beyond_its_field_of_view(setting):
 
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
 def test_a_radar_measures_how_fast_a_target_moves_away(setting):
-    """The speed is the change of the target's place, along the line from the radar to the target."""
+    """The speed is the change of the target's position, along the line from the radar to the target."""
     simulation = simulation_of(setting)
     before, after = np.array([4.0, 1.0, 0.2]), np.array([4.1, 0.9, 0.25])
     for pose in POSES:

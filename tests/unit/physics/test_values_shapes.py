@@ -1,4 +1,4 @@
-"""Rays at shapes in known poses travel as far as formulas say, in every simulator and system of axes."""
+"""Rays at shapes in known poses have the lengths of formulas, in every simulator and system of axes."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ LEANING = [frame(axis=(0.3, -0.5, 0.8), angle_rad=1.1), frame(axis=(1.0, 0.2, 0.
 
 
 def poses_of(shape, setting):
-    """Return the poses in which a simulator takes a shape; the stub refuses one that leans."""
+    """Return the poses in which a simulator accepts a shape; the stub rejects tilted shapes."""
     poses = POSES.get(shape.type, LYING)
     return [*poses, *LEANING] if setting.physics == "mujoco" and shape.type != "Plane" else poses
 
@@ -45,7 +45,7 @@ def simulation_of(setting, shape, outlined):
 
 
 def places_of(shape, setting):
-    """Return the pose of the shape in the axes of the ground, above the floor at height 0."""
+    """Return the poses of the shape in the axes of the ground, above the floor at height 0."""
     if shape.type == "Plane":
         return [frame((0.0, 0.0, 0.0)) @ pose for pose in UPRIGHT[:1]]
     poses = poses_of(shape, setting)
@@ -53,20 +53,20 @@ def places_of(shape, setting):
 
 
 def cases(shape, setting):
-    """Yield each ray at the shape: the frame of the sensor in the shape's, and that of the shape."""
+    """Yield, for each ray, the frame of the sensor in the shape's frame, and the frame of the shape."""
     for place in places_of(shape, setting):
         for number, (start, target) in enumerate(shape.aims):
             yield place, looking(start, target, 0.4 * number)
 
 
 def expected(formula, sensor, angle_rad=0.0):
-    """Return the distance by a formula, of a ray that is turned to the left."""
+    """Return the distance by a formula, for a ray that is turned to the left."""
     ahead = sensor.rotation @ [np.cos(angle_rad), np.sin(angle_rad), 0.0]
     return min(formula(sensor.position, ahead), REACH_M)
 
 
 def read(setting, shape, place, sensor, outlined):
-    """Return the simulation with its sensor at a frame in that of the shape."""
+    """Move the sensor to a frame in that of the shape, step, and return the simulation."""
     simulation = simulation_of(setting, shape, outlined)
     move(simulation, "R", setting.put(place @ sensor @ MOUNT.inverse))
     simulation.step(STEP_MS)
@@ -74,7 +74,7 @@ def read(setting, shape, place, sensor, outlined):
 
 
 def mismatches(shape, setting, outlined, measure):
-    """Yield a line for each ray whose distance is not that of the formula."""
+    """Yield a line for each ray whose measured distance differs from the formula."""
     for place, sensor in cases(shape, setting):
         for name, got, wanted in measure(read(setting, shape, place, sensor, outlined), shape, sensor):
             if not abs(got - wanted) <= shape.tolerance:
@@ -82,13 +82,13 @@ def mismatches(shape, setting, outlined, measure):
 
 
 def outlines(simulation, shape, sensor):
-    """Yield the readings of sensors that meet boundingObjects, and the right values."""
+    """Yield the measured and the right values of sensors whose rays meet boundingObjects."""
     for name in ("laser", "generic"):
         yield name, device(simulation, name).value, expected(shape.formula, sensor)
 
 
 def sights(simulation, shape, sensor):
-    """Yield the readings of sensors that meet visible shapes, and the right values."""
+    """Yield the measured and the right values of sensors whose rays meet visible shapes."""
     formula = shape.seen or shape.formula
     yield "infrared", device(simulation, "infrared").value, expected(formula, sensor)
     for ray, turned in zip(device(simulation, "lidar").layers[0], (0.2, 0.0, -0.2), strict=True):
@@ -98,7 +98,7 @@ def sights(simulation, shape, sensor):
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
 @pytest.mark.parametrize("shape", [it for it in SHAPES if it.bounding], ids=str)
 def test_a_ray_meets_a_bounding_object_where_the_formula_says(shape, setting):
-    """A policy that avoids walls must not see them where they are not."""
+    """A policy that avoids walls must see each wall at its true distance."""
     assert list(mismatches(shape, setting, True, outlines)) == []
 
 

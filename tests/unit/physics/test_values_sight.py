@@ -1,4 +1,4 @@
-"""Sensors with several rays, and pictures: averages, colors and pixels by formulas, at a wall."""
+"""Sensors with several rays, and pictures, at a wall: averages, colors and pixels compared with formulas."""
 
 import math
 from functools import partial
@@ -29,7 +29,7 @@ TYPES = {
     "coarse": ("generic", "resolution 25"),
 }
 NOTHING = f'DistanceSensor {{ name "nothing" {MOUNT.fields} lookupTable [ ] }}'
-# Where sensors are, and at which points they look, in the frame of the wall.
+# The poses of sensors and the points at which they look, in the frame of the wall.
 LOOKS = [
     looking((2.0, 0.3, -0.4), (0.2, 0.3, -0.4), 0.3),
     looking((2.5, 1.0, 0.5), (0.2, 0.8, 0.7), 1.1),
@@ -90,7 +90,10 @@ def expected(name, sensor):
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
 @pytest.mark.parametrize("name", TYPES)
 def test_a_distance_sensor_measures_by_its_type(name, setting):
-    """The average, the one ray, the nearest that returns, or the average by color; then the lookup table."""
+    """The value is the average, the single ray, the nearest echo, or the color-weighted average.
+
+    Then the lookup table maps the value.
+    """
     simulation = simulation_of(setting)
     for sensor in LOOKS:
         move(simulation, "R", setting.put(WALL @ sensor @ MOUNT.inverse))
@@ -128,7 +131,7 @@ def towards(left, up):
 
 
 def is_seen(lidar, layer, sensor, ways):
-    """Compare a layer with the distances along its rays, and its points with where they end."""
+    """Compare a layer with the distances along its rays, and the layer's points with the ends of the rays."""
     met, _ = distances(sensor, ways)
     points = [way * far if far < REACH_M else [math.inf] * 3 for way, far in zip(ways, met, strict=True)]
 
@@ -140,9 +143,10 @@ def is_seen(lidar, layer, sensor, ways):
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
 @pytest.mark.parametrize("name", FIXED)
 def test_each_ray_of_a_lidar_leaves_at_its_azimuth_and_elevation(setting, name):
-    """Layers from the top down, their ends included; rays from the left, in the middle of their shares.
+    """The layers go from the top down, and both ends are layers.
 
-    A tilt turns them all upwards about the y axis.
+    The rays go from the left, each in the middle of its share of the view. A tilt turns all rays upwards
+    about the y axis.
     """
     simulation = scanned(setting)
     upwards = turn([0, 1, 0], -FIXED[name])
@@ -156,7 +160,7 @@ def test_each_ray_of_a_lidar_leaves_at_its_azimuth_and_elevation(setting, name):
 
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
 def test_a_rotating_lidar_sees_all_around_within_a_turn(setting):
-    """It begins ahead and turns to the right; each of its rays looks up by the tilt."""
+    """The head begins ahead and turns to the right; the tilt raises each of its rays."""
     simulation = scanned(setting)
     for sensor in LOOKS:
         move(simulation, "R", setting.put(WALL @ sensor @ MOUNT.inverse))
@@ -168,7 +172,7 @@ def test_a_rotating_lidar_sees_all_around_within_a_turn(setting):
 
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
 def test_a_step_measures_the_part_that_the_head_of_a_lidar_passes(setting):
-    """Before that, ranges are 0, also after a reset of the world."""
+    """Rays that the head has not yet passed read 0, also after a reset of the world."""
     simulation = scanned(setting)
     lidar = device(simulation, "turning")
     simulation.reset()
@@ -187,7 +191,7 @@ def test_a_step_measures_the_part_that_the_head_of_a_lidar_passes(setting):
 
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
 def test_a_distance_sensor_without_a_lookup_table_measures_0(setting):
-    """Unlike other sensors, whose values stay as they are."""
+    """Other sensors without a lookup table return the measured value, but a distance sensor returns 0."""
     simulation = simulation_of(setting)
     kind, sensor = simulation.robots[0].parts.devices.rows["nothing"]
     simulation.step(STEP_MS)
@@ -207,7 +211,7 @@ BALL = frame((1.0, 0.0, 0.0), (0.3, 0.4, 0.5), 1.3)
 
 @cached
 def pictures_of(setting):
-    """Return a simulation of a wall before which a ball is, and of a robot with cameras."""
+    """Return a simulation of a ball in front of a wall, and of a robot with cameras."""
     shape = f"Shape {{ geometry Box {{ size {SIZE[0]} {SIZE[1]} {SIZE[2]} }} }}"
     ball = f"""Solid {{ {setting.put(WALL @ BALL).fields} name "ball" model "ball" recognitionColors [ 1 0 0 ]
       children [ Shape {{ geometry Sphere {{ radius 0.1 }} }} ] }}"""
@@ -218,7 +222,7 @@ def pictures_of(setting):
 
 
 def pixels():
-    """Yield row, column and direction of each pixel; a direction has length 1 along the axis of the lens."""
+    """Yield the row, column and direction of each pixel. A direction has length 1 along the lens axis."""
     half = math.tan(VIEW_RAD / 2.0)
     for row in range(HEIGHT_PX):
         for column in range(WIDTH_PX):
@@ -232,7 +236,7 @@ MUJOCO = [setting for setting in SETTINGS if setting.physics == "mujoco"]
 
 @pytest.mark.parametrize("setting", MUJOCO, ids=str)
 def test_a_pixel_of_a_range_finder_is_a_distance_along_the_lens(setting):
-    """MuJoCo: to the wall or to the ball, whichever is nearer; the stub draws nothing."""
+    """MuJoCo only: a pixel shows the wall or the ball, whichever is nearer. The stub renders nothing."""
     simulation = pictures_of(setting)
     ball = partial(rays.sphere, radius=0.1, center=BALL.position)
     for sensor in LOOKS[:4]:
@@ -245,13 +249,13 @@ def test_a_pixel_of_a_range_finder_is_a_distance_along_the_lens(setting):
             depth = met / np.linalg.norm(way)
             aside = np.linalg.norm(np.cross(ahead, BALL.position - sensor.position))
             if abs(aside - 0.1) < 0.02:
-                continue  # its edge, which is drawn with 20 corners
+                continue  # the edge of the ball, which is rendered with 20 corners
             assert image[row, column] == pytest.approx(depth if depth < REACH_M else math.inf, rel=2e-3)
 
 
 @pytest.mark.parametrize("setting", MUJOCO, ids=str)
 def test_a_camera_recognizes_an_object_where_it_is(setting):
-    """MuJoCo returns its place and rotation in the frame of the camera, and its middle in the picture."""
+    """MuJoCo only: the camera returns the object's pose in its own frame and the middle in the picture."""
     simulation = pictures_of(setting)
     starts = [(2.0, 0.3, -0.4), (1.5, -1.0, 0.6), (3.0, 1.0, 1.0)]
     for roll, start in enumerate(starts):

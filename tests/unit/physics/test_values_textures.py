@@ -1,4 +1,4 @@
-"""Textures under infra-red sensors: the pixel that a ray meets, by formulas, on each shape that has one."""
+"""Textures under infra-red sensors: formulas give the pixel that a ray meets on each shape."""
 
 import math
 
@@ -24,7 +24,7 @@ INFRARED = f"""DistanceSensor {{ name "eye" {MOUNT.fields} type "infra-red"
 
 
 def picture(reds):
-    """Return the bytes of a PNG file with these reds, (rows, columns); blue and green do not count."""
+    """Return a PNG file with these red values, (rows, columns); blue and green have no effect."""
     pixels = np.full((*reds.shape, 4), 200, np.uint8)
     pixels[:, :, 2] = reds
     return png.encode((reds.shape[1], reds.shape[0]), pixels.tobytes())
@@ -32,7 +32,7 @@ def picture(reds):
 
 @pytest.fixture
 def project(tmp_path):
-    """Return the folder of a world, in a project, with two images in a folder next to it."""
+    """Return the folder of a world, in a project that has two images in a folder next to it."""
     folder = tmp_path / "project" / "worlds"
     (folder / "textures").mkdir(parents=True)
     (folder / "textures" / "reds.png").write_bytes(picture(REDS))
@@ -42,7 +42,7 @@ def project(tmp_path):
 
 @pytest.fixture(params=PHYSICS)
 def load(request, project):
-    """`load(nodes)`: the simulation of a world with these nodes, in the project."""
+    """`load(nodes)` returns the simulation of a world with these nodes, in the project."""
 
     def load(nodes, folder=project):
         world = folder / "line.wbt"
@@ -64,19 +64,19 @@ def shape(geometry, look=LOOK):
 
 
 def red_at(u, v, reds=REDS):
-    """Return the red of the pixel at a place, 0 to 1: u to the right, v down, each side of the image 1."""
+    """Return the red value of a pixel, 0 to 1; u goes right and v goes down, each from 0 to 1."""
     return reds[int(v * ROWS), int(u * COLUMNS)] / 255.0
 
 
 def around(x, y):
-    """Return the share of a turn from +y, counter-clockwise as seen from above."""
+    """Return the azimuth of a point as a share of a turn from +y, counter-clockwise as seen from above."""
     return math.atan2(-x, y) / (2.0 * math.pi) % 1.0
 
 
 def on_box(point):
-    """Return the place in the texture of a box of 2 x 1 x 0.5 m: each side has all of it.
+    """Return the texture coordinates on a box of 2 x 1 x 0.5 m; each side shows the whole texture.
 
-    It stands upright on the sides, as seen from outside; on the top, x is to the right and y is up.
+    On the sides the texture is upright as seen from outside; on the top, x is to the right and y is up.
     """
     x, y, z = np.array(point) / [2.0, 1.0, 0.5] + 0.5
     side = max(range(3), key=lambda axis: abs(np.array([x, y, z])[axis] - 0.5))
@@ -88,7 +88,7 @@ def on_box(point):
 
 
 def on_cylinder(point):
-    """Return the place in the texture of a cylinder of 0.5 m radius and 1 m height; its ends have discs."""
+    """Return the texture coordinates on a cylinder of 0.5 m radius and 1 m height, whose ends show discs."""
     x, y, z = point
     if abs(z) > 0.5 - 1e-9:
         return x + 0.5, (0.5 - y if z > 0 else 0.5 + y)
@@ -96,14 +96,14 @@ def on_cylinder(point):
 
 
 def on_sphere(point):
-    """Return the place in the texture of a ball of 0.5 m radius: meridians and circles of latitude."""
+    """Return the texture coordinates on a ball of 0.5 m radius, by meridians and circles of latitude."""
     x, y, z = point
     return around(x, y), 0.5 - math.asin(z / 0.5) / math.pi
 
 
 SIDES = [(1, 0.3), (-1, 0.7), (-0.6, -1), (0.8, -1)]
-# Each row: a geometry, how far a ray travels to it, and a function from a point of its surface to the place
-# in its texture.
+# Each row: a geometry, a function that returns the length of a ray to it, and a function from a point of its
+# surface to texture coordinates.
 CASES = [
     (
         "Plane { size 4 2 }",
@@ -145,7 +145,7 @@ CASES = [
 
 
 def read(simulation, start, target):
-    """Return the reading of a sensor at a point of the shape's frame that looks at another point."""
+    """Return the reading of a sensor at `start` that looks at `target`, both in the frame of the shape."""
     move(simulation, "R", PLACE @ looking(start, target, 0.3) @ MOUNT.inverse)
     simulation.step(STEP_MS)
     return device(simulation, "eye").value
@@ -160,7 +160,7 @@ def met(distance, start, target):
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case[0].split()[0])
 def test_a_ray_sees_the_pixel_that_it_meets(case, load):
-    """A line follower reads the line where it is, and in the same way in which Webots paints it."""
+    """A line follower then reads the line where Webots would paint it."""
     geometry, distance, place, aims = case
     simulation = load(shape(geometry))
     for start, target in aims:
@@ -183,7 +183,7 @@ CENTER = ((0.3, 0.2, 1.0), (-0.7, 0.4, 0.0))
 
 @for_each("look, share, smooth", LOOKS)
 def test_base_color_and_roughness_count_with_the_texture(look, share, smooth, load):
-    """In an Appearance the texture takes the place of the diffuse color, as in Webots."""
+    """In an Appearance the texture replaces the diffuse color, as in Webots."""
     way, _ = met(rays.plane, *CENTER)
     red = share * REDS[1, 2] / 255.0
 
@@ -193,7 +193,7 @@ def test_base_color_and_roughness_count_with_the_texture(look, share, smooth, lo
 
 
 def test_maps_of_roughness_and_occlusion_count(load):
-    """By the red of their pixels, at the same place."""
+    """The red value of each map's pixel counts, at the same texture coordinates."""
     way, _ = met(rays.plane, *CENTER)
     other = OTHERS[1, 2] / 255.0
     look = f"PBRAppearance {{ baseColorMap {TEXTURE} roughnessMap {BESIDE} occlusionMap {BESIDE} }}"
@@ -203,7 +203,7 @@ def test_maps_of_roughness_and_occlusion_count(load):
 
 
 def transformed(u, v, scale, rotation, center, translation):
-    """Return a place after a TextureTransform of X3D, in which v is up."""
+    """Return the texture coordinates after a TextureTransform of X3D, in which v is up."""
     c, s = math.cos(rotation), math.sin(rotation)
     move = np.array([[1, 0, translation[0]], [0, 1, translation[1]], [0, 0, 1]])
     to_center = np.array([[1, 0, center[0]], [0, 1, center[1]], [0, 0, 1]])
@@ -227,7 +227,10 @@ TRANSFORMS = [
 
 @for_each("scale, rotation, center, translation", TRANSFORMS)
 def test_a_texture_transform_moves_turns_and_scales_the_texture(scale, rotation, center, translation, load):
-    """As X3D defines it; beyond the edges the texture repeats, or with repeatS FALSE its edge continues."""
+    """The transform follows X3D.
+
+    Beyond its edges the texture repeats; with `repeatS FALSE` its edge continues.
+    """
     node = f"""TextureTransform {{ scale {scale[0]} {scale[1]} rotation {rotation}
       center {center[0]} {center[1]} translation {translation[0]} {translation[1]} }}"""
     for fields, bound in BOUNDS:
@@ -250,7 +253,10 @@ WALL = "wallAppearance PBRAppearance { baseColor 0.3 1 1 roughness 0 }"
 
 @pytest.mark.parametrize("order", [f"{FLOOR} {WALL}", f"{WALL} {FLOOR}"], ids=["floor first", "walls first"])
 def test_the_floor_of_an_arena_has_its_texture_by_tiles(order, load):
-    """From its lower left corner; the walls have a look of their own. Line followers drive in such arenas."""
+    """Line followers drive in such arenas.
+
+    The tiles start at the lower left corner, and the walls have their own appearance.
+    """
     simulation = load(ARENA.format(order=order) + robot(INFRARED))
     start = np.array([0.2, -0.1, 0.4])
     for target in ((-0.9, 0.4, 0.0), (0.3, 0.2, 0.0), (0.33, -0.45, 0.0)):
@@ -270,7 +276,7 @@ def test_the_floor_of_an_arena_has_its_texture_by_tiles(order, load):
 
 
 def test_a_texture_whose_place_is_not_known_counts_as_unread(load):
-    """The base color counts then, as before, and a line at the start says so."""
+    """The base color then counts instead of the texture, and the simulation counts the texture as unread."""
     look = LOOK.replace("baseColorMap", "baseColor 0.5 1 1 baseColorMap")
     nodes = [f"Shape {{ appearance {look} geometry {geometry} }}" for geometry in ("Cone { }", "Plane { }")]
     nodes.append(f"CircleArena {{ translation 9 0 0 floorAppearance {look} }}")

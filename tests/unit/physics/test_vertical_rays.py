@@ -1,4 +1,4 @@
-"""Rays that point straight down or up, of cliff sensors and of a lidar on a ceiling."""
+"""Rays that point straight down or up, as those of cliff sensors and of a lidar on a ceiling."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,10 @@ Robot {
 
 @pytest.mark.parametrize("angle", ["1.5707963", "1.570796327", "1.57079632679", "1.5708"])
 def test_a_ray_straight_down_meets_the_floor_and_no_post_elsewhere(physics, angle):
-    """Files round a right angle differently; a post is several meters away."""
+    """World files round a right angle differently, so a ray may tilt a little.
+
+    It must still not meet a post several meters away.
+    """
     simulation = Simulation.load(WORLD.replace("ANGLE", angle).encode(), physics(), "world", Mode.FAST)
     robot = simulation.robots[0]
     _, lidar = robot.parts.devices.rows["lidar"]
@@ -39,7 +42,7 @@ def test_a_ray_straight_down_meets_the_floor_and_no_post_elsewhere(physics, angl
 
 
 def test_a_ray_straight_up_meets_nothing(physics):
-    """The sensor measures its maximum range."""
+    """The ray meets no object, so the sensor measures its maximum range."""
     simulation = Simulation.load(WORLD.replace("ANGLE", "-1.5707963").encode(), physics(), "world", Mode.FAST)
 
     simulation.step(16)

@@ -84,14 +84,14 @@ POSES = [
 
 @for_each("appearance, factor", COLORS)
 def test_a_dark_or_rough_surface_seems_farther(begin, appearance, factor):
-    """In every pose it is distance / (0.2 + 0.8 red (1 - roughness / 2)); red is scaled by the opacity."""
+    """The value is distance / (0.2 + 0.8 red (1 - roughness / 2)) in every pose; the opacity scales red."""
     for pose, distance_m in POSES:
         value = measured(begin(wall(appearance), INFRARED, pose))
         assert value == pytest.approx(distance_m / factor, 1e-6)
 
 
 def test_infrared_rays_meet_what_is_drawn(begin):
-    """A boundingObject alone is not seen, but a shape without one is."""
+    """The ray passes a boundingObject without a shape, and meets a shape without a boundingObject."""
     outline = "Solid { translation 0.5 0 0 boundingObject Box { size 0.1 1 1 } }"
 
     assert measured(begin(outline + wall(), INFRARED)) == pytest.approx(1.0)
@@ -100,7 +100,10 @@ def test_infrared_rays_meet_what_is_drawn(begin):
 
 @pytest.mark.parametrize("name", ["infra-red", "infrared", "Infra-Red"])
 def test_several_rays_are_averaged_before_the_color_counts(begin, name):
-    """The mean distance is divided by the mean reflection; Webots knows the type by both names."""
+    """The value is the mean distance divided by the mean reflection.
+
+    Webots accepts both names of the type.
+    """
     sensor = f"""DistanceSensor {{ name "eye" type "{name}" numberOfRays 2 aperture 1.0 gaussianWidth 1e6
         lookupTable [ 0 0 0, 40 40 0 ] }}"""
     half = """Solid {{ translation 1.05 0 {} children [ Shape {{
@@ -111,7 +114,7 @@ def test_several_rays_are_averaged_before_the_color_counts(begin, name):
 
 
 def test_a_laser_has_one_ray_whatever_the_file_says(begin):
-    """Webots corrects the number with a warning."""
+    """Webots corrects `numberOfRays` to 1 with a warning."""
     laser = 'DistanceSensor { name "eye" type "Laser" numberOfRays 5 lookupTable [ 0 0 0, 40 40 0 ] }'
     outlined = wall(outline="boundingObject Box { size 0.1 3 1 }")
 
@@ -125,7 +128,7 @@ HIGH = wall(outline="boundingObject Box { size 0.1 99 99 }")
 
 @for_each("turn", [0.0, 0.1, -0.3, 0.38, 0.41, -0.6, 1.0])
 def test_a_sonar_gets_no_echo_from_a_slanted_wall(begin, turn):
-    """Beyond an angle of incidence of 22.5 degrees the value is that of the maximum distance."""
+    """Beyond an angle of incidence of 22.5 degrees the sonar measures its maximum distance."""
     for axis in ("0 0 1", "0 1 0"):
         value = measured(begin(HIGH, SONAR.format(1, f"{axis} {turn}")))
 
@@ -134,7 +137,7 @@ def test_a_sonar_gets_no_echo_from_a_slanted_wall(begin, turn):
 
 
 def test_a_sonar_takes_the_nearest_of_the_rays_that_return(begin):
-    """Of three rays, one meets the wall too far from its normal; the other two are alike."""
+    """One of the three rays meets the wall too far from its normal. The other two return equal distances."""
     value = measured(begin(HIGH, SONAR.format(3, "0 0 1 0.2")))
 
     towards = math.cos(0.3) * math.cos(0.2) + math.sin(0.3) / 2 * math.sin(0.2)
@@ -142,7 +145,7 @@ def test_a_sonar_takes_the_nearest_of_the_rays_that_return(begin):
 
 
 def test_a_sonar_hears_a_post(begin):
-    """A round surface reflects the ray that meets its middle, but not one that meets its side."""
+    """A round post reflects a ray that meets its middle, but not a ray that meets its side."""
     post = "Solid {{ translation 1 {} 0 boundingObject Cylinder {{ radius 0.2 height 99 }} }}"
 
     assert measured(begin(post.format(0), SONAR.format(1, "0 0 1 0"))) == pytest.approx(0.8, 1e-5)
@@ -169,7 +172,7 @@ SHAPES = [
 
 @for_each("geometry, turned, distance_m", SHAPES)
 def test_a_lidar_sees_the_shapes(begin, geometry, turned, distance_m):
-    """Webots renders the shapes; the middle ray of the middle layer points along x."""
+    """Webots renders the visible shapes for a lidar; the middle ray of the middle layer points along x."""
     pose = "rotation 0 0 1 0.0872665"  # half of the angle between two rays
     shape = f"Solid {{ translation 2 0 0 {turned} children [ Shape {{ geometry {geometry} }} ] }}"
 
@@ -179,7 +182,7 @@ def test_a_lidar_sees_the_shapes(begin, geometry, turned, distance_m):
 
 
 def test_what_moves_is_seen_where_it_is(begin):
-    """This holds also after a supervisor has moved it."""
+    """After a supervisor moves the wall, both sensors measure the new distance."""
     simulation = begin("DEF WALL " + wall(), INFRARED + LIDAR, "rotation 0 0 1 0.0872665")
     before = (measured(simulation), scanned(simulation)[1, 18])
 
@@ -205,9 +208,9 @@ def test_rays_pass_the_robot_and_what_is_around_it(begin):
 
 
 def test_both_simulators_see_the_same():
-    """The world has twenty random shapes of all kinds.
+    """The world has twenty random shapes of all types.
 
-    Two implementations are compared, one of them MuJoCo's.
+    The stub and MuJoCo compute the rays with different code, so equal scans support both.
     """
     draw = random.Random(7)
     geometries = [geometry for geometry, _, _ in SHAPES]

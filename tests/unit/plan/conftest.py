@@ -1,4 +1,4 @@
-"""The jobs of these tests, and their plans."""
+"""Builders of jobs and of their plans."""
 
 from collections.abc import Callable
 from typing import Any
@@ -15,7 +15,7 @@ IMAGES = Images(trainer="trainer:1", stub="stub:1", mujoco="mujoco:1", webots="w
 
 @pytest.fixture
 def valid_job() -> Callable[..., TrainingJob]:
-    """Return a builder: keywords are fields of the spec, in camelCase."""
+    """Return a builder of jobs; its keywords are fields of the spec, in camelCase."""
 
     def make(name: str = "job", uid: str = UID, **spec: Any) -> TrainingJob:
         return identified(validate(make_job(name, **spec)), uid)
@@ -35,7 +35,7 @@ def in_cluster(valid_job: Callable[..., TrainingJob]) -> Callable[..., Plan]:
 
 @pytest.fixture
 def on_laptop(valid_job: Callable[..., TrainingJob]) -> Callable[..., Plan]:
-    """Return a builder of local plans of jobs, with ports of their own."""
+    """Return a builder of local plans of jobs, with fixed ports."""
 
     def make(**spec: Any) -> Plan:
         ports = Ports(ros_master=4000, status=4001, control=(4100, 4101), health=(4200, 4201))

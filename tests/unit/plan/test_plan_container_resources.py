@@ -1,4 +1,4 @@
-"""The resources of containers: what a job asks for, defaults, and memory of a standby."""
+"""The resources of containers: requests and limits of a job, defaults, and a standby's memory."""
 
 import pytest
 from hypothesis import given
@@ -41,7 +41,7 @@ def environment(container) -> dict[str, object]:
     ],
 )
 def test_a_default_never_contradicts_what_a_job_asks_for(wanted, planned):
-    """The API server refuses a request above its limit."""
+    """The API server rejects a request above its limit. So a default limit must not be below a request."""
     default = Resources(requests={"cpu": "1", "memory": "1Gi"}, limits={"cpu": "2"})
 
     assert resources.resources(Resources(**wanted), default) == planned
@@ -57,7 +57,10 @@ def test_a_default_never_contradicts_what_a_job_asks_for(wanted, planned):
 )
 @pytest.mark.parametrize("container", ["trainer", "sim-collect-0"])
 def test_a_request_for_memory_takes_no_limit_away(in_cluster, container, requested, limit):
-    """Otherwise the author of a job could use all memory of a node, and end the pods of others there."""
+    """Without a limit the container could use all memory of its node.
+
+    The kernel would then kill pods of other users.
+    """
     wanted = {"resources": {"requests": {"memory": requested}}}
     group = {"name": "collect", "role": "Collect"} | (wanted if container != "trainer" else {})
     trainer = {"evaluation": {"everySteps": 0}} | (wanted if container == "trainer" else {})
@@ -68,7 +71,7 @@ def test_a_request_for_memory_takes_no_limit_away(in_cluster, container, request
 
 
 def test_every_container_has_a_limit_of_its_memory(in_cluster):
-    """This holds for every request of a job."""
+    """A job that sets only requests still gets a memory limit on each container."""
     requests = {"resources": {"requests": {"memory": "1Gi", "cpu": "2"}}}
     groups = [{**group, **requests} for group in TWO_GROUPS]
 
@@ -81,7 +84,7 @@ STANDBY = [{"name": "collect", "role": "Collect", "standby": True}, {"name": "ev
 
 
 def test_a_sidecar_gets_an_option_for_a_second_simulator_that_stands_by(in_cluster):
-    """With it, the sidecar generates the second simulator's world from the given one, with its own names."""
+    """With `--standby` the sidecar generates a second world from the same source, with its own ROS names."""
     planned = containers(in_cluster(simulators=STANDBY))
 
     assert "--standby" in planned["sim-collect-0"]["args"]
@@ -89,9 +92,9 @@ def test_a_sidecar_gets_an_option_for_a_second_simulator_that_stands_by(in_clust
 
 
 def test_a_simulator_that_stands_by_has_memory_of_its_own_and_shares_the_processor(in_cluster):
-    """The container holds two simulators, and the memory of one would not suffice.
+    """The container runs two simulators, so it needs the memory of both.
 
-    Only one of them computes.
+    The processor is not doubled, because only one of them computes at a time.
     """
     one, two = (
         containers(in_cluster(simulators=simulators))["sim-collect-0"]["resources"]
@@ -103,7 +106,7 @@ def test_a_simulator_that_stands_by_has_memory_of_its_own_and_shares_the_process
 
 
 def test_a_simulator_that_stands_by_has_shared_memory_of_its_own(in_cluster):
-    """The container's memory includes this volume, in which Webots keeps its pictures."""
+    """Webots keeps its camera images in this volume, which counts toward the memory of the container."""
     spec = in_cluster(simulators=STANDBY).replicas[0].job["spec"]["template"]["spec"]
     sizes = {
         volume["name"]: volume["emptyDir"]["sizeLimit"]
@@ -119,13 +122,13 @@ def test_a_simulator_that_stands_by_has_shared_memory_of_its_own(in_cluster):
     [("160Mi", "320Mi"), ("1.5Gi", "3Gi"), ("0.3G", "0.6G"), ("500m", "1000m"), ("5", "10"), ("100", "200")],
 )
 def test_a_quantity_is_doubled_in_its_own_unit(quantity, doubled):
-    """The quantity in the pod stays in the unit that a person wrote."""
+    """Twice `1Gi` is `2Gi`, not a number of bytes, so a reader of the pod recognizes the job's value."""
     assert resources.twice(quantity) == doubled
 
 
 @given(st.integers(min_value=1, max_value=200_000))
 def test_there_is_always_a_thread_and_never_more_than_a_core_too_many(millis):
-    """The number is rounded up: half a core allows one thread."""
+    """The number of threads is the CPU limit, rounded up: half a core gives one thread."""
     threads = resources.threads({"limits": {"cpu": f"{millis}m"}})
 
     assert threads >= 1
@@ -141,7 +144,7 @@ def test_there_is_always_a_thread_and_never_more_than_a_core_too_many(millis):
     ],
 )
 def test_the_trainer_shares_memory_within_its_limit(in_cluster, wanted, size):
-    """Workers of a DataLoader or an AsyncVectorEnv need more than the 64 MiB of a container runtime."""
+    """Workers of a DataLoader or AsyncVectorEnv need more than a container runtime's 64 MiB."""
     planned = in_cluster(trainer={"resources": wanted})
     volumes = planned.replicas[0].job["spec"]["template"]["spec"]["volumes"]
     mounts = {each["mountPath"]: each["name"] for each in containers(planned)["trainer"]["volumeMounts"]}
@@ -151,7 +154,7 @@ def test_the_trainer_shares_memory_within_its_limit(in_cluster, wanted, size):
 
 
 def test_a_job_sets_the_resources_of_the_ros_master(in_cluster):
-    """A quota on limits.cpu always refuses a pod with a container that has no such limit."""
+    """A quota on `limits.cpu` rejects each pod in which a container has no CPU limit."""
     own = {"requests": {"cpu": "100m", "memory": "128Mi"}, "limits": {"cpu": "200m", "memory": "256Mi"}}
 
     planned = containers(in_cluster(simulators=[OWN, TWO_GROUPS[1]], rosMaster={"resources": own}))
@@ -161,7 +164,7 @@ def test_a_job_sets_the_resources_of_the_ros_master(in_cluster):
 
 
 def test_an_installation_sets_the_resources_of_jobs_that_mention_none(valid_job):
-    """The shortest job then fits a namespace with limits of its own; values of a job win."""
+    """The defaults let a minimal job fit a namespace with a quota; a value in the job overrides a default."""
     defaults = resources.Defaults(
         ros_master=Resources(limits={"cpu": "200m"}),
         simulator=Resources(limits={"cpu": "1"}),

@@ -25,14 +25,14 @@ def environment(container) -> dict[str, object]:
 
 
 def test_the_ros_master_starts_first_and_the_trainer_last(in_cluster):
-    """Native sidecars start in the order of the list."""
+    """A kubelet starts native sidecars in the order of the list."""
     names = list(containers(in_cluster(simulators=TWO_GROUPS)))
 
     assert names == ["ros-master", "sim-collect-0", "sim-collect-1", "sim-evaluate-0", "trainer"]
 
 
 def test_no_sidecar_of_a_simulator_has_a_startup_probe(in_cluster):
-    """If the first start of a sidecar with one fails, no trainer starts (Kubernetes issue 132826)."""
+    """No trainer starts after a sidecar with a startup probe has failed once (Kubernetes issue 132826)."""
     probed = [name for name, each in containers(in_cluster()).items() if "startupProbe" in each]
 
     assert probed == ["ros-master", "trainer"]
@@ -40,7 +40,10 @@ def test_no_sidecar_of_a_simulator_has_a_startup_probe(in_cluster):
 
 @pytest.mark.parametrize(("spec", "seconds"), [({}, 21_600), ({"startTimeoutSeconds": 605}, 605)])
 def test_a_start_may_take_as_long_as_the_first_step(in_cluster, spec, seconds):
-    """A trainer imports PyTorch for minutes on a busy node; a probe of two minutes ended it every time."""
+    """On a busy node a trainer imports PyTorch for minutes.
+
+    A startup probe of two minutes killed it every time.
+    """
     planned = containers(in_cluster(**spec))
 
     for name in ("ros-master", "trainer"):
@@ -51,7 +54,7 @@ def test_a_start_may_take_as_long_as_the_first_step(in_cluster, spec, seconds):
 
 
 def test_a_start_on_a_laptop_has_ten_minutes(on_laptop):
-    """A person waits for it; a ROS master that hangs must not hold the terminal for six hours."""
+    """A person waits for a local run, so a ROS master that hangs must not hold the terminal for six hours."""
     planned = containers(on_laptop())
 
     assert planned["ros-master"]["startupProbe"]["failureThreshold"] == 60
@@ -60,7 +63,10 @@ def test_a_start_on_a_laptop_has_ten_minutes(on_laptop):
 
 @pytest.mark.parametrize(("deadline", "timeout", "delay"), [(300, 21_600, 300), (300, 60, 60)])
 def test_a_sidecar_may_start_as_long_as_its_simulator(in_cluster, deadline, timeout, delay):
-    """The trainer counts a start that takes longer as failed."""
+    """The liveness probe waits as long as a start may take.
+
+    After that, the trainer counts the start as failed.
+    """
     groups = [{**group, "startDeadlineSeconds": deadline} for group in TWO_GROUPS]
     planned = containers(in_cluster(simulators=groups, startTimeoutSeconds=timeout))
 
@@ -68,7 +74,7 @@ def test_a_sidecar_may_start_as_long_as_its_simulator(in_cluster, deadline, time
 
 
 def test_sidecars_are_restarted_and_the_trainer_is_not(in_cluster):
-    """The trainer restarts in a new pod, which the Job makes."""
+    """A trainer restarts in a new pod, which the Job controller creates."""
     policies = {name: each.get("restartPolicy") for name, each in containers(in_cluster()).items()}
 
     assert policies.pop("trainer") is None
@@ -76,7 +82,7 @@ def test_sidecars_are_restarted_and_the_trainer_is_not(in_cluster):
 
 
 def test_the_ports_of_simulators_count_up(in_cluster):
-    """All containers share the pod's network."""
+    """The containers of a pod share one network, so each simulator needs its own ports."""
     planned = containers(in_cluster(simulators=TWO_GROUPS))
     arguments = [" ".join(planned[name]["args"]) for name in planned if name.startswith("sim-")]
 
@@ -85,14 +91,14 @@ def test_the_ports_of_simulators_count_up(in_cluster):
 
 
 def test_one_simulator_of_a_replica_keeps_the_clock(in_cluster):
-    """One topic must not carry two times."""
+    """If two simulators published `/clock`, their subscribers would read two times on one topic."""
     planned = containers(in_cluster(simulators=TWO_GROUPS))
 
     assert [name for name, each in planned.items() if "--clock" in each.get("args", ())] == ["sim-collect-0"]
 
 
 def test_control_ports_are_on_loopback_only(in_cluster):
-    """ROS and the sidecars' control have no authentication."""
+    """ROS and the control ports of sidecars have no authentication, so other pods must not reach them."""
     for container in containers(in_cluster()).values():
         assert not any(
             arg.startswith("--control=") and "127.0.0.1" not in arg for arg in container.get("args", ())
@@ -100,7 +106,7 @@ def test_control_ports_are_on_loopback_only(in_cluster):
 
 
 def test_every_container_knows_master_configuration_run_and_pod(in_cluster):
-    """These variables are the contract of the pod."""
+    """The programs of a pod read these environment variables."""
     for container in containers(in_cluster()).values():
         variables = environment(container)
         assert variables["ROS_MASTER_URI"] == "http://127.0.0.1:11311"
@@ -111,14 +117,14 @@ def test_every_container_knows_master_configuration_run_and_pod(in_cluster):
 
 
 def test_threads_follow_the_cpu_limit(in_cluster):
-    """PyTorch would otherwise start a thread for each core of the node."""
+    """PyTorch would start a thread for each core of the node, and the threads would compete for the limit."""
     trainer = containers(in_cluster(trainer={"resources": {"limits": {"cpu": "3500m"}}}))["trainer"]
 
     assert environment(trainer)["OMP_NUM_THREADS"] == "4"
 
 
 def test_variables_of_the_job_win_and_stand_once(in_cluster):
-    """Server-side apply refuses a list with a duplicate name."""
+    """Server-side apply rejects a list in which a variable's name occurs twice."""
     env = [
         {"name": "OMP_NUM_THREADS", "value": "2"},
         {"name": "TOKEN", "secretKeyRef": {"name": "hub", "key": "token"}},
@@ -132,14 +138,14 @@ def test_variables_of_the_job_win_and_stand_once(in_cluster):
 
 
 def test_two_replicas_of_two_simulators_fit_on_two_cores_with_the_operator(in_cluster):
-    """A cluster on a laptop has no more."""
+    """A cluster on a laptop may have only two cores, so one replica requests at most 450m."""
     requests = [each["resources"]["requests"]["cpu"] for each in containers(in_cluster()).values()]
 
     assert sum(int(cpu.removesuffix("m")) for cpu in requests) <= 450
 
 
 def test_the_jobs_own_program_replaces_the_loop_and_need_not_serve_health(in_cluster):
-    """A script of twenty lines has no web server."""
+    """A trainer program of twenty lines has no web server, so its container has no health probe."""
     trainer = containers(in_cluster(trainer={"command": ["python", "mine.py"]}))["trainer"]
 
     assert trainer["command"] == ["python", "mine.py"]
@@ -147,7 +153,7 @@ def test_the_jobs_own_program_replaces_the_loop_and_need_not_serve_health(in_clu
 
 
 def test_images_are_the_jobs_or_the_releases(in_cluster):
-    """A job names an image only if it differs."""
+    """A job names an image only if it replaces the image of the release."""
     simulators = [
         {"name": "a", "role": "Collect", "driver": "webots"},
         {"name": "b", "role": "Evaluate", "image": "mine:2"},
@@ -160,7 +166,7 @@ def test_images_are_the_jobs_or_the_releases(in_cluster):
 
 
 def test_mujoco_has_its_image_its_driver_and_memory_for_a_camera(in_cluster):
-    """A simulator with a renderer needs 200 MB, and its container also runs the sidecar."""
+    """A simulator with a renderer needs 200 MB, and its container runs the sidecar too."""
     mujoco = {"name": "a", "role": "Collect", "driver": "mujoco", "options": ["--leave-out", "all"]}
 
     planned = containers(in_cluster(simulators=[mujoco, {"name": "b", "role": "Evaluate"}]))
@@ -173,7 +179,7 @@ def test_mujoco_has_its_image_its_driver_and_memory_for_a_camera(in_cluster):
 
 
 def test_the_memory_that_a_job_asks_for_takes_the_place_of_mujoco_s(in_cluster):
-    """A world of many meshes needs more."""
+    """A world of many meshes needs more memory than MuJoCo's default."""
     mujoco = {
         "name": "a",
         "role": "Collect",
@@ -200,7 +206,10 @@ OF_POD = "$(PALAESTRA_POD_UID)"
 
 @pytest.mark.parametrize("where", ["in_cluster", "on_laptop"])
 def test_no_text_of_a_job_becomes_the_value_of_a_variable(request, where):
-    """A kubelet expands $(NAME) in commands, arguments and values, and the pod has variables from others."""
+    """A kubelet expands `$(NAME)` in commands, arguments and values.
+
+    A job's text must not become the value of a variable that it did not set.
+    """
     env = [{"name": "OWN", "value": OF_POD}]
     own = {
         "name": "own",
@@ -231,7 +240,7 @@ def test_no_text_of_a_job_becomes_the_value_of_a_variable(request, where):
 
 
 def test_a_run_directory_may_have_a_dollar_in_its_name(valid_job):
-    """In a plan a dollar sign is written twice; a kubelet, and the local runner, read it as one."""
+    """The plan writes a dollar sign as `$$`. Both the kubelet and the local runner read `$$` as one `$`."""
     layout = LocalLayout(images=Images.of_release("1"), job_directory="/runs/$(id)$$/job")
     replica = plan(valid_job(), layout).replicas[0]
     pod = read_pod(replica.job["spec"]["template"], "uid")
@@ -243,7 +252,10 @@ def test_a_run_directory_may_have_a_dollar_in_its_name(valid_job):
 
 
 def test_a_program_of_the_users_gets_the_sidecar_copied_into_its_image(in_cluster):
-    """The user's image need not contain Palaestra."""
+    """A user's image for the driver `command` need not contain Palaestra.
+
+    An init container copies the sidecar into a volume.
+    """
     planned = containers(in_cluster(simulators=COMMAND))
 
     assert next(iter(planned)) == "install-sidecar"
@@ -253,7 +265,7 @@ def test_a_program_of_the_users_gets_the_sidecar_copied_into_its_image(in_cluste
 
 
 def test_the_copied_sidecar_is_where_the_users_image_starts_it(in_cluster):
-    """The init container writes to a volume, which the simulators read."""
+    """The init container writes the sidecar into a volume, from which the simulators start it."""
     planned = containers(in_cluster(simulators=COMMAND))
     copied = {"name": "sidecar", "mountPath": "/palaestra"}
 
@@ -265,7 +277,7 @@ def test_the_copied_sidecar_is_where_the_users_image_starts_it(in_cluster):
 
 
 def test_ros_writes_its_logs_into_a_folder_that_is_there(in_cluster, on_laptop):
-    """ROS would create a missing folder for the owner of its parent, which is root for a pod's volume."""
+    """ROS would create a missing folder with the owner of its parent, which is root for a pod's volume."""
     for planned in (containers(in_cluster()), containers(on_laptop())):
         for container in planned.values():
             mounted = [mount["mountPath"] for mount in container["volumeMounts"]]
@@ -273,7 +285,7 @@ def test_ros_writes_its_logs_into_a_folder_that_is_there(in_cluster, on_laptop):
 
 
 def test_on_a_laptop_nothing_is_copied(on_laptop):
-    """The sidecar is installed together with the runner."""
+    """On a laptop the sidecar is installed together with the runner, so no init container copies it."""
     planned = containers(on_laptop(simulators=COMMAND))
 
     assert "install-sidecar" not in planned
@@ -281,7 +293,7 @@ def test_on_a_laptop_nothing_is_copied(on_laptop):
 
 
 def test_on_a_laptop_everything_lies_in_the_run_directory_and_on_loopback(on_laptop):
-    """A run must leave no files elsewhere on a person's machine."""
+    """A local run must not write files outside its run directory on a person's machine."""
     replica = on_laptop().replicas[0]
     planned = containers(on_laptop())
     mounts = [mount["mountPath"] for each in planned.values() for mount in each["volumeMounts"]]

@@ -13,14 +13,14 @@ def policy(planned):
 
 
 def test_a_laptop_needs_no_policy(valid_job):
-    """Everything is on loopback there, and no pod has its own network."""
+    """A local run listens on loopback only, and has no pod network to protect."""
     planned = plan(valid_job(), LocalLayout(images=IMAGES, job_directory="/runs/job"))
 
     assert planned.network_policy is None
 
 
 def test_all_pods_of_the_job_and_no_others_are_meant(in_cluster):
-    """One policy selects the pods of all replicas by their label."""
+    """One policy selects the pods of all replicas by the label with the job's name."""
     planned = in_cluster(replicas=2)
     selected = policy(planned)["podSelector"]["matchLabels"]
 
@@ -30,9 +30,9 @@ def test_all_pods_of_the_job_and_no_others_are_meant(in_cluster):
 
 
 def test_metrics_status_and_states_are_open_to_the_operator_and_to_monitoring(valid_job):
-    """Only pods of the operator have access, not its whole namespace.
+    """Only pods of the operator have access, not all pods of its namespace.
 
-    ROS and control ports are closed to all.
+    ROS and control ports are open to no pod.
     """
     layout = ClusterLayout(images=IMAGES, operator_namespace="ops", monitoring_namespace="eyes")
     (rule,) = plan(valid_job(), layout).network_policy["spec"]["ingress"]
@@ -51,7 +51,7 @@ def test_metrics_status_and_states_are_open_to_the_operator_and_to_monitoring(va
 
 
 def test_every_port_that_is_opened_is_one_that_a_container_declares(in_cluster):
-    """A policy for other ports would only seem to work."""
+    """A policy with other port numbers would block monitoring, although it looks right."""
     roles = {"collect": "Collect", "evaluate": "Evaluate"}
     planned = in_cluster(simulators=[{"name": name, "role": roles[name], "count": 16} for name in roles])
     spec = planned.replicas[0].job["spec"]["template"]["spec"]
@@ -75,7 +75,7 @@ def test_every_port_that_is_opened_is_one_that_a_container_declares(in_cluster):
     [({}, ["Ingress"], None), ({"egress": "Closed"}, ["Ingress", "Egress"], [])],
 )
 def test_egress_is_free_unless_the_job_closes_it(in_cluster, network, types, egress):
-    """A policy about egress without a rule would block all of it."""
+    """A policy of type Egress without a rule would block all egress."""
     spec = policy(in_cluster(network=network))
 
     assert spec["policyTypes"] == types
@@ -83,7 +83,10 @@ def test_egress_is_free_unless_the_job_closes_it(in_cluster, network, types, egr
 
 
 def test_a_job_that_is_made_again_has_a_policy_of_its_own(valid_job):
-    """The old policy is deleted with the old job, whenever that happens."""
+    """The policy's name contains the uid of its job.
+
+    The old policy can be deleted at any time without harm to the new job.
+    """
     layout = ClusterLayout(images=IMAGES)
     names = {
         plan(valid_job(uid=uid), layout).network_policy["metadata"]["name"] for uid in ("aaaa-1", "bbbb-1")
@@ -93,7 +96,7 @@ def test_a_job_that_is_made_again_has_a_policy_of_its_own(valid_job):
 
 
 def test_a_job_without_a_uid_has_no_policy(valid_job):
-    """A policy without the uid would have no owner."""
+    """The owner reference needs the uid; without an owner, nobody would delete the policy."""
     job = valid_job()
     nobody = job.model_copy(update={"metadata": job.metadata.model_copy(update={"uid": None})})
 

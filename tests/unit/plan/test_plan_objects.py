@@ -1,4 +1,4 @@
-"""The objects of a replica: their kinds, their names and their properties."""
+"""The objects of a replica: their kinds, names and properties."""
 
 import pytest
 import yaml
@@ -14,14 +14,17 @@ def pod(planned, replica=0):
 
 
 def test_a_job_is_a_policy_and_for_each_replica_a_config_map_a_claim_and_a_job(in_cluster):
-    """This order makes sure that a pod never exists before its policy; it waits for its volumes."""
+    """The operator creates objects in this order.
+
+    A pod never exists before its policy, and it waits for its volumes.
+    """
     kinds = [each["kind"] for each in in_cluster(replicas=2).objects]
 
     assert kinds == ["NetworkPolicy", *["ConfigMap", "PersistentVolumeClaim", "Job"] * 2]
 
 
 def test_names_are_deterministic_and_no_two_objects_of_a_kind_share_one(in_cluster):
-    """A second plan has the same names, so the API server refuses to create the objects twice."""
+    """A second plan has the same names, so the API server rejects a second creation of the same object."""
     first, second = in_cluster(replicas=3), in_cluster(replicas=3)
     names = [(each["kind"], each["metadata"]["name"]) for each in first.objects]
 
@@ -30,14 +33,14 @@ def test_names_are_deterministic_and_no_two_objects_of_a_kind_share_one(in_clust
 
 
 def test_the_name_of_a_config_map_follows_from_its_content(in_cluster):
-    """A ConfigMap never changes, so another content needs another name."""
+    """A ConfigMap is never changed, so a new content needs a new name."""
     names = {in_cluster(seed=seed).replicas[0].config_map["metadata"]["name"] for seed in (1, 2)}
 
     assert len(names) == 2
 
 
 def test_objects_go_with_the_job_and_the_claim_stays(in_cluster):
-    """The deletion of a TrainingJob must not delete its results, unless its spec says so."""
+    """The deletion of a TrainingJob must not delete its results, unless `retain: Delete` asks for it."""
     replica = in_cluster().replicas[0]
 
     assert replica.job["metadata"]["ownerReferences"][0]["controller"]
@@ -46,14 +49,17 @@ def test_objects_go_with_the_job_and_the_claim_stays(in_cluster):
 
 
 def test_a_claim_that_is_not_retained_goes_with_the_job(in_cluster):
-    """`retain: Delete` sets an owner reference."""
+    """With `retain: Delete` the claim has an owner reference, so Kubernetes deletes it with the job."""
     claim = in_cluster(storage={"retain": "Delete"}).replicas[0].claim
 
     assert claim["metadata"]["ownerReferences"][0]["kind"] == "TrainingJob"
 
 
 def test_a_job_that_is_made_again_gets_a_new_claim(valid_job):
-    """The uid is in the name, so the run of the predecessor is not continued by accident."""
+    """The claim's name contains the uid.
+
+    A new job of the same name therefore does not resume the deleted job's run.
+    """
     claims = {plan(valid_job(uid=uid), LAYOUT).replicas[0].claim["metadata"]["name"] for uid in "ab"}
 
     assert len(claims) == 2
@@ -67,7 +73,7 @@ def test_a_job_that_is_made_again_gets_a_new_claim(valid_job):
     ],
 )
 def test_no_claim_is_made_where_none_is_wanted(in_cluster, storage, volume):
-    """An existing claim belongs to somebody else, and an ephemeral run needs none."""
+    """An existing claim belongs to its user, and an ephemeral run needs no claim."""
     planned = in_cluster(storage=storage)
 
     assert planned.replicas[0].claim is None
@@ -75,7 +81,7 @@ def test_no_claim_is_made_where_none_is_wanted(in_cluster, storage, volume):
 
 
 def test_a_claim_has_the_size_and_class_of_the_job(in_cluster):
-    """Replay buffers of images need more than the default."""
+    """A replay buffer of images needs more than the default size."""
     claim = in_cluster(storage={"size": "5Gi", "storageClassName": "fast"}).replicas[0].claim
 
     assert claim["spec"]["resources"] == {"requests": {"storage": "5Gi"}}
@@ -83,7 +89,7 @@ def test_a_claim_has_the_size_and_class_of_the_job(in_cluster):
 
 
 def test_the_end_of_the_trainer_decides_and_always_by_name(in_cluster):
-    """A rule without a container name would match the sidecars' exit codes and hide the trainer's."""
+    """A rule without a container name would match the exit codes of sidecars too, and hide the trainer's."""
     rules = in_cluster().replicas[0].job["spec"]["podFailurePolicy"]["rules"]
 
     assert [rule["action"] for rule in rules] == ["Ignore", "Ignore", "FailJob"]
@@ -93,7 +99,7 @@ def test_the_end_of_the_trainer_decides_and_always_by_name(in_cluster):
 
 
 def test_one_pod_at_a_time(in_cluster):
-    """Two pods of a replica would write to one run directory."""
+    """Two pods of one replica would write to the same run directory."""
     spec = in_cluster(backoffLimit=5).replicas[0].job["spec"]
 
     assert spec["podReplacementPolicy"] == "Failed"
@@ -102,7 +108,7 @@ def test_one_pod_at_a_time(in_cluster):
 
 
 def test_a_queued_job_leaves_suspension_to_kueue(in_cluster):
-    """It is created suspended, so that no pod starts before Kueue has seen it."""
+    """The Job is created suspended, so that no pod starts before Kueue has admitted the job."""
     queued = in_cluster(scheduling={"queueName": "robots"}).replicas[0].job
     own = in_cluster(suspend=True).replicas[0].job
 
@@ -112,7 +118,7 @@ def test_a_queued_job_leaves_suspension_to_kueue(in_cluster):
 
 
 def test_a_job_without_a_uid_has_no_plan(valid_job):
-    """Its names and owner references would refer to no object."""
+    """Without a uid, names and owner references would refer to no object."""
     job = valid_job()
     nobody = job.model_copy(update={"metadata": job.metadata.model_copy(update={"uid": None})})
 
@@ -121,7 +127,7 @@ def test_a_job_without_a_uid_has_no_plan(valid_job):
 
 
 def test_each_replica_goes_on_from_the_replica_of_the_other_job_with_its_number(valid_job):
-    """Both are on the same claim, each job in its own folder."""
+    """Both jobs use the same claim, in which each job has its own folder."""
     job = valid_job(storage={"existingClaim": "runs", "resumeFrom": "5a0c"}, replicas=2)
 
     planned = plan(job, LAYOUT)
@@ -131,7 +137,7 @@ def test_each_replica_goes_on_from_the_replica_of_the_other_job_with_its_number(
 
 
 def test_going_on_from_another_jobs_run_is_refused_without_a_cluster(valid_job):
-    """There is no claim, and nobody would notice for a long time that the training began at step 0."""
+    """A local run has no claim. Without an error, a person would learn late that training began at step 0."""
     job = valid_job(storage={"existingClaim": "runs", "resumeFrom": "5a0c"})
     layout = LocalLayout(images=LAYOUT.images, job_directory="/runs/job")
 
@@ -151,7 +157,7 @@ def trainer_of(planned):
 
 
 def test_the_claim_of_an_initial_policy_is_mounted_for_the_trainer_alone_to_read(in_cluster):
-    """The claim belongs to another job, which may be running."""
+    """The claim belongs to another job, which may be running, so the trainer mounts it read-only."""
     planned = in_cluster(trainer=INITIAL)
 
     training, mounts = trainer_of(planned)
@@ -166,7 +172,7 @@ def test_the_claim_of_an_initial_policy_is_mounted_for_the_trainer_alone_to_read
 
 
 def test_an_initial_policy_on_the_run_s_own_claim_needs_no_second_volume(in_cluster):
-    """Some drivers never mount a claim twice in one pod."""
+    """Some storage drivers cannot mount one claim twice in a pod."""
     planned = in_cluster(trainer=INITIAL, storage={"existingClaim": "policies"})
 
     training, mounts = trainer_of(planned)
@@ -184,7 +190,7 @@ def test_an_initial_policy_in_the_image_needs_no_volume(in_cluster):
 
 
 def test_an_initial_policy_on_a_claim_is_refused_without_a_cluster(valid_job):
-    """Nobody would notice for a long time that the run began with random weights."""
+    """A person would learn late that the run began with random weights."""
     layout = LocalLayout(images=LAYOUT.images, job_directory="/runs/job")
 
     with pytest.raises(PlanError, match=r"^spec\.trainer\.initialPolicy\.claim: names a claim .*; remove it"):
@@ -192,7 +198,7 @@ def test_an_initial_policy_on_a_claim_is_refused_without_a_cluster(valid_job):
 
 
 def test_the_pod_is_restricted(in_cluster):
-    """Pod Security's *restricted* applies to sidecars, too."""
+    """The Pod Security standard *restricted* applies to sidecars, too."""
     spec = pod(in_cluster())
 
     assert spec["automountServiceAccountToken"] is False
@@ -205,7 +211,7 @@ def test_the_pod_is_restricted(in_cluster):
 
 
 def test_a_cluster_may_choose_the_user_of_a_pod(valid_job):
-    """OpenShift refuses a user outside the namespace's range; everything else stays restricted."""
+    """OpenShift rejects a user outside the range of the namespace; the rest of the pod stays restricted."""
     security = pod(plan(valid_job(), ClusterLayout(images=LAYOUT.images, user=None)))["securityContext"]
 
     assert security == {
@@ -216,7 +222,7 @@ def test_a_cluster_may_choose_the_user_of_a_pod(valid_job):
 
 
 def test_a_job_s_own_node_label_wins_over_the_installation_s(valid_job):
-    """The installation's label is only a default; a user's image may need another kind of node."""
+    """The installation's label is only a default, because a user's image may need another type of node."""
     layout = ClusterLayout(
         images=LAYOUT.images, node_selector={"kubernetes.io/arch": "amd64", "pool": "robots"}
     )
@@ -228,7 +234,7 @@ def test_a_job_s_own_node_label_wins_over_the_installation_s(valid_job):
 
 
 def test_a_pod_has_a_user_namespace_if_the_installation_asks_for_it(valid_job, in_cluster):
-    """A process that leaves its container then has no permissions on the node."""
+    """A process that escapes from its container then has no permissions on the node."""
     layout = ClusterLayout(images=LAYOUT.images, host_users=False)
 
     assert pod(plan(valid_job(), layout))["hostUsers"] is False
@@ -236,7 +242,7 @@ def test_a_pod_has_a_user_namespace_if_the_installation_asks_for_it(valid_job, i
 
 
 def test_scheduling_reaches_the_pod(in_cluster):
-    """The values of a platform engineer are passed on unchanged."""
+    """The plan copies the scheduling values of a platform engineer unchanged."""
     planned = in_cluster(
         scheduling={
             "nodeSelector": {"gpu": "yes"},
@@ -260,7 +266,7 @@ def test_scheduling_reaches_the_pod(in_cluster):
 
 
 def test_every_mount_has_a_volume_and_every_volume_a_mount(in_cluster):
-    """An API server refuses a mount without a volume, and a volume without a mount is useless."""
+    """The API server rejects a mount without a volume, and a volume without a mount is a mistake."""
     spec = pod(in_cluster())
     mounted = {
         mount["name"]
@@ -272,7 +278,7 @@ def test_every_mount_has_a_volume_and_every_volume_a_mount(in_cluster):
 
 
 def test_seeds_of_replicas_differ(in_cluster):
-    """Replicas are the same training with different random numbers."""
+    """Replicas run the same training with different random numbers."""
     seeds = [
         yaml.safe_load(each.config_map["data"]["training.yaml"])["seed"]
         for each in in_cluster(seed=7, replicas=3).replicas.values()
@@ -285,7 +291,7 @@ LONG = "quadruped-blind-locomotion-rough-terrain-ppo-a"
 
 
 def claims_of(planned):
-    """Return the names of the claims of a plan, and check that its Jobs mount them."""
+    """Return the names of the claims in a plan, after a check that its Jobs mount them."""
     names = [each.claim["metadata"]["name"] for each in planned.replicas.values()]
     for name, each in zip(names, planned.replicas.values(), strict=True):
         volumes = each.job["spec"]["template"]["spec"]["volumes"]
@@ -294,9 +300,9 @@ def claims_of(planned):
 
 
 def test_no_name_of_a_claim_is_longer_than_a_label(valid_job):
-    """Provisioners copy it into labels and tags of 63 characters.
+    """Storage provisioners copy the name of a claim into labels and tags, which allow 63 characters.
 
-    With 46 characters for the job, the name had 85.
+    With 46 characters for the job's name, the name of the claim had 85.
     """
     names = claims_of(plan(valid_job(LONG, replicas=12), LAYOUT))
     others = claims_of(plan(valid_job(LONG, uid="1" * 36, replicas=12), LAYOUT))
@@ -307,7 +313,7 @@ def test_no_name_of_a_claim_is_longer_than_a_label(valid_job):
 
 
 def test_a_short_name_of_a_claim_has_the_whole_uid(valid_job):
-    """Existing deployments keep their names."""
+    """Claims of existing jobs have such names, which must not change."""
     job = valid_job("walk")
 
     assert claims_of(plan(job, LAYOUT)) == [f"walk-0-{job.metadata.uid}"]

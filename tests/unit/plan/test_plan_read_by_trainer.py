@@ -1,4 +1,4 @@
-"""The trainer reads the file that the plan writes; the two packages share no code for it."""
+"""The trainer reads the training.yaml that the plan writes; the packages share no code for it."""
 
 from pathlib import Path
 
@@ -17,7 +17,10 @@ LAYOUT = ClusterLayout(images=Images.of_release("1"))
 
 
 def read_back(job):
-    """Return the trainer's reading of the training.yaml of a job's first replica; it knows every field."""
+    """Return the trainer's reading of the training.yaml of a job's first replica.
+
+    The trainer must log no unknown field.
+    """
     planned = plan(identified(job, "uid"), LAYOUT).replicas[0]
     with capture_logs() as logs:
         read = parse(yaml.safe_load(planned.config_map["data"]["training.yaml"]))
@@ -27,7 +30,7 @@ def read_back(job):
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
 def test_the_training_yaml_of_every_example_is_read_by_the_trainer(example):
-    """If one side renamed a field, only a run would show it, minutes later."""
+    """If one side renamed a field, only a run in a cluster would fail, minutes later."""
     job = load(example.read_text())
 
     read = read_back(job)
@@ -40,7 +43,7 @@ def test_the_training_yaml_of_every_example_is_read_by_the_trainer(example):
 
 
 def test_no_evaluation_is_written_as_zero_and_read_as_zero(valid_job):
-    """If the section is absent, the trainer uses its own default, which evaluates."""
+    """If the section were absent, the trainer would evaluate at its own default interval."""
     job = valid_job(trainer={"evaluation": {"everySteps": 0}})
 
     read = read_back(job)
@@ -49,7 +52,7 @@ def test_no_evaluation_is_written_as_zero_and_read_as_zero(valid_job):
 
 
 def test_wrappers_and_stacked_frames_are_read_as_they_were_written(valid_job):
-    """Without them a policy would learn in another environment."""
+    """Without its wrappers a policy would train in another environment than the job describes."""
     wrapper = {"name": "a.b:Own", "options": {"size": 2}}
     job = valid_job(trainer={"environment": {"wrappers": [wrapper], "frameStack": 3}})
 
@@ -71,14 +74,14 @@ def test_wrappers_and_stacked_frames_are_read_as_they_were_written(valid_job):
     ],
 )
 def test_what_is_normalized_is_read_as_it_was_written(valid_job, written, read):
-    """Only the trainer has defaults for absent fields."""
+    """The plan leaves absent fields to the trainer, which alone has the defaults."""
     job = valid_job(trainer={"algorithm": {"name": "PPO"} | written})
 
     assert read_back(job).algorithm.normalize == read
 
 
 def test_an_initial_policy_is_read_as_it_was_written_and_absent_unless_set(valid_job):
-    """A trainer whose release does not know a field logs it."""
+    """A trainer of an older release logs each unknown field, so the plan leaves an unset field out."""
     initial = {"initialPolicy": {"claim": "policies", "path": "a/model.zip"}}
 
     assert read_back(valid_job(trainer=initial)).initial_policy == "/initial-policy/a/model.zip"
@@ -87,7 +90,7 @@ def test_an_initial_policy_is_read_as_it_was_written_and_absent_unless_set(valid
 
 @pytest.mark.parametrize("cnn", ["small", None])
 def test_the_network_for_images_is_read_as_it_was_written(valid_job, cnn):
-    """A field that a job leaves out is absent."""
+    """The plan leaves out the field if the job does not set it."""
     job = valid_job(trainer={"algorithm": {"name": "PPO"} | ({"cnn": cnn} if cnn else {})})
 
     assert read_back(job).algorithm.cnn == cnn
@@ -95,7 +98,10 @@ def test_the_network_for_images_is_read_as_it_was_written(valid_job, cnn):
 
 @pytest.mark.parametrize("callbacks", [None, [{"name": "mine:Bored", "options": {"patience": 3}}]])
 def test_callbacks_are_read_as_they_were_written(valid_job, callbacks):
-    """Their options are free objects. Their keys stay as written, unlike the fields of a TrainingJob."""
+    """The options of a callback are free-form.
+
+    Their keys stay as written, unlike the fields of a TrainingJob.
+    """
     job = valid_job(trainer={"algorithm": {"name": "PPO"} | ({"callbacks": callbacks} if callbacks else {})})
 
     read = read_back(job).algorithm.callbacks
@@ -104,7 +110,7 @@ def test_callbacks_are_read_as_they_were_written(valid_job, callbacks):
 
 
 def test_how_simulators_are_kept_going_is_read_as_it_was_written(valid_job):
-    """Memory is written in bytes, because a trainer compares it with the kernel's values."""
+    """The plan writes memory in bytes, because the trainer compares it with a number from the kernel."""
     group = {
         "name": "collect",
         "role": "Collect",
@@ -134,14 +140,17 @@ def test_how_simulators_are_kept_going_is_read_as_it_was_written(valid_job):
     ids=["stub", "mujoco", "webots", "command", "stored job"],
 )
 def test_simulators_that_do_not_age_are_recycled_only_if_the_job_says_so(valid_job, group, read):
-    """Restarts took a fifth of a training; only the simulator of the paper failed at the 25th reset."""
+    """Restarts took a fifth of a training's time.
+
+    Only the simulator of the paper failed at the 25th reset.
+    """
     job = valid_job(simulators=[COLLECT | group, EVALUATE])
 
     assert read_back(job).simulators[0].recycle == read
 
 
 def test_a_simulator_that_is_never_recycled_has_no_limit(valid_job):
-    """Zero resets mean never, in the job and in the file."""
+    """`afterResets: 0` means never, in the job and in the file."""
     read = read_back(valid_job(simulators=[COLLECT | {"recycle": {"afterResets": 0}}, EVALUATE]))
 
     assert read.simulators[0].recycle is None
@@ -159,12 +168,12 @@ def test_a_simulator_that_is_never_recycled_has_no_limit(valid_job):
     ],
 )
 def test_a_gpu_that_the_trainer_asks_for_is_what_it_trains_on(valid_job, resources, device):
-    """Otherwise the GPU would be reserved and paid for, but idle."""
+    """Without the device the GPU would be reserved and paid for, but idle."""
     assert read_back(valid_job(trainer={"resources": resources})).device == device
 
 
 def test_the_file_of_a_job_without_a_gpu_says_nothing_of_devices(valid_job):
-    """Its ConfigMap is named after its content, so what a job does not ask for is left out."""
+    """The ConfigMap is named after its content, so a new field in every file would change every name."""
     planned = plan(identified(valid_job(), "uid"), LAYOUT).replicas[0]
 
     assert "device" not in yaml.safe_load(planned.config_map["data"]["training.yaml"])

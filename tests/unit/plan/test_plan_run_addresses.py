@@ -1,4 +1,4 @@
-"""The addresses of a run on this machine, which the command line reads from its training.yaml."""
+"""The addresses of a local run, which the command line reads from the run's training.yaml."""
 
 import pytest
 import yaml
@@ -17,7 +17,7 @@ def written(on_laptop, valid_job):
 
 
 def test_the_addresses_are_those_that_the_plan_wrote(written):
-    """A view or a line of progress that asks another port would show another run, or none."""
+    """A viewer or a progress line that requests another port would show another run, or fail."""
     content = yaml.safe_load(written)
 
     addresses = RunAddresses.read(written.encode())
@@ -33,7 +33,7 @@ def test_the_addresses_are_those_that_the_plan_wrote(written):
 
 
 def test_the_trainers_copy_has_the_same_addresses(written):
-    """The trainer writes its configuration into the run directory again, with its defaults."""
+    """The trainer writes a copy of its configuration, with all defaults, into the run directory."""
     copy = dump(parse(yaml.safe_load(written)))
 
     assert RunAddresses.read(copy.encode()) == RunAddresses.read(written.encode())
@@ -51,6 +51,6 @@ def test_the_trainers_copy_has_the_same_addresses(written):
     ],
 )
 def test_a_file_without_addresses_is_refused_with_the_missing_field(text, mistake):
-    """A run that was killed while it started may leave half a file."""
+    """A run that was killed while it started may leave a truncated file."""
     with pytest.raises(ProtocolError, match=mistake):
         RunAddresses.read(text)

@@ -1,4 +1,4 @@
-"""The worlds of a replica are checked once, stored once per group, and named only by the sidecars."""
+"""The worlds of a replica are checked once and stored once per group; only sidecars put in the ROS names."""
 
 import sys
 from itertools import chain
@@ -17,7 +17,7 @@ ARENA = builtin("arena").decode()
 
 
 def group(name="collect", role="Collect", **fields):
-    """Return a group of simulators."""
+    """Return a group of simulators as a job's spec has it."""
     return {"name": name, "role": role, **fields}
 
 
@@ -25,7 +25,7 @@ EVALUATE = group("evaluate", "Evaluate")
 
 
 def data(planned, replica=0):
-    """Return the content of a replica's ConfigMap."""
+    """Return the data of a replica's ConfigMap."""
     return planned.replicas[replica].config_map["data"]
 
 
@@ -59,7 +59,7 @@ def named(planned, replica=0):
 
 
 def calls_of(function, work):
-    """Return the number of calls of a function during `work`."""
+    """Return how often `work()` calls a function."""
     calls = []
 
     def note(frame, event, _):
@@ -75,7 +75,7 @@ def calls_of(function, work):
 
 
 def test_every_simulator_of_every_replica_has_ros_names_of_its_own(in_cluster):
-    """Without Palaestra, a ROS master can serve only one simulator."""
+    """Two simulators with equal ROS names would unregister each other from their ROS master."""
     planned = in_cluster(replicas=2, simulators=[group(count=3), EVALUATE])
     worlds = chain(*(named(planned, replica).values() for replica in range(2)))
     names = [robot.ros_name for world in worlds for robot in robots(world.encode())]
@@ -84,7 +84,7 @@ def test_every_simulator_of_every_replica_has_ros_names_of_its_own(in_cluster):
 
 
 def test_a_world_is_shipped_once_a_group_as_it_was_written(in_cluster):
-    """Seventeen named copies would be seventeen times the bytes, in etcd and on the network."""
+    """Seventeen copies with names would take seventeen times the bytes, in etcd and on the network."""
     world = {"inline": ARENA}
     planned = in_cluster(simulators=[group(count=16, world=world), group("evaluate", "Evaluate")])
 
@@ -93,7 +93,7 @@ def test_a_world_is_shipped_once_a_group_as_it_was_written(in_cluster):
 
 
 def test_a_world_is_parsed_once_for_all_simulators_of_all_replicas(valid_job):
-    """With parsing for each simulator, thirty replicas of seventeen took fifteen seconds per reconcile."""
+    """With one parse per simulator, thirty replicas of seventeen took fifteen seconds per reconcile."""
     world = {"inline": ARENA}
     job = valid_job(replicas=3, simulators=[group(count=4, world=world), EVALUATE | {"world": world}])
 
@@ -101,7 +101,7 @@ def test_a_world_is_parsed_once_for_all_simulators_of_all_replicas(valid_job):
 
 
 def test_a_world_that_ships_is_not_parsed(valid_job):
-    """It passes every check in this project's own tests.
+    """Tests of this project check the built-in worlds, so the plan need not parse them.
 
     Parsing takes most of the time of planning a small job.
     """
@@ -109,7 +109,7 @@ def test_a_world_that_ships_is_not_parsed(valid_job):
 
 
 def test_only_the_replicas_that_are_asked_for_are_planned(valid_job):
-    """A job with hundred replicas, of which one lacks an object, is planned for that one."""
+    """If one of a hundred replicas lacks an object, the operator plans only that replica."""
     planned = plan(valid_job(replicas=3), LAYOUT, replicas=[1])
 
     assert planned.replicas.keys() == {1}
@@ -117,7 +117,7 @@ def test_only_the_replicas_that_are_asked_for_are_planned(valid_job):
 
 
 def test_the_trainer_and_the_sidecar_get_the_same_world(in_cluster):
-    """training.yaml has the path of the world that the simulator runs."""
+    """The trainer reads the world's path from training.yaml; the sidecar gets the path as an option."""
     planned = in_cluster()
     told = [each["world"] for each in training(planned)["simulators"]]
 
@@ -127,7 +127,7 @@ def test_the_trainer_and_the_sidecar_get_the_same_world(in_cluster):
 
 
 def test_a_file_is_left_to_the_sidecar(in_cluster):
-    """The file is in the image, together with the files that it refers to."""
+    """The file is in the simulator's image, together with the files to which it refers."""
     planned = in_cluster(simulators=[group(world={"file": "/worlds/my.wbt"}), EVALUATE])
 
     assert "collect.wbt" not in data(planned)
@@ -135,7 +135,7 @@ def test_a_file_is_left_to_the_sidecar(in_cluster):
 
 
 def test_a_config_map_is_given_by_who_can_read_it(valid_job):
-    """The plan is pure, so the caller reads the cluster."""
+    """The plan is pure and reads nothing from the cluster, so its caller passes the content."""
     source = {"configMap": {"name": "worlds", "key": "a.wbt"}}
     job = valid_job(simulators=[group(world=source), EVALUATE])
 
@@ -147,7 +147,7 @@ def test_a_config_map_is_given_by_who_can_read_it(valid_job):
 
 
 def test_the_error_for_a_broken_world_has_field_line_and_column(in_cluster):
-    """A person sees the world's text in the job and must find the position."""
+    """The author of a job must find the position in the world's text."""
     broken = ARENA.replace("basicTimeStep 32", "basicTimeStep {")
 
     with pytest.raises(WorldError, match=r"^spec\.simulators\[0\]\.world\.inline:\d+:\d+: .*;"):
@@ -155,7 +155,7 @@ def test_the_error_for_a_broken_world_has_field_line_and_column(in_cluster):
 
 
 def test_a_world_that_no_sidecar_could_name_is_refused_before_anything_is_created(in_cluster):
-    """A refusal is visible at once; that a simulator cannot start may be visible only hours later."""
+    """A person sees a rejection at once, but a simulator that cannot start perhaps hours later."""
     twice = '#VRML_SIM R2023b utf8\nRobot { controller "ros" }\nRobot { controller "ros" }\n'
 
     with pytest.raises(WorldError, match=r'^spec\.simulators\[1\]\.world\.inline:3:1: .* called "robot"'):
@@ -163,7 +163,7 @@ def test_a_world_that_no_sidecar_could_name_is_refused_before_anything_is_create
 
 
 def test_worlds_that_fit_nowhere_are_refused(valid_job):
-    """The message has the remedy."""
+    """A ConfigMap has a size limit; the message names the images as the place for larger worlds."""
     source = {"configMap": {"name": "worlds", "key": "a.wbt"}}
     huge = ARENA.encode() + b"# " + b"x" * MOST_BYTES
     job = valid_job(simulators=[group(world=source), EVALUATE])
@@ -173,7 +173,7 @@ def test_worlds_that_fit_nowhere_are_refused(valid_job):
 
 
 def test_what_is_switched_off_is_absent(in_cluster):
-    """Zero resets mean never, and the trainer reads an absent field as never."""
+    """`afterResets: 0` means never, and the trainer reads an absent field as never."""
     planned = in_cluster(simulators=[group(recycle={"afterResets": 0}), EVALUATE])
 
     assert "recycle" not in training(planned)["simulators"][0]
@@ -184,7 +184,7 @@ MODEL = '<mujoco model="arm"><actuator><motor joint="x"/></actuator></mujoco>'
 
 
 def test_a_model_of_mujoco_is_a_file_that_ends_with_xml(in_cluster):
-    """Its sidecar writes the name into it, as into a world of Webots."""
+    """A sidecar writes the ROS names into a model of MuJoCo, as into a world of Webots."""
     planned = in_cluster(simulators=[group(driver="mujoco", world={"inline": MODEL}), EVALUATE])
 
     assert data(planned)["collect.xml"] == MODEL
@@ -194,7 +194,7 @@ def test_a_model_of_mujoco_is_a_file_that_ends_with_xml(in_cluster):
 
 @pytest.mark.parametrize("world", [{"inline": MODEL}, {"file": "/robots/arm.xml"}])
 def test_a_model_of_mujoco_needs_a_driver_that_reads_it(in_cluster, world):
-    """The stub would refuse it at each start."""
+    """The stub would reject the model at each of its starts."""
     with pytest.raises(
         PlanError, match=r"spec\.simulators\[0\]\.driver: stub reads no MJCF.*set driver mujoco"
     ):

@@ -1,4 +1,4 @@
-"""YAML that is written is read back unchanged: texts of a job's author stay texts."""
+"""A text in YAML is read back unchanged, so the texts of a job's author stay texts."""
 
 import re
 
@@ -17,7 +17,7 @@ WORDS = st.sampled_from(
 
 @given(st.lists(WORDS | st.text(max_size=3), max_size=8).map("".join))
 def test_a_text_is_read_back_as_it_was(text):
-    """The text may be a key, and contain any character that YAML takes for a line break."""
+    """A text may be a key, and may contain any character that YAML treats as a line break."""
     document = {"text": text, text: [text]}
 
     assert yaml.safe_load(as_yaml([document])) == document
@@ -25,14 +25,14 @@ def test_a_text_is_read_back_as_it_was(text):
 
 @pytest.mark.parametrize("end", BREAKS)
 def test_no_end_of_a_line_ends_the_text(end):
-    """Otherwise the rest of the text would become a separate field."""
+    """After a line break the rest of the text would become another field of the plan."""
     document = {"options": [f"a{end}simulators: []"]}
 
     assert yaml.safe_load(as_yaml([document])) == document
 
 
 def expanded(text):
-    """Return a text as a kubelet expands it.
+    """Return a text after a kubelet's expansion of variables.
 
     Source: k8s.io/kubernetes/third_party/forked/golang/expansion.
     """
@@ -41,5 +41,5 @@ def expanded(text):
 
 @given(st.text(alphabet="$()aB_ ", max_size=12))
 def test_a_text_comes_through_a_kubelet_as_it_is(text):
-    """Otherwise the kubelet would replace variables in it."""
+    """A kubelet would replace `$(NAME)` in the text by the value of a variable."""
     assert expanded(literal(text)) == text

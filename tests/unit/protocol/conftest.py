@@ -136,7 +136,7 @@ def bent(draw, shape):
 
 @pytest.fixture(scope="session")
 def messages():
-    """Return strategies for messages: valid ones, damaged ones, and any JSON."""
+    """Return strategies for messages: valid messages, damaged messages, and any JSON."""
 
     class Messages:
         right = staticmethod(SHAPES.__getitem__)
@@ -148,7 +148,7 @@ def messages():
 
 @pytest.fixture
 def state():
-    """Return a function that makes the state of a simulator; the test sets the fields that matter."""
+    """Return a builder of a simulator's state; its keywords are the fields that differ from the default."""
 
     def make(**changes):
         plain = {"state": SidecarState.IDLE, "driver": "stub", "world": "/worlds/collect-0.wbt"}
@@ -159,7 +159,7 @@ def state():
 
 @pytest.fixture
 def status():
-    """Return a function that makes the status of a trainer; the test sets the fields that matter."""
+    """Return a builder of a trainer's status; its keywords are the fields that differ from the default."""
 
     def make(**changes):
         return TrainerStatus(**{"step": 0, "target": 1, "episodes": 0, "phase": "training"} | changes)

@@ -1,4 +1,4 @@
-"""A message with a field that 0.1.0 does not have."""
+"""Messages with a field that release 0.1.0 does not have."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -26,12 +26,12 @@ class Later(JsonMessage):
 
 
 def test_an_added_field_is_absent_unless_it_is_set() -> None:
-    """A record that uses nothing new has the fields of the first release."""
+    """A message that uses no new field looks like a message of the first release."""
     assert Later(step=7).to_json() == First(step=7).to_json() == {"step": 7}
 
 
 def test_an_added_field_that_is_set_is_written_within_its_bounds_and_read_back() -> None:
-    """It has the same kinds as any other field."""
+    """A text that is too long is cut on writing, as for any other field."""
     content = Later(step=7, loss=0.5, note="too long").to_json()
 
     assert content == {"step": 7, "loss": 0.5, "note": "too l"}
@@ -39,12 +39,12 @@ def test_an_added_field_that_is_set_is_written_within_its_bounds_and_read_back()
 
 
 def test_both_releases_read_each_other() -> None:
-    """Images of one job may be of different releases."""
+    """The images of one job may be of different releases."""
     assert First.from_json(Later(step=7, loss=0.5).to_json()) == First(step=7)
     assert Later.from_json(First(step=7).to_json()) == Later(step=7)
 
 
 def test_an_added_field_with_a_wrong_value_is_refused() -> None:
-    """It may be absent, but not wrong."""
+    """The field may be absent, but a wrong value is an error, as for any other field."""
     with pytest.raises(ProtocolError, match=r"^loss: is not within 0 to inf$"):
         Later.from_json({"step": 7, "loss": -1})

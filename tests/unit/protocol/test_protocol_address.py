@@ -7,7 +7,7 @@ from palaestra_protocol.http import Address
 
 @pytest.mark.parametrize("text", ["127.0.0.1:7100", "0.0.0.0:0", "[::1]:65535"])
 def test_an_address_is_written_as_it_is_read(text) -> None:
-    """Programs parse the first line that a sidecar prints."""
+    """A program that starts a sidecar parses the address in the sidecar's first line of output."""
     assert str(Address.parse(text)) == text
 
 
@@ -15,6 +15,6 @@ def test_an_address_is_written_as_it_is_read(text) -> None:
     "text", ["", "7100", ":7100", "localhost:1", "127.0.0.1:65536", "127.0.0.1:x", "::1"]
 )
 def test_what_is_no_address_with_a_port_is_refused(text) -> None:
-    """A name could resolve to another machine tomorrow, so names are refused."""
+    """A host name is rejected, because tomorrow it could resolve to another machine."""
     with pytest.raises(ValueError, match=r"is not an address such as 127\.0\.0\.1:7100$"):
         Address.parse(text)

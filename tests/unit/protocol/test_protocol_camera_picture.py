@@ -1,4 +1,4 @@
-"""A camera's picture as data: a reader returns the written picture, and refuses one without bounds."""
+"""A camera's picture as data: a reader returns the written picture, and rejects an unbounded one."""
 
 import base64
 import json
@@ -14,12 +14,12 @@ PICTURE = CameraPicture(name="eye", width=2, height=1, pixels=b"\x00\x01\x02\xff
 
 
 def test_what_is_written_is_read_back():
-    """The page shows the colors that the robot sees."""
+    """The web page must show the colors that the robot's camera sees."""
     assert CameraPicture.from_json(json.loads(json.dumps(PICTURE.to_json()))) == PICTURE
 
 
 def test_the_largest_picture_fits_into_a_response():
-    """Noise cannot be compressed."""
+    """The largest message is a picture of noise, which cannot be compressed."""
     noise = os.urandom(3 * MOST_SIDE * MOST_SIDE)
     picture = CameraPicture(name="eye" * 40, width=MOST_SIDE, height=MOST_SIDE, pixels=noise)
 
@@ -37,6 +37,6 @@ def test_the_largest_picture_fits_into_a_response():
     ],
 )
 def test_a_picture_of_another_size_is_refused(changes, problem):
-    """A pod may send anything, also a few bytes that become many."""
+    """A pod may send a size that does not match its bytes, or a few bytes that decompress into very many."""
     with pytest.raises(ProtocolError, match=problem):
         CameraPicture.from_json(PICTURE.to_json() | changes)

@@ -28,12 +28,12 @@ DEADLINE_S = 0.5
 
 
 def echo(body):
-    """Return the request's body."""
+    """Return the body of the request as the response."""
     return Response(status=HTTPStatus.OK, body=body, content_type="text/plain")
 
 
 def fails(_):
-    """Raise an error that only a bug in a route raises."""
+    """Raise an error, as a route with a bug would."""
     raise RuntimeError("no such attribute")
 
 
@@ -57,7 +57,7 @@ def peered(host, server):
 @pytest.mark.parametrize("host", ["0.0.0.0", "::"])
 @pytest.mark.parametrize("peer", ["127.0.0.1", "::1"])
 def test_every_address_is_one_of_ipv6_and_of_ipv4(host, peer):
-    """In a cluster with IPv6 only, a kubelet sent its probes to [podIP]:8080 and got no response."""
+    """In a cluster with IPv6 only, a kubelet probed `[podIP]:8080`, and the server listened on IPv4 only."""
     with Server(Address(host, 0), ROUTES, name="test") as listening, peered(peer, listening) as connection:
         connection.sendall(b"GET /healthz HTTP/1.0\r\n\r\n")
         answer = connection.makefile("rb").read()
@@ -66,7 +66,7 @@ def test_every_address_is_one_of_ipv6_and_of_ipv4(host, peer):
 
 
 def test_a_node_without_ipv6_listens_on_ipv4(monkeypatch):
-    """`ipv6.disable=1` leaves no socket of that family."""
+    """With the kernel option `ipv6.disable=1`, no IPv6 socket can be created."""
     monkeypatch.setattr(socket, "has_dualstack_ipv6", lambda: False)
 
     with Server(EVERY, ROUTES, name="test") as listening:
@@ -75,7 +75,7 @@ def test_a_node_without_ipv6_listens_on_ipv4(monkeypatch):
 
 @pytest.fixture
 def server():
-    """A server with the default limits."""
+    """Yield a server with the default limits."""
     with Server(LOOPBACK, ROUTES, name="palaestra-test") as server:
         yield server
 
@@ -86,7 +86,7 @@ def connect(server):
 
 
 def ask(server, request):
-    """Return status, head and body of the response to any bytes, or None if the connection was closed."""
+    """Return the status, head and body of the response, or None if the server closed the connection."""
     with connect(server) as connection:
         try:
             connection.sendall(request)
@@ -100,7 +100,7 @@ def ask(server, request):
 
 
 def is_closed(connection, piece):
-    """Send one more piece, and return whether the server has closed the connection."""
+    """Send another piece of a request, and return whether the server has closed the connection."""
     try:
         connection.sendall(piece)
         return connection.recv(1) == b""
@@ -121,7 +121,7 @@ def is_closed(connection, piece):
     ],
 )
 def test_a_route_answers(server, request_, status, content_type, body) -> None:
-    """The head has the length of the body, and the kind of program that serves it."""
+    """The head of the response has the length of the body and the name of the server."""
     answered, head, text = ask(server, request_)
 
     assert (answered, text) == (status, body)
@@ -163,7 +163,7 @@ def test_a_route_answers(server, request_, status, content_type, body) -> None:
     ],
 )
 def test_a_refusal_names_field_and_fact(server, request_, status, error) -> None:
-    """Programs read the status, people the sentence."""
+    """A program reads the status of the error response, and a person reads its sentence."""
     answered, _, body = ask(server, request_)
 
     assert (answered, json.loads(body)) == (status, {"error": error})
@@ -179,7 +179,7 @@ def test_a_refusal_names_field_and_fact(server, request_, status, error) -> None
     ],
 )
 def test_other_methods_and_heads_that_are_too_long_are_refused(server, request_, status) -> None:
-    """The class http.server refuses them itself."""
+    """The base class in http.server sends these error responses itself."""
     with connect(server) as connection:
         connection.sendall(request_)
         assert connection.makefile("rb").readline().split()[1] == str(status).encode()
@@ -187,7 +187,7 @@ def test_other_methods_and_heads_that_are_too_long_are_refused(server, request_,
 
 @pytest.mark.parametrize("piece", [b"", b"x"], ids=["silent", "slow"])
 def test_a_request_that_is_not_complete_at_its_deadline_is_closed_unanswered(piece) -> None:
-    """A client must not hold a slot by sending a byte now and then."""
+    """A client that sends a byte now and then must not occupy a connection for ever."""
     short = Server(LOOPBACK, ROUTES, name="palaestra-test", deadline_s=DEADLINE_S)
     with short as server, connect(server) as connection:
         begin = time.monotonic()
@@ -199,7 +199,7 @@ def test_a_request_that_is_not_complete_at_its_deadline_is_closed_unanswered(pie
 
 
 def test_a_head_without_end_is_closed_unanswered(server) -> None:
-    """The length of a line, the number of lines and their total are limited."""
+    """The server limits the length of a line, the number of lines, and the size of the whole head."""
     lines = b"".join(b"X-%d: %s\r\n" % (number, b"x" * 50_000) for number in range(10))
     assert len(lines) > MOST_REQUEST_BYTES
 
@@ -211,7 +211,7 @@ REQUEST = b"GET /healthz HTTP/1.1\r\n\r\n"
 
 @contextlib.contextmanager
 def half_open(server, count, host="127.0.0.1"):
-    """Hold open some connections of one client that begin a request and never end it."""
+    """Yield connections of one client, each with a request that has begun and does not end."""
     with contextlib.ExitStack() as stack:
         kept = [
             stack.enter_context(socket.create_connection(server.address, source_address=(host, 0)))
@@ -226,7 +226,10 @@ def half_open(server, count, host="127.0.0.1"):
 
 
 def test_a_probe_is_answered_while_others_keep_half_open_connections() -> None:
-    """Forty such connections starved every probe. A kubelet restarts a container that does not respond."""
+    """Half-open connections of a few clients once blocked every probe.
+
+    A kubelet restarts a container that fails its probes.
+    """
     with Server(LOOPBACK, ROUTES, name="palaestra-test", deadline_s=60.0) as server:
         for host in ("127.0.0.1", "127.0.0.2", "127.0.0.3"):
             with half_open(server, 2 * MOST_OF_PEER, host):
@@ -234,9 +237,9 @@ def test_a_probe_is_answered_while_others_keep_half_open_connections() -> None:
 
 
 def test_a_peer_with_many_connections_takes_no_place_of_another() -> None:
-    """Its own oldest connection is closed.
+    """The server closes the oldest connection of the same client.
 
-    The other client's request gets its response when it is complete.
+    A request of another client still gets its response.
     """
     with (
         Server(LOOPBACK, ROUTES, name="palaestra-test", deadline_s=60.0) as server,
@@ -251,7 +254,10 @@ def test_a_peer_with_many_connections_takes_no_place_of_another() -> None:
 
 
 def test_a_connection_whose_request_is_answered_keeps_its_place() -> None:
-    """A response may take long; if all slots are busy, a new connection of the same client is closed."""
+    """A response may take long.
+
+    If responses are pending on all connections of a client, the server closes a new one of that client.
+    """
     begun, going_on = threading.Semaphore(0), threading.Event()
 
     def answer(_):
@@ -275,7 +281,7 @@ def test_a_connection_whose_request_is_answered_keeps_its_place() -> None:
 
 
 def test_an_error_of_a_route_is_logged_and_the_server_goes_on(server, caplog) -> None:
-    """A client that disconnects is not an error."""
+    """The log has the error, and the next request succeeds. A client that disconnects is not an error."""
     with caplog.at_level(logging.ERROR):
         assert ask(server, b"GET /wrong HTTP/1.1\r\n\r\n") is None
         assert ask(server, b"GET /healthz HTTP/1.1\r\n\r\n")[0] == 200
@@ -285,7 +291,7 @@ def test_an_error_of_a_route_is_logged_and_the_server_goes_on(server, caplog) ->
 
 
 def test_a_closed_server_frees_its_address() -> None:
-    """This holds also for a server that was never started."""
+    """The address is free again after `close`, also if the server was never started."""
     server = Server(LOOPBACK, ROUTES, name="palaestra-test")
     address = server.address
     with pytest.raises(OSError, match="Address already in use"):

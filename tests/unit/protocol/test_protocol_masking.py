@@ -1,4 +1,4 @@
-"""Passwords in addresses never leave a process."""
+"""Passwords in addresses are masked in every text that leaves a process."""
 
 import json
 
@@ -27,18 +27,18 @@ SECRET = "S3CR"
     ],
 )
 def test_the_user_information_of_each_address_is_masked(text, wanted):
-    """The rest of the address shows which host was requested."""
+    """The host of the address stays visible, so a person sees which server was requested."""
     assert masked(text) == wanted
 
 
 @given(st.text(st.characters(exclude_characters="/?#@ ", exclude_categories=["Z", "C"]), min_size=1))
 def test_no_password_is_left_whatever_it_is_made_of(password):
-    """RFC 3986 ends user information at the last @ before a slash, a question mark or a number sign."""
+    """By RFC 3986, user information ends at the last @ before a slash, a question mark or a number sign."""
     assert masked(f"ftp://user:{password}@host/x") == "ftp://***@host/x"
 
 
 def test_no_text_that_leaves_a_trainer_has_it(capsys):
-    """Its log, its last lines and its termination message with faults are all masked."""
+    """The trainer's log, its last lines, and its termination message with the faults are masked."""
     before = structlog.get_config()
     try:
         logs.configure_logs()
@@ -56,5 +56,5 @@ def test_no_text_that_leaves_a_trainer_has_it(capsys):
 
 @pytest.mark.parametrize("shorten", [lambda text: one_line(text, 200), printable, clipped])
 def test_no_text_that_a_command_prints_or_a_status_keeps_has_it(shorten):
-    """A password may come from a program of the user."""
+    """The text of an error may come from a user's program and contain a password."""
     assert shorten(ADDRESS) == masked(ADDRESS)

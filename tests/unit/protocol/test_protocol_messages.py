@@ -1,4 +1,4 @@
-"""The messages between trainer, sidecar and operator, and the messages that they refuse."""
+"""The messages between trainer, sidecar and operator: writing, reading, and rejection of wrong messages."""
 
 import contextlib
 import json
@@ -37,7 +37,7 @@ SHAPES = [SimulatorState, TrainerStatus, Termination]
 @given(data=st.data())
 @settings(max_examples=50)
 def test_what_is_written_is_read_back(messages, shape, data) -> None:
-    """Both ends are Palaestra's, and a message is JSON text between them."""
+    """The sender writes a message as JSON text, and the receiver reads an equal message."""
     message = data.draw(messages.right(shape))
 
     assert shape.from_json(json.loads(json.dumps(message.to_json()))) == message
@@ -47,7 +47,7 @@ def test_what_is_written_is_read_back(messages, shape, data) -> None:
 @given(data=st.data())
 @settings(max_examples=100)
 def test_no_json_at_all_breaks_a_reader(messages, shape, data) -> None:
-    """A pod may send anything, and a reader may raise only one kind of error."""
+    """A pod may send any JSON; a reader must raise no other error than `ProtocolError`."""
     content = data.draw(messages.anything)
 
     with contextlib.suppress(ProtocolError):
@@ -58,7 +58,10 @@ def test_no_json_at_all_breaks_a_reader(messages, shape, data) -> None:
 @given(data=st.data())
 @settings(max_examples=100)
 def test_one_wrong_field_breaks_no_reader(messages, shape, data) -> None:
-    """An almost valid message is harder than a random one, because it gets to the last check."""
+    """A message with a single wrong field passes most checks.
+
+    So it finds errors that random JSON does not.
+    """
     content = data.draw(messages.bent(shape))
 
     try:
@@ -70,7 +73,7 @@ def test_one_wrong_field_breaks_no_reader(messages, shape, data) -> None:
 
 @given(data=st.binary(max_size=200))
 def test_no_bytes_break_the_decoder(data) -> None:
-    """The bytes come from a socket and may be anything."""
+    """The bytes come from a socket, so they may be anything."""
     with contextlib.suppress(ProtocolError):
         decoded(data)
 
@@ -100,7 +103,7 @@ def test_no_bytes_break_the_decoder(data) -> None:
     ],
 )
 def test_a_refusal_names_the_field_and_the_fact(state, changes, message) -> None:
-    """The reader of the message has the program that sent it, not this one."""
+    """The person who reads the error can look at the program that sent the message, not at this reader."""
     with pytest.raises(ProtocolError) as refusal:
         SimulatorState.from_json(state().to_json() | changes)
 
@@ -109,7 +112,7 @@ def test_a_refusal_names_the_field_and_the_fact(state, changes, message) -> None
 
 @pytest.mark.parametrize("field", ["state", "driver", "world", "robots", "starts", "faults", "detail"])
 def test_a_missing_field_is_named(state, field) -> None:
-    """A default would hide a broken sidecar."""
+    """If a missing field got a default value, nobody would notice a broken sidecar."""
     content = state().to_json()
     del content[field]
 
@@ -118,7 +121,7 @@ def test_a_missing_field_is_named(state, field) -> None:
 
 
 def test_a_sidecar_of_an_older_release_tells_no_memory(state) -> None:
-    """No simulator is recycled for an unknown memory."""
+    """`rss_bytes` is then None, and the trainer recycles no simulator because of its memory."""
     content = state(rss_bytes=7).to_json()
     del content["rss_bytes"]
 
@@ -126,44 +129,44 @@ def test_a_sidecar_of_an_older_release_tells_no_memory(state) -> None:
 
 
 def test_a_field_that_a_newer_release_added_is_ignored_in_an_answer(state) -> None:
-    """Images of one job may be of different releases."""
+    """The images of one job may be of different releases."""
     content = state().to_json() | {"color": "green"}
 
     assert SimulatorState.from_json(content) == state()
 
 
 def test_a_field_that_does_not_belong_is_refused_in_a_request() -> None:
-    """A misspelled deadline must not become a missing deadline."""
+    """A misspelled deadline would otherwise be ignored, and the default deadline would apply."""
     with pytest.raises(ProtocolError, match=r"^deadline: is not a field of this request$"):
         StopRequest.from_json({"deadline": 5})
 
 
 @pytest.mark.parametrize("deadline_s", [-0.1, 3600.1, math.nan, math.inf, 10**400, "5", None, True])
 def test_a_deadline_is_a_number_of_seconds_within_an_hour(deadline_s) -> None:
-    """A wait must end, and NaN is not a time."""
+    """A wait must end, and NaN is not a duration."""
     with pytest.raises(ProtocolError, match=r"^deadline_s: "):
         StopRequest.from_json({"deadline_s": deadline_s})
 
 
 def test_a_deadline_may_be_now() -> None:
-    """This ends a simulator that hangs."""
+    """A deadline of 0 kills a simulator that hangs at once."""
     assert StopRequest.from_json({"deadline_s": 0}).to_json() == {"deadline_s": 0.0}
 
 
 def test_an_answer_that_is_too_long_is_not_even_read() -> None:
-    """To parse JSON takes many times its size in memory."""
+    """JSON takes many times its size in memory when it is parsed."""
     with pytest.raises(ProtocolError, match=r"^body: 524289 bytes are more than 524288$"):
         decoded(b" " * (MOST_BYTES + 1))
 
 
 def test_nesting_without_end_is_refused_as_any_other_nonsense() -> None:
-    """A parser whose stack overflows raises no ValueError."""
+    """A JSON parser whose stack overflows raises RecursionError, which is not a ValueError."""
     with pytest.raises(ProtocolError, match=r"^body: is not JSON \(RecursionError\)$"):
         decoded(b"[" * 100_000)
 
 
 def test_the_longest_messages_fit_in_an_answer(state, status) -> None:
-    """Otherwise a sidecar with many robots, or a trainer with many faults, could report nothing."""
+    """A sidecar with many robots, or a trainer with many faults, must still be able to report its state."""
     robot = RobotName(robot="\U0001f916" * 300, ros_name="\U0001f916" * 300, supervisor=True)
     fault = SimulatorStatus(
         name="\U0001f916" * 300, role="Collect", state="ready", last_fault="\U0001f916" * 600
@@ -183,7 +186,7 @@ def test_the_longest_messages_fit_in_an_answer(state, status) -> None:
 
 
 def test_a_text_that_is_too_long_is_cut_by_its_writer(state) -> None:
-    """A long error must not make the whole state unreadable."""
+    """One long error text must not make the whole state unreadable."""
     read = SimulatorState.from_json(state(detail="x" * 501 + "\ud800").to_json())
 
     assert read.detail == "x" * 500
@@ -191,7 +194,7 @@ def test_a_text_that_is_too_long_is_cut_by_its_writer(state) -> None:
 
 @pytest.mark.parametrize(("lines", "read"), [(16, "line 15"), (17, "and 2 more")])
 def test_lines_that_do_not_fit_are_counted(state, status, lines, read) -> None:
-    """A list that is cut without a note would pass for the whole list."""
+    """Without the count of omitted lines, a reader would take the shortened list for the whole list."""
     left_out = tuple(f"line {number}" for number in range(lines))
 
     for message in (state(left_out=left_out), status(left_out=left_out)):
@@ -200,7 +203,7 @@ def test_lines_that_do_not_fit_are_counted(state, status, lines, read) -> None:
 
 
 def test_a_number_that_json_cannot_say_is_not_known(status) -> None:
-    """The mean of diverged returns is NaN, which JSON cannot represent."""
+    """The mean return of a diverged training is NaN, which JSON cannot represent, so the reader gets None."""
     read = TrainerStatus.from_json(status(mean_return=math.nan, steps_per_second=math.inf).to_json())
 
     assert (read.mean_return, read.steps_per_second) == (None, None)
@@ -208,13 +211,13 @@ def test_a_number_that_json_cannot_say_is_not_known(status) -> None:
 
 @pytest.mark.parametrize("share", [-0.01, 1.01])
 def test_a_success_rate_is_a_share(status, share) -> None:
-    """A value in percent would pass for a very good policy."""
+    """A reader would take a rate in percent for the rate of a very good policy."""
     with pytest.raises(ProtocolError, match=r"^success_rate: is not within 0 to 1$"):
         TrainerStatus.from_json(status(success_rate=share).to_json())
 
 
 def test_an_interval_travels_with_its_rate(status) -> None:
-    """Both /status and the last word have it."""
+    """Both /status and the termination message contain the interval of the success rate."""
     interval = SuccessInterval(low=0.25, high=0.75, episodes=20)
     word = Termination(step=1, reason="done", success_interval=interval)
 
@@ -231,7 +234,7 @@ def test_an_interval_travels_with_its_rate(status) -> None:
     ],
 )
 def test_bounds_of_a_success_rate_are_shares(status, changes, mistake) -> None:
-    """The bounds are copied into a TrainingJob's status, whose schema allows only shares."""
+    """The operator copies the bounds into a TrainingJob's status, whose schema allows 0 to 1."""
     content = status(success_interval=SuccessInterval(low=0.1, high=0.2, episodes=5)).to_json()
     content["success_interval"] |= changes
 
@@ -241,7 +244,7 @@ def test_bounds_of_a_success_rate_are_shares(status, changes, mistake) -> None:
 
 @pytest.mark.parametrize("time", ["yesterday", "2025-02-30T00:00:00Z", "2025-01-31", "2025-01-31T12:00:00"])
 def test_a_time_is_one_that_kubernetes_takes(status, time) -> None:
-    """It is copied into a TrainingJob's status, whose schema says date-time."""
+    """The operator copies the time into a TrainingJob's status, whose schema requires a date-time."""
     content = status(last_progress=time).to_json()
 
     with pytest.raises(ProtocolError, match=r"^last_progress: is not a time such as 2025-01-31T12:00:00Z$"):
@@ -250,7 +253,7 @@ def test_a_time_is_one_that_kubernetes_takes(status, time) -> None:
 
 @pytest.mark.parametrize("age_s", [-0.1, math.nan, math.inf, 10**400, "5", True])
 def test_an_age_is_a_number_of_seconds(status, age_s) -> None:
-    """Stalls are detected with it, so a negative or an infinite age is refused."""
+    """The operator detects stalls by this age, so a negative or an infinite age is rejected."""
     content = status().to_json() | {"last_progress_age_s": age_s}
 
     with pytest.raises(ProtocolError, match=r"^last_progress_age_s: "):
@@ -258,7 +261,7 @@ def test_an_age_is_a_number_of_seconds(status, age_s) -> None:
 
 
 def test_a_nested_mistake_says_where_it_is(status) -> None:
-    """The list may have sixteen simulators."""
+    """The message names the index of the simulator, because the list may have sixteen."""
     good = SimulatorStatus(name="collect-0", role="Collect", state="ready")
     bad = SimulatorStatus(name="collect-1", role="Eval", state="ready")
 
@@ -268,7 +271,7 @@ def test_a_nested_mistake_says_where_it_is(status) -> None:
 
 @given(reason=st.text(max_size=3000))
 def test_the_last_word_fits_in_a_termination_message(reason) -> None:
-    """Kubernetes cuts it at 4096 bytes, and half of a JSON text cannot be parsed."""
+    """Kubernetes truncates the message at 4096 bytes, and a truncated JSON text cannot be parsed."""
     checkpoint = CheckpointStatus(step=2**53, time="2025-01-31T12:00:00.123456789+00:00")
     word = Termination(step=2**53, reason=reason, success_rate=1 / 3, last_checkpoint=checkpoint)
 
@@ -279,7 +282,7 @@ def test_the_last_word_fits_in_a_termination_message(reason) -> None:
 
 
 def test_the_longest_reason_is_cut_and_nothing_else() -> None:
-    """Every character of it takes twelve bytes."""
+    """Each character of this reason takes twelve bytes; the other fields are still complete."""
     message = Termination(step=7, reason="\U0001f916" * 3000, success_rate=0.5).to_message()
 
     read = Termination.from_message(message)
@@ -289,7 +292,7 @@ def test_the_longest_reason_is_cut_and_nothing_else() -> None:
 
 @given(data=st.data())
 def test_a_last_word_of_any_length_fits_in_a_termination_message(messages, data) -> None:
-    """Its log and its faults may have any length; the oldest are left out, but never the reason."""
+    """The oldest log lines and faults are left out until the message fits; the reason is cut last."""
     word = data.draw(messages.right(Termination))
 
     message = word.to_message()
@@ -302,7 +305,7 @@ def test_a_last_word_of_any_length_fits_in_a_termination_message(messages, data)
 
 
 def test_a_long_log_does_not_drive_out_the_faults() -> None:
-    """A reader of the last word needs both."""
+    """A person who looks for the cause needs the log lines and the faults."""
     fault = FaultRecord(
         time="2025-01-31T12:00:00Z", simulator="collect-0", kind="dead", fact="x" * 150, step=7
     )
@@ -319,7 +322,7 @@ def test_a_long_log_does_not_drive_out_the_faults() -> None:
     "lines", ["one line", [7], ["x" * 201], ["x"] * 11, ["\ud800"]], ids=["text", "7", "long", "many", "half"]
 )
 def test_a_log_that_nobody_of_ours_wrote_is_refused(lines) -> None:
-    """The log becomes part of a TrainingJob's status, whose size is bounded."""
+    """The log becomes part of a TrainingJob's status, so its size is limited."""
     content = Termination(step=7, reason="Completed").to_json() | {"log": lines}
 
     with pytest.raises(ProtocolError, match=r"^log"):
@@ -327,7 +330,7 @@ def test_a_log_that_nobody_of_ours_wrote_is_refused(lines) -> None:
 
 
 def test_a_trainer_of_an_older_release_is_understood(status) -> None:
-    """Images of one job may be of different releases."""
+    """The images of one job may be of different releases."""
     simulator = SimulatorStatus(name="collect-0", role="Collect", state="ready")
     running, ended = status(simulators=(simulator,)).to_json(), Termination(step=7, reason="x").to_json()
     for name in ("faults", "goodput", "steps_lost"):
@@ -342,7 +345,7 @@ def test_a_trainer_of_an_older_release_is_understood(status) -> None:
 
 
 def test_a_kind_that_a_newer_release_added_is_ignored_in_a_table(status) -> None:
-    """The same holds for any other unknown field."""
+    """An older operator ignores an unknown kind, like any other unknown field."""
     content = status(faults={"dead": 1, "melted": 2}, goodput={"stepping": 1.5, "dreaming": 9.0}).to_json()
 
     read = TrainerStatus.from_json(content)
@@ -361,13 +364,13 @@ def test_a_kind_that_a_newer_release_added_is_ignored_in_a_table(status) -> None
     ],
 )
 def test_a_table_says_which_of_its_values_is_wrong(status, changes, message) -> None:
-    """Only one of eleven numbers may be wrong."""
+    """The message names the wrong one of eleven numbers."""
     with pytest.raises(ProtocolError, match=message):
         TrainerStatus.from_json(status().to_json() | changes)
 
 
 def test_kinds_and_causes_are_those_of_the_metrics_and_the_status() -> None:
-    """Dashboards and a TrainingJob's status use these names."""
+    """Dashboards and the status of a TrainingJob use these names, so they must not change."""
     assert [kind.value for kind in FaultKind] == ["dead", "hung", "slow", "wrong_data"]
     assert [cause.value for cause in Cause] == [
         "stepping",
@@ -383,13 +386,13 @@ def test_kinds_and_causes_are_those_of_the_metrics_and_the_status() -> None:
 
 @pytest.mark.parametrize("message", ["", "Traceback (most recent call last):", "{" * 5000, "\ud800"])
 def test_the_end_of_a_log_is_no_last_word(message) -> None:
-    """FallbackToLogsOnError puts the end of a log into the termination message."""
+    """With FallbackToLogsOnError, the termination message of a crashed trainer is the end of its log."""
     with pytest.raises(ProtocolError):
         Termination.from_message(message)
 
 
 def test_the_exit_codes_are_those_that_a_job_decides_by() -> None:
-    """Every plan's podFailurePolicy has them, so a change needs a new release of all parts."""
+    """The podFailurePolicy of every plan has these codes. A change would need a new release of all parts."""
     assert {code.name: code.value for code in ExitCode} == {
         "DONE": 0,
         "CONFIGURATION": 2,
@@ -401,7 +404,7 @@ def test_the_exit_codes_are_those_that_a_job_decides_by() -> None:
 
 
 def test_an_end_without_code_and_signal_is_one_that_nobody_saw(state) -> None:
-    """A program that could not be started has neither."""
+    """A program that could not be started has neither an exit code nor a signal."""
     unseen = LastExit(code=None, signal=None, expected=False)
     failed = state(state=SidecarState.FAILED, last_exit=unseen)
 
@@ -409,5 +412,5 @@ def test_an_end_without_code_and_signal_is_one_that_nobody_saw(state) -> None:
 
 
 def test_a_protocol_error_is_a_value_error() -> None:
-    """A reader can catch it together with other wrong values."""
+    """A caller can catch `ValueError` for this error and for other wrong values."""
     assert issubclass(ProtocolError, ValueError)

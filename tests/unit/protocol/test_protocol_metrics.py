@@ -1,4 +1,4 @@
-"""Families of metrics as data, and the cost of counting thousands of times a second."""
+"""Metric families as data, and the time of a count, which happens thousands of times a second."""
 
 import time
 
@@ -13,7 +13,7 @@ MOST_S = 2e-6
 
 
 class Shown(Collector):
-    """A family with some values, which Prometheus' client collects."""
+    """A family with values, for the registry of the Prometheus client."""
 
     def __init__(self, family, values):
         self.family, self.values = family, values
@@ -23,7 +23,7 @@ class Shown(Collector):
         yield self.family.metric(self.values)
 
     def samples(self):
-        """Return the samples that a reader parses, by name and labels."""
+        """Return the samples of a scrape, by name and labels."""
         registry = CollectorRegistry()
         registry.register(self)
         text = generate_latest(registry).decode()
@@ -35,7 +35,7 @@ class Shown(Collector):
 
 
 def test_the_samples_of_a_counter_have_its_labels():
-    """The labels are in their declared order, and the name is the declared one."""
+    """Labels keep their declared order, and the name gets no second suffix."""
     colors = Label(name="color", values=("red", "blue"))
     family = Family(name="balls_total", kind=MetricType.COUNTER, meaning="Balls.", labels=(colors,))
 
@@ -43,7 +43,7 @@ def test_the_samples_of_a_counter_have_its_labels():
 
 
 def test_a_family_without_a_value_is_there_with_its_meaning():
-    """Unknown differs from zero, and a dashboard finds the name."""
+    """A metric without a value differs from a value of zero, and a dashboard still finds its name."""
     family = Family(name="height_metres", kind=MetricType.GAUGE, meaning="How high.")
     registry = CollectorRegistry()
     registry.register(Shown(family, {}))
@@ -54,7 +54,7 @@ def test_a_family_without_a_value_is_there_with_its_meaning():
 
 
 def test_a_histogram_counts_what_is_up_to_each_bound():
-    """As in Prometheus, a value at a bound belongs to it."""
+    """As in Prometheus, a value that equals a bound counts in that bound's bucket."""
     family = Family(name="wait_seconds", kind=MetricType.HISTOGRAM, meaning="Wait.", buckets=(1.0, 2.0))
     tally = family.tally()
     for value in (0.5, 1.0, 1.5, 9.0):
@@ -70,7 +70,10 @@ def test_a_histogram_counts_what_is_up_to_each_bound():
 
 
 def test_a_histogram_of_what_may_be_negative_has_no_sum():
-    """A sum that decreases looks like a restart; without the count, OpenTelemetry drops the histogram."""
+    """A sum that decreases looks like a restart.
+
+    The count stays, because OpenTelemetry drops a histogram without a count.
+    """
     family = Family(name="gain", kind=MetricType.HISTOGRAM, meaning="Gain.", buckets=(-1.0, 0.0))
 
     names = {name for name, *_ in Shown(family, {(): family.tally()}).samples()}
@@ -86,7 +89,7 @@ def test_a_histogram_of_what_may_be_negative_has_no_sum():
     ],
 )
 def test_series_are_counted_by_labels_and_buckets(kind, buckets, series):
-    """The count is the maximum number of series that are exported."""
+    """The result is the largest number of series that the family can export."""
     labels = (Label(name="color", values=("red", "blue")), Label(name="child", bound="child"))
     family = Family(name="x", kind=kind, meaning="X.", labels=labels, buckets=buckets)
 
@@ -94,7 +97,7 @@ def test_series_are_counted_by_labels_and_buckets(kind, buckets, series):
 
 
 def test_to_count_a_step_costs_less_than_two_microseconds():
-    """The best of ten runs counts, in processor time; up to 5,000 steps come a second."""
+    """Up to 5,000 steps are counted per second. The best of ten runs counts, in processor time."""
     tally = Tally((0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0))
 
     def cost_s():

@@ -1,4 +1,4 @@
-"""Numbers that people type: which are accepted, and the message about the others."""
+"""Numbers that people type as options: the accepted numbers, and the message about all others."""
 
 import math
 from argparse import ArgumentTypeError
@@ -12,7 +12,7 @@ from palaestra_protocol.numbers import milliseconds, seconds, whole
 
 @given(st.integers(), st.integers(-5, 5), st.none() | st.integers(5, 10))
 def test_a_whole_number_is_taken_if_and_only_if_it_is_within_its_bounds(number, least, most):
-    """This holds for every option."""
+    """Each option has a least and perhaps a largest value."""
     within = least <= number and (most is None or number <= most)
     try:
         assert whole(least, most)(str(number)) == number
@@ -24,7 +24,7 @@ def test_a_whole_number_is_taken_if_and_only_if_it_is_within_its_bounds(number, 
 
 @given(st.floats())
 def test_times_are_finite_and_only_a_delay_may_be_nothing(number):
-    """An endless wait or a negative one is a typing error."""
+    """An endless or a negative time is a typing error; only a delay may be 0."""
     for read, allowed in ((seconds, number > 0.0), (milliseconds, number >= 0.0)):
         try:
             assert read(repr(number)) == number
@@ -37,7 +37,7 @@ def test_times_are_finite_and_only_a_delay_may_be_nothing(number):
 
 @pytest.mark.parametrize("text", ["", "many", "1e999999x", "0x10"])
 def test_what_is_no_number_is_said_to_be_none(text):
-    """The message quotes the text, so that the user finds it."""
+    """The message quotes the typed text, so that a person finds the mistake."""
     for read in (whole(), seconds, milliseconds):
         with pytest.raises(ArgumentTypeError, match=f"^{text!r} is not a "):
             read(text)

@@ -1,4 +1,4 @@
-"""Values of ROS messages are encoded and decoded, for types of every kind, and for untrusted bytes."""
+"""Encoding and decoding of ROS messages: types of every form, and untrusted bytes."""
 
 import math
 import struct
@@ -34,7 +34,7 @@ def as_mapping(value):
 @settings(max_examples=30)
 @given(data=st.data())
 def test_every_value_survives_the_wire(name, data):
-    """These are numbers, texts, lists and nested messages of any size."""
+    """The values are numbers, texts, lists and nested messages of any size."""
     given_values = data.draw(values(MESSAGES[name], find, whole=True))
 
     assert as_mapping(CODECS[name].decode(CODECS[name].encode(given_values))) == given_values
@@ -44,7 +44,7 @@ def test_every_value_survives_the_wire(name, data):
 @settings(max_examples=30)
 @given(data=st.data())
 def test_absent_fields_are_zero_empty_or_false(name, data):
-    """A message without them has the same bytes when it is encoded again."""
+    """The decoded message has the same bytes when it is encoded again."""
     encoded = CODECS[name].encode(data.draw(values(MESSAGES[name], find)))
 
     assert CODECS[name].encode(CODECS[name].decode(encoded)._asdict()) == encoded
@@ -54,7 +54,7 @@ def test_absent_fields_are_zero_empty_or_false(name, data):
 @settings(max_examples=30)
 @given(data=st.data())
 def test_a_frame_is_the_length_and_the_message(name, data):
-    """Both are packed in one call where that is faster."""
+    """`frame` packs the length and the message in one call where that is faster."""
     given_values = data.draw(values(MESSAGES[name], find))
 
     assert CODECS[name].frame(given_values) == frame(CODECS[name].encode(given_values))
@@ -64,7 +64,7 @@ def test_a_frame_is_the_length_and_the_message(name, data):
 @settings(max_examples=30)
 @given(data=st.data())
 def test_a_message_cut_short_or_too_long_is_refused(name, data):
-    """Every byte counts: a message of another version must not be misread."""
+    """A message of another version of its type must not be read as a wrong value."""
     encoded = CODECS[name].encode(data.draw(values(MESSAGES[name], find)))
 
     with pytest.raises(ValueError, match="bytes"):
@@ -78,7 +78,7 @@ def test_a_message_cut_short_or_too_long_is_refused(name, data):
 @settings(max_examples=30)
 @given(payload=st.binary(max_size=200))
 def test_bytes_of_strangers_are_a_message_or_a_value_error(name, payload):
-    """A request must raise no other error."""
+    """Bytes from another program must cause no other error than ValueError."""
     with suppress(ValueError):
         CODECS[name].decode(memoryview(payload))
 
@@ -87,13 +87,13 @@ def test_bytes_of_strangers_are_a_message_or_a_value_error(name, payload):
     "field", ["string", "string[]", "uint8[]", "float64[]", "demo/Point[]", "demo/Named[]", "time[]"]
 )
 def test_a_length_that_the_payload_does_not_bear_out_is_refused(field):
-    """Four bytes must not make the reader allocate gigabytes or loop for hours."""
+    """Four bytes of a wrong length must not make the reader allocate gigabytes or loop for hours."""
     with pytest.raises(ValueError, match=f"a length of {MORE}, but only 8 bytes are left"):
         codec(f"{field} value").decode(struct.pack("<IQ", MORE, 0))
 
 
 def test_fields_have_the_names_of_the_definition_and_python_s_own_get_an_underscore():
-    """`from` cannot be an attribute."""
+    """A field of the definition may be named `from`, which is a keyword of Python."""
     message = codec("uint64 from\ndemo/Named[] named\nduration late")
 
     decoded = message.decode(
@@ -105,7 +105,7 @@ def test_fields_have_the_names_of_the_definition_and_python_s_own_get_an_undersc
 
 
 def test_bytes_numbers_and_flags_have_types_of_their_own():
-    """Lists of numbers are tuples, so nobody can change them."""
+    """Lists of numbers are tuples, so no subscriber can change a message that another one gets too."""
     message = codec("uint8[] a\nchar[2] b\nbyte[] c\nfloat32[2] d\nbool[] e\nbool f")
 
     decoded = message.decode(
@@ -117,7 +117,7 @@ def test_bytes_numbers_and_flags_have_types_of_their_own():
 
 
 def test_pixels_are_written_from_the_memory_in_which_they_were_drawn():
-    """A picture has a million bytes; `frame` copies them only once, into the message."""
+    """A picture has a million bytes, so `frame` copies them only once."""
     message = codec("string name\nuint8[] data")
     pixels = memoryview(bytearray(range(12))).cast("B", (3, 4))
 
@@ -127,7 +127,7 @@ def test_pixels_are_written_from_the_memory_in_which_they_were_drawn():
 
 
 def test_a_message_inside_may_be_a_tuple_of_its_fields():
-    """The tuple may be a decoded one; a mapping for each of ten thousand points takes too long."""
+    """A point cloud has ten thousand points; a mapping for each would take too long."""
     message = codec("demo/Point[] points\ndemo/Named named")
     mapping = {"points": [{"x": 1.0, "y": 2.0}], "named": {"name": "a", "point": {"x": 3.0}}}
 
@@ -137,7 +137,7 @@ def test_a_message_inside_may_be_a_tuple_of_its_fields():
 
 
 def test_characters_that_are_not_utf_8_are_replaced():
-    """The library genpy does the same: a name in another encoding must not end a subscriber."""
+    """As in genpy, a text in another encoding must not end the subscriber."""
     message = codec("string text")
 
     assert message.decode(frame("é".encode("latin-1") + b"x")).text == "\ufffdx"
@@ -177,20 +177,20 @@ def test_characters_that_are_not_utf_8_are_replaced():
     ],
 )
 def test_a_value_that_does_not_fit_its_field_is_refused(text, value):
-    """Whatever error Python raises, the message names the type and the field."""
+    """Python raises various errors for such values; the message always names the type and the field."""
     for method in (codec(text).encode, codec(text).frame):
         with pytest.raises(ValueError, match=r"demo/Test: value: "):
             method({"value": value})
 
 
 def test_a_field_that_the_type_does_not_have_is_refused():
-    """Otherwise a mistyped field would be sent as an empty text."""
+    """A mistyped field name would otherwise send an empty value."""
     with pytest.raises(ValueError, match="demo/Test: no field vale"):
         codec("string value").encode({"vale": "text"})
 
 
 def test_not_a_number_survives_the_wire():
-    """Sensors without a reading send it."""
+    """Sensors without a reading send NaN."""
     message = codec("float32 value")
 
     assert math.isnan(message.decode(message.encode({"value": math.nan})).value)

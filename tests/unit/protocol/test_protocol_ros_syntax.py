@@ -6,7 +6,7 @@ from palaestra_protocol.ros.syntax import MessageField, parse
 
 
 def test_fields_are_read_with_their_types_in_full():
-    """A type without a package is of the message's own package; only `Header` is always from std_msgs."""
+    """A type without a package is in the message's own package, except `Header` of std_msgs."""
     text = "Header header\nPoint[] points\nsensor_msgs/Image image\nfloat64[9] covariance  # row by row\n"
 
     assert parse("demo/Path", text).fields == (
@@ -18,7 +18,7 @@ def test_fields_are_read_with_their_types_in_full():
 
 
 def test_an_array_has_a_length_only_if_it_is_fixed():
-    """Other arrays have their length in front of their elements."""
+    """Only fixed arrays have their length in the type; other arrays carry their length on the wire."""
     fields = parse("demo/Arrays", "int8 one\nint8[] any\nint8[0] none\nint8[12] dozen").fields
 
     assert [field.length for field in fields] == [None, None, 0, 12]
@@ -33,7 +33,7 @@ def test_an_array_has_a_length_only_if_it_is_fixed():
     ],
 )
 def test_a_constant_is_kept_as_the_md5_covers_it(line, constant):
-    """Spaces and comments are removed, but a string has no comments."""
+    """Spaces and comments are removed; in a string constant, `#` does not begin a comment."""
     message = parse("demo/Constants", line)
 
     assert message.constants == (constant,)
@@ -42,13 +42,13 @@ def test_a_constant_is_kept_as_the_md5_covers_it(line, constant):
 
 @pytest.mark.parametrize("line", ["int32", "int32 a b", "int32[x] a", "int32 a-b", "int32[2][2] a", "2 a"])
 def test_a_line_that_is_no_field_is_refused(line):
-    """A skipped field would shift all later ones."""
+    """If the parser skipped the line, it would read all later fields at a wrong position."""
     with pytest.raises(ValueError, match=r"demo/Wrong: .* is not a field; write a type, a space and a name"):
         parse("demo/Wrong", line)
 
 
 def test_a_constant_of_a_message_is_refused():
-    """Only numbers and strings can be written on a line."""
+    """The syntax of a constant is one line, so only numbers and strings are possible."""
     with pytest.raises(
         ValueError, match="demo/Wrong: 'time NOW=1' is not a constant; its type must be a number"
     ):

@@ -1,4 +1,4 @@
-"""A scene and its states as data: what is written is read back, and nothing unbounded is read."""
+"""A scene and its states as data: a reader returns what was written, and rejects unbounded messages."""
 
 import contextlib
 import json
@@ -44,20 +44,20 @@ anything = st.recursive(
 
 
 def through_json(message):
-    """Return a message as its reader gets it."""
+    """Return a message after it was written as JSON and parsed."""
     return type(message).from_json(json.loads(json.dumps(message.to_json(), allow_nan=False)))
 
 
 @pytest.mark.parametrize("message", [ARENA, DRIVEN, SceneState(time_s=0.0)], ids=["scene", "state", "bare"])
 def test_what_is_written_is_read_back(message) -> None:
-    """A viewer gets the world that the simulator has, to a hundredth of a millimeter."""
+    """A viewer gets the poses of the simulator, rounded to a hundredth of a millimeter."""
     assert through_json(message) == message
 
 
 @pytest.mark.parametrize("message", [ARENA, DRIVEN], ids=["scene", "state"])
 @given(data=st.data())
 def test_a_wrong_part_breaks_no_reader(message, data) -> None:
-    """A pod may send anything, and a reader may raise only one kind of error."""
+    """A pod may send any JSON; a reader must raise no other error than `ProtocolError`."""
     content = message.to_json()
     name = data.draw(st.sampled_from(sorted(content)))
     content[name] = data.draw(anything)
@@ -68,14 +68,14 @@ def test_a_wrong_part_breaks_no_reader(message, data) -> None:
 
 @given(content=anything)
 def test_no_json_at_all_breaks_a_reader(content) -> None:
-    """The sender may be any program."""
+    """Any program may be the sender of this JSON."""
     for kind in (VisibleScene, SceneState):
         with contextlib.suppress(ProtocolError):
             kind.from_json(content)
 
 
 def test_a_number_that_is_not_finite_is_written_as_none() -> None:
-    """JSON has no NaN, and one bad joint must not hide the others."""
+    """JSON has no NaN, and one broken joint must not hide the others."""
     sick = SceneState(time_s=0.0, joints={"bad": math.nan, "good": 1.0}, rewards={"bad": math.inf})
 
     assert through_json(sick).joints == {"good": 1.0}
@@ -97,7 +97,7 @@ def test_a_number_that_is_not_finite_is_written_as_none() -> None:
     ],
 )
 def test_a_refusal_names_the_field_and_the_fact(changes, message) -> None:
-    """The reader of the message has written the sender, and does not know this program."""
+    """The person who reads the error wrote the sender, and does not know this reader."""
     with pytest.raises(ProtocolError) as refusal:
         VisibleScene.from_json(ARENA.to_json() | changes)
 
@@ -105,7 +105,7 @@ def test_a_refusal_names_the_field_and_the_fact(changes, message) -> None:
 
 
 def test_too_much_is_refused() -> None:
-    """A viewer of a foreign pod keeps its memory."""
+    """A foreign pod must not use up the memory of a viewer."""
     state = DRIVEN.to_json() | {"rewards": {f"term {i}": 0.0 for i in range(protocol.MOST_TERMS + 1)}}
     with pytest.raises(ProtocolError, match="rewards: has more than"):
         SceneState.from_json(state)

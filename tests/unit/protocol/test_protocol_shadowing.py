@@ -1,4 +1,4 @@
-"""A user's modules may shadow modules of Python and of Palaestra's dependencies; these are reported."""
+"""Reports of modules in a user's folder that shadow modules of Python or of Palaestra's dependencies."""
 
 import pytest
 
@@ -19,7 +19,10 @@ def put(tmp_path):
 
 @pytest.mark.parametrize("file", ["queue.py", "random.py", "types.py", "code.py", "email/__init__.py"])
 def test_a_module_of_the_standard_library_is_named_with_the_file_and_the_remedy(put, tmp_path, file):
-    """Libraries fail with a traceback about a partially initialized module, which has neither."""
+    """A library then fails with a traceback about a partially initialized module.
+
+    The traceback has no remedy.
+    """
     name = file.partition("/")[0].removesuffix(".py")
 
     found = put(file)
@@ -41,7 +44,7 @@ def test_a_module_of_the_standard_library_is_named_with_the_file_and_the_remedy(
     ],
 )
 def test_a_dependency_is_named_also_one_of_another_or_of_the_distribution(put, tmp_path, name):
-    """Dependencies are Palaestra's packages, the dependencies of these, those of an extra, and ROS."""
+    """Reported are modules of Palaestra, of its direct and indirect dependencies, of an extra, and of ROS."""
     found = put(f"{name}.py")
 
     assert found == [f"{tmp_path / name}.py: shadows the module {name}, which Palaestra needs; rename it"]
@@ -58,19 +61,19 @@ def test_a_dependency_is_named_also_one_of_another_or_of_the_distribution(put, t
     ],
 )
 def test_what_shadows_nothing_is_left_alone(put, file):
-    """Python imports the right module in these cases."""
+    """Python imports the right module in spite of these files."""
     assert put(file) == []
 
 
 def test_folders_of_installed_packages_are_somebodys_choice(put):
-    """On HPC clusters, `module load` puts whole site-packages folders on PYTHONPATH."""
+    """On HPC clusters `module load` puts site-packages folders on PYTHONPATH, on purpose."""
     put("numpy-2.0.0.dist-info/METADATA")
 
     assert put("numpy.py") == []
 
 
 def test_a_folder_that_is_missing_or_named_twice_changes_nothing(put, tmp_path):
-    """Python ignores such an entry."""
+    """Python ignores such an entry of the path."""
     [reason] = put("queue.py")
 
     assert shadows(f"{tmp_path}/missing:{tmp_path}") == [reason]

@@ -1,4 +1,4 @@
-"""Signals that set an event, in a process of their own: handlers belong to a whole process."""
+"""Signals that set an event, tested in a child process, because signal handlers belong to a whole process."""
 
 import subprocess
 import sys
@@ -23,7 +23,7 @@ print(event.wait(30), event.by_main)
 
 
 def test_a_signal_sets_the_event_in_a_thread_that_waits_for_nothing_else():
-    """A handler in the main thread would wait forever if that thread just then begins to wait for the event.
+    """A handler in the main thread would wait for ever if that thread just then begins to wait for the event.
 
     A ROS master once did not end for that reason. Other signals do not set the event.
     """

@@ -1,4 +1,4 @@
-"""Headers and frames of TCPROS, as bytes."""
+"""Headers and frames of TCPROS as bytes."""
 
 import struct
 
@@ -21,7 +21,7 @@ VALUES = st.text(max_size=40)
 
 @given(st.dictionaries(NAMES, VALUES, max_size=6))
 def test_a_header_survives_the_wire(fields):
-    """Values may contain anything, even `=`; names may not contain `=`."""
+    """A value may contain any character, even `=`; a name may not contain `=`."""
     framed = encode_header(fields)
 
     assert decode_header(framed[4:]) == fields
@@ -29,7 +29,7 @@ def test_a_header_survives_the_wire(fields):
 
 @given(st.lists(st.binary(max_size=50), max_size=8), st.integers(min_value=1, max_value=20))
 def test_frames_come_out_as_they_went_in_however_the_stream_is_cut(payloads, size):
-    """The network delivers bytes, not frames."""
+    """The network delivers bytes, so a frame may arrive in several pieces."""
     stream = b"".join(map(frame, payloads))
     reader = FrameReader()
 
@@ -40,7 +40,7 @@ def test_frames_come_out_as_they_went_in_however_the_stream_is_cut(payloads, siz
 
 @given(st.binary(max_size=60))
 def test_arbitrary_bytes_are_a_header_or_refused(data):
-    """Any client that connects to the port must cause no other error."""
+    """Any client may connect to the port and send any bytes; the reader must raise no other error."""
     try:
         fields = decode_header(data)
     except FramingError:
@@ -50,6 +50,6 @@ def test_arbitrary_bytes_are_a_header_or_refused(data):
 
 
 def test_a_frame_too_large_to_be_true_is_refused():
-    """After lost bytes, the reader would otherwise wait for gigabytes."""
+    """After lost bytes a reader would take other bytes for the length, and wait for gigabytes."""
     with pytest.raises(FramingError, match="out of step"):
         list(FrameReader().feed(struct.pack("<I", MAX_FRAME_BYTES + 1)))

@@ -1,4 +1,4 @@
-"""XML-RPC between peers that are not trusted: documents, a server with bounds, and a call with a deadline."""
+"""XML-RPC with untrusted peers: documents, a server with limits, and a call with a deadline."""
 
 import contextlib
 import socket
@@ -32,7 +32,7 @@ VALUES = st.recursive(
 
 @given(st.lists(VALUES, max_size=3))
 def test_what_is_encoded_is_decoded(values):
-    """Also by Python's own reader, which other programs use."""
+    """Python's own XML-RPC reader, which other programs use, returns the same values."""
     request = encode_request("name", tuple(values))
 
     assert decode_request(request) == ("name", tuple(values))
@@ -42,7 +42,7 @@ def test_what_is_encoded_is_decoded(values):
 
 @given(st.binary(max_size=60))
 def test_any_bytes_are_a_document_or_refused(data):
-    """One class of error is raised, whatever Python's reader raises."""
+    """The decoder raises `UnreadableDocument` in place of all errors of Python's parser."""
     for document in (data, b"<methodCall><methodName>m</methodName><params>" + data):
         with contextlib.suppress(UnreadableDocument):
             decode_request(document)
@@ -65,20 +65,20 @@ BOMB = b"""<?xml version="1.0"?><!DOCTYPE x [<!ENTITY a "aaaa"><!ENTITY b "&a;&a
     ],
 )
 def test_a_document_that_is_no_request_is_refused_with_the_fact(document, fact):
-    """Entities could expand to any size, and a deep value fails when it is written."""
+    """Entities could expand to any size, and a deeply nested value fails when it is written again."""
     with pytest.raises(UnreadableDocument, match=fact):
         decode_request(document)
 
 
 def test_a_fault_is_raised_with_its_text():
-    """As `xmlrpc.client` does."""
+    """`xmlrpc.client` raises the same error with the same text."""
     with pytest.raises(xmlrpc.client.Fault, match="no such call"):
         decode_response(encode_fault("no such call"))
 
 
 @pytest.fixture
 def server():
-    """Make servers with one method, `double`, and close them."""
+    """Yield a function that starts servers with the methods `double` and `nothing`."""
     made = []
 
     def make(**options):
@@ -93,7 +93,7 @@ def server():
 
 
 def dialed(server):
-    """Return a connection to a server, with a deadline."""
+    """Return a connection to a server, with a timeout."""
     return socket.create_connection(("127.0.0.1", server.port), timeout=PATIENCE_S)
 
 
@@ -103,7 +103,10 @@ def uri(server):
 
 
 def test_a_call_returns_the_value(server):
-    """Our client and Python's call over one connection."""
+    """Both `call` and Python's client get the value.
+
+    Python's client makes several calls over one connection.
+    """
     running = server()
 
     assert call(uri(running), PATIENCE_S, "double", 21) == 42
@@ -113,7 +116,7 @@ def test_a_call_returns_the_value(server):
 
 @pytest.mark.parametrize(("method", "given"), [("none", 1), ("double", {}), ("nothing", 0)])
 def test_a_call_that_cannot_be_made_is_a_fault(server, method, given):
-    """The connection and the server continue."""
+    """After the fault, the next call on the same connection succeeds."""
     with xmlrpc.client.ServerProxy(uri(server())) as proxy:
         with pytest.raises(xmlrpc.client.Fault):
             getattr(proxy, method)(given)
@@ -121,7 +124,7 @@ def test_a_call_that_cannot_be_made_is_a_fault(server, method, given):
 
 
 def test_several_calls_of_one_request_are_made_in_order_and_fail_alone(server):
-    """A robot registers hundreds of services at once."""
+    """A robot registers hundreds of services with one such request."""
     calls = [{"methodName": name, "params": [3]} for name in ("double", "none", "system.multicall", "double")]
 
     with xmlrpc.client.ServerProxy(uri(server())) as proxy:
@@ -134,7 +137,7 @@ def test_several_calls_of_one_request_are_made_in_order_and_fail_alone(server):
 
 
 def test_a_request_that_is_not_finished_is_dropped(server):
-    """A program that was stopped in the middle of a request would keep a thread."""
+    """A client that stops in the middle of a request must not occupy a thread for ever."""
     with dialed(server(request_s=0.2)) as connection:
         connection.sendall(b"POST / HTTP/1.1\r\n")
 
@@ -142,13 +145,13 @@ def test_a_request_that_is_not_finished_is_dropped(server):
 
 
 def test_a_connection_without_a_request_is_dropped(server):
-    """So is one that a client has forgotten."""
+    """The server also closes a connection that a client has forgotten to close."""
     with dialed(server(idle_s=0.2)) as connection:
         assert connection.recv(1) == b""
 
 
 def test_a_body_that_is_too_long_or_has_no_length_is_refused(server):
-    """Before any of it is read."""
+    """The server responds before it reads any of the body."""
     for header, status in ((f"Content-Length: {MOST_REQUEST_BYTES + 1}", b"413"), ("X: y", b"411")):
         with dialed(server()) as connection:
             connection.sendall(f"POST / HTTP/1.1\r\n{header}\r\n\r\n".encode())
@@ -158,7 +161,7 @@ def test_a_body_that_is_too_long_or_has_no_length_is_refused(server):
 
 
 def test_a_server_that_is_closed_closes_its_connections(server):
-    """A node that has ended must not answer as if it lived."""
+    """A node that has ended must not respond to calls as if it still ran."""
     running = server()
     with dialed(running) as connection:
         call(uri(running), PATIENCE_S, "double", 1)
@@ -169,7 +172,7 @@ def test_a_server_that_is_closed_closes_its_connections(server):
 
 
 def test_a_new_connection_takes_the_place_of_an_idle_one(server):
-    """Forgotten connections must not keep a simulator from registering."""
+    """Connections that clients forgot to close must not keep a simulator from registering."""
     running = server()
     with contextlib.ExitStack() as opened:
         idle = [opened.enter_context(dialed(running)) for _ in range(MOST_CONNECTIONS + 8)]
@@ -180,7 +183,7 @@ def test_a_new_connection_takes_the_place_of_an_idle_one(server):
 
 @pytest.fixture
 def peer():
-    """`peer(data)`: the address of a program that answers with these pieces, and then waits."""
+    """`peer(pieces)` returns the address of a program that answers with these pieces and then waits."""
     ended = threading.Event()
     sockets = []
 
@@ -210,7 +213,7 @@ HEAD = b"HTTP/1.1 200 OK\r\nContent-Type: text/xml\r\n"
 
 @pytest.mark.parametrize("pieces", [[], [b"H"] * 1000, [HEAD, b"\r\n", *[b" "] * 1000]])
 def test_a_call_ends_at_its_deadline_however_slowly_the_answer_comes(peer, pieces):
-    """A byte now and then would renew the deadline of a socket."""
+    """A byte now and then would renew a socket's timeout, so the call has a deadline."""
     began = time.monotonic()
 
     with pytest.raises(TimeoutError):
@@ -229,18 +232,18 @@ def test_a_call_ends_at_its_deadline_however_slowly_the_answer_comes(peer, piece
     ],
 )
 def test_an_answer_that_is_no_response_is_refused(peer, answer):
-    """One class of error is raised for all such answers."""
+    """The call raises the same error for every such response."""
     with pytest.raises(UnreadableDocument):
         call(peer([answer]), PATIENCE_S, "m")
 
 
-LONG = f"http://{'h' * 64}.org:1/"  # no host's name has such a part
+LONG = f"http://{'h' * 64}.org:1/"  # a label of a host name has at most 63 characters
 
 
 @pytest.mark.parametrize(
     "address", ["http://", "rosrpc://h:1", "http://h:x/", "http://h/", "http://ä:1/", LONG]
 )
 def test_an_address_that_is_none_is_refused(address):
-    """Nodes register any text as theirs."""
+    """A node may register any text as its address."""
     with pytest.raises(UnreadableDocument, match="is not an address"):
         call(address, PATIENCE_S, "m")

@@ -1,4 +1,4 @@
-"""What a viewer gets of a world: nodes, visible shapes, and the poses of what moves."""
+"""The data that a viewer gets of a world: nodes, visible shapes, and the poses of moving nodes."""
 
 import json
 import math
@@ -35,23 +35,23 @@ Robot { name "arm" children [
 
 @pytest.fixture
 def simulation():
-    """Return the simulation of a floor, a mark, a triangle and an arm with one joint."""
+    """Return the simulation of a floor, a marker, a triangle and an arm with one joint."""
     return load_scene(WORLD_FILE)
 
 
 def scene_of(simulation):
-    """Return the scene as a viewer reads it."""
+    """Return the scene as a viewer decodes it."""
     return VisibleScene.from_json(json.loads(json.dumps(simulation.appearance.scene("world.wbt").to_json())))
 
 
 def state_of(simulation):
-    """Return the state as a viewer reads it."""
+    """Return the state as a viewer decodes it."""
     text = json.dumps(simulation.appearance.state(simulation.time_ms).to_json())
     return SceneState.from_json(json.loads(text))
 
 
 def test_each_frame_with_shapes_is_a_node_and_parts_of_robots_bear_its_name(simulation):
-    """Two robots of a world may have parts of the same name."""
+    """Two robots may have parts with the same name, so a node has its robot's name in front."""
     nodes = {node.name: node for node in scene_of(simulation).nodes}
 
     assert nodes.keys() == {WORLD, "FLOOR", "Pose", "arm", "arm/leg"}
@@ -60,7 +60,7 @@ def test_each_frame_with_shapes_is_a_node_and_parts_of_robots_bear_its_name(simu
 
 
 def test_shapes_keep_size_color_and_place(simulation):
-    """A viewer draws them without the world file."""
+    """A viewer renders the shapes without access to the world file."""
     nodes = {node.name: node for node in scene_of(simulation).nodes}
     (mark,) = nodes["Pose"].shapes
     (floor,) = nodes["FLOOR"].shapes
@@ -77,7 +77,7 @@ def test_shapes_keep_size_color_and_place(simulation):
 
 
 def test_faces_are_triangles_that_shapes_share(simulation):
-    """A mesh is sent once, however many shapes have it."""
+    """A mesh is sent once, even if several shapes use it."""
     scene = scene_of(simulation)
     (shape,) = next(node for node in scene.nodes if node.name == WORLD).shapes
 
@@ -86,7 +86,7 @@ def test_faces_are_triangles_that_shapes_share(simulation):
 
 
 def test_a_state_has_what_moves_and_the_positions_of_motors(simulation):
-    """The leg follows its motor."""
+    """The state has the leg's pose and its motor's position; nodes that cannot move are absent."""
     simulation.robots[0].motors["hip"].set_position(math.pi / 2.0)
     for _ in range(20):
         simulation.step(32)
@@ -100,7 +100,7 @@ def test_a_state_has_what_moves_and_the_positions_of_motors(simulation):
 
 
 def test_what_a_client_moves_is_in_the_state_and_needs_no_new_scene():
-    """A target is put elsewhere at each episode, and a scene may have megabytes."""
+    """An environment moves its target at each episode; a new scene for that could have megabytes."""
     simulation = load_scene(builtin("arena"), "arena.wbt")
     before = scene_of(simulation)
     mark = next(node for node in simulation.tree.nodes.values() if node.def_name == "TARGET")
@@ -116,7 +116,7 @@ def test_what_a_client_moves_is_in_the_state_and_needs_no_new_scene():
 
 
 def test_a_new_look_is_a_new_revision(simulation):
-    """A viewer reads the scene again."""
+    """A viewer requests the scene again when the revision of a state has changed."""
     before = scene_of(simulation)
 
     children = next(node for node in simulation.tree.nodes.values() if node.def_name == "MARK")
@@ -128,7 +128,7 @@ def test_a_new_look_is_a_new_revision(simulation):
 
 @pytest.mark.parametrize("world", ["pen", "court"])
 def test_a_robot_without_visible_shapes_has_those_with_which_it_collides(world):
-    """The built-in PROTOs of E-puck and TurtleBot3 have no others, and an invisible robot shows nothing."""
+    """The built-in E-puck and TurtleBot3 have only collision shapes. A viewer would not see these robots."""
     path = builtin_path(world)
     assert path is not None
 
@@ -139,7 +139,7 @@ def test_a_robot_without_visible_shapes_has_those_with_which_it_collides(world):
 
 
 def test_a_mesh_that_is_too_large_becomes_its_box(simulation, monkeypatch):
-    """A viewer far away has a bounded memory."""
+    """A remote viewer has limited memory, so a mesh with too many points is sent as its bounding box."""
     monkeypatch.setattr("palaestra_sim.scene.appearance.MOST_POINTS", 2)
 
     scene = scene_of(simulation)
@@ -150,7 +150,7 @@ def test_a_mesh_that_is_too_large_becomes_its_box(simulation, monkeypatch):
 
 
 def test_nothing_is_computed_before_somebody_asks(simulation):
-    """A run that nobody watches is as fast as before."""
+    """A run without a viewer must not be slower."""
     simulation.step(32)
 
     assert simulation.appearance._nodes == []

@@ -1,4 +1,4 @@
-"""The faces of an Extrusion, as Webots' template makes them."""
+"""The faces of an Extrusion, as in Webots."""
 
 import math
 
@@ -10,14 +10,14 @@ SQUARE = (0.5, 0.5, 0.5, -0.5, -0.5, -0.5, -0.5, 0.5, 0.5, 0.5)
 
 
 def extruded(**fields):
-    """Return the faces with both caps."""
+    """Return the faces of an Extrusion with both caps."""
     return faces(
         {"crossSection": SQUARE, "splineSubdivision": (0.0,), **fields}, begin_cap=True, end_cap=True
     )
 
 
 def test_the_default_spine_gives_a_block_that_stands_on_the_ground():
-    """A file without a spine has one of 1 m along z."""
+    """An Extrusion without a spine is 1 m high, along z."""
     found = extruded()
 
     corners = {tuple(round(it, 9) + 0.0 for it in point) for point in found.points}
@@ -27,7 +27,7 @@ def test_the_default_spine_gives_a_block_that_stands_on_the_ground():
 
 
 def test_a_bent_spine_tilts_the_cross_section_at_the_bend():
-    """Its plane is across the mean of both directions, so the block is as wide as the bend is long."""
+    """The section at the bend lies between both directions, so the block is as wide as the bend is long."""
     found = extruded(spine=(0, 0, 0, 0, 0, 2, 2, 0, 2))
     middle = found.points[5:10]
 
@@ -37,7 +37,7 @@ def test_a_bent_spine_tilts_the_cross_section_at_the_bend():
 
 
 def test_scale_and_orientation_change_from_point_to_point():
-    """The last scale counts for all further points; a missing orientation is none."""
+    """The last scale applies to all further points of the spine; a missing orientation means no rotation."""
     found = extruded(scale=(2, 2, 0.5, 1), orientation=(0, 0, 1, 0, 0, 0, 1, math.pi / 2))
 
     assert {(round(abs(x), 9), round(abs(y), 9)) for x, y, _ in found.points[:5]} == {(1.0, 1.0)}
@@ -55,12 +55,12 @@ def test_scale_and_orientation_change_from_point_to_point():
     ],
 )
 def test_what_is_incomplete_too_large_or_curved_has_no_faces(fields):
-    """Then the simulator refuses it as a boundingObject."""
+    """Without faces the simulator rejects the Extrusion as a boundingObject."""
     assert extruded(**fields) is None
 
 
 def test_a_straight_spine_with_a_subdivision_is_the_same_block():
-    """A straight spine is the default; the curve through points on a line is that line."""
+    """A spline through points on a line is that line, so the subdivision changes nothing."""
     assert extruded(splineSubdivision=(4.0,), spine=(0, 0, 0, 0, 0, 1, 0, 0, 2)) == extruded(
         spine=(0, 0, 0, 0, 0, 2)
     )

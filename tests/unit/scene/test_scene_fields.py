@@ -1,4 +1,4 @@
-"""Every field of a device is applied, refused, or reported at the start."""
+"""Each field of a device is applied, rejected, or reported at the start of the simulator."""
 
 import pytest
 
@@ -42,7 +42,7 @@ FOR_PEOPLE = {
     "GPS.type",
     "TouchSensor.lookupTable",
 }
-# These fields are read only for some nodes, such as a light, another type of bumper, a radar or a fluid.
+# Only some nodes have a use for these fields, such as a light, another type of bumper, a radar or a fluid.
 ELSEWHERE = {
     "LightSensor.occlusion",
     "TouchSensor.resolution",
@@ -51,7 +51,7 @@ ELSEWHERE = {
 
 
 def sample(kind, name):
-    """Return a value of a field that is not its default."""
+    """Return a value for a field that differs from the field's default."""
     if kind.type is FieldType.NODE:
         return NODES[name]
     if kind.type is FieldType.BOOL:
@@ -60,7 +60,7 @@ def sample(kind, name):
 
 
 def load(type_name, field, physics):
-    """Return the simulation of a robot with a device that has that field."""
+    """Return the simulation of a robot with a device of that type, which has the field."""
     kind = DEVICES[type_name]
     device = f"{type_name} {{ {field} }}"
     part = f"HingeJoint {{ device {device} }}" if kind.on_joint else device
@@ -78,21 +78,21 @@ FIELDS = [
 
 
 class Watched(dict):
-    """The fields of a node, which record the names of those that are read."""
+    """The fields of a node; they record which fields are read."""
 
     def __init__(self):
         super().__init__()
         self.looked_at = set()
 
     def get(self, name, default=None):
-        """Return the content of a field, and record its name."""
+        """Return the content of a field, and record the field's name."""
         self.looked_at.add(name)
         return super().get(name, default)
 
 
 @pytest.fixture
 def watched(monkeypatch):
-    """Make each new node record the fields that are read."""
+    """Let each new node record the fields that are read."""
     begin = SceneNode.__init__
 
     def begun(node, *given):
@@ -105,7 +105,7 @@ def watched(monkeypatch):
 @pytest.mark.usefixtures("watched")
 @pytest.mark.parametrize("physics", [StubPhysics, MujocoPhysics])
 def test_no_field_of_a_device_is_ignored_in_silence(physics):
-    """A user would train without the noise, the delay or the aperture that the world sets."""
+    """A user would otherwise train without the noise, delay or aperture that the world file sets."""
     ignored = []
     for type_name, name in FIELDS:
         kind = field_kinds(type_name)[name]
@@ -126,7 +126,7 @@ def test_no_field_of_a_device_is_ignored_in_silence(physics):
     [(kind.node, name) for kind in DEVICES.values() for name in kind.without_effect.split()],
 )
 def test_a_field_without_effect_is_named_unless_it_has_its_default(type_name, name):
-    """A world that Webots has saved contains many defaults."""
+    """A world that Webots has saved contains many fields with their defaults, which would fill the report."""
     kind = field_kinds(type_name)[name]
     line = f"1 {type_name}: without effect: {name}"
     words = {FieldType.STRING: f'"{kind.default}"', FieldType.NODE: "NULL"}.get(kind.type, kind.default)
@@ -137,7 +137,7 @@ def test_a_field_without_effect_is_named_unless_it_has_its_default(type_name, na
 
 
 def test_fields_of_physics_without_effect_are_named_where_forces_act():
-    """The stub simulates no forces, so its users expect no bounces."""
+    """The stub computes no forces, so its report does not list `bounce`."""
     bouncing = "ContactProperties { bounce 0.9 softCFM 0.001 } ContactProperties { bounce 0 }"
     world = f"#VRML_SIM R2023b utf8\nWorldInfo {{ contactProperties [ {bouncing} ] }}\n".encode()
 

@@ -1,4 +1,4 @@
-"""Meshes: the triangle that a ray meets first, and meshes of hardly any extent."""
+"""Meshes: the first triangle on a ray, and meshes that are flat or empty."""
 
 import random
 
@@ -13,7 +13,7 @@ from tests.values.worlds import PHYSICS, Setting
 
 @pytest.mark.parametrize("front", [False, True])
 def test_the_nearest_of_many_triangles_is_that_of_all(front):
-    """The triangles are sorted into boxes, so that a ray tries a few of thousands."""
+    """Triangles are sorted into boxes, so that a ray tests only a few of thousands."""
     draw = random.Random(5)
     points = [tuple(draw.uniform(-1.0, 1.0) for _ in range(3)) for _ in range(60)]
     triangles = [tuple(draw.sample(range(60), 3)) for _ in range(200)]
@@ -28,7 +28,10 @@ def test_the_nearest_of_many_triangles_is_that_of_all(front):
 
 
 def test_a_ray_along_a_side_of_a_mesh_is_met_by_the_others():
-    """A direction of exactly 0 across the box around a flat mesh must not divide by it."""
+    """The box of a flat mesh has no height, and the ray's direction across the box is exactly 0.
+
+    This must not cause a division by 0.
+    """
     sheet = Mesh(((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1.0, 0.0)), ((0, 1, 2),))
 
     assert nearest_triangle(sheet, (0.9, 0.1, 2.0), (0.0, 0.0, -1.0)) == pytest.approx(2.0)
@@ -47,7 +50,7 @@ MESHES = [
 @pytest.mark.parametrize("physics", PHYSICS)
 @for_each("mesh", MESHES)
 def test_a_mesh_without_a_volume_is_an_obstacle_too(mesh, physics):
-    """MuJoCo would refuse a model with a hull of no volume, in its own words."""
+    """MuJoCo would reject the convex hull of such a mesh, with a message that names no node of the world."""
     outline = f"IndexedFaceSet {{ coord Coordinate {{ {mesh} }}"
     simulation = Setting(physics).load(f"Solid {{ boundingObject {outline} }}")
 

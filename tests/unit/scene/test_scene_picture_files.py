@@ -1,4 +1,4 @@
-"""Pictures are saved to and loaded from files."""
+"""Saving camera images to files, and loading them."""
 
 import struct
 import sys
@@ -14,7 +14,7 @@ BLUE, RED = bytes((255, 0, 0, 255)), bytes((0, 0, 255, 255))
 
 
 def decode(data):
-    """Return the size and the rows of a PNG file without filters, as this project writes them."""
+    """Return the size and rows of a PNG file without filters, which is the form that this project writes."""
     assert data[:8] == b"\x89PNG\r\n\x1a\n"
     chunks, at = {}, 8
     while at < len(data):
@@ -30,7 +30,7 @@ def decode(data):
 
 
 def test_a_picture_is_written_row_by_row_as_red_green_blue(tmp_path):
-    """Its checksums are right, so that other programs read it."""
+    """The image is red, blue / blue, red, so a wrong order of rows or channels is visible."""
     path = tmp_path / "eye.PNG"
 
     assert picture_files.save(str(path), (2, 2), memoryview(BLUE + RED + RED + BLUE))
@@ -38,7 +38,7 @@ def test_a_picture_is_written_row_by_row_as_red_green_blue(tmp_path):
 
 
 def test_a_picture_is_loaded_as_it_was_saved(tmp_path):
-    """Alpha is included if it was requested."""
+    """With `alpha=True` the file keeps the alpha channel."""
     path, pixels = str(tmp_path / "eye.png"), BLUE + bytes((1, 2, 3, 4))
 
     assert picture_files.save(path, (2, 1), pixels, alpha=True)
@@ -46,7 +46,7 @@ def test_a_picture_is_loaded_as_it_was_saved(tmp_path):
 
 
 def test_a_jpeg_file_has_the_quality_that_was_asked_for(tmp_path):
-    """Its colors are similar to those of the picture; a lower quality gives a smaller file."""
+    """A lower quality gives a smaller file; the loaded colors are close to the saved ones."""
     path, pixels = tmp_path / "eye.jpg", bytes(range(256)) * 64
     assert picture_files.save(str(path), (64, 64), pixels, quality=100)
     best = path.stat().st_size
@@ -60,7 +60,7 @@ def test_a_jpeg_file_has_the_quality_that_was_asked_for(tmp_path):
 
 @pytest.mark.parametrize("data", [None, b"", b"GIF89a", b"\x89PNG\r\n\x1a\n broken"])
 def test_what_is_no_picture_is_not_loaded(tmp_path, data):
-    """Webots prints that the file is unreadable."""
+    """The result is None; Webots prints that the file is unreadable."""
     path = tmp_path / "logo.png"
     if data is not None:
         path.write_bytes(data)
@@ -69,19 +69,19 @@ def test_what_is_no_picture_is_not_loaded(tmp_path, data):
 
 
 def test_a_picture_that_cannot_be_written_is_a_failure(tmp_path):
-    """The folder is missing, or the picture has no pixel."""
+    """Either the folder is missing, or the image has no pixel."""
     assert not picture_files.save(str(tmp_path / "none" / "eye.png"), (1, 1), BLUE)
     assert not picture_files.save(str(tmp_path / "eye.png"), (0, 0), b"")
 
 
 def test_other_formats_are_refused(tmp_path):
-    """A file in another format than its name claims would be worse."""
+    """Writing PNG data into a `.gif` file would mislead every reader of the file."""
     with pytest.raises(UnsimulatedError, match=r"use a name that ends in \.png or \.jpg"):
         picture_files.save(str(tmp_path / "eye.gif"), (1, 1), BLUE)
 
 
 def test_without_pillow_the_refusal_names_what_to_install(tmp_path, monkeypatch):
-    """PNG files are written without Pillow."""
+    """PNG files do not need Pillow, but JPEG files do."""
     monkeypatch.setitem(sys.modules, "PIL.Image", None)
 
     assert picture_files.save(str(tmp_path / "eye.png"), (1, 1), BLUE)

@@ -1,4 +1,4 @@
-"""The visible part of a world: shapes, colors, and the frames that carry them."""
+"""The visible part of a world: shapes, colors, and the frames to which they belong."""
 
 import math
 
@@ -47,7 +47,7 @@ def things(view):
     ],
 )
 def test_each_geometry_has_a_kind_and_a_size(things, geometry, kind, size):
-    """Sizes are full lengths, like those of the shapes for collisions."""
+    """Sizes are full lengths, as for collision shapes."""
     (thing,) = things(f"Shape {{ geometry {geometry} }}")
 
     assert (thing.kind, thing.size) == (kind, size)
@@ -68,7 +68,7 @@ def test_each_geometry_has_a_kind_and_a_size(things, geometry, kind, size):
     ],
 )
 def test_each_appearance_is_one_color(things, appearance, color):
-    """A texture is not read, and numbers that are not a color are accepted too."""
+    """Textures have no effect, and a color with wrong numbers still gives a color."""
     (thing,) = things(f"Shape {{ appearance {appearance} geometry Box {{ }} }}")
 
     assert thing.color == color
@@ -87,12 +87,12 @@ def test_each_appearance_is_one_color(things, appearance, color):
     ],
 )
 def test_what_has_no_surface_is_not_drawn(things, shape):
-    """A shape that cannot be drawn is not a reason to refuse a world."""
+    """A world with a shape that cannot be rendered still loads."""
     assert things(shape) == ()
 
 
 def test_a_shape_is_in_the_frame_of_the_nearest_place(things):
-    """A Pose has its own frame, but a Group does not."""
+    """The Pose is a frame, but the Group inside it is not."""
     (thing,) = things(
         f"Solid {{ translation 1 2 3 children [ Pose {{ translation 0 0 1 children [ "
         f"Group {{ children [ Shape {{ {RED} geometry Box {{ }} }} ] }} ] }} ] }}"
@@ -102,7 +102,7 @@ def test_a_shape_is_in_the_frame_of_the_nearest_place(things):
 
 
 def test_a_scale_makes_a_shape_larger_and_moves_it_away(things):
-    """An equal scale on all axes belongs to the frame; another one changes only the shape."""
+    """The frame takes an equal scale on all axes; a scale that differs by axis changes only the shape."""
     even, uneven = things(
         "Transform { scale 2 2 2 children [ Transform { translation 1 0 0 children [ "
         "Shape { geometry Box { size 1 1 1 } } ] } ] }\n"
@@ -115,7 +115,10 @@ def test_a_scale_makes_a_shape_larger_and_moves_it_away(things):
 
 
 def test_a_stand_in_has_the_shapes_of_its_outline(things):
-    """Its color is its own unless its author set an appearance; its floor is darker than its walls."""
+    """A stand-in has a default color unless the world sets its appearance.
+
+    The floor of an arena is darker than its walls.
+    """
     arena = things("RectangleArena { }")
     (box,) = things(f"SolidBox {{ {RED} }}")
 
@@ -125,7 +128,7 @@ def test_a_stand_in_has_the_shapes_of_its_outline(things):
 
 
 def test_shapes_of_joints_and_of_robots_move_with_them(things):
-    """A camera must find the frame that carries each of them."""
+    """A camera needs the frame that carries each shape; the floor outside all Solids has no frame."""
     body, wheel, floor = things(
         """Robot { name "r" boundingObject Box { } children [ Shape { geometry Box { } }
           HingeJoint { device RotationalMotor { } endPoint Solid {
@@ -139,7 +142,7 @@ def test_shapes_of_joints_and_of_robots_move_with_them(things):
 
 
 def test_a_mesh_of_points_has_triangles(things):
-    """A face with more corners is cut into triangles, and a wrong index removes its face."""
+    """A face with more than three corners is cut into triangles; a face with an invalid index is left out."""
     (thing,) = things(
         """Shape { geometry IndexedFaceSet {
           coord Coordinate { point [ 0 0 0, 1 0 0, 1 1 0, 0 1 0 ] }
@@ -151,7 +154,7 @@ def test_a_mesh_of_points_has_triangles(things):
 
 
 def test_a_mesh_that_is_seen_from_behind_is_turned_around(things):
-    """Its faces are listed clockwise."""
+    """With `ccw FALSE` the corners of the faces are listed clockwise, so the order is reversed."""
     (thing,) = things(
         """Shape { geometry IndexedFaceSet { ccw FALSE
           coord Coordinate { point [ 0 0 0, 1 0 0, 1 1 0 ] } coordIndex [ 0 1 2 ] } }"""
@@ -163,10 +166,10 @@ def test_a_mesh_that_is_seen_from_behind_is_turned_around(things):
 HOOK = [(0, 0, 0), (2, 0, 0), (2, 1, 0), (1, 1, 0), (1, 2, 0), (0, 2, 0)]  # its area is 3 square meters
 
 
-@pytest.mark.parametrize("first", [0, 1, 2])  # first axis
+@pytest.mark.parametrize("first", [0, 1, 2])  # index of the first corner
 @pytest.mark.parametrize("way", [1, -1])
 def test_a_face_that_is_not_convex_is_cut_without_overlap(first, way):
-    """Floors of houses are such faces."""
+    """The floor of a house is often such a face."""
     points = [(*point[first:], *point[:first]) for point in HOOK]
     triangles = cut(points, list(range(6))[::way])
 
@@ -176,7 +179,7 @@ def test_a_face_that_is_not_convex_is_cut_without_overlap(first, way):
 
 
 def test_an_outline_that_crosses_itself_ends():
-    """No triangulation of it is right, but the function must return."""
+    """No triangulation of such an outline is right, but the function must return."""
     star = [(0, 0, 0), (2, 2, 0), (0, 2, 0), (2, 0, 0), (1, 3, 0)]
 
     assert len(cut(star, [0, 1, 2, 3, 4])) == 3
@@ -190,7 +193,7 @@ def area(a, b, c):
 
 
 def test_a_grid_of_heights_is_a_mesh(things):
-    """Heights are listed along x first."""
+    """Heights are listed row by row, with x changing first."""
     (thing,) = things(
         "Shape { geometry ElevationGrid { xDimension 2 yDimension 2 xSpacing 3 height [ 0 0.5 1 2 ] } }"
     )
@@ -200,7 +203,7 @@ def test_a_grid_of_heights_is_a_mesh(things):
 
 
 def test_a_cylinder_of_an_old_file_stands_along_y(things):
-    """Webots turns it in the same way when it reads an old file."""
+    """Webots also turns the cylinder when it reads an old file."""
     world = """Solid { children [ Shape { geometry Cylinder { } } ] }"""
     (thing,) = things(world, "#VRML_SIM R2021b utf8\nWorldInfo { }")
 
@@ -216,12 +219,12 @@ def test_a_cylinder_of_an_old_file_stands_along_y(things):
     ],
 )
 def test_the_sky_has_one_color(view, background, sky):
-    """As in Webots, it is black if a world has no background."""
+    """A world without a background has a black sky, as in Webots."""
     assert view(background).sky() == sky
 
 
 def test_writes_that_are_visible_are_counted(view):
-    """A physics that draws then reads the nodes again; a write of `customData` causes no work."""
+    """A renderer reads the nodes again only after a visible write; a write of `name` is not visible."""
     seen = view(f'Solid {{ name "s" children [ Shape {{ {RED} geometry Box {{ }} }} ] }}')
     solid = seen.root.nodes()[1]
     look = solid.nodes()[0].nodes("appearance")[0]

@@ -1,4 +1,4 @@
-"""The command lines of the simulators."""
+"""The command line that a sidecar builds for each simulator."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ WORLD = Path("/worlds/collect-0.wbt")
 
 @pytest.fixture
 def path(tmp_path):
-    """Return a function that creates programs, and returns a PATH with them."""
+    """Return a function that creates executable programs and returns a PATH with their folder."""
 
     def make(*programs):
         for program in programs:
@@ -24,7 +24,7 @@ def path(tmp_path):
 
 
 def test_the_stub_gets_the_world_and_its_options(path) -> None:
-    """Options come last, as in the job."""
+    """The options of the job come last."""
     folder = path("palaestra-stub")
 
     started = command(
@@ -36,7 +36,7 @@ def test_the_stub_gets_the_world_and_its_options(path) -> None:
 
 
 def test_mujoco_gets_the_world_and_its_options(path) -> None:
-    """It has the same options as the stub, so a job needs no others."""
+    """MuJoCo has the same options as the stub, so a job can switch between them."""
     folder = path("palaestra-mujoco")
 
     started = command(Driver.MUJOCO, Launch(world=WORLD, options=["--leave-out", "all"]), {"PATH": folder})
@@ -45,28 +45,28 @@ def test_mujoco_gets_the_world_and_its_options(path) -> None:
 
 
 def test_mujoco_draws_on_one_thread(path) -> None:
-    """Several simulators share the cores."""
+    """Several simulators share the cores, so each software renderer uses one thread."""
     started = command(Driver.MUJOCO, Launch(world=WORLD), {"PATH": path("palaestra-mujoco")})
 
     assert started.environment["LP_NUM_THREADS"] == "0"
 
 
 def test_mujoco_is_not_told_how_to_draw(path) -> None:
-    """Otherwise it would load OpenGL at its start, and fail on a machine that lacks it."""
+    """With `MUJOCO_GL` set, MuJoCo would load OpenGL at its start, and fail on a machine without it."""
     started = command(Driver.MUJOCO, Launch(world=WORLD), {"PATH": path("palaestra-mujoco")})
 
     assert "MUJOCO_GL" not in started.environment
 
 
 def test_variables_of_the_job_decide_how_mujoco_draws(path) -> None:
-    """A user's image may have another library or a GPU."""
+    """A user's image may have another OpenGL library or a GPU."""
     given = {"PATH": path("palaestra-mujoco"), "MUJOCO_GL": "osmesa", "LP_NUM_THREADS": "4"}
 
     assert command(Driver.MUJOCO, Launch(world=WORLD), given).environment == given
 
 
 def test_webots_starts_paused_without_a_screen_and_prints(path) -> None:
-    """The trainer sets the mode when it is ready to step."""
+    """Webots starts paused; the trainer sets the mode when it is ready to step."""
     folder = path("webots")
 
     started = command(Driver.WEBOTS, Launch(world=WORLD, options=["--port=1235"]), {"PATH": folder})
@@ -79,14 +79,14 @@ def test_webots_starts_paused_without_a_screen_and_prints(path) -> None:
 
 @pytest.mark.parametrize(("given", "user"), [({}, "palaestra"), ({"USER": "maria"}, "maria")])
 def test_webots_always_has_a_user(path, given, user) -> None:
-    """Its temporary folder has the user's name, which a container does not set."""
+    """Webots names its temporary folder after the variable `USER`, which a container does not set."""
     started = command(Driver.WEBOTS, Launch(world=WORLD), {"PATH": path("webots"), **given})
 
     assert started.environment["USER"] == user
 
 
 def test_a_program_of_ones_own_gets_the_world_where_it_asks_for_it(path) -> None:
-    """`{world}` may be a part of an argument."""
+    """`{world}` may also be a part of an argument."""
     folder = path("my-sim")
     launch = Launch(world=WORLD, options=["--fast"], program=["my-sim", "--scene={world}", "-v"])
 
@@ -96,19 +96,19 @@ def test_a_program_of_ones_own_gets_the_world_where_it_asks_for_it(path) -> None
 
 
 def test_a_missing_program_is_named(tmp_path) -> None:
-    """This is known before anything is started, and a retry cannot help."""
+    """The sidecar reports this before it starts anything; a retry cannot help."""
     with pytest.raises(SidecarError, match=r"^--driver webots: program webots not found; install it"):
         command(Driver.WEBOTS, Launch(world=WORLD), {"PATH": str(tmp_path)})
 
 
 def test_a_driver_without_a_program_says_where_to_put_one() -> None:
-    """Users often forget the two dashes."""
+    """Users often forget the `--` in front of their program."""
     with pytest.raises(SidecarError, match=r"^--driver command: has no program; add it after --"):
         command(Driver.COMMAND, Launch(world=WORLD), {})
 
 
 def test_the_programs_beside_our_own_python_are_found_without_a_path(tmp_path) -> None:
-    """A virtual environment need not be activated."""
+    """Programs are found in a virtual environment that is not activated."""
     started = command(Driver.STUB, Launch(world=WORLD), {"PATH": str(tmp_path)})
 
     assert Path(started.arguments[0]).name == "palaestra-stub"

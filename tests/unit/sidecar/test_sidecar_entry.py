@@ -1,4 +1,4 @@
-"""The first steps of a sidecar's process."""
+"""The first imports of a sidecar's process."""
 
 import json
 import subprocess
@@ -12,12 +12,12 @@ print(json.dumps(sorted(name for name in sys.modules if name.startswith("palaest
 
 
 def test_signals_are_held_back_before_anything_else_is_imported():
-    """Until signals are blocked, process 1 of a container loses a SIGTERM.
+    """Process 1 of a container loses a SIGTERM that arrives before signals are blocked.
 
-    Every earlier import makes that longer.
+    Each import before that makes the time longer in which a SIGTERM is lost.
 
-    The import path is fixed before that, because a user's `signal.py` may shadow Python's.
-    The system is looked at before that too, because others have no such signals.
+    Only two modules come first. `shadowing` fixes the import path, because a user's `signal.py` may shadow
+    Python's. `linux` checks the system, because other systems lack these signals.
     """
     said = subprocess.run([sys.executable, "-c", FIRST], capture_output=True, check=True, timeout=60)
 

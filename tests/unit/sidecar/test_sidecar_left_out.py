@@ -1,4 +1,4 @@
-"""The file in which a simulator reports what it leaves out; the simulator may be any program."""
+"""The file in which a simulator reports the parts of a world that it leaves out; any program may write it."""
 
 import os
 
@@ -18,7 +18,7 @@ from palaestra_sim.sidecar.left_out import read_left_out
     ],
 )
 def test_a_report_is_read_as_printable_lines(tmp_path, content, lines) -> None:
-    """Terminals show these lines."""
+    """A terminal shows these lines, so control characters are removed."""
     file = tmp_path / "left-out"
     file.write_bytes(content)
 
@@ -26,7 +26,7 @@ def test_a_report_is_read_as_printable_lines(tmp_path, content, lines) -> None:
 
 
 def test_without_a_file_nothing_was_left_out(tmp_path) -> None:
-    """Most simulators write no file. A pipe would block the sidecar for ever."""
+    """Most simulators write no such file. Opening a pipe of that name would block the sidecar for ever."""
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "loop").symlink_to("loop")
 

@@ -1,4 +1,4 @@
-"""A simulator's output is passed on line by line, whatever it contains."""
+"""A sidecar copies its simulator's output line by line, whatever bytes the output contains."""
 
 import logging
 import os
@@ -11,7 +11,7 @@ from palaestra_sim.sidecar.output import MOST_LINE, LineHandler, Passage
 
 @pytest.fixture
 def passed_on(capfdbinary):
-    """Return a function that passes pieces on, and returns the output and the last line."""
+    """Return a function that sends pieces through a `Passage`; it returns the output and the last line."""
 
     def through(*pieces, mark=""):
         source, sink = os.pipe()
@@ -28,7 +28,7 @@ def passed_on(capfdbinary):
 
 
 def test_lines_come_out_as_they_went_in(passed_on) -> None:
-    """This holds also if a line comes in two pieces or is empty."""
+    """The output is the same if a line comes in two pieces or is empty."""
     out, last = passed_on(b"one\ntw", b"o\n\nthree\n")
 
     assert out == b"one\ntwo\n\nthree\n"
@@ -36,7 +36,7 @@ def test_lines_come_out_as_they_went_in(passed_on) -> None:
 
 
 def test_the_last_line_needs_no_newline(passed_on) -> None:
-    """A simulator may die in the middle of its last line."""
+    """A simulator may crash in the middle of its last line."""
     out, last = passed_on(b"Aborted")
 
     assert (out, last) == (b"Aborted\n", "Aborted")
@@ -44,7 +44,7 @@ def test_the_last_line_needs_no_newline(passed_on) -> None:
 
 @pytest.mark.parametrize("end", [b"", b"\n"])
 def test_a_line_without_end_is_passed_on_in_pieces(passed_on, end) -> None:
-    """A line without an end must not be kept for ever."""
+    """The sidecar must not collect an endless line in its memory."""
     out, _ = passed_on(b"x" * 3 * MOST_LINE + end)
 
     assert {len(line) for line in out.splitlines(keepends=True)[:-1]} == {MOST_LINE}
@@ -52,7 +52,7 @@ def test_a_line_without_end_is_passed_on_in_pieces(passed_on, end) -> None:
 
 
 def test_every_line_of_one_of_two_simulators_begins_with_its_mark(passed_on) -> None:
-    """The pieces of a long line begin with the mark too, which counts toward the maximum length."""
+    """Each piece of a long line begins with the mark too, and the mark counts toward the maximum length."""
     out, last = passed_on(b"one\n" + b"x" * MOST_LINE + b"\ntwo", mark="b: ")
 
     lines = out.splitlines(keepends=True)
@@ -62,14 +62,17 @@ def test_every_line_of_one_of_two_simulators_begins_with_its_mark(passed_on) -> 
 
 
 def test_bytes_that_are_no_text_are_passed_on(passed_on) -> None:
-    """A log consists of bytes; only the last line becomes text, for /state."""
+    """The log gets the bytes unchanged; the last line becomes text, because /state is JSON."""
     out, last = passed_on(b"\xff\xfe\n")
 
     assert (out, last) == (b"\xff\xfe\n", "\ufffd\ufffd")
 
 
 def test_our_own_lines_say_that_they_are_ours(capfdbinary) -> None:
-    """They also stay one line each, whatever text a simulator printed last."""
+    """A reader of the log must see which lines are the sidecar's.
+
+    A line break in a message is replaced by a space.
+    """
     record = logging.makeLogRecord({"msg": "failed: %s", "args": ("a\nb",)})
 
     LineHandler().emit(record)

@@ -1,4 +1,4 @@
-"""The Webots project around a generated world: files that Webots must find, and others that it must not."""
+"""The Webots project around a generated world: files that Webots must find, and files that it must not."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -19,7 +19,7 @@ RELATIVE = BALL + b'Shape { appearance Appearance { texture ImageTexture { url "
 
 @pytest.fixture
 def source(tmp_path):
-    """Return a function that puts a world into a folder, with files next to it."""
+    """Return a function that writes a world and other files of its project."""
 
     def make(*files, world="source/worlds/arena.wbt", content=BALL):
         for name in files:
@@ -35,7 +35,7 @@ def source(tmp_path):
 
 @pytest.fixture
 def named(tmp_path):
-    """Return a function that writes a world for Webots into the work folder."""
+    """Return a function that generates a world for Webots in the work folder."""
 
     def write(world, slot="a"):
         identity = replace(IDENTITY, slot=slot)
@@ -45,13 +45,13 @@ def named(tmp_path):
 
 
 def read(world, path):
-    """Return the text of a file by its path relative to a world's folder."""
+    """Return the text of a file, given by its path relative to a world's folder."""
     return (world.parent / path).read_text()
 
 
 @pytest.mark.parametrize("folder", project.FOLDERS)
 def test_webots_finds_the_folders_of_the_project_from_the_generated_world(source, named, folder) -> None:
-    """Webots takes the parent of the world's folder as the project, whatever its name is."""
+    """Webots takes the parent of the world's folder as the project, whatever the folder's name is."""
     world = named(source(f"{folder}/x/x.py", world="source/maps/arena.wbt"))
 
     assert world.parts[-4:] == ("work", "project", "maps", "collect-0.wbt")
@@ -59,7 +59,7 @@ def test_webots_finds_the_folders_of_the_project_from_the_generated_world(source
 
 
 def test_a_project_is_linked_as_a_whole(source, named) -> None:
-    """A PROTO may use a texture in its folder, and a controller may use a file in the worlds' folder."""
+    """A PROTO may use a texture of the project, and a controller may read a file in the worlds' folder."""
     world = named(source("protos/Box.proto", "textures/a.png", "worlds/map.json"))
 
     assert read(world, "../textures/a.png") == "textures/a.png"
@@ -67,7 +67,7 @@ def test_a_project_is_linked_as_a_whole(source, named) -> None:
 
 
 def test_a_world_without_a_project_gets_a_folder_and_no_link(source, named, tmp_path) -> None:
-    """A ConfigMap may be mounted next to unrelated folders, in the worst case those of the root."""
+    """A ConfigMap may be mounted next to unrelated folders, even in the root, so these are not linked."""
     world = named(source("secret/key", "worlds/other.wbt"))
 
     assert sorted(path.name for path in (tmp_path / "work").rglob("*")) == [
@@ -79,14 +79,14 @@ def test_a_world_without_a_project_gets_a_folder_and_no_link(source, named, tmp_
 
 
 def test_a_shipped_world_has_no_project(named, tmp_path) -> None:
-    """Its folder is in a Python package, next to modules."""
+    """The folder of a built-in world is part of a Python package, whose modules are not linked."""
     named(builtin_path("arena"))
 
     assert [path.name for path in (tmp_path / "work" / "project").iterdir()] == ["worlds"]
 
 
 def test_a_second_simulator_of_a_world_is_in_a_project_too(source, tmp_path) -> None:
-    """A notebook with two simulators has no job, so the names get a suffix."""
+    """The two simulators of a notebook belong to no job, so the second world gets the suffix `_2`."""
     content = builtin("arena")
     world = source("controllers/roll/roll.py", content=content)
 
@@ -97,7 +97,7 @@ def test_a_second_simulator_of_a_world_is_in_a_project_too(source, tmp_path) -> 
 
 
 def test_other_simulators_get_the_world_alone(source, tmp_path) -> None:
-    """The stub starts no controller, so it needs no project."""
+    """The stub starts no controllers, so it needs no files of the project."""
     world = source("controllers/roll/roll.py")
 
     alone = world_files.named(world, tmp_path / "work", IDENTITY, clock=True)
@@ -106,7 +106,7 @@ def test_other_simulators_get_the_world_alone(source, tmp_path) -> None:
 
 
 def test_the_standby_keeps_the_links_of_the_first(source, named) -> None:
-    """The first simulator may be reading a file through one of them."""
+    """The first simulator may just then read a file through a link, so the links are not replaced."""
     first = named(source("controllers/roll/roll.py"))
     link = first.parents[1] / "controllers"
     made = link.lstat().st_mtime_ns
@@ -118,7 +118,7 @@ def test_the_standby_keeps_the_links_of_the_first(source, named) -> None:
 
 
 def test_links_are_renewed_when_the_container_starts_again(source, named) -> None:
-    """A file that was removed from the source disappears from the copy, and a new one appears."""
+    """After a restart, the copy lacks folders that the source no longer has, and has the new ones."""
     first = named(source("controllers/roll/roll.py", "old/x"))
     old = first.parents[2] / "project" / "old"
     assert old.is_symlink()
@@ -131,7 +131,7 @@ def test_links_are_renewed_when_the_container_starts_again(source, named) -> Non
 
 
 def test_a_link_to_another_source_is_replaced(source, named, tmp_path) -> None:
-    """A person may use one work folder for two worlds."""
+    """A person may use the same work folder for a second world."""
     named(source("controllers/roll/roll.py"))
     (tmp_path / "source").rename(tmp_path / "other")
 
@@ -141,7 +141,7 @@ def test_a_link_to_another_source_is_replaced(source, named, tmp_path) -> None:
 
 
 def test_worlds_of_two_folders_of_one_project_do_not_overwrite_each_other(source, named) -> None:
-    """The folder of the second world was a link in the project of the first."""
+    """A link to the folder of the second world would let the sidecar write into the source project."""
     first = source("controllers/roll/roll.py")
     second = source(world="source/maps/arena.wbt")
     named(first)
@@ -153,7 +153,7 @@ def test_worlds_of_two_folders_of_one_project_do_not_overwrite_each_other(source
 
 
 def test_a_source_called_as_a_generated_world_stays_as_it_is(source, named) -> None:
-    """At every start the generated world replaces the link to it."""
+    """The generated world has the same name as the source, and replaces only the link to the source."""
     world = source("controllers/roll/roll.py", world="source/worlds/collect-0.wbt")
 
     for slot in (*world_files.SLOTS, *world_files.SLOTS):
@@ -163,7 +163,7 @@ def test_a_source_called_as_a_generated_world_stays_as_it_is(source, named) -> N
 
 
 def test_the_work_folder_is_not_linked_into_itself(source, tmp_path) -> None:
-    """A program that follows links would never end."""
+    """With a link to itself in the folder, a program that follows links would never end."""
     world = source("controllers/roll/roll.py")
 
     made = world_files.named(
@@ -174,7 +174,7 @@ def test_the_work_folder_is_not_linked_into_itself(source, tmp_path) -> None:
 
 
 def test_a_work_folder_around_the_project_of_the_world_is_refused(source, tmp_path) -> None:
-    """The generated world would be written among the sources, and links would replace them."""
+    """The sidecar would write the generated world among the sources and replace them by links."""
     world = source("x").parents[1].rename(tmp_path / "project") / "worlds" / "arena.wbt"
 
     with pytest.raises(SidecarError, match=r"^--work: .*: has the project of the world; give another"):
@@ -189,7 +189,7 @@ MODEL = b"""<mujoco><worldbody><include file="../../shared/Box.proto"/></worldbo
 
 @pytest.mark.parametrize("content", [PROTO, MODEL], ids=["wbt", "mjcf"])
 def test_files_above_the_project_are_found_from_the_generated_world(source, tmp_path, content) -> None:
-    """Packages share PROTOs and meshes between several projects."""
+    """Some packages share PROTOs and meshes between several projects."""
     world = source("shared/Box.proto", "lab/x", world="source/lab/worlds/arena.wbt", content=content)
     (tmp_path / "source/shared/Box.proto").write_text("<mujocoinclude/>")
 
@@ -209,7 +209,7 @@ def test_files_above_the_project_are_found_from_the_generated_world(source, tmp_
     ],
 )
 def test_a_root_that_does_not_hold_all_is_refused(source, tmp_path, root, refusal) -> None:
-    """The simulator would not find a file, and its message would not show the cause."""
+    """The simulator would not find a file, and its error would not name `--root` as the cause."""
     world = source("shared/Box.proto", world="source/lab/worlds/arena.wbt", content=PROTO)
 
     with pytest.raises(SidecarError, match=f"^--root: {tmp_path}/{refusal}"):
@@ -219,7 +219,7 @@ def test_a_root_that_does_not_hold_all_is_refused(source, tmp_path, root, refusa
 
 
 def test_the_world_in_its_own_root_has_only_its_neighbors(source, tmp_path) -> None:
-    """With the root, a person sets that nothing above belongs to the project."""
+    """With `--root` a person declares that nothing above this folder belongs to the project."""
     world = source("worlds/map.json", "secret", content=RELATIVE)
 
     made = world_files.named(world, tmp_path / "work", IDENTITY, clock=True, root=world.parent)
@@ -229,7 +229,7 @@ def test_the_world_in_its_own_root_has_only_its_neighbors(source, tmp_path) -> N
 
 
 def test_of_the_root_only_what_is_not_the_system_s_is_linked(tmp_path) -> None:
-    """A world in /worlds of an image has its project in /."""
+    """The project of a world in `/worlds` is `/`, whose system folders must not be linked."""
     folder = project.lay_out(Path("/usr/arena.wbt"), tmp_path / "project", Path("/"), linked=True)
 
     assert (folder / "bin").is_symlink()
@@ -237,7 +237,7 @@ def test_of_the_root_only_what_is_not_the_system_s_is_linked(tmp_path) -> None:
 
 
 def test_a_world_in_the_root_has_nothing_outside(tmp_path) -> None:
-    """The root has no parent, so a world in it has no project."""
+    """The root folder has no parent, so a world in it has no project."""
     folder = project.lay_out(Path("/arena.wbt"), tmp_path / "project", Path("/"), linked=True)
 
     assert not project.has_project(Path("/arena.wbt"))
@@ -246,7 +246,7 @@ def test_a_world_in_the_root_has_nothing_outside(tmp_path) -> None:
 
 
 def test_a_path_with_dots_means_the_folders_that_it_leads_to(source, named, tmp_path, monkeypatch) -> None:
-    """A person may type ../arena.wbt in a folder next to the world."""
+    """A person may type `../arena.wbt` in a folder next to the world."""
     source("controllers/roll/roll.py", "worlds/sub/x")
     monkeypatch.chdir(tmp_path / "source" / "worlds" / "sub")
 
@@ -257,14 +257,14 @@ def test_a_path_with_dots_means_the_folders_that_it_leads_to(source, named, tmp_
 
 
 def test_relative_addresses_need_no_project(source, named) -> None:
-    """A texture next to a world is found as before."""
+    """A texture next to the world is found without a project."""
     world = named(source("worlds/a.png", content=RELATIVE))
 
     assert read(world, "a.png") == "worlds/a.png"
 
 
 def test_a_controller_without_a_project_is_named_with_the_remedy(source) -> None:
-    """Webots silently starts another program instead."""
+    """Without the controller Webots starts `<generic>` and reports no error."""
     world = source()
 
     warning = project.missing_controllers(world, BALL, {})
@@ -278,19 +278,19 @@ def test_a_controller_without_a_project_is_named_with_the_remedy(source) -> None
 
 @pytest.mark.parametrize("controller", ["ros", "void", "<none>", "<generic>", "<extern>", ""])
 def test_a_controller_of_webots_needs_no_project(source, controller) -> None:
-    """No file of the project is needed for it."""
+    """Webots finds its own controllers without a project."""
     content = BALL.replace(b"roll", controller.encode())
 
     assert project.missing_controllers(source(), content, {}) is None
 
 
 def test_a_robot_without_a_controller_needs_no_project(source) -> None:
-    """It has Webots' default controller, <generic>."""
+    """Webots starts its default controller `<generic>` for such a robot."""
     assert project.missing_controllers(source(), BALL.replace(b'controller "roll"', b""), {}) is None
 
 
 def test_a_world_in_its_project_warns_of_nothing(source) -> None:
-    """A robot's PROTO may bring its controller, from a folder that only Webots knows."""
+    """A PROTO of the project may set the controller, in a folder that only Webots knows."""
     assert project.missing_controllers(source("protos/Ball.proto"), BALL, {}) is None
 
 
@@ -302,7 +302,7 @@ def test_a_world_in_its_project_warns_of_nothing(source) -> None:
     ],
 )
 def test_controllers_of_other_projects_are_found(source, tmp_path, variable, path) -> None:
-    """A project in the image may serve a world from a ConfigMap."""
+    """A project in the image may have the controllers for a world from a ConfigMap."""
     source("controllers/roll/roll.py", "../webots/projects/default/controllers/roll/roll.py")
     world = source(world="elsewhere/worlds/arena.wbt")
 
@@ -310,7 +310,7 @@ def test_controllers_of_other_projects_are_found(source, tmp_path, variable, pat
 
 
 def test_a_warning_of_many_robots_fits_into_a_line(source) -> None:
-    """The log cuts long lines, and the remedy comes last."""
+    """The log truncates long lines, and the remedy at the end must stay readable."""
     balls = b"".join(b'Robot { name "ball %d" controller "roll" }\n' % number for number in range(100))
 
     warning = project.missing_controllers(source(), BALL + balls, {})

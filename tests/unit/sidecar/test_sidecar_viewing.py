@@ -1,4 +1,4 @@
-"""What a sidecar reads from its simulator for viewers: rarely, bounded, and without harm to either."""
+"""The requests of a sidecar to its simulator on behalf of viewers: seldom, bounded, and harmless."""
 
 import contextlib
 import socket
@@ -16,7 +16,7 @@ LARGE = b"x" * 5_000_000  # more than a socket holds
 
 
 class Simulator:
-    """A loop in a thread that answers viewers and counts their requests."""
+    """A simulator's loop in a thread, which answers requests for viewers and counts them."""
 
     def __init__(self, path):
         self.asked = []
@@ -29,12 +29,12 @@ class Simulator:
         self.thread.start()
 
     def scene(self):
-        """Return a large scene."""
+        """Return a scene that is larger than the buffer of a socket."""
         self.asked.append("scene")
         return LARGE
 
     def state(self):
-        """Return the number of the request, or fail."""
+        """Return the number of the request, or raise an error if `sick` is set."""
         self.asked.append("state")
         if self.sick:
             raise ZeroDivisionError
@@ -46,7 +46,7 @@ class Simulator:
         return b"%d" % len(self.asked)
 
     def end(self):
-        """End the loop and its socket."""
+        """End the loop and close its socket."""
         self.loop.post(self.loop.stop)
         self.thread.join(10.0)
         self.socket.close()
@@ -55,7 +55,7 @@ class Simulator:
 
 @pytest.fixture
 def path(tmp_path):
-    """Return the path of a socket, longer than an address of a socket may be."""
+    """Return a path that is longer than the address of a socket may be."""
     folder = tmp_path / ("deep" * 40)
     folder.mkdir()
     return folder / "collect-0.view"
@@ -63,7 +63,7 @@ def path(tmp_path):
 
 @pytest.fixture
 def simulator(path):
-    """Yield a simulator that answers viewers."""
+    """Yield a running simulator that answers requests for viewers."""
     running = Simulator(path)
     yield running
     running.end()
@@ -71,20 +71,20 @@ def simulator(path):
 
 @pytest.fixture
 def now():
-    """Return a list whose only item is the time of the viewing's clock."""
+    """Return a list with the time of the viewing's clock, which a test may change."""
     return [100.0]
 
 
 @pytest.fixture
 def view(path, now):
-    """Yield what a sidecar has for its simulator, with a clock that the test sets."""
+    """Yield the sidecar's side of the connection, with a clock that the test sets."""
     one = Viewing(path, clock=lambda: now[0])
     yield one
     one.close()
 
 
 def test_nothing_is_computed_before_a_request(simulator):
-    """A run that nobody watches is as fast as before."""
+    """A run without a viewer must not be slower."""
     time.sleep(0.05)
 
     assert simulator.asked == []
@@ -92,12 +92,12 @@ def test_nothing_is_computed_before_a_request(simulator):
 
 @pytest.mark.usefixtures("simulator")
 def test_a_large_scene_arrives_whole(view):
-    """The loop sends as much as the sidecar reads, and goes on with its steps in between."""
+    """The loop sends as much as the sidecar reads, and steps the simulation in between."""
     assert view.scene() == LARGE
 
 
 def test_many_viewers_cost_as_much_as_one(simulator, view, now):
-    """At most 30 states a second are computed, and others are the one of before."""
+    """The simulator computes at most 30 states a second; more requests get the last state again."""
     seen = {view.state() for _ in range(50)}
     assert len(seen) == 1
 
@@ -107,7 +107,7 @@ def test_many_viewers_cost_as_much_as_one(simulator, view, now):
 
 
 def test_a_picture_is_asked_for_at_most_five_times_a_second(simulator, view, now):
-    """To make a picture small takes the simulator's time."""
+    """The simulator needs time to shrink a picture, so more requests get the last picture again."""
     seen = {view.camera() for _ in range(50)}
     now[0] += 0.19
     assert {view.camera()} == seen
@@ -118,7 +118,7 @@ def test_a_picture_is_asked_for_at_most_five_times_a_second(simulator, view, now
 
 
 def test_a_scene_that_cannot_be_described_ends_no_simulator(simulator, view):
-    """A viewer must not end a training."""
+    """An error while the simulator describes its world must not end the training."""
     simulator.sick = True
     with pytest.raises(SimulatorSilent, match="could not describe its world; its log has the reason"):
         view.state()
@@ -130,7 +130,7 @@ def test_a_scene_that_cannot_be_described_ends_no_simulator(simulator, view):
 @pytest.mark.parametrize("line", [b"quit\n", b"state\nstate\n", b"x" * 100])
 @pytest.mark.usefixtures("simulator")
 def test_another_request_closes_its_connection(path, line):
-    """The socket is a file, and another program may open it."""
+    """Any program of the container may open the socket and send any request."""
     with viewing._connected(path) as connection:
         connection.settimeout(10.0)
         connection.sendall(line)
@@ -139,13 +139,13 @@ def test_another_request_closes_its_connection(path, line):
 
 
 def test_a_simulator_that_does_not_run_is_told(view):
-    """The sidecar has only a socket of the simulator, which does not respond."""
+    """The sidecar has only the path of the socket, on which no program listens."""
     with pytest.raises(SimulatorSilent, match="does not run"):
         view.state()
 
 
 def test_the_next_simulator_is_seen_after_a_restart(path, view, now):
-    """The connection to the last one is of no use."""
+    """The connection to the first simulator is broken, so the sidecar connects again."""
     first = Simulator(path)
     view.state()
     first.end()
@@ -158,7 +158,7 @@ def test_the_next_simulator_is_seen_after_a_restart(path, view, now):
 
 
 def test_a_simulator_that_hangs_is_told_in_time(path, view, monkeypatch):
-    """A viewer waits no longer than a moment, and the sidecar not at all."""
+    """A viewer waits for at most the deadline, and the sidecar's own work does not wait at all."""
     monkeypatch.setattr(viewing, "_DEADLINE_S", 0.1)
     with socket.socket(socket.AF_UNIX) as listener:
         folder = path.parent
@@ -171,7 +171,7 @@ def test_a_simulator_that_hangs_is_told_in_time(path, view, monkeypatch):
 
 
 def test_a_simulator_without_a_scene_is_explained_in_one_sentence():
-    """A person asks to see Webots, and learns what to do."""
+    """A person who wants to view Webots gets an error that names a driver with a view."""
     nothing = Viewing.without("driver webots does not describe its world to viewers; use driver stub")
 
     with pytest.raises(NothingToSee, match="use driver stub"):

@@ -1,4 +1,4 @@
-"""The world that a simulator runs is written completely, with its own ROS names, or not at all."""
+"""The world file for a simulator is written as a whole with the simulator's ROS names, or not at all."""
 
 from dataclasses import replace
 
@@ -20,7 +20,7 @@ Shape { appearance Appearance { texture ImageTexture { url [ "textures/a.png" ] 
 
 @pytest.fixture
 def source(tmp_path):
-    """Return a function that puts a source world into a project folder."""
+    """Return a function that writes a source world into the folder of a project."""
 
     def make(content=ARENA):
         world = tmp_path / "project" / "worlds" / "arena.wbt"
@@ -32,7 +32,7 @@ def source(tmp_path):
 
 
 def test_a_world_gets_its_own_names_and_its_own_place(source, tmp_path) -> None:
-    """The source is not changed, because other simulators are generated from it."""
+    """The source file stays unchanged, because the worlds of other simulators are generated from it."""
     world = source()
 
     named = world_files.named(world, tmp_path / "new" / "work", IDENTITY, clock=False)
@@ -43,7 +43,7 @@ def test_a_world_gets_its_own_names_and_its_own_place(source, tmp_path) -> None:
 
 
 def test_a_world_that_has_its_names_is_written_as_it_is(source, tmp_path) -> None:
-    """The operator has generated it, and the sidecar generates it again."""
+    """A person may start a sidecar with a world that already has the names."""
     once = world_files.named(source(), tmp_path / "once", IDENTITY, clock=True)
 
     twice = world_files.named(once, tmp_path / "twice", IDENTITY, clock=True)
@@ -52,7 +52,7 @@ def test_a_world_that_has_its_names_is_written_as_it_is(source, tmp_path) -> Non
 
 
 def test_only_one_simulator_keeps_the_clock(source, tmp_path) -> None:
-    """Two on one master would publish two times."""
+    """Two simulators with one ROS master would publish two different times on `/clock`."""
     world = source()
 
     silent = world_files.named(world, tmp_path / "work", IDENTITY, clock=False)
@@ -62,7 +62,7 @@ def test_only_one_simulator_keeps_the_clock(source, tmp_path) -> None:
 
 
 def test_the_robots_are_listed_by_the_names_that_they_have(source, tmp_path) -> None:
-    """The trainer reads them from /state and never makes a name itself."""
+    """The trainer reads the ROS names from /state and never builds a name itself."""
     world = world_files.named(source(), tmp_path, IDENTITY, clock=True)
 
     robots = world_files.described(world.read_bytes(), "arena")
@@ -72,16 +72,16 @@ def test_the_robots_are_listed_by_the_names_that_they_have(source, tmp_path) -> 
 
 
 def test_a_robot_without_a_name_is_not_listed() -> None:
-    """The controller would make a name from its process id, which is not known before."""
+    """The controller would build the name from its process id, which is not known before its start."""
     nameless = b'#VRML_SIM R2023b utf8\nRobot { name "r" controller "ros" }\n'
 
     assert world_files.described(nameless, "world") == ()
 
 
 def test_what_lies_beside_a_world_lies_beside_its_copy(source, tmp_path) -> None:
-    """Addresses are relative to the world file, and its folder may be read-only.
+    """References in a world are relative to its folder, which may be read-only.
 
-    So the copy has links to the neighbours of the file.
+    So the folder of the copy has links to the files next to the source.
     """
     world = source(NEIGHBOURS)
     for folder, name in [(world.parent / "textures", "a.png"), (world.parents[1] / "protos", "Box.proto")]:
@@ -95,7 +95,7 @@ def test_what_lies_beside_a_world_lies_beside_its_copy(source, tmp_path) -> None
 
 
 def test_a_container_that_starts_again_finds_its_own_links(source, tmp_path) -> None:
-    """The work folder outlives a container."""
+    """The work folder still exists when a container restarts, so the links of the first start are there."""
     world = source(NEIGHBOURS)
     (world.parent / "textures").mkdir()
 
@@ -106,7 +106,7 @@ def test_a_container_that_starts_again_finds_its_own_links(source, tmp_path) -> 
 
 
 def test_the_world_of_a_standby_lies_beside_the_first_ones(source, tmp_path) -> None:
-    """Both find the same files, and neither overwrites the other."""
+    """Both simulators find the same files, and the world of one does not overwrite the world of the other."""
     world = source(NEIGHBOURS)
     (world.parent / "textures").mkdir()
 
@@ -121,7 +121,7 @@ def test_the_world_of_a_standby_lies_beside_the_first_ones(source, tmp_path) -> 
 
 
 def test_a_broken_world_says_where_and_leaves_nothing(source, tmp_path) -> None:
-    """The person who wrote the world gets line and column."""
+    """The author of the world gets the line and the column of the mistake."""
     world = source(b"#VRML_SIM R2023b utf8\nRobot {\n")
 
     with pytest.raises(WorldError, match=r"arena\.wbt:\d+:\d+: "):
@@ -130,13 +130,13 @@ def test_a_broken_world_says_where_and_leaves_nothing(source, tmp_path) -> None:
 
 
 def test_a_missing_world_is_named(tmp_path) -> None:
-    """The message has the option, the file, the fact and the remedy."""
+    """The message has the option, the path, the error and the remedy."""
     with pytest.raises(SidecarError, match=r"^--world: .*/no\.wbt: No such file or directory; give a"):
         world_files.named(tmp_path / "no.wbt", tmp_path, IDENTITY, clock=False)
 
 
 def test_a_world_that_does_not_fit_is_not_there_at_all(source, tmp_path) -> None:
-    """Otherwise the next start would run half of a world."""
+    """A partly written world must not be there at the next start."""
     (tmp_path / "work" / "collect-1.wbt").mkdir(parents=True)
 
     with pytest.raises(SidecarError, match=r"^--work: .*: Is a directory; give a folder with free space$"):

@@ -1,7 +1,7 @@
 """A ROS without sockets: tests call services by path, as a client does, and topics keep the sent messages.
 
-Requests and responses go through the real message types, so a field that the type does not have is an error
-here too.
+Requests and responses are encoded and decoded with the real message types, so a field that the type does not
+have is an error here too.
 """
 
 import heapq
@@ -25,7 +25,7 @@ PENDING = object()
 
 
 class FakePublisher:
-    """A publisher that delivers messages to the inboxes of its topic."""
+    """A publisher that puts messages into the inboxes of its topic."""
 
     def __init__(self, topic, type_name, template, latched, reading):
         self.topic = topic
@@ -36,19 +36,19 @@ class FakePublisher:
 
     @property
     def heard(self):
-        """Whether the topic has a subscriber."""
+        """Return whether the topic has a subscriber."""
         return bool(self.topic.inboxes)
 
     def send(self, fields):
-        """Deliver the template with these fields."""
+        """Deliver the publisher's template with these fields."""
         self.topic.deliver({**self.template, **fields})
 
     def send_stamped(self, fields):
-        """Deliver the template with these fields, as `send` does."""
+        """Deliver the publisher's template with these fields, as `send` does."""
         self.send(fields)
 
     def send_value(self, value):
-        """Deliver only the value."""
+        """Deliver the value alone, without the template."""
         self.topic.deliver(value)
 
 
@@ -66,7 +66,7 @@ class FakeTopic:
 
 
 class FakeNode:
-    """A node for both sides: the controller serves, and a client uses `call`."""
+    """A node for both sides: the controller registers services, and a client uses `call`."""
 
     def __init__(self, ros, name):
         self.name = name
@@ -110,7 +110,7 @@ class FakeNode:
         self._ros.later(delay_s, callback)
 
     def close(self):
-        """Remove all services."""
+        """Mark the node as closed, and remove all services."""
         self.closed = True
         self.services.clear()
 
@@ -138,7 +138,7 @@ class FakeNode:
         return value
 
     def inbox(self, path):
-        """Subscribe, and return the list that receives the messages."""
+        """Subscribe to a topic, and return the list that collects its messages."""
         messages = []
         name = path if path.startswith("/") else f"/{self.name}/{path}"
         self._ros.topic(name).inboxes.append(messages)
@@ -185,7 +185,7 @@ class FakeRos:
         return [it for it in self.nodes if it.name == name][-1]
 
     def topic(self, name):
-        """Return a topic by its global name."""
+        """Return a topic by its global name; make it if it is new."""
         return self._topics.setdefault(name, FakeTopic())
 
     def clock(self):
@@ -212,13 +212,13 @@ def _travelled(codec, fields):
 
 @pytest.fixture
 def ros():
-    """A ROS without nodes."""
+    """Return a ROS without nodes."""
     return FakeRos()
 
 
 @pytest.fixture
 def start(ros, tmp_path):
-    """Return `start(world=..., mode=..., options=...)`, which starts a stub and returns its Simulator."""
+    """Return `start(world=..., mode=..., options=...)`, which starts a stub and returns its simulator."""
 
     def begin(world=None, mode=Mode.FAST, **options):
         path = tmp_path / "worlds" / "arena.wbt"
@@ -240,21 +240,21 @@ def start(ros, tmp_path):
 
 @pytest.fixture
 def robot(ros, start):
-    """The node of the shipped arena's robot, running fast."""
+    """Return the node of the robot in the built-in arena, in fast mode."""
     start()
     return ros.node("robotino")
 
 
 @pytest.fixture
 def two_robots(ros, start):
-    """The nodes of the built-in world with a separate supervisor: supervisor and robot."""
+    """Return the nodes of supervisor and robot, from the built-in world with a separate supervisor."""
     start(builtin("two_robots"))
     return ros.node("supervisor"), ros.node("robotino")
 
 
 @pytest.fixture
 def drive():
-    """`drive(node, vx, vy, omega)` commands the wheels over ROS, as a facade does."""
+    """`drive(node, vx, vy, omega)` commands the wheels over ROS, as the trainer's facade does."""
 
     def command(node, vx, vy, omega):
         speeds = (
@@ -271,7 +271,7 @@ def drive():
 
 @pytest.fixture
 def position():
-    """`position(node, "ROBOTINO")` returns x, y, z of a node by its DEF, over ROS."""
+    """`position(node, "ROBOTINO")` returns x, y, z of a node, which ROS finds by its DEF."""
 
     def ask(node, def_name):
         handle = node.get("supervisor/get_from_def", name=def_name)
@@ -283,7 +283,7 @@ def position():
 
 @pytest.fixture
 def world():
-    """`world(objects, robot=...)` returns a world file with these nodes, and with a robot by default."""
+    """`world(objects, robot=...)` returns a world file with these nodes and a robot."""
 
     def write(objects="", robot=ROBOT, info=""):
         return f"#VRML_SIM R2023b utf8\nWorldInfo {{ {info} }}\n{objects}\n{robot}\n".encode()
@@ -323,5 +323,5 @@ ROBOT = f"""DEF ROBOTINO Robot {{
 
 @pytest.fixture
 def simple_robot():
-    """The text of a robot of radius 0.2 m with one noiseless ray whose value is 1 - distance."""
+    """Return the text of a robot of radius 0.2 m with one ray without noise, whose value is 1 - distance."""
     return ROBOT

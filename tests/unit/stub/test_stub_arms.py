@@ -21,13 +21,13 @@ CAMERA = """Camera { name "eye" width 320 height 200 focus Focus { focalDistance
 
 @pytest.fixture
 def load(world, simple_robot):
-    """`load(part)` returns a simulation whose robot has that part."""
+    """`load(part)` returns the simulation of a robot with that part."""
     return lambda part: load_scene(world(robot=simple_robot.replace("DEF IR", f"{part} DEF IR")))
 
 
 @pytest.fixture
 def robot_with(start, world, simple_robot, ros):
-    """`robot_with(part)` returns the node of a robot that has that part."""
+    """`robot_with(part)` returns the node of a robot with that part."""
 
     def begin(part):
         start(world(robot=simple_robot.replace("DEF IR", f"{part} DEF IR")))
@@ -37,7 +37,7 @@ def robot_with(start, world, simple_robot, ros):
 
 
 def test_a_linear_motor_lifts_what_is_on_its_slider_as_far_as_the_stop(load):
-    """The motor moves at 0.1 m/s for 0.32 s, and then on to its stop at 0.2 m."""
+    """The motor moves at 0.1 m/s for 0.32 s, and then continues to its stop at 0.2 m."""
     simulation = load(LIFT)
     (robot,) = simulation.robots
     start = robot.sensors["top"]
@@ -54,7 +54,7 @@ def test_a_linear_motor_lifts_what_is_on_its_slider_as_far_as_the_stop(load):
 
 
 def test_a_linear_motor_has_services_for_force_and_none_for_torque(robot_with):
-    """The services depend on the type of the motor; `get_type` returns 1."""
+    """A linear motor has services for force instead of torque; its `get_type` returns 1."""
     robot = robot_with(LIFT)
 
     assert robot.get("lift/get_type") == 1
@@ -65,7 +65,7 @@ def test_a_linear_motor_has_services_for_force_and_none_for_torque(robot_with):
 
 
 def test_the_devices_of_a_joint_know_each_other_by_name(robot_with):
-    """This holds for any order in the world; "" means that the joint lacks the device."""
+    """The order of the devices in the world does not matter; "" means that the joint has no such device."""
     robot = robot_with(LIFT)
 
     assert robot.get("lift/get_brake_name") == "grip"
@@ -80,7 +80,10 @@ def test_the_devices_of_a_joint_know_each_other_by_name(robot_with):
 
 
 def test_a_brake_limits_the_speed_that_a_motor_reaches(robot_with):
-    """6 N m against 3 N m s/rad give 2 rad/s; without the brake it turns at 5 rad/s again."""
+    """The brake holds 6 N m with 3 N m s/rad at 2 rad/s.
+
+    Without damping, the motor turns at 5 rad/s again.
+    """
     robot = robot_with(WRIST)
     angles = robot.inbox("turn/value")
     robot.call("turn/enable", value=STEP_MS)
@@ -97,7 +100,7 @@ def test_a_brake_limits_the_speed_that_a_motor_reaches(robot_with):
 
 
 def test_a_brake_slows_a_driven_wheel(load):
-    """The motors of wheels turn with the body, but the same rule holds."""
+    """Motors of wheels move the whole body, but the brake limits their speed too."""
     simulation = load("")
     (robot,) = simulation.robots
     for motor in robot.motors.values():
@@ -111,7 +114,7 @@ def test_a_brake_slows_a_driven_wheel(load):
 
 
 def test_an_led_keeps_its_state(robot_with):
-    """The LED is invisible, but a program reads its state."""
+    """A program reads the state of the LED, although nobody sees its light."""
     robot = robot_with('LED { name "lamp" color [ 1 0 0, 0 1 0 ] }')
 
     assert robot.get("lamp/get_led") == 0
@@ -121,7 +124,7 @@ def test_an_led_keeps_its_state(robot_with):
 
 
 def test_a_camera_answers_its_settings_and_fails_to_see(robot_with):
-    """A success of `enable` would let a client wait for images for ever."""
+    """If `enable` succeeded, a client would wait for images for ever."""
     robot = robot_with(CAMERA)
 
     info = robot.call("eye/get_info")
@@ -136,7 +139,7 @@ def test_a_camera_answers_its_settings_and_fails_to_see(robot_with):
 
 
 def test_a_camera_zooms_and_focuses_within_its_limits(robot_with):
-    """As in the controller, every call succeeds; a value beyond the limits changes nothing."""
+    """As in the real controller, each call succeeds, but a value beyond the limits changes nothing."""
     robot = robot_with(CAMERA)
 
     for fov in (1.0, 1.3):
@@ -152,7 +155,7 @@ def test_a_camera_zooms_and_focuses_within_its_limits(robot_with):
 
 
 def test_a_camera_without_zoom_and_focus_stays_as_it_is(robot_with):
-    """It also has no services for recognition."""
+    """The camera's services for recognition are missing too."""
     robot = robot_with('Camera { name "eye" }')
 
     robot.call("eye/set_fov", value=1.0)
@@ -164,7 +167,7 @@ def test_a_camera_without_zoom_and_focus_stays_as_it_is(robot_with):
 
 
 def test_a_range_finder_answers_its_settings_alone(robot_with):
-    """A camera behaves in the same way."""
+    """The settings have values, but `enable` fails, as for a camera."""
     robot = robot_with('RangeFinder { name "it" maxRange 3 }')
     answer = robot.call("it/get_info")
 
@@ -173,7 +176,7 @@ def test_a_range_finder_answers_its_settings_alone(robot_with):
 
 
 def test_a_skin_has_no_bones_and_whatever_needs_one_fails(robot_with):
-    """The stub loads no meshes; Webots itself crashes for an unknown bone."""
+    """The stub loads no meshes, so it has no bones. Webots itself crashes at an unknown bone."""
     robot = robot_with('Skin { name "anna" }')
 
     assert robot.get("anna/get_bone_count") == 0
@@ -192,7 +195,7 @@ TANK = """Robot { name "tank" controller "ros" controllerArgs [ "--name=tank" "-
 
 
 def test_two_tracks_drive_a_robot_as_two_wheels_do(world):
-    """Without slip, a belt moves the robot by as many meters as its motor turns."""
+    """A belt without slip moves its side of the robot by the distance that its motor turns."""
     (robot,) = (simulation := load_scene(world(robot=TANK))).robots
     for name, speed in (("left", 0.1), ("right", 0.2)):
         robot.motors[name].set_position(math.inf)
@@ -206,7 +209,7 @@ def test_two_tracks_drive_a_robot_as_two_wheels_do(world):
 
 
 def test_a_track_without_a_motor_is_a_fixed_part_of_its_robot(world):
-    """Its boundingObject counts; its wheels and its belt are only drawn."""
+    """The boundingObject of the track counts as an obstacle; its wheels and belt are only visual."""
     (robot,) = load_scene(world(robot=TANK.replace("LinearMotor", "Brake"))).robots
 
     assert robot.body.base.drive is None
@@ -214,7 +217,7 @@ def test_a_track_without_a_motor_is_a_fixed_part_of_its_robot(world):
 
 
 def test_what_is_at_the_end_of_a_joint_is_refused_if_it_is_unknown(load):
-    """Otherwise a gripper of an unknown type would silently be missing."""
+    """Without the error, a gripper of an unknown type would be missing and nobody would notice."""
     with pytest.raises(WorldError, match="the stub simulates no Minotaur on a robot"):
         load("HingeJoint { endPoint Minotaur { } }")
     with pytest.raises(WorldError, match="the stub simulates no Minotaur on a robot"):
@@ -224,7 +227,7 @@ def test_what_is_at_the_end_of_a_joint_is_refused_if_it_is_unknown(load):
 
 
 def test_a_sensor_on_a_caster_is_one_of_the_robot_s(load):
-    """A joint without a motor is fixed, and everything on it belongs to the robot."""
+    """A joint without a motor is fixed, so its sensor is a sensor of the robot."""
     (robot,) = load('BallJoint { endPoint Solid { children [ GPS { name "low" } ] } }').robots
 
     assert "low" in robot.sensors

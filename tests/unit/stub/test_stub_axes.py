@@ -1,4 +1,4 @@
-"""Worlds whose y axis points up have the same motions and readings, in the axes of the file."""
+"""Worlds whose y axis points up: motions and readings are the same, in the axes of the file."""
 
 import math
 
@@ -13,7 +13,7 @@ from palaestra_sim.stub.physics import StubPhysics
 from palaestra_sim.world import builtin_protos, parse
 from palaestra_sim.world.stand_ins import shipped
 
-LYING = "1 0 0 -1.5707963267948966"  # a solid lies along z, in a world whose y axis points up
+LYING = "1 0 0 -1.5707963267948966"  # this rotation lays a solid along z, in a world whose y axis points up
 E_PUCK = """E-puck { translation %s rotation %s controller "ros" controllerArgs [ "--name=a" "--synchronize" ]
   turretSlot [ GPS { } ] }"""
 WALL = "Solid { translation %s boundingObject Box { size %s } }"
@@ -32,19 +32,19 @@ def load(text, header="R2023b", leave_out=None):
 
 
 def load_twin(system):
-    """Return the same E-puck in front of the same wall, in a world with these axes."""
+    """Return the same E-puck in front of the same wall, in a world with another system of axes."""
     info = f'WorldInfo {{ basicTimeStep 16 coordinateSystem "{system}" }}'
     return load("\n".join([info, *TWINS[system]]))
 
 
 def y_up(vector):
-    """Return a vector of a world whose z axis points up in the axes of one whose y axis does."""
+    """Return a vector, converted from axes with z up to axes with y up."""
     x, y, z = vector
     return x, z, -y
 
 
 def drive(simulation, left, right, steps=20):
-    """Drive the E-puck with these wheel speeds."""
+    """Drive the E-puck with these wheel speeds, and return its robot."""
     (robot,) = simulation.robots
     for name, speed in (("left wheel motor", left), ("right wheel motor", right)):
         robot.motors[name].set_position(math.inf)
@@ -56,7 +56,7 @@ def drive(simulation, left, right, steps=20):
 
 @pytest.mark.parametrize(("left", "right"), [(3.0, 3.0), (-3.0, -2.0), (2.0, -2.0)])
 def test_a_robot_drives_and_sees_alike_whichever_axis_points_up(left, right):
-    """Clients see the same, only in other axes."""
+    """A client reads the same motion, converted to the axes of the world."""
     twin, robot = (drive(load_twin(system), left, right) for system in ("ENU", "NUE"))
 
     assert robot.place.translation == pytest.approx(y_up(twin.place.translation))
@@ -69,7 +69,7 @@ def test_a_robot_drives_and_sees_alike_whichever_axis_points_up(left, right):
 
 
 def test_a_supervisor_places_a_robot_in_the_axes_of_the_file():
-    """The value of a written field is read back, and a reset returns to that of the file."""
+    """A written field reads back the same value; a reset restores the value of the file."""
     simulation = load_twin("NUE")
     (robot,) = simulation.robots
     robot.place.translation = (0.5, 0.25, 1.0)
@@ -85,7 +85,7 @@ def test_a_supervisor_places_a_robot_in_the_axes_of_the_file():
 
 
 def test_contact_points_are_in_the_axes_of_the_file():
-    """A supervisor compares them with positions of nodes."""
+    """A supervisor compares contact points with positions of nodes, which are in the same axes."""
     simulation = load_twin("NUE")
     robot = drive(simulation, 6.0, 6.0, steps=200)
     ((point, _),) = simulation.contact_points(robot.parts.node, descendants=True)
@@ -96,7 +96,7 @@ def test_contact_points_are_in_the_axes_of_the_file():
 
 
 def test_a_robot_that_lies_in_a_world_is_refused():
-    """Its wheels would not reach the floor."""
+    """The wheels of a robot that lies on its side would not touch the floor."""
     lying = E_PUCK % ("0 0 0", "0 0 1 0")
 
     with pytest.raises(WorldError, match="a robot that drives, but does not stand upright"):
@@ -104,7 +104,7 @@ def test_a_robot_that_lies_in_a_world_is_refused():
 
 
 def test_what_is_added_stands_in_the_axes_of_the_file():
-    """The text and the world have the same author."""
+    """The author of the added text writes it in the axes of the world."""
     simulation = load('WorldInfo { coordinateSystem "EUN" }')
     root = simulation.tree.root
     children = simulation.tree.field_of(root, "children", simulation)
@@ -114,7 +114,7 @@ def test_what_is_added_stands_in_the_axes_of_the_file():
 
 
 def test_an_unknown_system_of_axes_is_a_mistake():
-    """Webots knows three systems."""
+    """Webots has exactly three systems of axes."""
     with pytest.raises(
         WorldError, match='coordinateSystem "UP" is not one of ENU, NUE, EUN; write one of them'
     ):
@@ -122,7 +122,7 @@ def test_an_unknown_system_of_axes_is_a_mistake():
 
 
 def test_what_comes_with_webots_is_turned_in_an_old_world():
-    """Its files have today's axes: x of a box became -z of the world, and z became y."""
+    """PROTOs of Webots have today's axes, so in an old world x of a box became -z, and z became y."""
     old = load("WorldInfo { } WoodenBox { translation 0 1.5 0 size 1 2 3 }", "R2021a")
     (box,) = old.scene.solids
 
@@ -163,15 +163,15 @@ FORWARD = {"R2023b": (1.0, 0.0, 0.0), "R2021b": (0.0, 0.0, -1.0)}
 
 
 def load_car(release):
-    """Return the same car in front of the same post, in a world of a release with its axes."""
+    """Return the same car in front of the same post, in a world of a release with that release's axes."""
     return load(f"WorldInfo {{ basicTimeStep 16 }} {CARS[release]} {POSTS[release]}", release)
 
 
 @pytest.mark.parametrize(("left", "right"), [(3.0, 3.0), (-3.0, -2.0), (2.0, -2.0)])
 def test_a_world_of_old_axes_is_the_same_world(left, right):
-    """Robots looked along -z there, y pointed up, and cylinders stood along y.
+    """In an old world, robots looked along -z, y pointed up, and cylinders stood along y.
 
-    Webots turns such worlds when it loads them.
+    Webots converts such a world when it loads the file.
     """
     twin, robot = (drive(load_car(release), left, right) for release in CARS)
     places = [it.parts.node.place for it in (twin, robot)]
@@ -189,7 +189,7 @@ def test_a_world_of_old_axes_is_the_same_world(left, right):
 
 
 def test_a_supervisor_turns_a_robot_of_old_axes_in_the_axes_of_the_file():
-    """A read returns the value of the last write, and the robot looks along its own -z axis."""
+    """The supervisor reads the rotation that it wrote, and the robot looks along its own -z axis."""
     (robot,) = load_car("R2021b").robots
     place = robot.parts.node.place
     start = place.translation, place.rotation
@@ -208,8 +208,8 @@ def test_a_supervisor_turns_a_robot_of_old_axes_in_the_axes_of_the_file():
 
 
 def test_a_robot_of_webots_drives_in_an_old_world():
-    """Its file has today's axes: Webots turns the instance, and the stub does too."""
-    forward = "0 1 0 -1.5707963267948966"  # -z is x of the world
+    """The PROTO has today's axes, so Webots and the stub turn the instance in an old world."""
+    forward = "0 1 0 -1.5707963267948966"  # -z of the robot is x of the world
     wall = WALL % ("1.1 0.05 -2", "0.01 0.1 1")
     old = load(f"WorldInfo {{ basicTimeStep 16 }} {E_PUCK % ('1 0 -2', forward)} {wall}", "R2021b")
     twin, robot = drive(load_twin("ENU"), 3.0, 3.0), drive(old, 3.0, 3.0)

@@ -1,4 +1,4 @@
-"""Robots with any wheels and outline on the floor: pairs of wheels, boxes, rows of discs."""
+"""Robots with any wheels and outline on the floor: pairs of wheels, boxes, and rows of discs."""
 
 import math
 
@@ -43,7 +43,7 @@ def pair():
 
 
 def test_two_wheels_drive_a_robot(pair):
-    """With equal speeds it drives straight on; with a faster right wheel it turns to the left."""
+    """With equal speeds the robot drives straight; with a faster right wheel it turns left."""
     body, go = pair()
 
     go(4.0, 4.0, 10)
@@ -54,7 +54,7 @@ def test_two_wheels_drive_a_robot(pair):
 
 
 def test_two_wheels_speed_up_as_three_do(pair):
-    """The limit is 10 m/s2 for every robot, because friction sets it."""
+    """Friction limits the acceleration to 10 m/s2, whatever the number of wheels."""
     body, go = pair()
 
     go(60.0, 60.0, 1)
@@ -65,7 +65,7 @@ def test_two_wheels_speed_up_as_three_do(pair):
 
 
 def test_a_pushed_pair_of_wheels_keeps_what_it_can(pair):
-    """A push to the side ends with the next step; one straight on fades."""
+    """A sideways push ends with the next step, because the wheels hold; a push straight ahead fades."""
     body, go = pair()
 
     body.push(2.0, 1.0, 0.0)
@@ -77,7 +77,7 @@ def test_a_pushed_pair_of_wheels_keeps_what_it_can(pair):
 
 
 def test_a_body_without_wheels_stays():
-    """A push ends with the next step."""
+    """A push of a body without wheels ends with the next step."""
     body = StubBody(MobileBase(), ROUND)
     body.push(1.0, 0.0, 0.5)
 
@@ -87,14 +87,14 @@ def test_a_body_without_wheels_stays():
 
 
 def test_a_drive_wants_one_motor_a_wheel():
-    """Such a mismatch is a bug of the loader, not of the world."""
+    """A wrong number of motors is a bug of the loader, so no world can cause it."""
     with pytest.raises(ValueError, match="do not fit a drive of 2 wheels"):
         MobileBase([Motor(MotorSpec(name="alone"))], find_drive(PAIR))
 
 
 @pytest.mark.parametrize(("heading", "half"), [(0.0, 0.3), (math.pi / 2, 0.1), (math.pi, 0.3)])
 def test_a_long_robot_stops_at_a_wall_with_its_own_side(heading, half):
-    """The distance is half its length ahead, and half its width to the side."""
+    """The robot stops at half its length from a wall ahead, and at half its width from a wall to the side."""
     body = StubBody(MobileBase(), LONG)
     body.face(Neighborhood([Block(1.05, 0.0, 0.0, (0.1, 4.0))], body.radius), ())
     body.place(1.0 - half + 0.02, 0.0, heading)
@@ -106,7 +106,7 @@ def test_a_long_robot_stops_at_a_wall_with_its_own_side(heading, half):
 
 
 def test_a_long_robot_that_turns_at_a_wall_moves_off(pair):
-    """Its front pushes the whole robot away, so that no part enters the wall."""
+    """The wall pushes the whole robot away, so that no part of it enters the wall."""
     body, go = pair(LONG, [Block(0.0, 1.05, 0.0, (40.0, 0.1))])
     body.place(0.0, 0.85, 0.0)
 
@@ -119,7 +119,7 @@ def test_a_long_robot_that_turns_at_a_wall_moves_off(pair):
 
 
 def test_a_fast_turn_does_not_swing_through_a_pole(pair):
-    """Within one step, the end of a long robot moves further than the pole is thick."""
+    """In one step, the end of a long robot moves further than the thickness of the pole."""
     pole = Disc(0.0, 0.5, 0.01)
     body, go = pair(discs_of_box(0.0, 0.0, 0.0, 1.2, 0.04), [pole])
     body.place(0.0, 0.0, math.pi / 2 - 0.5)
@@ -131,7 +131,7 @@ def test_a_fast_turn_does_not_swing_through_a_pole(pair):
 
 
 def test_an_outline_beside_the_origin_goes_along(pair):
-    """A single disc off the origin keeps its offset at every heading."""
+    """The outline is one disc off the origin, which keeps its offset at every heading."""
     body, _ = pair([RoundPart(0.2, 0.1, 0.05)])
 
     body.place(1.0, 2.0, math.pi / 2)
@@ -142,7 +142,7 @@ def test_an_outline_beside_the_origin_goes_along(pair):
 
 
 def test_a_robot_meets_every_disc_of_another(pair):
-    """The other robot feels the contact, too."""
+    """The other robot reports the contact too."""
     other = StubBody(MobileBase(), LONG)
     other.place(1.0, 0.5, 0.0)
     body, go = pair(others=[other])
@@ -155,7 +155,7 @@ def test_a_robot_meets_every_disc_of_another(pair):
 
 
 def test_rays_meet_every_disc_of_a_robot():
-    """A ray that passes the origin of a long robot still hits its end."""
+    """A ray may pass the origin of a long robot and still hit the robot's end."""
     other = StubBody(MobileBase(), LONG)
     other.place(1.0, 0.25, math.pi / 2)
     fan = Fan([(0.0, 0.0, 1.0, 0.0)], [5.0])
@@ -172,7 +172,7 @@ def test_rays_meet_every_disc_of_a_robot():
     heading=st.floats(-3, 3),
 )
 def test_a_long_robot_never_ends_inside_anything(commands, heading):
-    """This holds also when it turns in a corner."""
+    """No part of the robot enters a wall, even when the robot turns in a corner."""
     walls = [Block(s * 1.05, 0.0, 0.0, (0.1, 2.2)) for s in (-1, 1)]
     walls += [Block(0.0, s * 1.05, 0.0, (2.2, 0.1)) for s in (-1, 1)]
     motors = [Motor(MotorSpec(name=name, max_velocity_rad_s=100.0)) for name in ("left", "right")]

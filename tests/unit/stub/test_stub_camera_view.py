@@ -1,4 +1,4 @@
-"""The newest picture of a robot's camera, for viewers."""
+"""The newest image of a robot's camera, for viewers."""
 
 import json
 
@@ -14,17 +14,17 @@ from palaestra_sim.stub.physics import StubPhysics
 
 
 class Eye:
-    """A camera whose pixels have their column as blue and the number of the picture as red."""
+    """A camera whose pixels have their column as blue and the number of the image as red."""
 
     def __init__(self, lens):
         self.lens = lens
         self.pictures = 0
 
     def open(self):
-        """Do nothing."""
+        """Do nothing, because this camera needs no renderer."""
 
     def colors(self):
-        """Return the next picture."""
+        """Return the next image."""
         self.pictures += 1
         width, height = self.lens.size
         return b"".join(bytes((x % 256, 7, self.pictures, 255)) for x in range(width)) * height
@@ -32,13 +32,16 @@ class Eye:
 
 @pytest.fixture
 def eyes():
-    """Return a list that receives each camera."""
+    """Return a list that collects the cameras."""
     return []
 
 
 @pytest.fixture
 def see(ros, tmp_path, world, simple_robot, eyes):
-    """`see(width, height)` starts a simulator with such a camera; return its robot and a viewer's request."""
+    """`see(width, height)` starts a simulator with such a camera.
+
+    It returns the robot's node and a function that requests an image, as a viewer does.
+    """
 
     class Seeing(StubPhysics):
         def eye(self, place, lens):
@@ -59,7 +62,7 @@ def see(ros, tmp_path, world, simple_robot, eyes):
 
 
 def test_a_viewer_gets_the_picture_that_the_trainer_got_last(see, eyes):
-    """It shows what the policy acted on, and no picture is rendered for it."""
+    """The viewer sees the image on which the policy acted, and no image is rendered for the viewer."""
     robot, look = see(4, 2)
     robot.call("eye/enable", value=32)
     robot.inbox("eye/image")
@@ -74,7 +77,7 @@ def test_a_viewer_gets_the_picture_that_the_trainer_got_last(see, eyes):
 
 
 def test_a_camera_that_nobody_reads_has_no_picture(see, eyes):
-    """Rendering costs a training that needs no pictures more than all the rest of a step."""
+    """Rendering takes longer than the rest of a step, so a training that reads no images renders none."""
     robot, look = see(4, 2)
     robot.call("robot/time_step", value=32)
 
@@ -83,7 +86,7 @@ def test_a_camera_that_nobody_reads_has_no_picture(see, eyes):
 
 
 def test_a_camera_that_is_off_has_no_picture(see):
-    """The last one would look as if the robot stood still."""
+    """An old image would look as if the robot stood still."""
     robot, look = see(4, 2)
     robot.call("eye/enable", value=32)
     robot.inbox("eye/image")
@@ -95,7 +98,7 @@ def test_a_camera_that_is_off_has_no_picture(see):
 
 
 def test_a_large_picture_loses_columns_and_rows(see):
-    """A page needs no more, and a response has a bounded size."""
+    """A web page needs no larger image, and the size of a response is limited."""
     robot, look = see(2 * MOST_SIDE, 10)
     robot.call("eye/enable", value=32)
     robot.inbox("eye/image")

@@ -1,4 +1,4 @@
-"""Worlds that change while they run: nodes are added and removed, states saved, joints moved."""
+"""Worlds that change at run time: nodes are added and removed, states are saved, and joints are moved."""
 
 import math
 
@@ -12,14 +12,14 @@ STEP_MS = 32
 
 @pytest.fixture
 def children(robot):
-    """The handle of the root's `children` field."""
+    """Return the handle of the root's field `children`."""
     root = robot.get("supervisor/get_root")
     return robot.get("supervisor/node/get_field", node=root, fieldName="children")
 
 
 @pytest.fixture
 def add(robot, children):
-    """`add(text, position)` returns the response to an import into the root's children."""
+    """`add(text, position)` imports nodes into the root's children and returns the response."""
 
     def call(text, position=-1, field=None):
         return robot.get(
@@ -39,12 +39,12 @@ def find(robot):
 
 
 def count(robot, field):
-    """Return the number of values of a field."""
+    """Return the number of values in a field."""
     return robot.get("supervisor/field/get_count", field=field)
 
 
 def test_an_added_node_is_found_and_counts_at_once(robot, children, add, find):
-    """As in Webots, this holds also while the simulation is paused."""
+    """As in Webots, the node is found even while the simulation is paused."""
     before = count(robot, children)
 
     assert add(WALL) == 1
@@ -57,7 +57,7 @@ def test_an_added_node_is_found_and_counts_at_once(robot, children, add, find):
 
 
 def test_several_nodes_are_added_in_their_order_before_the_position(robot, children, add, find):
-    """A position counts from 0, or from the end if it is negative."""
+    """Positions count from 0 at the start of the field, and from -1 at its end."""
     assert add("DEF A Group { } DEF B Group { }", position=1) == 1
 
     assert robot.get("supervisor/field/get_node", field=children, index=1) == find("A")
@@ -65,7 +65,7 @@ def test_several_nodes_are_added_in_their_order_before_the_position(robot, child
 
 
 def test_an_added_solid_is_an_obstacle_until_it_is_removed(start, ros):
-    """Rays meet it from the next step on."""
+    """From the next step on, rays meet the added wall; after its removal they do not."""
     simulation = start().simulation
     (robot,) = simulation.robots
     node = ros.node("robotino")
@@ -90,7 +90,7 @@ def test_an_added_solid_is_an_obstacle_until_it_is_removed(start, ros):
 
 
 def test_a_removed_node_is_gone_with_its_handle_and_its_number(robot, children, add, find):
-    """In Webots the handle would be a dangling pointer."""
+    """In Webots the client would keep a dangling pointer; here a call with the old handle fails."""
     add("DEF OUTER Pose { children [ DEF INNER Solid { } ] }")
     outer, inner = find("OUTER"), find("INNER")
     number = robot.get("supervisor/node/get_id", node=inner)
@@ -107,7 +107,7 @@ def test_a_removed_node_is_gone_with_its_handle_and_its_number(robot, children, 
 
 @pytest.mark.parametrize("service", ["remove_node", "remove"])
 def test_a_node_is_removed_by_its_place_in_a_field(robot, children, add, find, service):
-    """`remove` removes nodes too, as `wb_supervisor_field_remove_mf` does."""
+    """The service `remove` removes nodes too, as `wb_supervisor_field_remove_mf` does."""
     add(WALL)
     index = "position" if service == "remove_node" else "index"
 
@@ -128,7 +128,7 @@ def test_a_node_is_removed_by_its_place_in_a_field(robot, children, add, find, s
     ],
 )
 def test_what_cannot_be_added_fails_and_changes_nothing(robot, children, add, text, message):
-    """Either everything is added or nothing; the message has the position in the text."""
+    """If one node of the text is wrong, no node is added; the message has the position of the mistake."""
     before = count(robot, children)
 
     with pytest.raises(ServiceFailed, match=message):
@@ -138,7 +138,7 @@ def test_what_cannot_be_added_fails_and_changes_nothing(robot, children, add, te
 
 
 def test_a_place_that_the_field_does_not_have_answers_no_success(robot, children, add):
-    """The position is outside the field, or the field holds numbers."""
+    """The position is outside the field, or the field contains numbers instead of nodes."""
     own = robot.get("supervisor/get_self")
     numbers = robot.get("supervisor/node/get_field", node=own, fieldName="translation")
     before = count(robot, children)
@@ -149,14 +149,14 @@ def test_a_place_that_the_field_does_not_have_answers_no_success(robot, children
 
 
 def test_a_running_robot_and_its_parts_cannot_be_removed(robot, find):
-    """If it succeeded without an effect, the client would have a wrong idea of the robot."""
+    """If the call succeeded, the client would believe that the part is gone."""
     for name in ("ROBOTINO", "BODY"):
         with pytest.raises(ServiceFailed, match="remove"):
             robot.get("supervisor/node/remove", node=find(name))
 
 
 def test_a_reset_removes_what_was_added_and_brings_nothing_back(start, ros):
-    """Webots does the same."""
+    """As in Webots, a reset does not restore a node that a client has removed."""
     simulation = start().simulation
     node = ros.node("robotino")
     root = node.get("supervisor/get_root")
@@ -172,7 +172,7 @@ def test_a_reset_removes_what_was_added_and_brings_nothing_back(start, ros):
 
 
 def test_a_state_holds_a_node_and_all_inside_it(start, ros):
-    """A robot returns to its position, at rest; `__init__` is its start in the world file."""
+    """Loading a state puts the robot back at rest; the state `__init__` is its start in the world file."""
     simulation = start().simulation
     (robot,) = simulation.robots
     node = ros.node("robotino")
@@ -197,7 +197,7 @@ def test_a_state_holds_a_node_and_all_inside_it(start, ros):
 
 
 def test_a_joint_is_put_to_a_position_and_its_motor_holds_it(start, ros, world, simple_robot):
-    """Webots sets the motor's target, too."""
+    """As in Webots, the call also sets the target of the joint's motor."""
     arm = """DEF ARM SliderJoint { jointParameters JointParameters { axis 0 0 1 minStop 0 maxStop 0.2 }
       device [ PositionSensor { name "height" } LinearMotor { name "lift" } ] endPoint Solid { } }"""
     simulation = start(world(robot=simple_robot.replace("DEF IR", f"{arm} DEF IR"))).simulation
@@ -222,7 +222,7 @@ def test_a_joint_is_put_to_a_position_and_its_motor_holds_it(start, ros, world, 
 
 
 def test_the_sensor_of_a_joint_without_a_motor_measures_where_it_is_put(start, ros, world, simple_robot):
-    """At first that is its position in the world file."""
+    """At the start, the sensor reads the joint's position in the world file."""
     flap = """DEF FLAP HingeJoint { jointParameters HingeJointParameters { position 0.25 }
       device [ PositionSensor { name "angle" } ] endPoint Solid { } }"""
     simulation = start(world(robot=simple_robot.replace("DEF IR", f"{flap} DEF IR"))).simulation
@@ -239,7 +239,7 @@ def test_the_sensor_of_a_joint_without_a_motor_measures_where_it_is_put(start, r
 
 
 def test_a_robot_that_stands_at_a_wall_has_a_contact_point_there(start, ros):
-    """It has the number of the Solid that touches: of the robot, or of the wall."""
+    """Robot and wall have the same contact points, each with the number of its own Solid."""
     simulation = start().simulation
     (robot,) = simulation.robots
     node = ros.node("robotino")

@@ -1,4 +1,4 @@
-"""Every row of the table of devices is read, sampled, served, enabled, published and corrupted."""
+"""Each row of the table of devices is tested: reading, sampling, services, publishing and corruption."""
 
 import math
 import struct
@@ -28,7 +28,7 @@ SENSORS = [name for name in NAMES if DEVICES[name].sampler is not None]
 
 
 def written(kind):
-    """Return the node of a device as a world has it, with other nodes that it needs for a reading."""
+    """Return the node of a device as text, with other nodes that the device needs for a reading."""
     node = f'{kind.node} {{ name "device" {SETTINGS.get(kind.node, "")} }}'
     if kind.node == "Radar":
         node += " Solid { translation 2 0 0 radarCrossSection 1 }"
@@ -36,7 +36,7 @@ def written(kind):
 
 
 def numbers(topic, data):
-    """Return the numbers of the reading in a framed message."""
+    """Return the numbers of the reading in the frame of a message."""
     reading = reading_field(topic.type_name, topic.reading)
     if reading is None:
         message = message_type(topic.type_name).codec.decode(data[LENGTH.size :])
@@ -47,7 +47,7 @@ def numbers(topic, data):
 
 
 def flat(value):
-    """Return the numbers of a reading: the words of an image or a cloud, or the last field of a message."""
+    """Return the numbers of a reading: the floats of an image or a cloud, or the last field of a message."""
     if isinstance(value, dict):
         _, value = value.popitem()
     if isinstance(value, bytes):
@@ -56,13 +56,13 @@ def flat(value):
 
 
 def value_of(topic):
-    """Return the current reading of a topic, or the first of several."""
+    """Return the current reading for a topic, or the first of several readings."""
     return topic.source.value[0] if topic.many else topic.source.value
 
 
 @pytest.fixture
 def stub(start, world):
-    """`stub("GPS")` returns a stub whose robot has one device of that type."""
+    """`stub("GPS")` starts a stub whose robot has one device of that type."""
 
     def begin(name):
         robot = f"""Robot {{ supervisor TRUE controller "ros"
@@ -74,13 +74,13 @@ def stub(start, world):
 
 @pytest.fixture
 def device(stub, ros):
-    """`device("GPS")` returns its row, the device, and the node of its robot."""
+    """`device("GPS")` returns the row of the type, the device, and the node of its robot."""
 
     def begin(name):
         (robot,) = stub(name).simulation.robots
         kind, found = robot.parts.devices.rows["device"]
         if name == "Lidar":
-            found.clouded = True  # enable_point_cloud does this; one topic needs it
+            found.clouded = True  # `enable_point_cloud` does this; one of the topics needs it
         return kind, found, ros.node("robotino")
 
     return begin
@@ -88,7 +88,7 @@ def device(stub, ros):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_device_is_listed_and_serves_what_its_row_has(device, name):
-    """A client must not rely on services that the row does not have."""
+    """A client must find exactly the services of the row, and those that each device has."""
     kind, found, node = device(name)
 
     served = {path.partition("/")[2] for path in node.services if path.startswith("device/")}
@@ -104,7 +104,7 @@ def test_a_device_is_listed_and_serves_what_its_row_has(device, name):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_its_node_has_the_fields_of_webots(name):
-    """A supervisor finds them by name, even if the world does not set them."""
+    """A supervisor finds such a field by name, even if the world file does not set it."""
     kinds = field_kinds(name)
 
     assert kinds["name"].default == DEVICES[name].name
@@ -113,7 +113,7 @@ def test_its_node_has_the_fields_of_webots(name):
 
 @pytest.mark.parametrize("name", [name for name in NAMES if DEVICES[name].fields])
 def test_a_write_to_a_field_that_is_read_at_the_start_is_refused(stub, name):
-    """If the write succeeded without an effect, the client would have a wrong idea of the world."""
+    """If the write succeeded, the client would believe that it changed the world."""
     tree = stub(name).simulation.tree
     node = next(it for it in tree.nodes.values() if it.type_name == name)
     *_, field = field_kinds(name)
@@ -124,7 +124,7 @@ def test_a_write_to_a_field_that_is_read_at_the_start_is_refused(stub, name):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_the_name_of_a_device_may_be_written(stub, name):
-    """A running controller keeps the first name of the device, as in Webots."""
+    """As in Webots, the running controller still uses the first name of the device."""
     tree = stub(name).simulation.tree
 
     require_effect(next(it for it in tree.nodes.values() if it.type_name == name), "name")
@@ -132,7 +132,7 @@ def test_the_name_of_a_device_may_be_written(stub, name):
 
 @pytest.mark.parametrize("name", SENSORS)
 def test_a_sensor_has_a_value_after_a_step_and_publishes_all_its_topics(device, name):
-    """If a row's sampler were missing, the topic would publish NaN for ever."""
+    """A sensor whose row has no sampler would publish NaN for ever."""
     kind, found, node = device(name)
     inboxes = [node.inbox(f"device/{topic.name}") for topic in kind.topics(found)]
 
@@ -147,7 +147,7 @@ def test_a_sensor_has_a_value_after_a_step_and_publishes_all_its_topics(device, 
 
 @pytest.mark.parametrize("name", SENSORS)
 def test_enable_0_ends_all_topics(device, name):
-    """Every client disables a sensor before it changes the period."""
+    """A client disables a sensor before it sets another period, so all its publishers must go."""
     kind, found, node = device(name)
     node.call("device/enable", value=64)
     assert node.get("device/get_sampling_period") == 64
@@ -160,7 +160,7 @@ def test_enable_0_ends_all_topics(device, name):
 
 @pytest.mark.parametrize("name", SENSORS)
 def test_the_message_of_each_topic_has_its_reading_where_its_row_says(device, name):
-    """The rest of the message is fixed; a reading at another position would overwrite other fields."""
+    """A reading written at a wrong position would overwrite other fields of the message."""
     kind, found, node = device(name)
     node.call("device/enable", value=32)
     node.call("robot/time_step", value=32)
@@ -185,7 +185,7 @@ def test_the_message_of_each_topic_has_its_reading_where_its_row_says(device, na
 
 @pytest.mark.parametrize("name", SENSORS)
 def test_a_wrong_value_reaches_each_fraction_of_a_reading(device, name):
-    """The table has no column for this; if a row missed it, a fault would have no effect."""
+    """If the corruption missed a float of a reading, a requested fault would have no effect."""
     kind, found, _ = device(name)
 
     for topic in kind.topics(found):
@@ -202,7 +202,7 @@ def test_a_wrong_value_reaches_each_fraction_of_a_reading(device, name):
 
 @pytest.mark.parametrize("name", SENSORS)
 def test_its_publishers_know_the_field_of_the_reading(stub, ros, name):
-    """Faults need it: gyro and accelerometer share a message type, but have different readings."""
+    """The fault of a wrong value needs the field, because gyro and accelerometer share a message type."""
     (robot,) = stub(name).simulation.robots
     kind, found = robot.parts.devices.rows["device"]
     node = ros.node("robotino")

@@ -1,4 +1,4 @@
-"""Display: a program's drawings can be copied and pasted."""
+"""Display: a program draws on it, and copies and pastes parts of its picture."""
 
 import pytest
 
@@ -13,13 +13,13 @@ ROBOT = """Robot { supervisor TRUE controller "ros" controllerArgs [ "--name=pai
 
 @pytest.fixture
 def painter(start, world, ros):
-    """The node of a robot with a display, and the display's picture."""
+    """Return the node of a robot with a display, and the display's image buffer."""
     simulation = start(world(robot=ROBOT)).simulation
     return ros.node("painter"), simulation.robots[0].parts.devices.rows["screen"][1].picture
 
 
 def lit(picture):
-    """Return the rows of a picture, with # for each pixel that is not black."""
+    """Return the rows of an image as text, with # for each pixel that is not black."""
     return [
         "".join("#" if any(picture.at(x, y)[:3]) else "." for x in range(picture.width))
         for y in range(picture.height)
@@ -43,7 +43,7 @@ def lit(picture):
     ids=["line", "rectangle", "filled rectangle", "oval", "filled oval", "polygon", "filled polygon"],
 )
 def test_a_shape_is_drawn_as_far_as_it_is_on_the_picture(points, rows):
-    """The picture is compared pixel by pixel."""
+    """Pixels outside the image are left out; all others are compared one by one."""
     picture = ImageBuffer(width=5, height=5)
     picture.draw(points, RED)
 
@@ -51,7 +51,7 @@ def test_a_shape_is_drawn_as_far_as_it_is_on_the_picture(points, rows):
 
 
 def test_every_drawing_service_draws(painter):
-    """Each uses the last color, alpha and opacity."""
+    """Each service uses the color, alpha and opacity that were set last."""
     robot, picture = painter
     assert robot.get("screen/set_color", value=0xFF8000) is True
     assert robot.get("screen/draw_pixel", x1=1, y1=2) == 1
@@ -74,7 +74,7 @@ def test_every_drawing_service_draws(painter):
 
 
 def test_what_was_copied_can_be_pasted(painter):
-    """A handle is valid until it is deleted; Webots would crash after that."""
+    """A handle is valid until the client deletes it; Webots would crash at a later use."""
     robot, picture = painter
     robot.call("screen/fill_rectangle", x=0, y=0, width=2, height=2)
     image = robot.get("screen/image_copy", x=1, y=1, width=2, height=2)
@@ -98,7 +98,7 @@ def test_what_was_copied_can_be_pasted(painter):
     ids=["RGB", "RGBA", "ARGB", "BGRA", "ABGR"],
 )
 def test_an_image_comes_in_any_format(painter, format_, pixel):
-    """The image is orange in each of them."""
+    """The pixel is orange in each of these formats."""
     robot, picture = painter
     image = robot.get("screen/image_new", width=1, height=1, data=pixel, format=format_)
     robot.call("screen/image_paste", ir=image, x=0, y=0, blend=0)
@@ -107,7 +107,10 @@ def test_an_image_comes_in_any_format(painter, format_, pixel):
 
 
 def test_bytes_that_an_image_lacks_are_black(painter):
-    """The complete client of webots_ros sends 5 bytes for 50 pixels, and Webots reads beyond them."""
+    """The complete client of webots_ros sends 5 bytes for 50 pixels.
+
+    Webots reads beyond the end of the data.
+    """
     robot, picture = painter
     image = robot.get("screen/image_new", width=2, height=1, data=[255, 128], format=3)
     robot.call("screen/image_paste", ir=image, x=0, y=0, blend=0)
@@ -125,7 +128,7 @@ def test_bytes_that_an_image_lacks_are_black(painter):
     ],
 )
 def test_an_image_that_cannot_be_made_has_the_handle_0(painter, service, request_):
-    """Calls with this handle succeed without an effect; Webots only prints that it is invalid."""
+    """Calls with handle 0 succeed without an effect; Webots only prints that the handle is invalid."""
     robot, picture = painter
     image = robot.get(f"screen/{service}", **request_)
 
@@ -144,7 +147,7 @@ def test_an_image_that_cannot_be_made_has_the_handle_0(painter, service, request
     ],
 )
 def test_what_cannot_be_drawn_is_refused(painter, service, request_, fact):
-    """The error comes before anything is drawn."""
+    """The call fails before any pixel is drawn."""
     robot, picture = painter
     with pytest.raises(ServiceFailed, match=fact):
         robot.call(f"screen/{service}", **request_)
@@ -153,7 +156,10 @@ def test_what_cannot_be_drawn_is_refused(painter, service, request_, fact):
 
 
 def test_a_picture_is_mixed_with_what_is_there_only_if_it_blends(painter):
-    """The picture is mixed by its alpha; otherwise it replaces the pixels, alpha included."""
+    """With blending, alpha mixes the pasted pixels with the old ones.
+
+    Without blending, the pasted pixels replace them.
+    """
     robot, picture = painter
     robot.call("screen/fill_rectangle", x=0, y=0, width=8, height=6)
     image = robot.get("screen/image_new", width=1, height=1, data=[0, 0, 0, 51], format=6)
@@ -164,7 +170,7 @@ def test_a_picture_is_mixed_with_what_is_there_only_if_it_blends(painter):
 
 
 def test_a_copy_ends_at_the_edge_of_the_display(painter):
-    """Pixels beyond the edge are left out."""
+    """Pixels beyond the edge of the display are left out."""
     robot, picture = painter
     robot.call("screen/draw_pixel", x1=7, y1=5)
     image = robot.get("screen/image_copy", x=7, y=5, width=4, height=4)
@@ -176,7 +182,7 @@ def test_a_copy_ends_at_the_edge_of_the_display(painter):
 
 
 def test_an_image_is_saved_and_loaded(painter, tmp_path):
-    """Handle 0 is the display itself, which is black at first."""
+    """Handle 0 stands for the display itself, which is black at first."""
     robot, picture = painter
     path = str(tmp_path / "screen.png")
     robot.call("screen/draw_pixel", x1=0, y1=0)
@@ -192,9 +198,9 @@ def test_an_image_is_saved_and_loaded(painter, tmp_path):
 
 
 def test_a_text_is_drawn_in_the_size_of_the_font(painter):
-    """Lines are drawn one below the other, without smooth edges if smoothing is off.
+    """Lines of text are drawn one below the other; without smoothing, edges have no gray pixels.
 
-    A size below 1 changes nothing.
+    A font size below 1 changes nothing.
     """
     robot, picture = painter
     assert robot.get("screen/set_font", font="Arial", size=6, antiAliasing=0) == 1
@@ -207,7 +213,7 @@ def test_a_text_is_drawn_in_the_size_of_the_font(painter):
 
 
 def test_only_a_camera_that_sees_is_attached(start, world, ros):
-    """If the call succeeded without a picture, it would have no effect."""
+    """The camera here has no images, so an attached display would show nothing."""
     start(world(robot=ROBOT.replace("children [", 'children [ Camera { name "eye" } LED { name "lamp" }')))
     robot = ros.node("painter")
 

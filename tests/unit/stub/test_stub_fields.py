@@ -1,4 +1,4 @@
-"""Fields over ROS: types, values, the time when a write takes effect, and rotations."""
+"""Fields over ROS: types, values, rotations, and the time at which a write takes effect."""
 
 import math
 
@@ -19,7 +19,7 @@ HALF = math.sqrt(0.5)
 
 @pytest.fixture
 def field(robot):
-    """`field("TARGET", "translation")` returns the handle of a field."""
+    """`field("TARGET", "translation")` returns the handle of a field of a node with that DEF."""
 
     def find(def_name, name):
         node = robot.get("supervisor/get_from_def", name=def_name)
@@ -50,7 +50,7 @@ def xyz(vector):
     ],
 )
 def test_a_field_tells_its_type(robot, field, path, number, type_name, count):
-    """MF types have 0x10 added; the count of an SF field is -1."""
+    """The number of an MF type has 0x10 added; the count of an SF field is -1."""
     def_name, name = path.split(".")
     handle = field(def_name, name)
 
@@ -61,7 +61,7 @@ def test_a_field_tells_its_type(robot, field, path, number, type_name, count):
 
 
 def test_values_of_the_world_file_and_defaults_are_read(robot, field):
-    """A value is the same whether the file has it or it is the default."""
+    """A client cannot see whether a value comes from the world file or is the default."""
     get = robot.get
 
     assert xyz(get("supervisor/field/get_vec3f", field=field("TARGET", "translation"))) == (1.5, 0, 0.001)
@@ -74,7 +74,7 @@ def test_values_of_the_world_file_and_defaults_are_read(robot, field):
 
 
 def test_colors_are_opaque_and_vec2f_travels_as_a_vector(ros, start, world):
-    """The types are those of the services, not of the fields."""
+    """The response types are those of the services: a color with alpha, and a vector of three numbers."""
     start(
         world(
             "DEF LIGHT DirectionalLight { color 1 0.5 0.25 } DEF P Pose { children [ Shape {"
@@ -95,7 +95,7 @@ def test_colors_are_opaque_and_vec2f_travels_as_a_vector(ros, start, world):
 
 
 def test_mf_values_are_read_by_index(robot, field):
-    """Negative indices count from the end."""
+    """A negative index counts from the end."""
     handle = field("ROBOTINO", "controllerArgs")
 
     values = [robot.get("supervisor/field/get_string", field=handle, index=index) for index in (0, 1, -1)]
@@ -104,7 +104,7 @@ def test_mf_values_are_read_by_index(robot, field):
 
 
 def test_nodes_of_fields_are_handles(robot, field):
-    """The handle is 0 if the field has no node."""
+    """If the field has no node at an index, or contains other values, the handle is 0."""
     children = field("TARGET", "children")
 
     first = robot.get("supervisor/field/get_node", field=children, index=0)
@@ -115,7 +115,7 @@ def test_nodes_of_fields_are_handles(robot, field):
 
 
 def test_a_written_value_is_read_at_once_and_seen_with_the_next_step(robot, field, position):
-    """Writes are queued; `get` returns the queued value, the node's getters the current one."""
+    """Writes are queued: `get` of the field returns the queued value, the node still has the current one."""
     handle = field("TARGET", "translation")
 
     assert robot.get("supervisor/field/set_vec3f", field=handle, value={"x": -1.0, "y": 0.5}) == 1
@@ -127,7 +127,7 @@ def test_a_written_value_is_read_at_once_and_seen_with_the_next_step(robot, fiel
 
 
 def test_the_last_of_several_writes_wins(robot, field, position):
-    """The writes are in the same step."""
+    """All these writes are made in the same step."""
     handle = field("TARGET", "translation")
     for x in (0.1, 0.2, 0.3):
         robot.call("supervisor/field/set_vec3f", field=handle, value={"x": x})
@@ -138,7 +138,7 @@ def test_the_last_of_several_writes_wins(robot, field, position):
 
 
 def test_a_robot_is_moved_by_its_translation_and_rotation(robot, field, position):
-    """An episode begins like this; the robot then drives on from there."""
+    """An environment starts an episode like this."""
     robot.call(
         "supervisor/field/set_vec3f",
         field=field("ROBOTINO", "translation"),
@@ -159,7 +159,7 @@ def test_a_robot_is_moved_by_its_translation_and_rotation(robot, field, position
 
 
 def test_the_translation_of_a_robot_is_where_it_is(robot, field, drive):
-    """The field changes as the robot moves."""
+    """The field changes while the robot drives."""
     drive(robot, 0.1, 0.0, 0.0)
 
     robot.call("robot/time_step", value=3200)
@@ -169,7 +169,7 @@ def test_the_translation_of_a_robot_is_where_it_is(robot, field, drive):
 
 
 def test_an_obstacle_that_is_moved_is_seen_where_it_is(robot, field):
-    """Rays and collisions use the new position."""
+    """A ray meets the obstacle at its new position."""
     inbox = robot.inbox("ir1/value")
     robot.call("ir1/enable", value=32)
     robot.call(
@@ -184,7 +184,7 @@ def test_an_obstacle_that_is_moved_is_seen_where_it_is(robot, field):
 
 
 def test_a_write_beyond_the_values_that_there_are_is_lost(robot, field):
-    """The call still succeeds."""
+    """The call succeeds, but the value is not stored."""
     handle = field("ROBOTINO", "controllerArgs")
 
     assert robot.get("supervisor/field/set_string", field=handle, index=9, value="x") == 1
@@ -192,7 +192,7 @@ def test_a_write_beyond_the_values_that_there_are_is_lost(robot, field):
 
 
 def test_values_that_are_drawn_only_are_kept_and_change_nothing(ros, start, world):
-    """They change nothing in the physics of Webots either."""
+    """A visual value is stored, but it has no effect on physics, as in Webots."""
     shape = "Shape { appearance DEF PAINT PBRAppearance { } geometry DEF DOT Cylinder { radius 0.1 } }"
     start(world(f"Pose {{ children [ {shape} ] }}"))
     robot = ros.node("robotino")
@@ -216,7 +216,7 @@ def test_values_that_are_drawn_only_are_kept_and_change_nothing(ros, start, worl
 def test_a_write_that_would_be_read_back_and_change_nothing_is_refused(
     robot, field, path, setter, value, fact
 ):
-    """Otherwise a client that randomizes sizes would always train in the same world."""
+    """A client that randomizes sizes would otherwise train in the same world all the time."""
     handle = field(*path.split("."))
 
     with pytest.raises(
@@ -226,7 +226,7 @@ def test_a_write_that_would_be_read_back_and_change_nothing_is_refused(
 
 
 def test_the_sensor_of_a_robot_cannot_be_moved_by_field(robot, simple_robot, ros, start, world):
-    """Its ray stays at its position in the world file."""
+    """The rays of a sensor start at the position in the world file."""
     del robot
     start(world(robot=simple_robot))
     node = ros.node("robotino")
@@ -238,7 +238,7 @@ def test_the_sensor_of_a_robot_cannot_be_moved_by_field(robot, simple_robot, ros
 
 
 def test_custom_data_can_be_written_both_ways(robot, field):
-    """A write through the robot takes effect at once, one through the field with the next step."""
+    """`set_custom_data` takes effect at once; a write to the field takes effect with the next step."""
     handle = field("ROBOTINO", "customData")
     robot.call("robot/set_custom_data", value="a")
     assert robot.get("supervisor/field/get_string", field=handle) == "a"
@@ -251,7 +251,7 @@ def test_custom_data_can_be_written_both_ways(robot, field):
 
 
 def test_an_episode_is_seeded_by_custom_data_and_reset_in_one_step(robot, field):
-    """The write takes effect before the reset, so write and reset together take one step."""
+    """The write takes effect before the reset, so an environment needs only one step for both."""
     handle = field("ROBOTINO", "customData")
     inbox = robot.inbox("ir1/value")
     robot.call("ir1/enable", value=192)
@@ -269,7 +269,7 @@ def test_an_episode_is_seeded_by_custom_data_and_reset_in_one_step(robot, field)
 
 
 def test_a_reset_restores_places_and_not_other_fields(robot, field, position):
-    """A reset restores poses, but other field writes stay."""
+    """As in Webots, a reset restores poses, but keeps other written fields."""
     robot.call("supervisor/field/set_vec3f", field=field("TARGET", "translation"), value={"x": -1.0})
     robot.call("supervisor/field/set_string", field=field("ROBOTINO", "description"), value="new")
     robot.call("robot/time_step", value=32)
@@ -283,7 +283,7 @@ def test_a_reset_restores_places_and_not_other_fields(robot, field, position):
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 def test_a_value_that_libcontroller_refuses_answers_success(robot, field, bad):
-    """The field keeps its value."""
+    """As in libController, the call succeeds and the field keeps its value."""
     handle = field("TARGET", "translation")
 
     assert robot.get("supervisor/field/set_vec3f", field=handle, value={"x": bad}) == 1
@@ -292,7 +292,7 @@ def test_a_value_that_libcontroller_refuses_answers_success(robot, field, bad):
 
 
 def test_a_value_of_the_wrong_type_answers_success(robot, field):
-    """The value is not stored."""
+    """The value is not stored, although the call succeeds."""
     handle = field("TARGET", "translation")
 
     assert robot.get("supervisor/field/set_float", field=handle, value=1.0) == 1
@@ -301,7 +301,10 @@ def test_a_value_of_the_wrong_type_answers_success(robot, field):
 
 
 def test_a_read_of_the_wrong_type_answers_nothing_or_fails(robot, field):
-    """The values are 0 and "", as in libController; a null vector crashes the real controller."""
+    """The result is 0 or "", as in libController.
+
+    A vector would be a null pointer, which crashes the real controller.
+    """
     handle = field("TARGET", "translation")
 
     assert robot.get("supervisor/field/get_float", field=handle) == 0.0
@@ -311,7 +314,7 @@ def test_a_read_of_the_wrong_type_answers_nothing_or_fails(robot, field):
 
 
 def test_mf_values_can_be_set_inserted_and_removed(robot, field):
-    """Only an insertion into an SF field fails."""
+    """An index outside the field, or an SF field, makes the call return 0."""
     root = robot.get("supervisor/get_root")
     children = robot.get("supervisor/node/get_field", node=root, fieldName="children")
     world_info = robot.get("supervisor/field/get_node", field=children, index=0)
@@ -335,14 +338,14 @@ def test_mf_values_can_be_set_inserted_and_removed(robot, field):
 
 
 def test_tracking_of_a_field_is_accepted(robot, field):
-    """It affects only the speed of Webots' responses."""
+    """Tracking only makes responses of Webots faster."""
     handle = field("TARGET", "translation")
 
     assert robot.get("supervisor/field/enable_sf_tracking", field=handle, sampling_period=32) == 1
 
 
 def test_a_rotation_of_zero_cannot_be_written_back(robot, field):
-    """The real controller has this fault: a read gives the identity, and writing it back has no effect."""
+    """The real controller has this bug: a client reads the identity, and writing it back has no effect."""
     handle = field("ROBOTINO", "rotation")
     saved = robot.get("supervisor/field/get_rotation", field=handle)
     assert (saved.x, saved.y, saved.z, saved.w) == (0.0, 0.0, 0.0, 1.0)
@@ -358,7 +361,7 @@ def test_a_rotation_of_zero_cannot_be_written_back(robot, field):
 
 
 def test_the_workaround_writes_a_rotation_of_zero(robot, field):
-    """With a tiny z and w = 1 the angle is exactly 0 and the axis is z."""
+    """With a tiny z and w = 1, the angle is exactly 0 and the axis is z."""
     handle = field("ROBOTINO", "rotation")
     robot.call("supervisor/field/set_rotation", field=handle, value={"z": HALF, "w": HALF})
     robot.call("robot/time_step", value=32)
@@ -372,7 +375,7 @@ def test_the_workaround_writes_a_rotation_of_zero(robot, field):
 
 @pytest.mark.parametrize("w", [1.0000001, -1.5, math.nan])
 def test_a_quaternion_that_is_not_of_length_1_makes_the_angle_nan(w):
-    """It is therefore refused; clients must normalize it first."""
+    """A write with such a quaternion is rejected, so a client must normalize it first."""
     assert math.isnan(quaternion_to_axis_angle(0.0, 0.0, 0.1, w)[3])
 
 
@@ -381,7 +384,7 @@ def test_a_quaternion_that_is_not_of_length_1_makes_the_angle_nan(w):
     axis=st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda a: math.hypot(*a) > 0.1),
 )
 def test_other_rotations_survive_the_way_there_and_back(angle, axis):
-    """The tolerance is that of float64 and acos."""
+    """The tolerance is the rounding error of float64 and acos."""
     length = math.hypot(*axis)
     unit = tuple(it / length for it in axis)
     x, y, z, w = axis_angle_to_quaternion((*unit, angle))
@@ -397,12 +400,12 @@ def test_other_rotations_survive_the_way_there_and_back(angle, axis):
     [("Robot", 34), ("Solid", 80), ("WorldInfo", 84), ("TouchSensor", 60), ("Nonsense", 0), ("-", 0)],
 )
 def test_type_numbers_are_those_of_nodes_h(type_name, number):
-    """They count from WB_NODE_NO_NODE = 0."""
+    """The numbers count from WB_NODE_NO_NODE = 0 in webots/nodes.h."""
     assert type_number(type_name) == number
 
 
 def test_a_kind_of_robot_is_a_kind_of_solid():
-    """Inherited fields come first; a different default replaces the inherited one in place."""
+    """A Robot has the fields of a Solid first; a different default replaces the inherited one."""
     solid, robot = list(field_kinds("Solid")), list(field_kinds("Robot"))
 
     assert robot[: len(solid)] == solid
@@ -428,7 +431,7 @@ def test_a_kind_of_robot_is_a_kind_of_solid():
     ],
 )
 def test_a_field_that_is_not_listed_has_the_type_that_its_value_shows(world, written, kind):
-    """Newer or rarer fields can then still be read."""
+    """A client can read a rare or a new field of Webots that the tables do not list."""
     simulation = load_scene(world(f"DEF A Pose {{ novelty {written} }}"))
     tree = simulation.tree
 
@@ -436,7 +439,7 @@ def test_a_field_that_is_not_listed_has_the_type_that_its_value_shows(world, wri
 
 
 def test_every_field_of_the_shipped_worlds_has_values():
-    """No default is malformed, and no value is lost."""
+    """A malformed default or a lost value of the built-in worlds would raise an error here."""
     for name in ("arena", "two_robots"):
         simulation = load_scene(builtin(name))
         for node in list(simulation.tree.nodes.values()):

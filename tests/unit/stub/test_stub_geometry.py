@@ -25,37 +25,37 @@ poses = st.builds(Pose, vectors, matrices)
 
 
 def close(values, tolerance=1e-9):
-    """Return a value that equals numbers up to rounding."""
+    """Return a value that compares equal to these numbers up to rounding."""
     return pytest.approx(values, abs=tolerance)
 
 
 @given(matrix=matrices, vector=vectors)
 def test_a_rotation_keeps_lengths(matrix, vector):
-    """If lengths stay the same, every matrix is a rotation."""
+    """A matrix that keeps lengths is a rotation or a reflection, so wrong entries are noticed."""
     assert math.hypot(*turn(matrix, vector)) == close(math.hypot(*vector))
 
 
 @given(matrix=matrices, vector=vectors)
 def test_the_transposed_turns_back(matrix, vector):
-    """The inverse of a rotation is then cheap."""
+    """The transpose is the inverse, which makes the inverse cheap."""
     assert turn(transposed(matrix), turn(matrix, vector)) == close(vector)
 
 
 @given(first=matrices, second=matrices, vector=vectors)
 def test_a_product_does_the_second_rotation_first(first, second, vector):
-    """Nested frames need this order."""
+    """The pose of a node in nested frames is a product in this order."""
     assert turn(multiply(first, second), vector) == close(turn(first, turn(second, vector)))
 
 
 @given(outer=poses, inner=poses, point=vectors)
 def test_a_frame_in_a_frame_carries_points_through_both(outer, inner, point):
-    """This is the meaning of a Pose in a Pose."""
+    """A Pose inside a Pose moves points in this way."""
     assert outer.after(inner).carry(point) == close(outer.carry(inner.carry(point)), 1e-8)
 
 
 @given(rotation=rotations)
 def test_the_axis_stays_where_it_is(rotation):
-    """This defines the axis."""
+    """The points of the axis do not move."""
     axis = rotation[:3]
 
     assert turn(from_axis_angle(rotation), axis) == close(axis)
@@ -63,7 +63,7 @@ def test_the_axis_stays_where_it_is(rotation):
 
 @given(rotation=rotations)
 def test_both_ways_to_a_quaternion_agree(rotation):
-    """One starts from the field's axis and angle, the other from the node's matrix.
+    """One quaternion comes from a field's axis and angle, the other from a node's matrix.
 
     A quaternion and its negative are the same rotation.
     """
@@ -79,13 +79,13 @@ def test_both_ways_to_a_quaternion_agree(rotation):
 
 
 def test_an_axis_without_direction_turns_nothing():
-    """The axis comes from a world file and must not give NaN."""
+    """An axis in a world file may be 0 0 0, which must not give NaN."""
     assert from_axis_angle((0.0, 0.0, 0.0, 1.0)) == from_axis_angle((0.0, 0.0, 1.0, 0.0))
 
 
 @given(angle=st.floats(-3.1, 3.1))
 def test_the_heading_is_the_angle_about_z(angle):
-    """This holds for everything that stands upright."""
+    """Every body that is turned only about z is upright."""
     pose = Pose(rotation=from_axis_angle((0.0, 0.0, 1.0, angle)))
 
     assert pose.heading_rad == close(angle)
@@ -93,13 +93,13 @@ def test_the_heading_is_the_angle_about_z(angle):
 
 
 def test_what_leans_by_more_than_two_degrees_is_not_upright():
-    """The planar physics cannot simulate it."""
+    """The planar physics of the stub cannot simulate such a body."""
     assert not Pose(rotation=from_axis_angle((1.0, 0.0, 0.0, 0.036))).upright
     assert Pose(rotation=from_axis_angle((1.0, 0.0, 0.0, 0.034))).upright
 
 
 def test_half_turns_have_quaternions_too():
-    """There, w is 0, and the usual formula divides by it."""
+    """At a half turn w is 0, and the usual formula divides by w."""
     for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)):
         quaternion = to_quaternion(from_axis_angle((*axis, math.pi)))
 

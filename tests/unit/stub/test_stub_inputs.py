@@ -1,4 +1,4 @@
-"""Battery, keyboard and joystick: every robot has them, and Palaestra's services control them."""
+"""Battery, keyboard and joystick: each robot has them, and services of this project control them."""
 
 import pytest
 
@@ -6,7 +6,7 @@ BATTERY = "battery [ 1 10 0 ] cpuConsumption 10"
 
 
 def stepped(robot, *topics):
-    """Enable the devices of these topics, step once, and return the messages of each."""
+    """Enable the devices of these topics, make a step, and return the messages of each topic."""
     inboxes = [robot.inbox(topic) for topic in topics]
     for device in {topic.partition("/")[0] for topic in topics}:
         assert robot.get(f"{device}/enable", value=32) is True
@@ -15,7 +15,7 @@ def stepped(robot, *topics):
 
 
 def test_pressed_keys_are_published_at_every_step_until_they_are_released(robot):
-    """Each key has its own message, as in Webots while a person holds the key."""
+    """Each pressed key gives one message per step, as in Webots while a person holds the key."""
     assert robot.get("palaestra/keyboard/press", value=ord("W")) is True
     assert robot.get("palaestra/keyboard/press", value=ord("A")) is True
     (keys,) = stepped(robot, "keyboard/key")
@@ -28,7 +28,7 @@ def test_pressed_keys_are_published_at_every_step_until_they_are_released(robot)
 
 
 def test_a_keyboard_reports_seven_keys_at_most(robot):
-    """Webots reports no more."""
+    """Webots reports at most seven keys too."""
     answers = [robot.get("palaestra/keyboard/press", value=key) for key in range(65, 73)]
 
     assert answers == [True] * 7 + [False]
@@ -38,7 +38,7 @@ def test_a_keyboard_reports_seven_keys_at_most(robot):
 
 
 def test_a_joystick_is_not_connected_until_somebody_moves_it(robot):
-    """Clients check this first, and work without a joystick."""
+    """Clients check the connection first, and work without a joystick."""
     assert robot.get("joystick/is_connected") is False
     assert robot.get("joystick/get_number_of_axes") == -1
     (axis,) = stepped(robot, "joystick/axis0")
@@ -47,7 +47,7 @@ def test_a_joystick_is_not_connected_until_somebody_moves_it(robot):
 
 
 def test_a_moved_joystick_publishes_axes_points_of_view_and_pressed_buttons(robot):
-    """The topics are the controller's: an axis has a message at every step, a button while it is pressed."""
+    """As with the real controller, an axis has a message at each step, a button only while it is pressed."""
     assert robot.get("palaestra/joystick/set_axes", values=[100.0, -128.0]) is True
     assert robot.get("palaestra/joystick/set_povs", values=[1.0]) is True
     assert robot.get("palaestra/joystick/press", value=3) is True
@@ -63,13 +63,13 @@ def test_a_moved_joystick_publishes_axes_points_of_view_and_pressed_buttons(robo
 
 @pytest.mark.parametrize("values", [[1.0] * 7, [128.0], [float("nan")]])
 def test_a_joystick_cannot_be_turned_beyond_its_range(robot, values):
-    """The service returns False, and the joystick neither moves nor gets connected."""
+    """The service returns False, and the joystick is not moved or connected."""
     assert robot.get("palaestra/joystick/set_axes", values=values) is False
     assert robot.get("joystick/is_connected") is False
 
 
 def test_a_battery_loses_what_the_cpu_takes(start, world, simple_robot, ros):
-    """10 W for 32 ms are 0.32 J; the field has the same value as the sensor."""
+    """A power of 10 W for 32 ms takes 0.32 J; the field and the sensor have the same value."""
     start(world(robot=simple_robot.replace("Robot {", f"Robot {{ {BATTERY}", 1)))
     robot = ros.node("robotino")
     (values,) = stepped(robot, "battery_sensor/value")
@@ -82,7 +82,7 @@ def test_a_battery_loses_what_the_cpu_takes(start, world, simple_robot, ros):
 
 
 def test_a_robot_with_an_empty_battery_stands_still_until_a_reset(start, world, simple_robot):
-    """Webots switches it off; a reset restores the energy of the world file."""
+    """As in Webots, the robot is switched off; a reset restores the energy of the world file."""
     simulation = start(world(robot=simple_robot.replace("Robot {", f"Robot {{ {BATTERY}", 1))).simulation
     (robot,) = simulation.robots
     for motor in robot.motors.values():
@@ -102,7 +102,7 @@ def test_a_robot_with_an_empty_battery_stands_still_until_a_reset(start, world, 
 
 
 def test_a_robot_without_a_battery_reads_minus_1(robot):
-    """Webots does the same."""
+    """Webots returns -1 too."""
     (values,) = stepped(robot, "battery_sensor/value")
 
     assert values == [-1.0]

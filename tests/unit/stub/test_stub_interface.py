@@ -1,4 +1,4 @@
-"""The services of a robot are those in the table of Webots R2023b, and no others."""
+"""The services of a robot are exactly those in the table of Webots R2023b."""
 
 from pathlib import Path
 
@@ -18,7 +18,7 @@ DEVICES = {
 
 
 def rows():
-    """Yield the rows of the table, with the devices of the built-in arena filled in."""
+    """Yield the rows of the table, with the devices of the built-in arena in place of the variables."""
     for line in TABLE.read_text().splitlines():
         if line.startswith("#"):
             continue
@@ -29,20 +29,20 @@ def rows():
 
 
 def is_linear(path):
-    """Return whether a service belongs to linear motors, which have no services for torque."""
+    """Return whether a service belongs to linear motors, which have forces instead of torques."""
     return path.endswith("_force") and not path.startswith("supervisor/")
 
 
 @for_each("path, type_name", [row for row in rows() if not is_linear(row[0])])
 def test_every_service_of_the_table_is_served_with_its_type(robot, path, type_name):
-    """`rosservice type` distinguishes types with the same md5 only by name."""
+    """Some types have the same md5, and a client distinguishes them only by their names."""
     service, _ = robot.services[path]
 
     assert service.name == type_name
 
 
 def test_nothing_is_served_that_the_table_does_not_have(robot):
-    """A client that works with the stub must not rely on services that Webots lacks."""
+    """A client that works with the stub must not depend on a service that Webots lacks."""
     known = {path for path, _ in rows()}
     listed = {"robot", "supervisor", *DEVICES["<dev>"]}
 
@@ -52,18 +52,18 @@ def test_nothing_is_served_that_the_table_does_not_have(robot):
 
 
 def test_a_rotational_motor_has_no_services_for_force(robot):
-    """The services depend on the type of the motor."""
+    """Services of force belong to linear motors only."""
     assert "wheel0_joint/set_torque" in robot.services
     assert "wheel0_joint/set_force" not in robot.services
 
 
 def test_the_device_list_is_advertised_last(robot):
-    """It is the best readiness probe, because all other services then exist."""
+    """When this service exists, all others exist too, so a client can wait for it."""
     assert list(robot.services)[-1] == "robot/get_device_list"
 
 
 def test_a_robot_that_is_no_supervisor_has_no_supervisor_services(two_robots):
-    """The controller checks this once, when it starts."""
+    """The real controller checks once, at its start, whether the robot is a supervisor."""
     supervisor, robotino = two_robots
 
     assert any(path.startswith("supervisor/") for path in supervisor.services)
@@ -71,7 +71,7 @@ def test_a_robot_that_is_no_supervisor_has_no_supervisor_services(two_robots):
 
 
 def test_the_device_list_has_raw_names_and_paths_have_underscores(robot):
-    """R2023b returns names with blanks, but topics and services cannot have blanks."""
+    """R2023b returns names with blanks, but names of topics and services cannot have blanks."""
     names = robot.get("robot/get_device_list")
 
     assert "touch sensor" in names
@@ -80,7 +80,7 @@ def test_the_device_list_has_raw_names_and_paths_have_underscores(robot):
 
 
 def test_devices_are_listed_in_the_order_of_the_world_file(robot):
-    """A client may rely on this order."""
+    """A client may depend on this order."""
     names = robot.get("robot/get_device_list")
 
     assert names[:4] == ["wheel0_joint", "wheel0_joint_sensor", "wheel1_joint", "wheel1_joint_sensor"]
@@ -88,7 +88,7 @@ def test_devices_are_listed_in_the_order_of_the_world_file(robot):
 
 
 def test_the_model_name_is_latched_and_global(ros, start):
-    """A late subscriber then gets one message from each live controller."""
+    """A late subscriber gets one message from each running controller."""
     inbox = ros.topic("/model_name").inboxes
     inbox.append([])
     start()
@@ -99,7 +99,7 @@ def test_the_model_name_is_latched_and_global(ros, start):
 
 
 def test_the_robot_tells_about_itself(robot):
-    """A facade reads these values when it connects."""
+    """The trainer's facade reads these values when it connects."""
     assert robot.get("robot/get_basic_time_step") == 32.0
     assert robot.get("robot/get_time") == 0.0
     assert robot.get("robot/get_supervisor") is True
@@ -110,7 +110,7 @@ def test_the_robot_tells_about_itself(robot):
 
 
 def test_what_the_stub_cannot_do_fails_with_a_remedy(robot):
-    """A success without an effect would be worse."""
+    """If the call succeeded without an effect, the client would be misled."""
     handle = robot.get("supervisor/get_from_def", name="ROBOTINO")
 
     with pytest.raises(Exception, match="simulates no forces; use driver mujoco or webots"):
@@ -120,7 +120,7 @@ def test_what_the_stub_cannot_do_fails_with_a_remedy(robot):
 
 
 def test_pictures_and_movies_fail_without_rendering(robot):
-    """Webots fails in the same way with --no-rendering."""
+    """Webots with `--no-rendering` fails in the same way."""
     assert robot.get("supervisor/export_image", filename="/tmp/a.png", quality=50) == 0
     assert robot.get("supervisor/movie_is_ready") == 1
     assert robot.get("supervisor/movie_failed") == 0
@@ -135,13 +135,13 @@ def test_pictures_and_movies_fail_without_rendering(robot):
     [("world_save", "worlds are not saved"), ("animation_start_recording", "no animations are recorded")],
 )
 def test_a_file_that_no_simulator_writes_fails_with_a_remedy(robot, service, fact):
-    """A client that reads the file would not find it."""
+    """A client would look for a file that does not exist."""
     with pytest.raises(Exception, match=f"{fact} here"):
         robot.call(f"supervisor/{service}", value="/tmp/a.wbt")
 
 
 def test_the_harmless_rest_answers_as_webots_does(robot):
-    """Nobody types, selects a node or opens a robot window."""
+    """These services concern a person who types, selects a node or opens a robot window."""
     assert robot.get("robot/wait_for_user_input_event", eventType=1, timeout=0) == 0
     assert robot.get("robot/wwi_receive_text") == ""
     assert robot.get("robot/wwi_send_text", value="hello") is True
@@ -150,6 +150,6 @@ def test_the_harmless_rest_answers_as_webots_does(robot):
 
 
 def test_remote_control_mode_is_refused(robot):
-    """`set_mode` of a robot has nothing to do with a pause, and the stub has no real robot."""
+    """The stub has no real robot to control. This `set_mode` does not pause the simulation."""
     assert robot.get("robot/set_mode", arg=b"", mode=0) == 1
     assert robot.get("robot/set_mode", arg=b"", mode=1) == 0

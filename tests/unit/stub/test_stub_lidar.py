@@ -1,4 +1,4 @@
-"""Lidar: the measurements of its rays, and their messages."""
+"""Lidar: the distances along its rays, and its messages."""
 
 import math
 import struct
@@ -16,7 +16,7 @@ ROBOT = """Robot {{ supervisor TRUE controller "ros" controllerArgs [ "--name=se
 
 @pytest.fixture
 def seer(start, world, ros):
-    """`seer(fields)` returns the node of a robot that looks at a wall 1.9 m ahead, 1 m high."""
+    """`seer(fields)` returns the node of a robot whose lidar looks at a wall 1.9 m ahead and 1 m high."""
 
     def begin(fields, objects=WALL):
         start(world(objects, robot=ROBOT.format(fields)))
@@ -26,7 +26,7 @@ def seer(start, world, ros):
 
 
 def seen(robot, *topics):
-    """Enable the lidar, make a step, and return the message of each topic."""
+    """Enable the lidar, make a step, and return one message of each topic."""
     inboxes = [robot.inbox(f"eye/{topic}") for topic in topics]
     assert robot.get("eye/enable", value=64) is True
     for _ in range(2):
@@ -41,7 +41,7 @@ def floats(data):
 
 
 def test_the_rays_of_a_layer_go_from_left_to_right(seer):
-    """A ray goes through the middle of its pixel; its distance is along the ray, not along the axis."""
+    """Each ray goes through the middle of its pixel; the distance is measured along the ray, not the axis."""
     image, scan = seen(seer(FLAT), "range_image", "laser_scan")
     expected = [1.9 / math.cos(angle) for angle in (0.6, 0.3, 0.0, -0.3, -0.6)]
 
@@ -51,7 +51,7 @@ def test_the_rays_of_a_layer_go_from_left_to_right(seer):
 
 
 def test_a_scan_has_the_angles_and_times_of_the_controller(seer):
-    """The scan's period is the one that was enabled."""
+    """The scan's duration is the sampling period that was enabled."""
     scan, older = seen(seer(FLAT), "laser_scan", "laser_scan/layer0")
 
     assert (scan["angle_min"], scan["angle_max"], scan["angle_increment"]) == (-0.75, 0.75, 0.3)
@@ -62,7 +62,10 @@ def test_a_scan_has_the_angles_and_times_of_the_controller(seer):
 
 
 def test_several_layers_look_up_and_down(seer):
-    """The top layer looks over the wall, the lowest one at the floor; the scans are then per layer."""
+    """The top layer looks over the wall, and the lowest at the floor.
+
+    With several layers, each has its own scan.
+    """
     robot = seer(TALL, WALL + "Solid { children [ Shape { geometry Plane { size 20 20 } } ] }")
     image, middle = seen(robot, "range_image", "laser_scan/layer1")
     top, _, low = (floats(image["data"])[row * 3 + 1] for row in range(3))
@@ -74,14 +77,14 @@ def test_several_layers_look_up_and_down(seer):
 
 
 def test_nothing_nearer_or_farther_than_the_range_is_seen(seer):
-    """Both values are infinite."""
+    """The distance is infinite in both cases."""
     (near,) = seen(seer(FLAT.replace("minRange 0.1", "minRange 2.1")), "laser_scan")
 
     assert list(near["ranges"]) == pytest.approx([1.9 / math.cos(0.6), *[math.inf] * 3, 1.9 / math.cos(0.6)])
 
 
 def test_a_cloud_of_points_comes_while_it_is_enabled(seer):
-    """Each point has x forward, y left, z up, and then the layer and the time."""
+    """Each point has x forward, y left and z up, then the layer and the time."""
     robot = seer(FLAT)
     clouds = robot.inbox("eye/point_cloud")
     seen(robot, "range_image")
@@ -101,7 +104,7 @@ def test_a_cloud_of_points_comes_while_it_is_enabled(seer):
 
 
 def test_a_layer_can_be_asked_for(seer):
-    """Webots would read a null pointer for a layer that does not exist."""
+    """Webots would read a null pointer for a layer that the lidar does not have."""
     robot = seer(TALL)
     seen(robot, "range_image")
 
@@ -113,7 +116,7 @@ def test_a_layer_can_be_asked_for(seer):
 
 
 def test_the_settings_are_answered(seer):
-    """As in libController, a frequency beyond the limits is ignored."""
+    """As in libController, a frequency beyond the limits changes nothing."""
     robot = seer(FLAT)
     info = robot.call("eye/get_info")
 
@@ -124,7 +127,7 @@ def test_the_settings_are_answered(seer):
 
 
 def test_a_lidar_that_is_not_enabled_casts_no_rays(seer):
-    """Rays cost time; the image then stays that of the last enabled step."""
+    """Rays take time; the image stays as it was at the last step with an enabled lidar."""
     robot = seer(FLAT)
     robot.call("robot/time_step", value=32)
     assert set(floats(robot.get("eye/get_layer_range_image", layer=0).data)) == {math.inf}
@@ -134,7 +137,7 @@ def test_a_lidar_that_is_not_enabled_casts_no_rays(seer):
 
 
 def test_noise_is_a_share_of_the_range_and_a_resolution_rounds(seer):
-    """The noise comes first."""
+    """The noise is added before the distance is rounded."""
     (scan,) = seen(seer(f"{FLAT} noise 0.05 resolution 0.25"), "laser_scan")
 
     assert all(math.remainder(distance, 0.25) == 0.0 for distance in scan["ranges"])

@@ -1,4 +1,4 @@
-"""The log of a controller: `/rosout` and the log level, as every roscpp node has them."""
+"""The log of a controller: `/rosout` and the log level, as in each roscpp node."""
 
 import pytest
 
@@ -6,7 +6,7 @@ from palaestra_sim.ros.node import ServiceFailed
 
 
 def test_a_refusal_is_logged(robot):
-    """A person who runs `rqt_console` sees the mistake of the client."""
+    """A person with `rqt_console` sees the mistake of the client."""
     inbox = robot.inbox("/rosout")
     with pytest.raises(ServiceFailed):
         robot.call("wheel0_joint/set_torque", value=1.0)
@@ -19,7 +19,7 @@ def test_a_refusal_is_logged(robot):
 
 
 def test_a_higher_level_silences_it(robot):
-    """The same is done by `rosservice call /robotino/set_logger_level ros fatal`."""
+    """`rosservice call /robotino/set_logger_level ros fatal` has the same effect."""
     inbox = robot.inbox("/rosout")
     robot.call("set_logger_level", logger="ros", level="FATAL")
     with pytest.raises(ServiceFailed):
@@ -30,6 +30,6 @@ def test_a_higher_level_silences_it(robot):
 
 
 def test_an_unknown_level_is_refused(robot):
-    """The message has the known levels."""
+    """The message lists the valid levels."""
     with pytest.raises(ServiceFailed, match="no level 'loud'; use debug, info, warn, error, fatal"):
         robot.call("set_logger_level", logger="ros", level="loud")

@@ -1,4 +1,4 @@
-"""The event loop of sockets and timers, and when it polls instead of sleeping."""
+"""The event loop of sockets and timers, and the times at which it polls instead of sleeping."""
 
 import os
 import socket
@@ -10,7 +10,7 @@ from palaestra_sim.ros.loop import Loop
 
 @pytest.fixture
 def loop():
-    """A loop that is closed when the test ends."""
+    """Yield a loop, which is closed at the end of the test."""
     fresh = Loop()
     yield fresh
     fresh.close()
@@ -18,7 +18,7 @@ def loop():
 
 @pytest.fixture
 def pair(loop):
-    """The far end of a connection; the loop echoes whatever arrives at its own."""
+    """Yield one end of a connection; the loop returns all bytes that arrive at the other end."""
     mine, theirs = socket.socketpair()
     loop.watch(mine, lambda: mine.send(mine.recv(100)))
     yield theirs
@@ -29,7 +29,7 @@ def pair(loop):
 
 @pytest.fixture
 def looks(monkeypatch):
-    """Return a list that grows by one with each poll that yields the processor."""
+    """Return a list that grows by one at each poll."""
     seen = []
     monkeypatch.setattr(os, "sched_yield", lambda: seen.append(1))
     return seen
@@ -37,7 +37,7 @@ def looks(monkeypatch):
 
 @pytest.fixture
 def chatter(loop, pair):
-    """`chatter(50)` exchanges as many requests and responses, with short waits between them."""
+    """`chatter(50)` exchanges 50 requests and responses, with short waits between them."""
 
     def begin(count):
         def go_on():
@@ -55,7 +55,7 @@ def chatter(loop, pair):
 
 
 def run(loop, *delays_s):
-    """Run until the last of some timers, and return their delays in the order in which they fired."""
+    """Run the loop until the last timer, and return the timers' delays in the order in which they fired."""
     came = []
     for delay_s in delays_s:
         loop.later(delay_s, lambda delay_s=delay_s: came.append(delay_s))
@@ -65,12 +65,12 @@ def run(loop, *delays_s):
 
 
 def test_moments_come_in_their_order(loop):
-    """The order in which they were set does not matter."""
+    """The order in which the timers were set has no effect."""
     assert run(loop, 0.003, 0.001, 0.0, 0.002) == [0.0, 0.001, 0.002, 0.003]
 
 
 def test_what_arrives_is_answered_meanwhile(loop, chatter):
-    """A timer must not delay other work."""
+    """While a timer is pending, the loop must still handle requests."""
     said = chatter(3)
 
     run(loop, 0.05)
@@ -79,9 +79,9 @@ def test_what_arrives_is_answered_meanwhile(loop, chatter):
 
 
 def test_after_short_waits_it_looks_before_it_sleeps(loop, chatter, looks):
-    """A wake-up would take longer than the wait."""
+    """After several short waits, the next request is near, and waking up takes longer than polling."""
 
-    def talk():  # repeat it if another process took the processor: that wait was not short
+    def talk():  # if another process took the processor, that wait was long; try again
         if looks:
             loop.stop()
         else:
@@ -95,7 +95,7 @@ def test_after_short_waits_it_looks_before_it_sleeps(loop, chatter, looks):
 
 
 def test_a_longer_wait_now_and_then_is_enough_not_to_look(loop, pair, looks):
-    """Useless polling takes processor time from the other simulators."""
+    """Polling in vain takes processor time from other simulators."""
 
     def ask():
         asked.append(pair.send(b"question"))
@@ -115,7 +115,10 @@ def test_a_longer_wait_now_and_then_is_enough_not_to_look(loop, pair, looks):
 
 
 def test_it_does_not_look_for_a_moment_that_is_near(loop, chatter, looks):
-    """The clients wait for the end of a step too; polling made three milliseconds three and a third."""
+    """The clients also wait for the end of the step.
+
+    With polling, three milliseconds became three and a third.
+    """
     chatter(50)
 
     run(loop, 0.003)
@@ -124,7 +127,7 @@ def test_it_does_not_look_for_a_moment_that_is_near(loop, chatter, looks):
 
 
 def test_another_thread_may_post(loop):
-    """It is the only method that other threads may call."""
+    """`post` is the only method that another thread may call."""
     loop.post(loop.stop)
 
     assert loop.run() is None

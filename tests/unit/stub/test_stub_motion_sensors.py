@@ -1,4 +1,4 @@
-"""GPS, compass, gyro and similar sensors on a robot that stands, drives and turns."""
+"""GPS, compass, gyro and similar sensors, on a robot that stands, drives or turns."""
 
 import math
 import random
@@ -23,7 +23,7 @@ ON_A_TURNTABLE = """HingeJoint {{
 
 @pytest.fixture
 def load(world, simple_robot):
-    """`load(sensor, robot=..., info=...)` returns a simulation whose robot has that sensor, with seed 7."""
+    """`load(sensor, robot=..., info=...)` returns the simulation of a robot with that sensor and seed 7."""
 
     def begin(sensor, robot="", info="", objects=""):
         text = simple_robot.replace("DEF IR", f"{sensor} DEF IR")
@@ -35,7 +35,7 @@ def load(world, simple_robot):
 
 @pytest.fixture
 def device(start, world, simple_robot, ros):
-    """`device(sensor)` returns the node of a stub whose robot has that sensor."""
+    """`device(sensor)` returns the node of a robot with that sensor."""
 
     def begin(sensor):
         start(world(robot=simple_robot.replace("DEF IR", f"{sensor} DEF IR")))
@@ -45,7 +45,7 @@ def device(start, world, simple_robot, ros):
 
 
 def drive(simulation, vx, vy, omega, steps=30):
-    """Drive until that velocity is reached."""
+    """Drive until the robot has reached that velocity."""
     motors = simulation.robots[0].motors
     for name, speed in zip(WHEELS, wheel_speeds(vx, vy, omega), strict=True):
         motors[name].set_position(math.inf)
@@ -60,13 +60,13 @@ def value_of(simulation, name):
 
 
 def draws(count):
-    """Return the first numbers of the noise with seed 7."""
+    """Return the first random numbers of the noise with seed 7."""
     noise = random.Random(7)
     return [noise.gauss(0.0, 1.0) for _ in range(count)]
 
 
 def test_a_gps_reads_its_own_place_and_not_that_of_its_robot(load):
-    """The GPS is 0.1 m in front of the center of a robot that looks north."""
+    """The GPS is 0.1 m ahead of the robot's center, and the robot looks north."""
     simulation = load(
         "GPS { translation 0.1 0 0.3 }", f"translation 1 2 0 {NORTH}", info="gpsReference 100 200 300"
     )
@@ -77,7 +77,7 @@ def test_a_gps_reads_its_own_place_and_not_that_of_its_robot(load):
 
 
 def test_a_gps_reads_its_speed_in_the_axes_of_the_world(load):
-    """The robot drives forward, which is north."""
+    """The robot drives forward while it looks north."""
     simulation = load("GPS { }", NORTH)
 
     drive(simulation, 0.3, 0.0, 0.0)
@@ -88,7 +88,7 @@ def test_a_gps_reads_its_speed_in_the_axes_of_the_world(load):
 
 
 def test_a_gps_off_the_middle_moves_when_the_robot_turns(load):
-    """It is 0.2 m to the left of the center, so it moves backward."""
+    """The GPS is 0.2 m to the left of the center, so a left turn moves it backward."""
     simulation = load("GPS { translation 0 0.2 0 }")
 
     drive(simulation, 0.0, 0.0, 0.5, steps=1)
@@ -103,7 +103,7 @@ def test_a_gps_off_the_middle_moves_when_the_robot_turns(load):
 
 
 def test_a_gps_on_a_joint_moves_with_it(load):
-    """The motor's speed counts too, not only the robot's: 2 rad/s at 0.1 m from the axis."""
+    """The motor's speed adds to that of the robot: 2 rad/s at 0.1 m from the axis."""
     simulation = load(ON_A_TURNTABLE.format("GPS { translation 0.1 0 0 }"))
     simulation.robots[0].motors["turntable"].set_position(math.inf)
     simulation.robots[0].motors["turntable"].set_velocity(2.0)
@@ -117,7 +117,7 @@ def test_a_gps_on_a_joint_moves_with_it(load):
 
 
 def test_a_place_on_a_slider_moves_along_its_axis():
-    """The axis is in the frame of the joint, which is turned here."""
+    """The axis of the slider is in the frame of the joint, which is turned here."""
     frame = Frame(None, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0, math.pi / 2.0))
     motor = Motor(MotorSpec(name="lift"))
     motor.speed_rad_s = 0.2
@@ -132,7 +132,7 @@ def test_a_place_on_a_slider_moves_along_its_axis():
 
 
 def test_a_robot_that_is_placed_elsewhere_has_no_speed(load):
-    """Webots, too, takes the speed from its physics and not from two positions."""
+    """Webots also takes the speed from the physics, not from the difference of two positions."""
     simulation = load("GPS { }")
     simulation.step(STEP_MS)
 
@@ -159,7 +159,7 @@ def test_the_noise_of_a_gps_is_in_meters_and_that_of_its_speed_a_fraction(load):
 
 
 def test_a_gps_rounds_to_its_resolution(load):
-    """Position and speed have a resolution each."""
+    """Position and speed have separate resolutions."""
     simulation = load("GPS { resolution 0.25 speedResolution 0.2 }", "translation 1.1 -0.4 0")
 
     drive(simulation, 0.0, 0.5, 0.0, steps=1)
@@ -177,13 +177,13 @@ def test_a_gps_rounds_to_its_resolution(load):
     ],
 )
 def test_what_a_gps_cannot_read_is_refused(load, sensor, info, fact):
-    """A wrong position would be worse than none."""
+    """If the GPS returned a wrong position, a client would not notice."""
     with pytest.raises(WorldError, match=fact):
         load(sensor, info=info)
 
 
 def test_a_gps_reads_a_worldinfo_that_follows_its_robot(simple_robot):
-    """The order of nodes in a file has no meaning."""
+    """The order of the nodes in a world file does not matter."""
     robot = simple_robot.replace("DEF IR", "GPS { } DEF IR")
 
     simulation = load_scene(f"#VRML_SIM R2023b utf8\n{robot}\nWorldInfo {{ gpsReference 1 2 3 }}\n".encode())
@@ -193,7 +193,7 @@ def test_a_gps_reads_a_worldinfo_that_follows_its_robot(simple_robot):
 
 
 def test_a_gps_answers_its_coordinate_system_and_converts_angles(device):
-    """Each part is truncated toward zero, as in the library of Webots."""
+    """As in the library of Webots, each part of the angle is truncated toward zero."""
     node = device("GPS { }")
 
     def converted(angle):
@@ -205,7 +205,7 @@ def test_a_gps_answers_its_coordinate_system_and_converts_angles(device):
 
 
 def test_a_gps_is_in_the_frame_of_its_name_except_for_its_speed(device):
-    """The controller leaves the frame of that message empty."""
+    """The real controller leaves the frame of the speed message empty."""
     node = device("GPS { }")
 
     node.call("gps/enable", value=STEP_MS)
@@ -227,7 +227,7 @@ def test_a_gps_is_in_the_frame_of_its_name_except_for_its_speed(device):
     ],
 )
 def test_a_compass_shows_north_in_its_own_frame(load, robot, mount, north):
-    """North is +y of the world; robot and mount turn the sensor."""
+    """North is +y of the world, and the rotation of the robot and of the mount turn the sensor."""
     simulation = load(f"Compass {{ {mount} }}", robot)
 
     simulation.step(STEP_MS)
@@ -236,7 +236,7 @@ def test_a_compass_shows_north_in_its_own_frame(load, robot, mount, north):
 
 
 def test_a_compass_turns_against_its_robot(load):
-    """Its documentation computes the bearing as atan2 of the first two values."""
+    """The manual of Webots computes the bearing as atan2 of the first two values."""
     simulation = load("Compass { }")
 
     drive(simulation, 0.0, 0.0, 0.5)
@@ -249,7 +249,7 @@ def test_a_compass_turns_against_its_robot(load):
 
 
 def test_axes_go_through_table_and_resolution_and_one_that_is_off_is_nan(load):
-    """The order is that of Webots, with the table first."""
+    """The order is that of Webots: first the table, then the resolution."""
     simulation = load("Compass { lookupTable [ -1 -100 0, 1 100 0 ] resolution 30 zAxis FALSE }", NORTH)
 
     simulation.step(STEP_MS)
@@ -260,7 +260,7 @@ def test_axes_go_through_table_and_resolution_and_one_that_is_off_is_nan(load):
 
 
 def test_each_axis_of_a_noisy_table_draws_its_own_noise(load):
-    """The draws are in the order x, y, z."""
+    """The random numbers are drawn in the order x, y, z."""
     simulation = load("Compass { lookupTable [ -1 -100 0.5, 1 100 0.5 ] yAxis FALSE }", "rotation 0 0 1 0.5")
     first, third = draws(2)
 
@@ -273,24 +273,24 @@ def test_each_axis_of_a_noisy_table_draws_its_own_noise(load):
 
 
 def test_a_sensor_without_a_table_answers_an_empty_one(device):
-    """The default of the field has no rows."""
+    """The field is empty by default."""
     assert device("Compass { }").get("compass/get_lookup_table") == ()
 
 
 def test_a_sensor_answers_its_table(device):
-    """The rows follow each other."""
+    """The response has the rows one after the other, in one list."""
     node = device("Compass { lookupTable [ -1 -100 0, 1 100 0.5 ] }")
 
     assert node.get("compass/get_lookup_table") == (-1.0, -100.0, 0.0, 1.0, 100.0, 0.5)
 
 
 def test_a_table_whose_inputs_do_not_grow_is_refused(load):
-    """No value could be interpolated between its rows."""
+    """No value could be interpolated between such rows."""
     with pytest.raises(WorldError, match="the inputs of lookupTable do not increase; sort its rows"):
         load("Compass { lookupTable [ 1 1 0, 0 0 0 ] }")
 
 
-STANDING = "rotation 1 0 0 -1.5707963267948966"  # the robot's z points up, in a world whose y axis points up
+STANDING = "rotation 1 0 0 -1.5707963267948966"  # the robot's z points up where the world's y does
 
 
 @pytest.mark.parametrize(
@@ -302,7 +302,10 @@ STANDING = "rotation 1 0 0 -1.5707963267948966"  # the robot's z points up, in a
     ],
 )
 def test_the_system_of_axes_says_where_north_and_up_are(load, system, robot, north, height_m, quaternion):
-    """Its letters are the directions of x, y and z; an InertialUnit has the axes of the file."""
+    """The letters of the system are the directions of x, y and z.
+
+    An InertialUnit uses the axes of the file.
+    """
     info = f'coordinateSystem "{system}" gpsReference 1 2 400'
     simulation = load("Compass { } InertialUnit { } Altimeter { translation 0 0 0.3 }", robot, info)
     simulation.step(STEP_MS)
@@ -313,7 +316,7 @@ def test_the_system_of_axes_says_where_north_and_up_are(load, system, robot, nor
 
 
 def test_gravity_of_an_old_world_may_be_a_vector():
-    """Until R2020a gravity had three numbers."""
+    """Until R2020a, the field `gravity` had three numbers."""
     text = '#VRML_SIM R2019a utf8\nWorldInfo { gravity 0 -3.7 0 } Robot { controller "ros" controllerArgs'
     simulation = load_scene(
         f'{text} [ "--name=a" "--synchronize" ] children [ Accelerometer {{ }} ] }}'.encode()
@@ -328,7 +331,7 @@ def test_gravity_of_an_old_world_may_be_a_vector():
     [("", (0.0, 0.0, 1.0)), ("rotation 1 0 0 1.5707963267948966", (0.0, 1.0, 0.0))],
 )
 def test_a_gyro_reads_the_turning_of_its_robot_about_its_own_axes(load, mount, direction):
-    """The robot turns about the vertical, so a gyro that is tipped over reads it on another axis."""
+    """The robot turns about the vertical, so a tilted gyro reads the rotation on another axis."""
     simulation = load(f"Gyro {{ translation 0.1 0 0 {mount} }}")
 
     drive(simulation, 0.2, 0.0, 0.5)
@@ -337,7 +340,7 @@ def test_a_gyro_reads_the_turning_of_its_robot_about_its_own_axes(load, mount, d
 
 
 def test_a_gyro_reads_the_motor_that_carries_it_too(load):
-    """Robot and turntable turn about the same axis."""
+    """The robot and its turntable turn about the same axis, so their speeds add up."""
     simulation = load(ON_A_TURNTABLE.format("Gyro { }"))
     simulation.robots[0].motors["turntable"].set_position(math.inf)
     simulation.robots[0].motors["turntable"].set_velocity(2.0)
@@ -348,7 +351,10 @@ def test_a_gyro_reads_the_motor_that_carries_it_too(load):
 
 
 def test_a_gyro_marks_what_it_does_not_measure(device):
-    """In ROS, -1 in a covariance means not measured; the covariance of the reading is unknown, which is 0."""
+    """In ROS, -1 in a covariance means "not measured".
+
+    The covariance of the reading itself is unknown, which is 0.
+    """
     node = device("Gyro { }")
     node.call("gyro/enable", value=STEP_MS)
     inbox = node.inbox("gyro/values")
@@ -370,7 +376,7 @@ def test_a_gyro_marks_what_it_does_not_measure(device):
     ],
 )
 def test_an_accelerometer_at_rest_reads_the_reaction_to_gravity(load, mount, info, expected):
-    """The reaction points up, in the sensor's own frame."""
+    """The reaction to gravity points up, in the axes of the sensor."""
     simulation = load(f"Accelerometer {{ {mount} }}", info=info)
 
     simulation.step(STEP_MS)
@@ -379,7 +385,7 @@ def test_an_accelerometer_at_rest_reads_the_reaction_to_gravity(load, mount, inf
 
 
 def test_an_accelerometer_reads_a_robot_that_speeds_up_and_then_drives_on(load):
-    """The limit along x is 10 m/s2; at constant speed only gravity is left."""
+    """The robot accelerates with at most 10 m/s2 along x; at constant speed only gravity is left."""
     simulation = load("Accelerometer { }", NORTH)
 
     drive(simulation, 2.0, 0.0, 0.0, steps=1)
@@ -391,7 +397,7 @@ def test_an_accelerometer_reads_a_robot_that_speeds_up_and_then_drives_on(load):
 
 
 def test_an_accelerometer_reads_the_last_basic_step_of_a_long_one(load):
-    """The robot reaches its speed after two of six basic steps."""
+    """The robot reaches its speed after two of six basic steps, so the last one has no acceleration."""
     simulation = load("Accelerometer { }")
     drive(simulation, 0.5, 0.0, 0.0, steps=0)
 
@@ -401,7 +407,7 @@ def test_an_accelerometer_reads_the_last_basic_step_of_a_long_one(load):
 
 
 def test_an_accelerometer_off_the_middle_reads_the_pull_to_the_middle(load):
-    """It is the square of 2 rad/s times 0.3 m, against the arm; the value is half a basic step late."""
+    """The value is the square of 2 rad/s times 0.3 m, toward the center; it is half a basic step late."""
     simulation = load("Accelerometer { translation 0.3 0 0 }")
 
     drive(simulation, 0.0, 0.0, 2.0)
@@ -414,7 +420,7 @@ def test_an_accelerometer_off_the_middle_reads_the_pull_to_the_middle(load):
 
 
 def test_a_reset_is_no_acceleration(load):
-    """The robot drove before the reset and stands after it."""
+    """The robot drove before the reset and stands after it, but this change is no acceleration."""
     simulation = load("Accelerometer { }")
     drive(simulation, 0.5, 0.0, 0.0)
 
@@ -425,7 +431,7 @@ def test_a_reset_is_no_acceleration(load):
 
 
 def test_an_inertial_unit_reads_its_rotation_in_the_world(load):
-    """Robot and mount are each turned by 90 degrees about the vertical."""
+    """The robot and the mount are each turned by 90 degrees about the vertical."""
     simulation = load(f"InertialUnit {{ {NORTH} }}", NORTH)
 
     simulation.step(STEP_MS)
@@ -434,7 +440,7 @@ def test_an_inertial_unit_reads_its_rotation_in_the_world(load):
 
 
 def test_an_inertial_unit_turns_with_its_robot(load):
-    """The quaternion has half of the angle."""
+    """A quaternion contains half of the rotation angle."""
     simulation = load("InertialUnit { }")
 
     drive(simulation, 0.0, 0.0, 0.5)
@@ -446,7 +452,7 @@ def test_an_inertial_unit_turns_with_its_robot(load):
 
 
 def test_the_noise_of_an_inertial_unit_turns_it_about_all_axes(load):
-    """It is a fraction of pi: a sum of small rotations is near the vector of the three."""
+    """The noise is a fraction of pi. For small angles, the three rotations add up like a vector."""
     simulation = load("InertialUnit { noise 0.0001 }")
 
     simulation.step(STEP_MS)
@@ -458,7 +464,7 @@ def test_the_noise_of_an_inertial_unit_turns_it_about_all_axes(load):
 
 
 def test_an_inertial_unit_rounds_each_number_to_its_resolution(load):
-    """As in Webots, the quaternion then no longer has length 1."""
+    """As in Webots, the rounded quaternion does not have length 1."""
     simulation = load("InertialUnit { resolution 0.5 }", "rotation 0 0 1 0.7")
 
     simulation.step(STEP_MS)
@@ -467,18 +473,18 @@ def test_an_inertial_unit_rounds_each_number_to_its_resolution(load):
 
 
 def test_an_inertial_unit_answers_its_noise(device):
-    """The value is that of the field."""
+    """The service returns the value of the field."""
     assert device("InertialUnit { noise 0.25 }").get("inertial_unit/get_noise") == 0.25
 
 
 def test_an_inertial_unit_with_an_axis_switched_off_is_refused(load):
-    """Webots then sends a rotation that no robot can have."""
+    """Webots then returns a rotation that no robot can have."""
     with pytest.raises(WorldError, match="an inertial unit with an axis that is switched off"):
         load("InertialUnit { yAxis FALSE }")
 
 
 def test_an_altimeter_reads_its_height_and_that_of_the_reference(load):
-    """The robot is 0.5 m up, and the sensor 0.3 m higher."""
+    """The robot is at a height of 0.5 m, and the sensor is 0.3 m above the robot's origin."""
     simulation = load("Altimeter { translation 0 0 0.3 }", "translation 0 0 0.5", info="gpsReference 1 2 400")
 
     simulation.step(STEP_MS)
@@ -487,7 +493,7 @@ def test_an_altimeter_reads_its_height_and_that_of_the_reference(load):
 
 
 def test_an_altimeter_adds_noise_and_then_rounds(load):
-    """The noise is in meters."""
+    """The noise is in meters, and is added before rounding."""
     simulation = load("Altimeter { accuracy 3 resolution 0.25 }")
     (noise,) = draws(1)
 
@@ -506,7 +512,7 @@ def test_an_altimeter_adds_noise_and_then_rounds(load):
     ],
 )
 def test_a_light_sensor_in_a_world_without_lights_reads_darkness(load, fields, expected):
-    """It reads its table's value for no irradiance, which for an E-puck is the largest value."""
+    """The sensor returns the table's value for an irradiance of 0. On an E-puck this is the largest value."""
     simulation = load(f"LightSensor {{ {fields} }}")
 
     simulation.step(STEP_MS)
@@ -515,7 +521,7 @@ def test_a_light_sensor_in_a_world_without_lights_reads_darkness(load, fields, e
 
 
 def test_the_table_of_a_light_sensor_adds_noise(load):
-    """The noise is a fraction of the response."""
+    """The noise is a fraction of the sensor's value."""
     simulation = load("LightSensor { lookupTable [ 1 4095 0.01, 2 0 0.01 ] }")
     (noise,) = draws(1)
 
@@ -525,5 +531,5 @@ def test_the_table_of_a_light_sensor_adds_noise(load):
 
 
 def test_a_light_sensor_answers_its_table_or_the_default(device):
-    """The default is that of Webots."""
+    """Without a table in the world file, the default is that of Webots."""
     assert device("LightSensor { }").get("light_sensor/get_lookup_table") == (0, 0, 0, 1, 1000, 0)

@@ -1,4 +1,4 @@
-"""Motors and the effect of their commands, over ROS and directly."""
+"""Motors and the effects of their commands, over ROS and without ROS."""
 
 import itertools
 import math
@@ -12,18 +12,18 @@ INF = math.inf
 
 @pytest.fixture
 def motor():
-    """A motor with a limit of 10 rad/s."""
+    """Return a motor with a velocity limit of 10 rad/s."""
     return Motor(MotorSpec(name="m"))
 
 
 def test_a_new_motor_holds_its_position(robot):
-    """As after each reset, its target is 0 and its velocity the maximum."""
+    """As after a reset, the target is 0 and the velocity is the maximum."""
     assert robot.get("wheel0_joint/get_target_position") == 0.0
     assert robot.get("wheel0_joint/get_velocity") == pytest.approx(137.46)
 
 
 def test_get_velocity_returns_the_commanded_velocity(robot):
-    """Position sensors measure the real speed."""
+    """A client reads the real speed from the position sensors."""
     robot.call("wheel0_joint/set_position", value=INF)
     robot.call("wheel0_joint/set_velocity", value=5.0)
 
@@ -32,14 +32,14 @@ def test_get_velocity_returns_the_commanded_velocity(robot):
 
 
 def test_infinity_travels(robot):
-    """Both directions use float64."""
+    """ROS messages of both directions have float64, which can be infinite."""
     assert robot.get("wheel0_joint/set_position", value=-INF) is True
     assert robot.get("wheel0_joint/get_target_position") == -INF
 
 
 @pytest.mark.parametrize(("asked", "kept"), [(200.0, 137.46), (-200.0, -137.46), (INF, 137.46), (0.0, 0.0)])
 def test_a_velocity_is_clamped_to_the_limit(robot, asked, kept):
-    """Webots logs a warning, but the call succeeds."""
+    """As in Webots, a warning is logged, but the call succeeds."""
     robot.call("wheel0_joint/set_position", value=INF)
 
     assert robot.get("wheel0_joint/set_velocity", value=asked) is True
@@ -48,7 +48,7 @@ def test_a_velocity_is_clamped_to_the_limit(robot, asked, kept):
 
 @pytest.mark.parametrize("service", ["set_velocity", "set_position", "set_acceleration"])
 def test_nan_is_refused_and_answers_success(robot, service):
-    """All setters return success."""
+    """As in Webots, the call of each setter succeeds, but NaN is not stored."""
     getter = {"set_position": "get_target_position"}.get(service, service.replace("set", "get"))
     before = robot.get(f"wheel0_joint/{getter}")
 
@@ -57,7 +57,7 @@ def test_nan_is_refused_and_answers_success(robot, service):
 
 
 def test_a_negative_velocity_needs_an_infinite_target(robot):
-    """This is a common mistake: the robot turns only one way until set_position(inf)."""
+    """A client that forgets `set_position(inf)` sees its robot turn only one way. The mistake is common."""
     robot.call("wheel0_joint/set_velocity", value=-3.0)
     assert robot.get("wheel0_joint/get_velocity") == pytest.approx(137.46)
 
@@ -68,7 +68,7 @@ def test_a_negative_velocity_needs_an_infinite_target(robot):
 
 
 def test_a_motor_tells_what_the_world_file_says(robot):
-    """A motor has limits and a name in the file."""
+    """Limits and name are those of the file."""
     assert robot.get("wheel1_joint/get_max_velocity") == pytest.approx(137.46)
     assert robot.get("wheel1_joint/get_acceleration") == -1.0
     assert robot.get("wheel1_joint/get_max_torque") == 10.0
@@ -82,19 +82,19 @@ def test_a_motor_tells_what_the_world_file_says(robot):
 
 @pytest.mark.parametrize(("asked", "kept"), [(0.0, 0.0), (40.0, 10.0), (-1.0, 10.0), (math.nan, 10.0)])
 def test_available_torque_is_kept_within_the_limit(robot, asked, kept):
-    """Every value that Webots uses or ignores returns success."""
+    """The call succeeds for every value, also for one that Webots ignores."""
     assert robot.get("wheel0_joint/set_available_torque", value=asked) is True
     assert robot.get("wheel0_joint/get_available_torque") == kept
 
 
 def test_a_part_of_the_torque_of_a_wheel_is_refused(robot):
-    """The stub has no masses, so it cannot drive a robot with less torque."""
+    """The stub has no masses, so it cannot compute how a robot drives with less torque."""
     with pytest.raises(Exception, match="a part of the torque of 'wheel0_joint' is not simulated; set 0, or"):
         robot.call("wheel0_joint/set_available_torque", value=4.0)
 
 
 def test_a_motor_without_torque_drives_nothing(robot):
-    """A program that switches its motors off expects the robot to stay."""
+    """A program that switches off its motors expects that the robot stays."""
     sensor = robot.inbox("wheel0_joint_sensor/value")
     robot.call("wheel0_joint_sensor/enable", value=32)
     for wheel in ("wheel0_joint", "wheel1_joint", "wheel2_joint"):
@@ -108,14 +108,14 @@ def test_a_motor_without_torque_drives_nothing(robot):
 
 
 def test_torque_control_fails(robot):
-    """The stub's wheels have speeds but no torques."""
+    """In the stub, wheels have speeds but no torques."""
     with pytest.raises(Exception, match="torques are not simulated; set a position or velocity"):
         robot.call("wheel0_joint/set_torque", value=1.0)
     assert robot.get("wheel0_joint/torque_feedback_sensor/enable", value=32) is False
 
 
 def test_commands_take_effect_with_the_next_step(robot):
-    """Until then the shaft keeps its position."""
+    """Until the next step, the shaft keeps its position."""
     sensor = robot.inbox("wheel0_joint_sensor/value")
     robot.call("wheel0_joint_sensor/enable", value=32)
     robot.call("robot/time_step", value=32)
@@ -129,7 +129,7 @@ def test_commands_take_effect_with_the_next_step(robot):
 
 
 def test_in_position_control_the_shaft_turns_to_its_target_and_stays(robot):
-    """It turns no faster than the commanded velocity."""
+    """The shaft turns at most with the commanded velocity."""
     sensor = robot.inbox("wheel0_joint_sensor/value")
     robot.call("wheel0_joint_sensor/enable", value=32)
     robot.call("wheel0_joint/set_velocity", value=2.0)
@@ -143,7 +143,7 @@ def test_in_position_control_the_shaft_turns_to_its_target_and_stays(robot):
 
 
 def test_a_motor_accelerates_no_faster_than_its_limit(motor):
-    """The default of -1 means no limit."""
+    """The default limit of -1 means no limit."""
     motor.set_position(INF)
     motor.set_velocity(4.0)
     assert motor.demand(0.1) == 4.0
@@ -154,7 +154,7 @@ def test_a_motor_accelerates_no_faster_than_its_limit(motor):
 
 
 def test_positions_are_clamped_to_limits_that_differ():
-    """Equal limits mean no limits."""
+    """Equal limits, as in the default 0 and 0, mean no limits."""
     motor = Motor(MotorSpec(name="m", min_rad=-1.0, max_rad=2.0))
 
     motor.set_position(5.0)
@@ -164,7 +164,7 @@ def test_positions_are_clamped_to_limits_that_differ():
 
 
 def positions(motor, steps, step_s=0.008):
-    """Return the positions of a motor after each of some steps."""
+    """Return the motor's position after each of some steps."""
     found = []
     for _ in range(steps):
         motor.advance(step_s)
@@ -173,7 +173,10 @@ def positions(motor, steps, step_s=0.008):
 
 
 def test_the_gains_of_the_controller_decide_how_a_target_is_reached(motor):
-    """With a proportional gain of 1 it covers 63 % in a second; with the default of 10 it arrives."""
+    """With a proportional gain of 1 the shaft covers 63 % in a second.
+
+    With the default of 10 it reaches the target.
+    """
     motor.set_control_pid(1.0, 0.0, 0.0)
     motor.set_position(1.0)
 
@@ -181,7 +184,7 @@ def test_the_gains_of_the_controller_decide_how_a_target_is_reached(motor):
 
 
 def test_the_controller_integrates_and_differentiates_the_error(motor):
-    """Webots does so in each basic step, from the time when the gains were set."""
+    """As in Webots, integral and derivative change at each basic step after the gains were set."""
     motor.set_control_pid(1.0, 2.0, 0.001)
     motor.set_position(0.5)
 
@@ -196,14 +199,14 @@ def test_the_controller_integrates_and_differentiates_the_error(motor):
 
 @pytest.mark.parametrize("gains", [(0.0, 0.0, 0.0), (1.0, -1.0, 0.0), (1.0, 0.0, -1.0), (math.nan, 0.0, 0.0)])
 def test_gains_that_webots_refuses_change_nothing(motor, gains):
-    """All three keep their values."""
+    """The motor keeps all three gains."""
     motor.set_control_pid(*gains)
 
     assert motor.gains == (10.0, 0.0, 0.0)
 
 
 def test_a_multiplier_scales_positions_velocities_and_torques():
-    """The program reads the value that it set, and the shaft moves by the product."""
+    """The program reads the value that it set, while the shaft moves by the value times the multiplier."""
     motor = Motor(MotorSpec(name="m", multiplier=-0.5, max_velocity_rad_s=2.0))
 
     motor.set_position(1.0)
@@ -218,7 +221,7 @@ def test_a_multiplier_scales_positions_velocities_and_torques():
 
 
 def test_a_joint_without_physics_accelerates_by_its_torque_and_keeps_its_velocity_to_the_target():
-    """Webots moves it without its controller: first at 10 rad/s2, then at the velocity, up to the target."""
+    """Webots accelerates such a joint with 10 rad/s2, then keeps the velocity, and stops at the target."""
     motor = Motor(MotorSpec(name="m", max_velocity_rad_s=2.0))
     motor.kinematic = True
     motor.set_position(1.0)
@@ -231,7 +234,7 @@ def test_a_joint_without_physics_accelerates_by_its_torque_and_keeps_its_velocit
 
 @pytest.mark.parametrize(("acceleration", "speed"), [(-1.0, 1.0), (4.0, 0.4), (40.0, 1.0)])
 def test_the_acceleration_of_a_joint_without_physics_is_at_most_its_torque(acceleration, speed):
-    """The manual calls this the kinematics mode."""
+    """The manual of Webots calls this the kinematics mode."""
     motor = Motor(MotorSpec(name="m", acceleration_rad_s2=acceleration))
     motor.kinematic = True
     motor.set_position(INF)
@@ -242,7 +245,7 @@ def test_the_acceleration_of_a_joint_without_physics_is_at_most_its_torque(accel
 
 
 def test_an_endless_motion_of_a_joint_without_physics_ends_at_its_limit():
-    """There, a limit of the commands also limits the motion."""
+    """Without physics, the limit of the target position also limits the motion."""
     motor = Motor(MotorSpec(name="m", max_torque_nm=100.0, min_rad=-1.0, max_rad=1.0))
     motor.kinematic = True
     motor.set_position(INF)
@@ -251,7 +254,7 @@ def test_an_endless_motion_of_a_joint_without_physics_ends_at_its_limit():
 
 
 def test_a_robot_without_physics_accelerates_as_its_wheels_do(ros, start, world, simple_robot):
-    """At 10 rad/s2 its wheels need 0.4 s for 4 rad/s; with physics they reach it at once."""
+    """With 10 rad/s2, wheels without physics need 0.4 s for 4 rad/s; with physics they reach this at once."""
     start(world(robot=simple_robot.replace("physics Physics { }", "")))
     robot = ros.node("robotino")
     sensor = robot.inbox("wheel0_joint_sensor/value")
@@ -268,7 +271,7 @@ def test_a_robot_without_physics_accelerates_as_its_wheels_do(ros, start, world,
 
 
 def test_a_reset_takes_every_command_back(motor):
-    """A client therefore sends set_position(inf) after each reset."""
+    """A client must send `set_position(inf)` after each reset."""
     motor.set_position(INF)
     motor.set_velocity(-2.0)
     motor.set_acceleration(3.0)
@@ -281,7 +284,7 @@ def test_a_reset_takes_every_command_back(motor):
 
 
 def test_a_motor_off_the_wheels_turns_too(ros, start, world, simple_robot):
-    """An additional joint such as a turret moves only its shaft."""
+    """The motor of a turret moves only its own shaft, not the robot."""
     turret = """HingeJoint { device [ RotationalMotor { name "turret" } PositionSensor { name "angle" } ]
       endPoint Solid { physics Physics { } } }"""
     start(world(robot=simple_robot.replace("DEF IR", f"{turret} DEF IR")))

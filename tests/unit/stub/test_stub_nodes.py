@@ -1,4 +1,4 @@
-"""The scene tree over ROS: nodes are found, read and moved."""
+"""The scene tree over ROS: clients find, read and move nodes."""
 
 import math
 
@@ -15,26 +15,26 @@ def find(robot):
 
 
 def test_a_def_that_does_not_exist_is_handle_0(find):
-    """The call succeeds with 0 and is not an error."""
+    """The response is a success with the handle 0, not an error."""
     assert find("NOBODY") == 0
     assert find("") == 0
     assert find("ROBOTINO.NOBODY") == 0
 
 
 def test_handles_look_like_addresses_and_stay_the_same(find):
-    """They stay the same as long as the world is loaded."""
+    """A handle stays the same as long as the world is loaded."""
     assert find("TARGET") == find("TARGET") > 2**40
     assert find("TARGET") != find("ROBOTINO")
 
 
 def test_dots_lead_inside(find):
-    """BODY is inside ROBOTINO, not inside TARGET."""
+    """The path ROBOTINO.BODY leads to a node inside ROBOTINO; TARGET has no such node."""
     assert find("ROBOTINO.BODY") == find("BODY") != 0
     assert find("TARGET.BODY") == 0
 
 
 def test_a_protos_inside_is_not_found_where_there_are_no_protos(robot, find):
-    """`proto` searches only inside a PROTO."""
+    """`proto` searches inside a PROTO, and ROBOTINO is not an instance of a PROTO."""
     assert robot.get("supervisor/get_from_def", name="BODY", proto=find("ROBOTINO")) == 0
 
 
@@ -53,7 +53,10 @@ def test_a_node_tells_what_it_is(robot, find):
 
 @pytest.fixture
 def among_protos(ros, start, world):
-    """The node of a PROTO E-puck as supervisor, in a world with a stand-in; and `find`, by DEF name."""
+    """Return a supervisor that is a PROTO E-puck, and a function that finds nodes by DEF.
+
+    The world also has a stand-in, a WoodenBox.
+    """
     arguments = 'controllerArgs [ "--name=puck" "--synchronize" ]'
     robot = f'DEF PUCK E-puck {{ controller "ros" {arguments} supervisor TRUE }}'
     start(world("DEF BOX WoodenBox { translation 2 0 0 }", robot=robot))
@@ -65,7 +68,7 @@ def among_protos(ros, start, world):
     ("name", "proto", "base", "number"), [("PUCK", "E-puck", "Robot", 34), ("BOX", "WoodenBox", "Solid", 80)]
 )
 def test_an_instance_of_a_proto_has_the_name_of_the_proto(among_protos, name, proto, base, number):
-    """Its base type is that of the PROTO's own node, even if a stand-in replaces it."""
+    """The base type is that of the node inside the PROTO, even if a stand-in replaces the PROTO."""
     puck, find = among_protos
     node = find(name)
 
@@ -76,7 +79,7 @@ def test_an_instance_of_a_proto_has_the_name_of_the_proto(among_protos, name, pr
 
 
 def test_a_proto_is_looked_into_only_through_an_instance(among_protos):
-    """`proto` selects fields of the node inside it, or a DEF in there; other nodes have neither."""
+    """With `proto`, a client reads fields and a DEF inside an instance. Other nodes have neither."""
     puck, find = among_protos
     number = "supervisor/node/get_number_of_fields"
     root = puck.get("supervisor/get_root")
@@ -89,7 +92,7 @@ def test_a_proto_is_looked_into_only_through_an_instance(among_protos):
 
 
 def test_ids_lead_back_to_nodes(robot, find):
-    """Unknown ids give 0."""
+    """An unknown number gives the handle 0."""
     number = robot.get("supervisor/node/get_id", node=find("TARGET"))
 
     assert robot.get("supervisor/get_from_id", id=number) == find("TARGET")
@@ -98,7 +101,7 @@ def test_ids_lead_back_to_nodes(robot, find):
 
 
 def test_the_root_is_a_group_with_id_0(robot, find):
-    """It contains the world and has no parent."""
+    """The root contains all nodes of the world and has no parent."""
     root = robot.get("supervisor/get_root")
 
     assert robot.get("supervisor/node/get_id", node=root) == 0
@@ -109,12 +112,12 @@ def test_the_root_is_a_group_with_id_0(robot, find):
 
 
 def test_self_is_the_robot_that_asks(robot, find):
-    """The built-in arena's robot is its own supervisor."""
+    """In the built-in arena, the robot is its own supervisor."""
     assert robot.get("supervisor/get_self") == find("ROBOTINO")
 
 
 def test_a_device_is_found_by_its_raw_name(robot):
-    """The name has its blanks; an unknown one fails the call."""
+    """The raw name contains blanks. For an unknown name the call fails."""
     handle = robot.get("supervisor/get_from_device", value="touch sensor")
 
     assert robot.get("supervisor/node/get_type_name", node=handle) == "TouchSensor"
@@ -123,7 +126,7 @@ def test_a_device_is_found_by_its_raw_name(robot):
 
 
 def test_devices_of_other_robots_are_not_found(two_robots):
-    """They belong to their own controllers."""
+    """A controller can use only the devices of its own robot."""
     supervisor, _ = two_robots
 
     with pytest.raises(ServiceFailed, match="no device 'ir1'"):
@@ -132,13 +135,13 @@ def test_devices_of_other_robots_are_not_found(two_robots):
 
 @pytest.mark.parametrize("handle", [0, 1, 2**63, 0x5580_0000_0000])
 def test_a_handle_that_is_none_fails(robot, handle):
-    """Webots also fails for 0; any other handle may crash the real controller."""
+    """As in Webots, the call fails for handle 0; other wrong handles may crash the real controller."""
     with pytest.raises(ServiceFailed, match="does not exist; get a new handle"):
         robot.call("supervisor/node/get_position", node=handle)
 
 
 def test_the_handle_of_a_field_is_no_node(robot, find):
-    """If a client mixes them up, the calls must fail."""
+    """A client that confuses the handles of fields and nodes must get an error."""
     field = robot.get("supervisor/node/get_field", node=find("TARGET"), fieldName="translation")
 
     with pytest.raises(ServiceFailed, match=r"node .* does not exist"):
@@ -148,7 +151,7 @@ def test_the_handle_of_a_field_is_no_node(robot, find):
 
 
 def test_positions_are_in_the_world(robot, position, drive):
-    """Positions of parts move with the robot."""
+    """The position of a robot's part changes while the robot drives."""
     assert position(robot, "CYLINDER_2") == (-0.8, -0.8, 0.2)
     drive(robot, 0.1, 0.0, 0.0)
 
@@ -161,7 +164,7 @@ def test_positions_are_in_the_world(robot, position, drive):
 
 
 def test_orientations_are_quaternions(robot, find, drive):
-    """A turn to the left is a rotation about +z."""
+    """A left turn is a rotation about +z."""
     drive(robot, 0.0, 0.0, 0.5)
     robot.call("robot/time_step", value=3200)
 
@@ -172,7 +175,7 @@ def test_orientations_are_quaternions(robot, find, drive):
 
 
 def test_the_velocity_is_in_world_axes(robot, find, drive):
-    """After a turn to the left, forward is +y."""
+    """After a quarter turn to the left, forward is +y of the world."""
     field = robot.get("supervisor/node/get_field", node=find("ROBOTINO"), fieldName="rotation")
     half = math.sqrt(0.5)
     robot.call("supervisor/field/set_rotation", field=field, value={"z": half, "w": half})
@@ -186,14 +189,14 @@ def test_the_velocity_is_in_world_axes(robot, find, drive):
 
 
 def test_what_stands_has_no_velocity(robot, find):
-    """Every node with a frame has the velocity 0."""
+    """A fixed node with a frame has the velocity 0."""
     velocity = robot.get("supervisor/node/get_velocity", node=find("TARGET"))
 
     assert (velocity.linear.x, velocity.linear.y, velocity.angular.z) == (0.0, 0.0, 0.0)
 
 
 def test_a_velocity_can_be_set_and_fades(robot, find, position, drive):
-    """The motors stop the robot within a few basic steps."""
+    """The motors of the robot stop it within a few basic steps."""
     drive(robot, 0.0, 0.0, 0.0)
     velocity = {"linear": {"x": 1.0}}
 
@@ -206,15 +209,15 @@ def test_a_velocity_can_be_set_and_fades(robot, find, position, drive):
 
 
 def test_a_node_without_a_place_has_no_position(robot, find):
-    """Webots returns a null pointer that crashes the controller."""
+    """Webots returns a null pointer, which crashes its controller."""
     with pytest.raises(ServiceFailed, match="a Cylinder has no position"):
         robot.call("supervisor/node/get_position", node=find("BODY"))
 
 
 def test_get_pose_is_swapped_as_in_webots(robot, find):
-    """It returns `from_node` relative to `node`.
+    """As in Webots, the service returns `from_node` relative to `node`.
 
-    0 for `from_node` crashes the real controller and fails here.
+    A `from_node` of 0 crashes the real controller; here the call fails.
     """
     pose = robot.get("supervisor/node/get_pose", node=find("CYLINDER_2"), from_node=find("CYLINDER_0"))
     seen = (pose.translation.x, pose.translation.y, pose.translation.z)
@@ -226,7 +229,7 @@ def test_get_pose_is_swapped_as_in_webots(robot, find):
 
 
 def test_the_pose_of_a_part_is_constant_in_its_robot(robot, find, drive):
-    """The robot's own motion does not change it."""
+    """The pose of a part relative to its robot does not change while the robot drives."""
     sensor = robot.get("supervisor/get_from_device", value="ir3")
     drive(robot, 0.1, 0.1, 0.5)
     robot.call("robot/time_step", value=1920)
@@ -238,7 +241,7 @@ def test_the_pose_of_a_part_is_constant_in_its_robot(robot, find, drive):
 
 
 def test_fields_are_found_by_name_and_by_index(robot, find):
-    """The handle is 0 if the field does not exist."""
+    """For a field that does not exist, the handle is 0."""
     target = find("TARGET")
     count = robot.get("supervisor/node/get_number_of_fields", node=target)
     handles = [
@@ -255,7 +258,7 @@ def test_fields_are_found_by_name_and_by_index(robot, find):
 
 
 def test_reset_physics_of_a_node_stops_it(robot, find, drive):
-    """The robot starts again from rest."""
+    """After the call, the robot accelerates from rest."""
     drive(robot, 2.0, 0.0, 0.0)
     robot.call("robot/time_step", value=320)
 
@@ -266,7 +269,7 @@ def test_reset_physics_of_a_node_stops_it(robot, find, drive):
 
 
 def test_a_node_can_be_exported_as_written(robot, find):
-    """The text is that of the world file."""
+    """The exported text is that of the world file."""
     text = robot.get("supervisor/node/export_string", node=find("CYLINDER_0"))
     whole = robot.get("supervisor/node/export_string", node=robot.get("supervisor/get_root"))
 
@@ -276,7 +279,7 @@ def test_a_node_can_be_exported_as_written(robot, find):
 
 
 def test_hints_are_taken(robot, find):
-    """They only change the speed of Webots' responses, or the rendering."""
+    """These services change only the speed of responses, or the rendering."""
     target = find("TARGET")
 
     assert robot.get("supervisor/node/enable_pose_tracking", node=target, sampling_period=32) == 1
@@ -289,7 +292,7 @@ def test_hints_are_taken(robot, find):
 
 
 def test_a_used_node_is_a_node_of_its_own(robot, find):
-    """It has its own id, and DEF finds the first."""
+    """A node that USE repeats has its own number; its DEF leads to the first one."""
     wall = find("WALL_0")
     field = robot.get("supervisor/node/get_field", node=wall, fieldName="boundingObject")
 
@@ -300,7 +303,7 @@ def test_a_used_node_is_a_node_of_its_own(robot, find):
 
 
 def test_what_hangs_on_a_joint_moves_with_it(ros, start, world, simple_robot):
-    """After a quarter turn about x, a point 1 m to the left is 1 m up."""
+    """The joint turns a quarter about x, so a point 1 m to the left moves to 1 m above."""
     arm = """HingeJoint { jointParameters HingeJointParameters { anchor 0 0 0.5 }
       device RotationalMotor { name "arm" }
       endPoint Solid { translation 0 0 0.5 children [ DEF HAND Pose { translation 0 1 0 } ] } }

@@ -1,4 +1,4 @@
-"""Discs, blocks and hulls: pushing robots out and stopping rays, checked against what a fine ruler says."""
+"""Discs, blocks and hulls push robots out and stop rays; the tests check both by the gap to the obstacle."""
 
 import math
 
@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from palaestra_sim.stub.obstacles import Block, Disc, Hull, Neighborhood
 
 places = st.floats(-3, 3)
-nearby = st.floats(-1.5, 1.5)  # from the center of an obstacle, so that most touch it
+nearby = st.floats(-1.5, 1.5)  # distance from the center of an obstacle, so that most robots touch it
 angles = st.floats(-math.pi, math.pi)
 sizes = st.floats(0.05, 2)
 discs = st.builds(Disc, places, places, sizes)
@@ -19,7 +19,7 @@ angles_around = st.lists(st.integers(0, 11), min_size=3, max_size=6, unique=True
 
 @st.composite
 def hulls(draw):
-    """The hull of some points on an ellipse, and of one between them."""
+    """Draw the hull of some points on an ellipse, and of one point between them."""
     x, y, width, length = draw(places), draw(places), draw(sizes), draw(sizes)
     corners = [math.pi * index / 6.0 for index in draw(angles_around)]
     points = [(x + width * math.cos(turn), y + length * math.sin(turn)) for turn in corners]
@@ -32,7 +32,7 @@ AHEAD = ((0.0, 0.0, 1.0, 0.0),)
 
 
 def cast(obstacle, x, y, heading, reach=10.0):
-    """Return the distance that one ray travels from x, y."""
+    """Return the length of one ray that starts at x, y."""
     distances = [reach]
     obstacle.scan((x, y, math.cos(heading), math.sin(heading)), AHEAD, distances)
     return distances[0]
@@ -41,11 +41,11 @@ def cast(obstacle, x, y, heading, reach=10.0):
 @given(
     place=st.tuples(places, places), away=st.tuples(nearby, nearby), heading=angles, radius=st.floats(0.05, 1)
 )
-# The square of this distance has few digits.
+# The square of this distance is so small that its digits are lost.
 @example(place=(0.0, 0.0), away=(0.0, 2.8e-161), heading=0.0, radius=1.0)
 @pytest.mark.parametrize("block", [False, True], ids=["disc", "block"])
 def test_a_robot_that_was_pushed_out_touches_and_is_not_inside(block, place, away, heading, radius):
-    """The contact gives the shortest way out."""
+    """The contact has the shortest way out of the obstacle."""
     obstacle = Block(*place, heading, (1.0, 2.0)) if block else Disc(*place, 1.0)
     x, y = place[0] + away[0], place[1] + away[1]
     contact = obstacle.contact(x, y, radius)
@@ -59,7 +59,7 @@ def test_a_robot_that_was_pushed_out_touches_and_is_not_inside(block, place, awa
 
 @given(obstacle=obstacles, x=places, y=places, radius=st.floats(0.05, 1))
 def test_there_is_a_contact_exactly_where_the_gap_is_smaller_than_the_radius(obstacle, x, y, radius):
-    """Both values describe the same shape."""
+    """The gap and the contact are computed separately, and must describe the same shape."""
     gap = obstacle.gap(x, y)
     assume(abs(gap - radius) > 1e-9)
 
@@ -68,7 +68,7 @@ def test_there_is_a_contact_exactly_where_the_gap_is_smaller_than_the_radius(obs
 
 @given(obstacle=obstacles, x=places, y=places, heading=angles)
 def test_a_ray_ends_at_the_surface_and_crosses_nothing_before(obstacle, x, y, heading):
-    """With sphere tracing, no point on the way may be inside the obstacle."""
+    """By sphere tracing, no point on the way of the ray is inside the obstacle."""
     assume(obstacle.gap(x, y) > 1e-6)
     met = cast(obstacle, x, y, heading)
     end = (x + met * math.cos(heading), y + met * math.sin(heading))
@@ -82,7 +82,7 @@ def test_a_ray_ends_at_the_surface_and_crosses_nothing_before(obstacle, x, y, he
 
 @given(obstacle=obstacles, x=places, y=places)
 def test_a_ray_towards_the_middle_meets_the_shape(obstacle, x, y):
-    """This holds for every direction."""
+    """From each direction, the ray ends between the robot and the middle of the shape."""
     assume(obstacle.gap(x, y) > 1e-6)
 
     met = cast(obstacle, x, y, math.atan2(obstacle.y - y, obstacle.x - x))
@@ -92,7 +92,7 @@ def test_a_ray_towards_the_middle_meets_the_shape(obstacle, x, y):
 
 @given(obstacle=obstacles, x=places, y=places)
 def test_a_ray_away_from_the_shape_does_not_turn_round(obstacle, x, y):
-    """A sensor does not see obstacles behind it."""
+    """A sensor does not see an obstacle behind it."""
     assume(obstacle.gap(x, y) > 1e-3)
 
     assert cast(obstacle, x, y, math.atan2(y - obstacle.y, x - obstacle.x)) == 10.0
@@ -100,7 +100,7 @@ def test_a_ray_away_from_the_shape_does_not_turn_round(obstacle, x, y):
 
 @given(x=places, y=places, heading=angles, ray_heading=angles)
 def test_turning_robot_and_ray_is_turning_the_ray(x, y, heading, ray_heading):
-    """A ray is given in the robot's frame."""
+    """A ray is given in the frame of the robot."""
     block = Block(0.3, -0.2, 0.7, (1.0, 0.5))
     assume(block.gap(x, y) > 1e-3)
     distances = [10.0]
@@ -111,7 +111,7 @@ def test_turning_robot_and_ray_is_turning_the_ray(x, y, heading, ray_heading):
 
 
 def test_a_ray_begins_at_its_own_origin():
-    """Sensors are on the rim, not in the center."""
+    """Sensors are on the robot's rim, not at its center."""
     distances = [10.0]
 
     Disc(2.0, 0.0, 0.5).scan((0.0, 0.0, 1.0, 0.0), ((0.2, 0.0, 1.0, 0.0),), distances)
@@ -120,7 +120,7 @@ def test_a_ray_begins_at_its_own_origin():
 
 
 def test_a_ray_along_a_face_misses_a_parallel_wall():
-    """The direction across the wall is exactly 0 and must not be a divisor."""
+    """The ray's direction across the wall is exactly 0, and must not be a divisor."""
     wall = Block(0.0, 1.0, 0.0, (4.0, 0.1))
 
     assert cast(wall, -3.0, 0.0, 0.0) == 10.0
@@ -128,12 +128,12 @@ def test_a_ray_along_a_face_misses_a_parallel_wall():
 
 
 def test_a_ray_from_inside_is_0_long():
-    """A sensor inside a wall measures the wall."""
+    """A sensor inside a wall measures a distance of 0."""
     assert cast(Block(0.0, 0.0, 0.0, (1.0, 1.0)), 0.1, 0.1, 0.3) == 0.0
 
 
 def test_a_longer_obstacle_does_not_hide_a_nearer_one():
-    """A scan can only shorten a distance."""
+    """A scan only shortens the distances that it gets, so the order of obstacles does not matter."""
     distances = [10.0]
     frame = (0.0, 0.0, 1.0, 0.0)
     Disc(2.0, 0.0, 0.5).scan(frame, AHEAD, distances)
@@ -143,7 +143,7 @@ def test_a_longer_obstacle_does_not_hide_a_nearer_one():
 
 
 def test_a_robot_that_touches_a_hull_is_pushed_off_its_nearest_edge():
-    """A triangle of 2 m by 1 m; the robot is next to its slope, then inside, near its long side."""
+    """The triangle is 2 m by 1 m. The robot is next to its slope, then inside it near the long side."""
     wedge = Hull([(0.0, 0.0), (2.0, 0.0), (0.0, 1.0), (0.5, 0.3)])
     slope = (1.0 / math.sqrt(5.0), 2.0 / math.sqrt(5.0))
 
@@ -154,7 +154,7 @@ def test_a_robot_that_touches_a_hull_is_pushed_off_its_nearest_edge():
 
 
 def test_a_robot_in_the_middle_of_a_disc_is_pushed_somewhere():
-    """No direction is the nearest there, so any may be chosen."""
+    """All directions out of the disc have the same length, so any of them is right."""
     assert Disc(1.0, 1.0, 0.5).contact(1.0, 1.0, 0.2) == (1.0, 0.0, 0.7)
 
 
@@ -162,7 +162,7 @@ def test_a_robot_in_the_middle_of_a_disc_is_pushed_somewhere():
     ("x", "y", "normal"), [(0.9, 0.0, (1, 0)), (-0.9, 0.0, (-1, 0)), (0, 0.4, (0, 1)), (0, -0.4, (0, -1))]
 )
 def test_a_robot_whose_middle_is_in_a_block_leaves_by_the_nearest_face(x, y, normal):
-    """A robot that is placed in a wall leaves it on the side from which it was placed."""
+    """A robot that was put partly into a wall must not come out on the other side."""
     contact = Block(0.0, 0.0, 0.0, (2.0, 1.0)).contact(x, y, 0.1)
 
     assert contact[:2] == pytest.approx(normal)
@@ -175,14 +175,14 @@ def test_a_robot_whose_middle_is_in_a_block_leaves_by_the_nearest_face(x, y, nor
     reach=st.floats(0, 2),
 )
 def test_a_neighborhood_forgets_nothing_in_reach(obstacles, x, y, reach):
-    """It may return too many obstacles, but never too few."""
+    """The neighborhood may contain obstacles out of reach, but must not lack one in reach."""
     near = Neighborhood(obstacles, reach).near(x, y)
 
     assert [it for it in obstacles if it.gap(x, y) <= reach and it not in near] == []
 
 
 def test_a_neighborhood_is_bounded():
-    """A robot that drives away for ever must not fill the memory."""
+    """A robot that drives away for ever must not use up the memory."""
     neighborhood = Neighborhood([Disc(0.0, 0.0, 1.0)], 0.5)
 
     for i in range(2 * Neighborhood.LIMIT):

@@ -1,4 +1,4 @@
-"""The outline of a robot: discs replace boxes."""
+"""The outline of a robot: discs in place of a box."""
 
 import math
 
@@ -13,18 +13,18 @@ places = st.floats(-2.0, 2.0)
 
 
 def ahead(box, heading_rad):
-    """Return the extent of a box's discs from the origin in one direction."""
+    """Return how far the discs of a box reach from the origin in one direction."""
     c, s = math.cos(heading_rad), math.sin(heading_rad)
     return max(x * c + y * s + radius for x, y, radius in box)
 
 
 def test_a_square_is_one_disc():
-    """The corners become round."""
+    """The disc has the width of the square, so the corners are cut off."""
     assert discs_of_box(0.5, -0.2, 0.3, 0.4, 0.4) == (RoundPart(0.5, -0.2, 0.2),)
 
 
 def test_a_box_is_a_row_of_discs_along_its_longer_axis():
-    """For a robot of 0.6 x 0.2 m they are at -0.2 to 0.2 m, one radius apart."""
+    """For a robot of 0.6 x 0.2 m, the discs are at -0.2 to 0.2 m, one radius apart."""
     discs = discs_of_box(0.0, 0.0, 0.0, 0.6, 0.2)
 
     assert [disc.x_m for disc in discs] == pytest.approx([-0.2, -0.1, 0.0, 0.1, 0.2])
@@ -32,7 +32,7 @@ def test_a_box_is_a_row_of_discs_along_its_longer_axis():
 
 
 def test_a_box_wider_than_long_is_a_row_to_its_side():
-    """The same box can be written with swapped axes and another heading."""
+    """A world file may describe the same box with swapped sides and another heading."""
     wide = discs_of_box(1.0, 2.0, 0.2, 0.2, 0.6)
     long = discs_of_box(1.0, 2.0, 0.2 + math.pi / 2, 0.6, 0.2)
 
@@ -41,7 +41,7 @@ def test_a_box_wider_than_long_is_a_row_to_its_side():
 
 @given(x=places, y=places, heading=st.floats(-4, 4), length=sizes, width=sizes)
 def test_the_discs_have_the_length_and_width_of_the_box(x, y, heading, length, width):
-    """The robot must stop at a wall where the box would."""
+    """The robot must stop at a wall as the box would."""
     discs = discs_of_box(x, y, heading, length, width)
 
     for direction, half in ((0.0, length / 2), (math.pi / 2, width / 2)):
@@ -52,7 +52,7 @@ def test_the_discs_have_the_length_and_width_of_the_box(x, y, heading, length, w
 
 @given(length=sizes, width=sizes)
 def test_the_sides_are_closed_unless_the_box_is_a_bar(length, width):
-    """The discs overlap by half, up to a length of eight widths; a longer box has sixteen of them."""
+    """Up to a length of eight widths, neighbor discs overlap by half; a longer box has sixteen discs."""
     discs = discs_of_box(0.0, 0.0, 0.0, length, width)
     count = len(discs)
 
@@ -63,5 +63,5 @@ def test_the_sides_are_closed_unless_the_box_is_a_bar(length, width):
 
 
 def test_a_box_without_width_has_discs_without_radius():
-    """A mistake in a world must not cause a crash."""
+    """A box with a width of 0 is a mistake in a world, which must not crash the simulator."""
     assert {disc.radius_m for disc in discs_of_box(0.0, 0.0, 0.0, 1.0, 0.0)} == {0.0}

@@ -1,4 +1,4 @@
-"""The Robotino on the floor: kinematics, acceleration, collisions with sliding."""
+"""The Robotino on the floor: kinematics, acceleration, and collisions in which the robot slides."""
 
 import math
 
@@ -20,7 +20,7 @@ speeds = st.floats(-2, 2)
 
 @pytest.fixture
 def build():
-    """`build(obstacles, others, **motor)` returns a body, and a function that commands and steps it."""
+    """`build(obstacles, others, **motor)` returns a body, and a function that drives it."""
 
     def make(obstacles=(), others=(), **spec):
         wheels = [Motor(MotorSpec(name=name, **{"max_velocity_rad_s": 137.46, **spec})) for name in WHEELS]
@@ -42,12 +42,15 @@ def build():
 
 @given(vx=speeds, vy=speeds, omega=speeds)
 def test_wheel_speeds_and_twist_are_inverse(vx, vy, omega):
-    """Three wheels have three degrees of freedom, so nothing is lost."""
+    """Three wheels have three degrees of freedom, so the conversion loses nothing."""
     assert twist(*wheel_speeds(vx, vy, omega)) == pytest.approx((vx, vy, omega), abs=1e-9)
 
 
 def test_wheel_speeds_are_those_of_the_sample_controller():
-    """In base.c, wheel 0 stands still on the way forward, and the front wheels turn against each other."""
+    """As in base.c, a robot that drives forward turns its front wheels in opposite directions.
+
+    Wheel 0 stands still.
+    """
     w0, w1, w2 = wheel_speeds(1.0, 0.0, 0.0)
 
     assert (w0, w1, w2) == pytest.approx((0.0, -13.7464, 13.7464), abs=1e-4)
@@ -64,7 +67,7 @@ def test_wheel_speeds_are_those_of_the_sample_controller():
     ],
 )
 def test_a_second_of_driving_leads_where_it_should(build, command, moved):
-    """The speed is so low that the first basic step reaches it."""
+    """The speed is so low that the robot reaches it in the first basic step."""
     body, go = build()
 
     go(*command, 125)
@@ -74,7 +77,7 @@ def test_a_second_of_driving_leads_where_it_should(build, command, moved):
 
 
 def test_sideways_is_sideways_of_the_robot(build):
-    """After a quarter turn to the left, the robot's left is -x of the world."""
+    """After a quarter turn to the left, the robot's left side points along -x of the world."""
     body, go = build()
     body.place(0.0, 0.0, math.pi / 2)
 
@@ -86,10 +89,10 @@ def test_sideways_is_sideways_of_the_robot(build):
 def test_driving_and_turning_is_a_circle(build):
     """The radius is v / omega.
 
-    The circle is closed after a full turn, up to the error of the midpoint rule.
+    After a full turn the circle is closed, up to the error of the midpoint rule.
     """
     body, go = build()
-    steps = 400  # slow enough to reach the speed in the first one
+    steps = 400  # so slow that the robot reaches the speed in the first step
     omega = 2 * math.pi / (steps * STEP_S)
 
     go(0.3, 0.0, omega, steps // 2)
@@ -101,7 +104,7 @@ def test_driving_and_turning_is_a_circle(build):
 
 
 def test_the_heading_stays_in_half_a_turn_each_way(build):
-    """The number of turns does not matter."""
+    """However often the robot turns, its heading stays within -pi to pi."""
     body, go = build()
 
     for _ in range(300):
@@ -111,7 +114,7 @@ def test_the_heading_stays_in_half_a_turn_each_way(build):
 
 @pytest.mark.parametrize(("axis", "limit"), [(0, 10.0), (1, 6.0), (2, 20.0)])
 def test_speeding_up_takes_its_time(build, axis, limit):
-    """The limits are 10 m/s2, 6 m/s2 and 20 rad/s2, as in the sample controller."""
+    """As in the sample controller, the limits are 10 m/s2, 6 m/s2 and 20 rad/s2."""
     body, go = build()
     command = [0.0, 0.0, 0.0]
     command[axis] = 3.0
@@ -124,7 +127,7 @@ def test_speeding_up_takes_its_time(build, axis, limit):
 
 
 def test_all_axes_are_slowed_by_the_same_factor(build):
-    """The direction is then right from the first basic step on."""
+    """The robot then has the right direction from the first basic step on."""
     body, go = build()
 
     go(2.0, 2.0, 0.0, 1)
@@ -134,7 +137,7 @@ def test_all_axes_are_slowed_by_the_same_factor(build):
 
 
 def test_a_motor_that_is_slower_than_its_command_bends_the_way(build):
-    """A wheel's own maxVelocity always applies."""
+    """The velocity limit of each motor applies, so the robot is slower than commanded."""
     body, go = build(max_velocity_rad_s=5.0)
 
     go(1.0, 0.0, 0.0, 50)
@@ -143,7 +146,7 @@ def test_a_motor_that_is_slower_than_its_command_bends_the_way(build):
 
 
 def test_a_motor_with_an_acceleration_is_slower_to_start(build):
-    """The robot's own limits apply too."""
+    """The acceleration limit of a motor applies in addition to that of the robot."""
     body, go = build(acceleration_rad_s2=10.0)
 
     go(0.3, 0.0, 0.0, 1)
@@ -152,7 +155,7 @@ def test_a_motor_with_an_acceleration_is_slower_to_start(build):
 
 
 def test_standing_still_is_exact(build):
-    """There is no drift, so two runs can be compared bit by bit."""
+    """A standing robot does not drift, so two runs can be compared bit for bit."""
     body, go = build()
     go(0.3, 0.2, 0.1, 40)
     go(0.0, 0.0, 0.0, 10)
@@ -165,7 +168,7 @@ def test_standing_still_is_exact(build):
 
 
 def test_a_wall_stops_what_drives_straight_into_it(build):
-    """The rim of the robot stops at the wall."""
+    """The rim of the robot comes to rest at the surface of the wall."""
     body, go = build([Block(1.05, 0.0, 0.0, (0.1, 4.0))])
 
     go(0.5, 0.0, 0.0, 200)
@@ -176,7 +179,7 @@ def test_a_wall_stops_what_drives_straight_into_it(build):
 
 
 def test_a_robot_slides_along_a_wall(build):
-    """The component along the wall is not reduced."""
+    """The velocity along the wall stays the same."""
     body, go = build([Block(1.05, 0.0, 0.0, (0.1, 40.0))])
     body.place(0.8, 0.0, 0.0)
 
@@ -187,7 +190,7 @@ def test_a_robot_slides_along_a_wall(build):
 
 
 def test_a_robot_slides_round_a_cylinder(build):
-    """If it is hit off its center, the robot passes it at the distance of the two radii."""
+    """A robot that hits a cylinder off its center passes it at the distance of the two radii."""
     disc = Disc(1.0, 0.0, 0.15)
     body, go = build([disc])
     body.place(0.0, 0.05, 0.0)
@@ -202,7 +205,7 @@ def test_a_robot_slides_round_a_cylinder(build):
 
 
 def test_a_corner_holds(build):
-    """The corner has two contacts at a time."""
+    """In the corner, the robot has two contacts at a time."""
     walls = [Block(1.05, 0.0, 0.0, (0.1, 4.0)), Block(0.0, 1.05, 0.0, (4.0, 0.1))]
     body, go = build(walls)
 
@@ -212,7 +215,7 @@ def test_a_corner_holds(build):
 
 
 def test_wheels_spin_on_at_a_wall(build):
-    """The shafts turn as commanded; only the body knows that they slip."""
+    """The motors turn as commanded, so the robot leaves the wall at once when it is commanded back."""
     body, go = build([Block(1.05, 0.0, 0.0, (0.1, 4.0))])
     go(0.5, 0.0, 0.0, 200)
     before = body.x
@@ -224,7 +227,7 @@ def test_wheels_spin_on_at_a_wall(build):
 
 @pytest.mark.parametrize("speed", [3.0, 8.0])
 def test_nothing_is_fast_enough_to_pass_through_a_wall(build, speed):
-    """A basic step at full speed is longer than a wall is thick."""
+    """At full speed, one basic step is longer than the wall is thick."""
     body, go = build([Block(1.05, 0.0, 0.0, (0.1, 4.0))])
 
     go(speed, 0.0, 0.0, 200)
@@ -233,7 +236,7 @@ def test_nothing_is_fast_enough_to_pass_through_a_wall(build, speed):
 
 
 def test_at_rest_against_a_wall_nothing_is_touched_any_more(build):
-    """Only a push counts as a touch, not a rounding error at the surface."""
+    """Only a push toward the wall is a touch; a rounding error at the surface is not."""
     body, go = build([Block(1.05, 0.0, 0.3, (0.1, 4.0))])
     go(0.5, 0.0, 0.0, 100)
     go(0.0, 0.0, 0.0, 5)
@@ -245,7 +248,7 @@ def test_at_rest_against_a_wall_nothing_is_touched_any_more(build):
 
 
 def test_a_robot_that_is_put_into_a_wall_is_pushed_out(build):
-    """This holds also for a robot that stands still."""
+    """A robot that stands still is pushed out too."""
     body, go = build([Block(1.05, 0.0, 0.0, (0.1, 4.0))])
     body.place(0.95, 0.0, 0.0)
 
@@ -256,7 +259,7 @@ def test_a_robot_that_is_put_into_a_wall_is_pushed_out(build):
 
 
 def test_robots_stop_each_other_and_both_feel_it(build):
-    """The one that drives gives way; the other's bumper fires too."""
+    """The robot that drives is stopped; the bumper of the other robot reports the touch too."""
     standing, _ = build()
     standing.place(1.0, 0.0, 0.0)
     body, go = build(others=[standing])
@@ -270,7 +273,7 @@ def test_robots_stop_each_other_and_both_feel_it(build):
 
 
 def test_halting_takes_all_motion_and_the_motors_begin_again(build):
-    """reset_physics sets velocities to zero and keeps the commands."""
+    """`reset_physics` sets all velocities to zero and keeps the commands of the motors."""
     body, go = build()
     go(3.0, 0.0, 0.0, 50)
 
@@ -282,7 +285,7 @@ def test_halting_takes_all_motion_and_the_motors_begin_again(build):
 
 
 def test_a_push_fades_as_the_motors_take_over(build):
-    """The push is in world axes, whatever the heading."""
+    """A push is given in the axes of the world, whatever the heading of the robot."""
     body, go = build()
     body.place(0.0, 0.0, math.pi / 2)
     body.push(1.0, 0.0, 0.0)
@@ -301,7 +304,7 @@ def test_a_push_fades_as_the_motors_take_over(build):
     )
 )
 def test_a_robot_never_ends_inside_anything(commands):
-    """This holds for any commands, in an arena with walls and a cylinder."""
+    """Random commands drive a robot in an arena with walls and a cylinder."""
     walls = [Block(s * 1.05, 0.0, 0.0, (0.1, 2.2)) for s in (-1, 1)]
     walls += [Block(0.0, s * 1.05, 0.0, (2.2, 0.1)) for s in (-1, 1)]
     obstacles = [*walls, Disc(0.6, 0.6, 0.1)]

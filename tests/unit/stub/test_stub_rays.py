@@ -1,4 +1,4 @@
-"""The lookup table of a sensor turns meters into volts; a robot has a fan of rays."""
+"""A sensor's lookup table converts meters to volts; a robot has a fan of rays."""
 
 import math
 import random
@@ -15,17 +15,17 @@ ROWS = [(0.1, 3.0, 0.0), (0.2, 2.0, 0.0), (0.4, 1.0, 0.0)]
 
 
 def silent(_mean, _deviation):
-    """Raise an error, because a sensor without noise must draw none."""
+    """Raise an error: a sensor without noise must not draw a random number."""
     raise AssertionError("a sensor without noise drew some")
 
 
 def one(_mean, deviation):
-    """Return a draw of exactly one deviation."""
+    """Return a random number of exactly one standard deviation."""
     return deviation
 
 
 def test_rows_answer_their_own_value():
-    """At its rows, the table is exact."""
+    """At the distance of a row, the table returns the value of the row."""
     table = LookupTable(ROWS)
 
     assert [table.response(row[0], silent) for row in ROWS] == pytest.approx([3.0, 2.0, 1.0])
@@ -33,18 +33,18 @@ def test_rows_answer_their_own_value():
 
 @pytest.mark.parametrize(("distance", "volts"), [(0.15, 2.5), (0.3, 1.5), (0.25, 1.75)])
 def test_between_rows_it_is_linear(distance, volts):
-    """Webots does the same."""
+    """As in Webots, the values between two rows are interpolated."""
     assert LookupTable(ROWS).response(distance, silent) == pytest.approx(volts)
 
 
 @pytest.mark.parametrize(("distance", "volts"), [(0.0, 3.0), (0.05, 3.0), (0.41, 1.0), (1e9, 1.0)])
 def test_beyond_both_ends_the_end_value_holds(distance, volts):
-    """No value is extrapolated at either end."""
+    """The table does not extrapolate at either end."""
     assert LookupTable(ROWS).response(distance, silent) == volts
 
 
 def test_noise_is_a_fraction_of_the_response():
-    """One deviation of 10 % noise on 2 V is 0.2 V."""
+    """A noise of 10 % means a standard deviation of 0.2 V at 2 V."""
     table = LookupTable([(d, v, 0.1) for d, v, _ in ROWS])
 
     assert table.response(0.2, one) == pytest.approx(2.2)
@@ -53,20 +53,20 @@ def test_noise_is_a_fraction_of_the_response():
 
 
 def test_noise_is_interpolated_too():
-    """Each row has its own noise."""
+    """Each row of the table has its own noise."""
     table = LookupTable([(0.0, 1.0, 0.0), (1.0, 1.0, 0.2)])
 
     assert table.response(0.5, one) == pytest.approx(1.1)
 
 
 def test_an_empty_table_answers_metres():
-    """Webots does the same."""
+    """As in Webots, a sensor without a table returns the distance in meters."""
     assert LookupTable([]).response(0.37, silent) == pytest.approx(0.37)
 
 
 @given(distance=st.floats(0, 2))
 def test_a_response_lies_between_the_limits(distance):
-    """The message promises min_range and max_range for values without noise."""
+    """A message has `min_range` and `max_range`, which hold for values without noise."""
     table = LookupTable(ROWS)
     low, high = table.limits
 
@@ -74,7 +74,7 @@ def test_a_response_lies_between_the_limits(distance):
 
 
 def test_noise_has_the_spread_that_the_table_says():
-    """It is 0.5 % of the response, over many draws."""
+    """Over many draws, the standard deviation is 0.5 % of the value."""
     table = LookupTable([(0.0, 2.0, 0.005)])
     gauss = random.Random(1).gauss
     draws = [table.response(0.1, gauss) for _ in range(5000)]
@@ -86,24 +86,24 @@ def test_noise_has_the_spread_that_the_table_says():
 
 
 def fan_of(obstacles):
-    """Return two rays on the rim of a robot: ahead and to the left."""
+    """Return two rays on the rim of a robot: one ahead and one to the left."""
     fan = Fan([(0.2, 0.0, 1.0, 0.0), (0.0, 0.2, 0.0, 1.0)], [0.4, 0.4])
     fan.face(Neighborhood(obstacles, fan.reach_m), ())
     return fan
 
 
 def test_rays_that_meet_nothing_have_their_full_reach():
-    """The table turns it into its last value."""
+    """The table converts the full length to the value of its last row."""
     assert fan_of([]).cast((0.0, 0.0, 1.0, 0.0)) == [0.4, 0.4]
 
 
 def test_each_ray_is_stopped_for_itself():
-    """Only an obstacle in its own direction stops it."""
+    """Only an obstacle in its own direction shortens a ray."""
     assert fan_of([Disc(0.0, 0.5, 0.1)]).cast((0.0, 0.0, 1.0, 0.0)) == pytest.approx([0.4, 0.2])
 
 
 def test_rays_turn_with_the_robot():
-    """After a left turn, objects on the left are ahead."""
+    """After a left turn, objects that were on the left are ahead."""
     left = math.pi / 2
 
     distances = fan_of([Disc(0.0, 0.5, 0.1)]).cast((0.0, 0.0, math.cos(left), math.sin(left)))
@@ -112,7 +112,7 @@ def test_rays_turn_with_the_robot():
 
 
 def test_rays_meet_robots_that_drive():
-    """The rays use the current positions of robots, not those in the world file."""
+    """The rays meet a robot at its current position, not at that of the world file."""
     other = Disc(5.0, 0.0, 0.2)
     fan = Fan([(0.2, 0.0, 1.0, 0.0)], [0.4])
     fan.face(Neighborhood((), fan.reach_m), [other])

@@ -6,7 +6,7 @@ from palaestra_sim.scene.mode import Mode
 
 
 def test_enable_takes_multiples_of_the_basic_step_before_the_first_step(robot):
-    """For any other value the call returns false and the sensor stays off."""
+    """For any other period the call returns false, and the sensor stays off."""
     assert robot.get("ir1/enable", value=31) is False
     assert robot.get("ir1/get_sampling_period") == 0
 
@@ -15,7 +15,7 @@ def test_enable_takes_multiples_of_the_basic_step_before_the_first_step(robot):
 
 
 def test_enable_takes_multiples_of_the_last_step_afterwards(robot):
-    """32 was valid before; after a step of 192 it is not."""
+    """After a step of 192 ms, a period of 32 ms is not a multiple of the step any more."""
     robot.call("robot/time_step", value=192)
 
     assert robot.get("ir1/enable", value=32) is False
@@ -23,20 +23,20 @@ def test_enable_takes_multiples_of_the_last_step_afterwards(robot):
 
 
 def test_a_refused_step_does_not_change_what_enable_takes(robot):
-    """Only accepted steps count."""
+    """Only a step that was accepted changes the accepted periods."""
     robot.call("robot/time_step", value=33)
 
     assert robot.get("ir1/enable", value=32) is True
 
 
 def test_negative_multiples_pass_as_in_webots(robot):
-    """-32 % 32 is 0, so only the client can prevent it."""
+    """As in the real controller, the remainder of -32 / 32 is 0, so the client itself must check the sign."""
     assert robot.get("ir1/enable", value=-32) is True
     assert robot.get("ir1/get_sampling_period") == -32
 
 
 def test_the_same_period_again_changes_nothing(robot):
-    """There is one publisher, and one message per step."""
+    """The topic still has one publisher, which sends one message per step."""
     robot.call("ir1/enable", value=32)
 
     assert robot.get("ir1/enable", value=32) is True
@@ -44,7 +44,7 @@ def test_the_same_period_again_changes_nothing(robot):
 
 
 def test_another_period_adds_a_second_publisher(robot):
-    """Both publish on one topic, so a client must disable the sensor first."""
+    """Both publishers send messages, so a client must disable the sensor before it changes the period."""
     robot.call("ir1/enable", value=64)
     robot.call("ir1/enable", value=32)
     inbox = robot.inbox("ir1/value")
@@ -58,7 +58,7 @@ def test_another_period_adds_a_second_publisher(robot):
 
 
 def test_enable_0_takes_all_publishers_back(robot):
-    """To change a period, a client calls enable(0) and then enable(p)."""
+    """A client calls `enable(0)` and then `enable(p)` to change the period."""
     robot.call("ir1/enable", value=64)
     robot.call("ir1/enable", value=32)
 
@@ -68,7 +68,7 @@ def test_enable_0_takes_all_publishers_back(robot):
 
 
 def test_no_message_comes_before_the_next_step(robot, ros):
-    """The main loop sleeps until the count increases."""
+    """The controller's loop sleeps until a step has increased the count."""
     inbox = robot.inbox("ir1/value")
     robot.call("ir1/enable", value=32)
     ros.advance(60)
@@ -80,7 +80,7 @@ def test_no_message_comes_before_the_next_step(robot, ros):
 
 
 def test_each_due_sensor_sends_one_message_a_step(robot):
-    """A facade matches messages to steps by this rule."""
+    """The trainer's facade assigns messages to steps by this rule."""
     paths = [f"ir{i}/value" for i in range(1, 10)] + ["touch_sensor/value", "wheel0_joint_sensor/value"]
     inboxes = [robot.inbox(path) for path in paths]
     for path in paths:
@@ -93,7 +93,7 @@ def test_each_due_sensor_sends_one_message_a_step(robot):
 
 
 def test_a_period_of_three_steps_sends_every_third_time(robot):
-    """A sensor is due when count times step is a multiple of its period."""
+    """A sensor is due if the count of steps times the step is a multiple of its period."""
     inbox = robot.inbox("ir1/value")
     robot.call("ir1/enable", value=96)
     sizes = []
@@ -106,7 +106,7 @@ def test_a_period_of_three_steps_sends_every_third_time(robot):
 
 
 def test_the_phase_is_a_product_not_a_sum(robot):
-    """Two steps of 32 and one of 64 count as 3 * 64 = 192 for the controller, not as 128."""
+    """Two steps of 32 ms and one of 64 ms count as 3 * 64 = 192 ms for the controller, not as 128 ms."""
     inbox = robot.inbox("ir1/value")
     robot.call("ir1/enable", value=192)
     for _ in range(2):
@@ -118,7 +118,7 @@ def test_the_phase_is_a_product_not_a_sum(robot):
 
 
 def test_a_step_of_0_sets_the_count_back(robot):
-    """With a count of 0, every enabled sensor is due."""
+    """When the count is 0, each enabled sensor is due."""
     inbox = robot.inbox("ir1/value")
     robot.call("ir1/enable", value=3200)
     robot.call("robot/time_step", value=32)
@@ -130,7 +130,7 @@ def test_a_step_of_0_sets_the_count_back(robot):
 
 
 def test_messages_come_after_the_answer(ros, start):
-    """They come right after it by default, and later with publish_delay_s."""
+    """By default the messages follow the response at once; `publish_delay_s` delays them."""
     start(publish_delay_s=0.002)
     robot = ros.node("robotino")
     inbox = robot.inbox("ir1/value")
@@ -144,7 +144,7 @@ def test_messages_come_after_the_answer(ros, start):
 
 
 def test_an_impatient_client_gets_every_message_without_the_fault(ros, start):
-    """The messages of a step are sent before the next step begins."""
+    """The client steps again before the messages arrive, and still gets the messages of all three steps."""
     start(publish_delay_s=0.002)
     robot = ros.node("robotino")
     inbox = robot.inbox("ir1/value")
@@ -158,7 +158,10 @@ def test_an_impatient_client_gets_every_message_without_the_fault(ros, start):
 
 
 def test_an_impatient_client_loses_messages_with_the_fault(ros, start):
-    """Step k+1 arrived while the loop was busy with k, so its messages never come."""
+    """With `lost_wakeup`, the second step comes while the loop handles the first.
+
+    The messages of the second step never come.
+    """
     start(publish_delay_s=0.002, lost_wakeup=True)
     robot = ros.node("robotino")
     inbox = robot.inbox("ir1/value")
@@ -172,7 +175,10 @@ def test_an_impatient_client_loses_messages_with_the_fault(ros, start):
 
 
 def test_a_client_that_waits_for_the_message_can_lose_the_next_one(ros, start):
-    """The loop has sent all messages but not stored the count yet, so a client must not rely on messages."""
+    """The loop had sent the messages but not yet stored the count.
+
+    So a message does not prove that the loop is ready.
+    """
     start(publish_delay_s=0.002, lost_wakeup=True)
     robot = ros.node("robotino")
     inbox = robot.inbox("ir1/value")
@@ -191,7 +197,7 @@ def test_a_client_that_waits_for_the_message_can_lose_the_next_one(ros, start):
 
 
 def test_a_distance_sensor_sends_its_constants_with_every_value(robot):
-    """The range is in volts: min and max are those of the table's second column."""
+    """min_range and max_range are volts from the second column of the lookup table."""
     robot.call("ir2/enable", value=32)
 
     (publisher,) = robot.publishers("ir2/value")
@@ -207,7 +213,7 @@ def test_a_distance_sensor_sends_its_constants_with_every_value(robot):
 
 
 def test_an_infra_red_sensor_says_so(ros, start, world, simple_robot):
-    """radiation_type is 1 only for the type "infra-red"."""
+    """`radiation_type` is 1 only for a sensor of type "infra-red"."""
     start(world(robot=simple_robot.replace('name "ir1"', 'name "ir1" type "infra-red"')))
     robot = ros.node("robotino")
     robot.call("ir1/enable", value=32)
@@ -219,7 +225,7 @@ def test_an_infra_red_sensor_says_so(ros, start, world, simple_robot):
 
 
 def test_a_bumper_sends_booleans_and_a_position_sensor_numbers(robot):
-    """The table of topics has a message type for each kind of sensor."""
+    """The table of topics has a message type for each type of sensor."""
     types = {}
     for device in ("touch_sensor", "wheel0_joint_sensor", "battery_sensor", "keyboard"):
         robot.call(f"{device}/enable", value=32)
@@ -235,7 +241,7 @@ def test_a_bumper_sends_booleans_and_a_position_sensor_numbers(robot):
 
 
 def test_pseudo_devices_can_be_enabled_and_have_nothing_to_tell(robot):
-    """Every robot has them, whether they are connected or not."""
+    """Each robot has a battery sensor, a keyboard and a joystick, even if none is connected."""
     keys = robot.inbox("keyboard/key")
 
     for device in ("battery_sensor", "keyboard", "joystick"):
@@ -248,7 +254,7 @@ def test_pseudo_devices_can_be_enabled_and_have_nothing_to_tell(robot):
 
 
 def test_a_distance_sensor_tells_its_table(robot):
-    """A facade needs it to convert volts into meters."""
+    """The trainer's facade needs the table to convert volts to meters."""
     table = robot.get("ir1/get_lookup_table")
 
     assert list(table[:6]) == [0.03, 3.03, 0.005, 0.035, 2.78, 0.005]
@@ -260,7 +266,7 @@ def test_a_distance_sensor_tells_its_table(robot):
 
 
 def test_devices_tell_their_names_and_kinds(robot):
-    """Node types are numbers, as in webots/nodes.h."""
+    """The type of a node is a number of webots/nodes.h."""
     assert robot.get("touch_sensor/get_name") == "touch sensor"
     assert robot.get("touch_sensor/get_type") == 0
     assert robot.get("touch_sensor/get_node_type") == 60
@@ -270,7 +276,7 @@ def test_devices_tell_their_names_and_kinds(robot):
 
 
 def test_the_clock_tells_simulated_time(robot):
-    """The one controller with --clock publishes whole milliseconds after each step."""
+    """A controller with the argument `--clock` publishes whole milliseconds after each step."""
     inbox = robot.inbox("/clock")
 
     for _ in range(40):
@@ -282,12 +288,12 @@ def test_the_clock_tells_simulated_time(robot):
 
 @pytest.mark.usefixtures("two_robots")
 def test_only_a_robot_with_the_argument_publishes_the_clock(ros):
-    """A master may have only one such robot."""
+    """A ROS master may have only one publisher of the clock."""
     assert len(ros.topic("/clock").publishers) == 1
 
 
 def test_auto_publish_enables_every_sensor(ros, start, world, simple_robot):
-    """The period is the basic step."""
+    """The sampling period is the basic step."""
     start(world(robot=simple_robot.replace('"--synchronize"', '"--synchronize" "--auto-publish"')))
     robot = ros.node("robotino")
 
@@ -299,7 +305,7 @@ def test_auto_publish_enables_every_sensor(ros, start, world, simple_robot):
 
 
 def test_enabling_is_possible_in_pause(ros, start):
-    """A facade does so with a simulator that was started with --mode=pause."""
+    """The trainer's facade enables sensors of a simulator that was started with --mode=pause."""
     start(mode=Mode.PAUSE)
 
     assert ros.node("robotino").get("ir1/enable", value=192) is True

@@ -1,4 +1,4 @@
-"""Worlds: their content is read, and refusals have line and column."""
+"""Worlds are read; rejections name the line and the column."""
 
 import math
 import pickle
@@ -28,7 +28,7 @@ def distance(simulation):
 
 
 def test_the_shipped_arena_is_read_whole():
-    """It has four walls, the floor and four cylinders; the target is not an obstacle."""
+    """The arena has four walls, a floor and four cylinders; its target is not an obstacle."""
     scene = scene_of(builtin("arena"))
 
     kinds = [shape.kind for shape in scene.solids]
@@ -42,7 +42,7 @@ def test_the_shipped_arena_is_read_whole():
 
 
 def test_rays_sit_on_the_rim_and_count_counter_clockwise():
-    """ir1 is at the front, and ir2 at 40 degrees."""
+    """ir1 is at the front of the robot, and ir2 is at 40 degrees to the left."""
     (robot,) = scene_of(builtin("arena")).robots
 
     azimuths = [math.degrees(math.atan2(*it.beams[0].ray[:1:-1])) for it in robot.devices.of(DISTANCE_SENSOR)]
@@ -51,14 +51,14 @@ def test_rays_sit_on_the_rim_and_count_counter_clockwise():
 
 
 def test_walls_stand_where_the_file_has_them():
-    """Their inner faces are at 2 m."""
+    """The inner faces of the walls are 2 m from the center."""
     walls = scene_of(builtin("arena")).solids[1:5]
 
     assert [obstacle(wall).gap(0.0, 0.0) for wall in walls] == pytest.approx([2.0] * 4)
 
 
 def test_a_robot_without_a_body_watches_only(world):
-    """A separate supervisor has no body: nothing collides with it, and sensors do not see it."""
+    """No robot collides with a separate supervisor, and no sensor sees it."""
     watcher = """Robot { name "eye" supervisor TRUE controller "ros"
       controllerArgs ["--name=eye" "--synchronize"] }"""
     simulation = load_scene(world(watcher))
@@ -70,7 +70,7 @@ def test_a_robot_without_a_body_watches_only(world):
 
 @pytest.mark.parametrize("angle", [0.0, 0.5, math.pi / 2, -2.0])
 def test_a_box_may_have_any_heading(world, angle):
-    """The crate is 1 m ahead, turned about z, so its face or its corner comes nearer."""
+    """The crate is 1 m ahead. By its heading, a face or a corner is nearest to the robot."""
     crate = f"""Solid {{ translation 1 0 0.15 rotation 0 0 1 {angle} name "crate"
       boundingObject Box {{ size 0.4 0.4 0.3 }} }}"""
     half = 0.2 / max(abs(math.cos(angle)), abs(math.sin(angle)))
@@ -81,7 +81,7 @@ def test_a_box_may_have_any_heading(world, angle):
 
 
 def test_frames_inside_frames_are_followed(world):
-    """Solids may be inside Group, Pose and Solid; a boundingObject may contain Pose and Shape."""
+    """Solids may be inside Group, Pose and Solid. A boundingObject may contain Pose and Shape."""
     nested = """Group { children [ Pose { translation 0 1 0 rotation 0 0 1 -1.5707963 children [
       Solid { name "post" translation 1 0.9 0 boundingObject Pose { translation 0 0 0.1 children [
         Shape { geometry Cylinder { radius 0.1 height 0.2 } } ] } } ] } ] }"""
@@ -92,7 +92,7 @@ def test_frames_inside_frames_are_followed(world):
 
 
 def test_a_use_is_the_last_def_before_it(world):
-    """VRML defines it so."""
+    """VRML defines USE in this way."""
     posts = """DEF POST Solid { translation 5 0 0.1 name "a"
         boundingObject DEF SHAPE Cylinder { radius 0.1 height 0.2 } }
       Solid { translation 1 0 0.1 name "b" boundingObject USE SHAPE }"""
@@ -103,14 +103,14 @@ def test_a_use_is_the_last_def_before_it(world):
 @pytest.mark.parametrize(
     ("z", "height", "seen"),
     [
-        (0.1, 0.2, True),  # on the floor
-        (0.5, 0.2, False),  # a lamp, above
-        (-0.1, 0.2, False),  # the floor itself
-        (0.2, 0.2, False),  # above the ray, but not above the body
+        (0.1, 0.2, True),  # a post on the floor
+        (0.5, 0.2, False),  # a lamp above the ray
+        (-0.1, 0.2, False),  # below the surface of the floor
+        (0.2, 0.2, False),  # above the ray, but low enough to touch the robot's body
     ],
 )
 def test_a_ray_sees_what_is_at_its_height(world, z, height, seen):
-    """The ray is 5 cm above the floor."""
+    """The ray is 5 cm above the floor, so it meets only what is at that height."""
     post = f"""Solid {{ translation 1 0 {z} name "post"
       boundingObject Cylinder {{ radius 0.1 height {height} }} }}"""
 
@@ -118,7 +118,7 @@ def test_a_ray_sees_what_is_at_its_height(world, z, height, seen):
 
 
 def test_what_is_drawn_only_is_neither_seen_nor_felt(world):
-    """The target is a Shape without boundingObject."""
+    """The target is a Shape without a boundingObject."""
     drawn = """Pose { translation 0.5 0 0 children [ Shape { geometry Cylinder { radius 0.2 } } ] }
       Solid { translation 0.5 0 0 name "ghost" children [ Shape { geometry Box { } } ] }
       Viewpoint { } Background { } DirectionalLight { }"""
@@ -127,7 +127,7 @@ def test_what_is_drawn_only_is_neither_seen_nor_felt(world):
 
 
 def test_two_robots_see_each_other(world, simple_robot):
-    """Rays meet the robots' bodies at their current positions."""
+    """Rays meet the body of the other robot at its current position."""
     second = simple_robot.replace("DEF ROBOTINO", "DEF OTHER").replace("robotino", "other")
     second = second.replace("Robot {", "Robot { translation 1 0 0 ", 1)
     simulation = load_scene(world(second))
@@ -139,7 +139,7 @@ def test_two_robots_see_each_other(world, simple_robot):
 
 
 def test_a_bumper_without_a_boundingobject_never_fires(world, simple_robot):
-    """This is so in the original PROTO of the Robotino 3."""
+    """The bumper in the original PROTO of the Robotino 3 has no boundingObject."""
     bare = simple_robot.replace(
         '"touch sensor" boundingObject Cylinder { radius 0.2 height 0.2 }', '"touch sensor"'
     )
@@ -153,7 +153,7 @@ def test_a_bumper_without_a_boundingobject_never_fires(world, simple_robot):
 
 
 def test_an_obstacle_may_get_another_size(world):
-    """A client that randomizes sizes must train in the worlds that it wrote."""
+    """A client that randomizes sizes must train in the worlds that it writes."""
     post = """Solid { translation 1 0 0.1 name "post" children [ Shape {
       geometry DEF SIZE Cylinder { radius 0.1 height 0.2 } } ] boundingObject USE SIZE }"""
     simulation = load_scene(world(post))
@@ -196,7 +196,7 @@ BAD = {
 
 @pytest.mark.parametrize(("objects", "fact"), BAD.values(), ids=BAD.keys())
 def test_what_cannot_be_simulated_is_refused(world, objects, fact):
-    """The stub must not simulate something else instead."""
+    """The stub must not simulate something else in place of such a node."""
     with pytest.raises(WorldError, match=fact):
         scene_of(world(objects))
 
@@ -230,7 +230,7 @@ BAD_ROBOTS = {
 
 @pytest.mark.parametrize(("change", "fact"), BAD_ROBOTS.values(), ids=BAD_ROBOTS.keys())
 def test_a_robot_that_cannot_be_simulated_is_refused(world, simple_robot, change, fact):
-    """The message names the part that is the reason."""
+    """The message names the part of the robot that the stub cannot simulate."""
     source = world(robot=simple_robot.replace(*change, 1 if "HingeJoint" in change[0] else -1))
     assert source != world()
 
@@ -241,14 +241,14 @@ def test_a_robot_that_cannot_be_simulated_is_refused(world, simple_robot, change
 @pytest.mark.parametrize(
     ("rays", "seen"),
     [
-        ("rotation 0 1 0 0.5", 0.05 / math.sin(0.5)),  # down to the floor
+        ("rotation 0 1 0 0.5", 0.05 / math.sin(0.5)),  # the ray ends at the floor
         ("rotation 0 1 0 1.5707963", 0.05),
-        ("rotation 0 1 0 -0.5", 1.0),  # over the wall
+        ("rotation 0 1 0 -0.5", 1.0),  # the ray passes above the wall
         ("rotation 0 1 0 -0.05", 0.65 / math.cos(0.05)),
     ],
 )
 def test_a_ray_may_look_up_and_down(world, simple_robot, rays, seen):
-    """The floor is at height 0, the ray 5 cm above it, and the wall 0.65 m ahead and 0.2 m high."""
+    """The ray starts 5 cm above the floor; the wall is 0.65 m ahead and 0.2 m high."""
     wall = 'Solid { translation 0.9 0 0.1 name "wall" boundingObject Box { size 0.1 4 0.2 } }'
     tilted = simple_robot.replace("DEF IR DistanceSensor {", f"DistanceSensor {{ {rays}")
 
@@ -265,16 +265,19 @@ WATCHER = """Robot {{ translation 0 0 1 rotation {rotation} name "tower" control
     [
         ("0 1 0 0", 1.8),
         ("0 1 0 0.25", 2.0 / math.cos(0.25) - 0.2),
-        ("0 1 0 0.8", 1.0 / math.sin(0.8) - 0.2),  # down to the floor
+        ("0 1 0 0.8", 1.0 / math.sin(0.8) - 0.2),  # the ray ends at the floor
         ("0 1 0 1.5707963", 0.8),
-        ("0 1 0 -0.8", 9.0),  # over the wall
-        ("1 0 0 1.2", 1.8),  # about its own axis
-        ("0.5773503 0.5773503 0.5773503 2.0943951", 9.0),  # its x axis is y of the world
+        ("0 1 0 -0.8", 9.0),  # the ray passes above the wall
+        ("1 0 0 1.2", 1.8),  # a rotation about the ray itself
+        ("0.5773503 0.5773503 0.5773503 2.0943951", 9.0),  # the robot's x axis is y of the world
         ("0 0 1 0.4", 2.0 / math.cos(0.4) - 0.2),
     ],
 )
 def test_a_robot_that_leans_sees_along_its_own_axes(rotation, seen):
-    """It has no wheels, is 1 m above the floor and 2 m from a wall, and its ray passes its own shape."""
+    """The robot has no wheels.
+
+    It is 1 m above the floor and 2 m from a wall, and its ray passes its own shape.
+    """
     wall = "Solid { translation 2.05 0 1 boundingObject Box { size 0.1 9 2 } }"
     text = f"#VRML_SIM R2023b utf8\nWorldInfo {{ }} {wall} {WATCHER.format(rotation=rotation)}"
 
@@ -286,7 +289,7 @@ def test_a_robot_that_leans_sees_along_its_own_axes(rotation, seen):
 
 @pytest.mark.parametrize("count", range(1, 31))
 def test_several_rays_are_a_cone_that_is_symmetric_about_its_axis(world, simple_robot, count):
-    """In front of a wall, a sonar measures the ray on the axis, or the ray nearest to it."""
+    """In front of a wall, a sonar measures along its axis, or along the ray nearest to the axis."""
     sonar = simple_robot.replace('name "ir1"', f'name "ir1" type "sonar" numberOfRays {count} aperture 0.2')
     wall = 'Solid { translation 0.55 0 0.3 name "wall" boundingObject Box { size 0.1 4 2 } }'
 
@@ -296,13 +299,13 @@ def test_several_rays_are_a_cone_that_is_symmetric_about_its_axis(world, simple_
 
 
 def test_rays_off_the_axis_count_less(world, simple_robot):
-    """Of five rays at a thin post, those ahead and above meet it.
+    """Of five rays at a thin post, the ray ahead and the upper ray meet the post.
 
-    The one below meets the floor, and the side rays meet nothing within 1 m.
+    The lower ray meets the floor, and the two side rays meet nothing within 1 m.
     """
     cone = simple_robot.replace('name "ir1"', 'name "ir1" numberOfRays 5 aperture 0.4 gaussianWidth 0.5')
     post = "Solid { translation 0.6 0 0.1 boundingObject Cylinder { radius 0.01 height 0.2 } }"
-    weight = math.exp(-1.0)  # 0.2 rad off the axis; the width is 0.4 * 0.5
+    weight = math.exp(-1.0)  # the ray is 0.2 rad off the axis; the width is 0.4 * 0.5
 
     measured = distance(load_scene(world(post, robot=cone)))
 
@@ -312,13 +315,13 @@ def test_rays_off_the_axis_count_less(world, simple_robot):
 
 
 def test_a_robot_with_a_body_inside_a_pose_is_refused(world, simple_robot):
-    """Its translation would be in another frame than the floor's."""
+    """The translation of such a robot would be in another frame than the floor."""
     with pytest.raises(WorldError, match="a robot that drives inside another node"):
         scene_of(world(robot=f"Pose {{ translation 1 0 0 children [ {simple_robot} ] }}"))
 
 
 def test_a_robot_may_have_its_parts_in_groups_and_its_table_from_the_default(world, simple_robot):
-    """Fields that a world leaves out have Webots' defaults: 0 to 1000 over 10 cm."""
+    """A sensor inside a Group is found. Without a table, Webots' default of 0 to 1000 over 10 cm applies."""
     part = 'Group { children [ DistanceSensor { translation 0.2 0 0.05 name "near" } ] }'
     wall = 'Solid { translation 0.3 0 0.15 name "wall" boundingObject Box { size 0.1 4 0.3 } }'
     simulation = load_scene(world(wall, robot=simple_robot.replace("DEF IR", f"{part} DEF IR")))
@@ -330,7 +333,7 @@ def test_a_robot_may_have_its_parts_in_groups_and_its_table_from_the_default(wor
 
 
 def test_a_robot_without_a_body_may_have_rays(world):
-    """A light barrier has the pose of the file."""
+    """A light barrier is such a robot; it stays at the pose of the world file."""
     barrier = """Robot { name "barrier" translation 0 1 0 rotation 0 0 1 -1.5707963 children [
       DistanceSensor { translation 0 0 0.1 name "beam" lookupTable [ 0 0 0, 5 5 0 ] } ] }"""
     simulation = load_scene(world(robot=barrier))
@@ -345,7 +348,7 @@ def test_a_robot_without_a_body_may_have_rays(world):
 
 
 def test_a_joint_without_a_motor_stays_where_it_is(world, simple_robot):
-    """Its sensor reads 0."""
+    """The joint does not move, so its sensor reads 0."""
     joint = 'HingeJoint { device [ PositionSensor { name "hinge" } ] }'
     simulation = load_scene(world(robot=simple_robot.replace("DEF IR", f"{joint} DEF IR")))
 
@@ -355,7 +358,7 @@ def test_a_joint_without_a_motor_stays_where_it_is(world, simple_robot):
 
 
 def test_a_position_sensor_may_be_coarse_and_noisy(world, simple_robot):
-    """The noise, in rad, is added before the value is rounded to steps of `resolution`."""
+    """The noise in radians is added before the value is rounded to multiples of `resolution`."""
     coarse = simple_robot.replace(
         'PositionSensor { name "wheel0_joint_sensor" }',
         'PositionSensor { name "wheel0_joint_sensor" resolution 0.25 noise 0.5 }',
@@ -372,7 +375,7 @@ def test_a_position_sensor_may_be_coarse_and_noisy(world, simple_robot):
 
 
 def test_all_that_is_refused_comes_in_one_message_with_a_line_for_each_kind_and_all_places(world):
-    """A person can then correct a world at once, not in as many rounds as it has mistakes."""
+    """A person can correct all mistakes of a world at once, and not one after each start."""
     robot = """Robot { name "r" controller "ros"
       children [ Theseus { } Minotaur { } ] }"""
     ball = "Solid { physics Physics { }\nboundingObject Cone { } }"
@@ -399,7 +402,7 @@ def test_all_that_is_refused_comes_in_one_message_with_a_line_for_each_kind_and_
 
 
 def test_a_refusal_of_several_things_survives_a_copy(world):
-    """A process pool needs this."""
+    """A process pool pickles the error, so that it reaches the parent."""
     with pytest.raises(WorldRefusedError) as caught:
         scene_of(world("Floor { }\nTree { }"))
 
@@ -407,7 +410,7 @@ def test_a_refusal_of_several_things_survives_a_copy(world):
 
 
 def test_a_shape_that_is_used_twice_is_refused_once(world):
-    """The shape is at one position in the file."""
+    """The shape has one position in the file, so the message has one line about it."""
     objects = """Solid { boundingObject DEF BALL Cone { } }
       Solid { boundingObject USE BALL }"""
 
@@ -418,7 +421,7 @@ def test_a_shape_that_is_used_twice_is_refused_once(world):
 
 
 def test_a_wheel_may_have_an_outline_and_free_rollers(world, simple_robot):
-    """The wheel touches only the floor, and the stub's floor is flat."""
+    """The stub's floor is flat, and a wheel touches nothing else. So its outline has no effect."""
     roller = "HingeJoint { endPoint Solid { boundingObject Cylinder { radius 0.01 height 0.01 } } }"
     wheel = f"endPoint DEF WHEEL Solid {{ children [ {roller} ] "
 
@@ -429,13 +432,13 @@ def test_a_wheel_may_have_an_outline_and_free_rollers(world, simple_robot):
 
 @pytest.mark.parametrize("step", ["0.5", "32.5", "0", "-32"])
 def test_the_basic_step_is_whole_milliseconds(world, step):
-    """The controller uses only the integer part of the value as its divisor."""
+    """The real controller uses only the integer part of the basic step as its divisor."""
     with pytest.raises(WorldError, match="not a whole number of milliseconds"):
         scene_of(world(info=f"basicTimeStep {step}"))
 
 
 def test_errors_point_at_the_node(world):
-    """The message has line and column, and the remedy."""
+    """The message has the line, the column and the remedy."""
     with pytest.raises(WorldError) as caught:
         scene_of(world("Solid {\n  boundingObject Cone { }\n}"))
 

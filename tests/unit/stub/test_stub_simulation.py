@@ -1,4 +1,4 @@
-"""The simulation without ROS, as an experiment uses it, and the effects of a reset."""
+"""The simulation without ROS, for a program that uses it directly, and the effects of a reset."""
 
 import math
 import subprocess
@@ -17,12 +17,12 @@ from tests.scenes import load_scene
 
 @pytest.fixture
 def simulation():
-    """The simulation of the built-in arena."""
+    """Return the simulation of the built-in arena."""
     return load_scene(builtin("arena"))
 
 
 def drive(simulation, vx, vy, omega):
-    """Command the wheels of the first robot."""
+    """Command the wheels of the first robot for a velocity."""
     motors = simulation.robots[0].motors
     for name, speed in zip(WHEELS, wheel_speeds(vx, vy, omega), strict=True):
         motors[name].set_position(math.inf)
@@ -30,13 +30,13 @@ def drive(simulation, vx, vy, omega):
 
 
 def readings(simulation):
-    """Return all sensor values and the pose, unrounded."""
+    """Return the values of all sensors and the pose of the robot, unrounded."""
     robot = simulation.robots[0]
     return [sensor.value for sensor in robot.sensors.values()] + [*robot.place.translation]
 
 
 def run(simulation, steps=30):
-    """Drive a fixed route, and return every reading on it."""
+    """Drive a fixed route, and return the readings after each step."""
     history = []
     for step in range(steps):
         drive(simulation, 0.3, 0.1 * math.sin(step), 0.2)
@@ -46,7 +46,7 @@ def run(simulation, steps=30):
 
 
 def test_it_can_be_driven_without_ros(simulation):
-    """A program can load, command, step and read."""
+    """A program can load a world, command motors, step, and read sensors."""
     robot = simulation.robots[0]
     robot.motors["wheel0_joint"].set_position(math.inf)
     robot.motors["wheel0_joint"].set_velocity(2.0)
@@ -68,7 +68,7 @@ def test_it_can_be_driven_without_ros(simulation):
     )
 )
 def test_sending_a_velocity_again_changes_nothing(ways):
-    """The trainer's facade does not send unchanged velocities; the run must stay the same, bit by bit."""
+    """The trainer's facade sends only velocities that have changed; the run must be the same, bit for bit."""
 
     def moments(told_again):
         simulation = load_scene(builtin("arena"))
@@ -88,7 +88,7 @@ def test_sending_a_velocity_again_changes_nothing(ways):
 
 
 def test_the_front_sensor_tells_volts_at_a_wall(simulation):
-    """In front of the wall the ray is 2 mm long, so the table's first row applies."""
+    """At the wall the ray is 2 mm long, so the first row of the table applies."""
     drive(simulation, 0.5, 0.0, 0.0)
     for _ in range(30):
         simulation.step(192)
@@ -101,7 +101,7 @@ def test_the_front_sensor_tells_volts_at_a_wall(simulation):
 
 
 def test_the_bumper_tells_every_touch_since_it_was_read(simulation):
-    """A touch in the first of six basic steps must not be missed, and is reported once."""
+    """A touch in the first of six basic steps is reported, and only once."""
     robot = simulation.robots[0]
     robot.body.place(1.76, 0.0, 0.0)
     drive(simulation, 0.5, 0.0, 0.0)
@@ -117,18 +117,18 @@ def test_the_bumper_tells_every_touch_since_it_was_read(simulation):
 
 @pytest.mark.parametrize("duration_ms", [0, -32, 33])
 def test_only_multiples_of_the_basic_step_can_be_stepped(simulation, duration_ms):
-    """Any other value would step another duration than the requested one."""
+    """Another duration would be rounded to a duration that nobody requested."""
     with pytest.raises(ValueError, match="not a positive multiple of the basic step"):
         simulation.step(duration_ms)
 
 
 def test_two_simulations_of_a_world_agree_bit_by_bit():
-    """World, commands and seed are the same."""
+    """Both simulations have the same world, commands and seed."""
     assert run(load_scene(builtin("arena"))) == run(load_scene(builtin("arena")))
 
 
 def test_a_reset_repeats_the_run_bit_by_bit(simulation):
-    """With the seed in customData, episodes can be replayed."""
+    """With the same seed in `customData`, an episode can be repeated exactly."""
     simulation.robots[0].custom_data = "7"
     simulation.reset()
     simulation.step(32)
@@ -141,7 +141,7 @@ def test_a_reset_repeats_the_run_bit_by_bit(simulation):
 
 
 def test_another_seed_is_another_noise(simulation):
-    """The route is the same, because noise affects only the sensors."""
+    """The noise affects only the readings, so the robot takes the same route."""
     histories = []
     for seed in ("7", '{"seed": 8}'):
         simulation.robots[0].custom_data = seed
@@ -154,7 +154,7 @@ def test_another_seed_is_another_noise(simulation):
 
 
 def test_noise_does_not_depend_on_what_the_rays_meet(simulation):
-    """Each sensor draws once a step, so a robot elsewhere has the same noise in its free rays."""
+    """Each sensor draws one random number per step, whatever its ray meets."""
     values = []
     for x in (0.0, 1.7):
         simulation.reset()
@@ -167,7 +167,7 @@ def test_noise_does_not_depend_on_what_the_rays_meet(simulation):
 
 
 def test_every_robot_has_noise_of_its_own():
-    """Its own customData seeds it."""
+    """The `customData` of each robot seeds the robot's noise."""
     source = builtin("arena")
     robot = source[source.index(b"DEF ROBOTINO Robot") :]
     source += robot.replace(b'name "robotino"', b'name "second" translation 0 1 0 customData "5"', 1)
@@ -197,23 +197,23 @@ def test_every_robot_has_noise_of_its_own():
     ],
 )
 def test_a_seed_is_a_number_or_in_an_object(custom_data, seed):
-    """Any other value leaves the seed unchanged."""
+    """With any other value the seed stays as it was."""
     assert seed_of(custom_data, otherwise=1) == seed
 
 
 @given(text=st.text())
 def test_no_custom_data_is_an_error(text):
-    """The data may belong to another program."""
+    """The data may belong to another program, so no text is an error."""
     assert isinstance(seed_of(text, otherwise=1), int)
 
 
 def test_the_first_seed_is_that_of_the_world(world):
-    """It is WorldInfo.randomSeed until customData sets another."""
+    """The seed is WorldInfo.randomSeed until `customData` sets another seed."""
     assert load_scene(world(info="randomSeed 42")).robots[0].seed == 42
 
 
 def test_a_reset_happens_within_the_next_basic_step(simulation):
-    """The request changes nothing; after the next step the time is one basic step."""
+    """The request alone changes nothing; after the next step, the time is one basic step."""
     drive(simulation, 0.3, 0.0, 0.0)
     simulation.step(1920)
     simulation.reset()
@@ -226,7 +226,7 @@ def test_a_reset_happens_within_the_next_basic_step(simulation):
 
 
 def test_the_steps_after_the_first_go_on_from_the_reset(simulation):
-    """A long step that contains the reset ends five basic steps after it."""
+    """A long step with a reset in its first basic step continues for the other five."""
     simulation.reset()
 
     simulation.step(192)
@@ -235,7 +235,7 @@ def test_the_steps_after_the_first_go_on_from_the_reset(simulation):
 
 
 def test_a_reset_restores_motors_and_rest(simulation):
-    """It sets position control at 0: a client that forgets set_position(inf) stands still."""
+    """After a reset the motors hold position 0, so a client must send `set_position(inf)` again."""
     drive(simulation, 0.3, 0.0, 0.5)
     simulation.step(1920)
     simulation.reset()
@@ -250,7 +250,7 @@ def test_a_reset_restores_motors_and_rest(simulation):
 
 
 def test_a_reset_restores_the_places_of_all_solids(simulation):
-    """This includes the target and the cylinders, and the rays see the difference."""
+    """A reset also restores the target and the cylinders, and the rays meet them there."""
     cylinder = simulation.tree.of_def("CYLINDER_0")
     translation = simulation.tree.field_of(cylinder, "translation", simulation)
     translation.set(FieldType.VEC3F, 0, (0.5, 0.0, 0.2))
@@ -265,7 +265,7 @@ def test_a_reset_restores_the_places_of_all_solids(simulation):
 
 
 def test_reset_physics_is_at_once_and_keeps_time_and_place(simulation):
-    """It only stops the motion."""
+    """The call only stops all motion."""
     drive(simulation, 2.0, 0.0, 0.0)
     simulation.step(320)
     place = simulation.robots[0].place.translation
@@ -278,7 +278,10 @@ def test_reset_physics_is_at_once_and_keeps_time_and_place(simulation):
 
 
 def test_it_is_small():
-    """Many stubs run on one machine; a whole stub needs less than 120 MB, and this part far less."""
+    """Many stubs run on one machine.
+
+    A whole stub needs less than 120 MB, and the simulation less than 40 MB.
+    """
     program = (
         "import pathlib, sys; from palaestra_sim.scene.simulation import Simulation;"
         "from palaestra_sim.stub.physics import StubPhysics;"

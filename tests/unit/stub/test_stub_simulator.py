@@ -1,4 +1,4 @@
-"""A stub between two worlds: reload, load, restart and quit, and the arguments in controllerArgs."""
+"""The life of a stub: reload, load, restart, quit, and the arguments in controllerArgs."""
 
 import pytest
 
@@ -12,7 +12,7 @@ from palaestra_sim.world import builtin
 
 
 def test_a_controller_starts_for_each_ros_robot(ros, start):
-    """Their names come from controllerArgs."""
+    """The names of the controllers' nodes come from controllerArgs."""
     simulator = start(builtin("two_robots"))
 
     assert list(simulator.controllers) == ["supervisor", "robotino"]
@@ -20,7 +20,7 @@ def test_a_controller_starts_for_each_ros_robot(ros, start):
 
 
 def test_robots_with_other_controllers_are_left_alone(ros, start, world, simple_robot):
-    """They do not move, and the world does not wait for them."""
+    """Robots with other controllers do not move, and no step waits for them."""
     start(world('Robot { name "statue" controller "<none>" }', robot=simple_robot))
 
     assert [node.name for node in ros.nodes] == ["robotino"]
@@ -28,7 +28,7 @@ def test_robots_with_other_controllers_are_left_alone(ros, start, world, simple_
 
 
 def test_nothing_starts_from_a_wrong_world(ros, tmp_path):
-    """The error comes before any node is created."""
+    """The stub rejects the world before it registers any node."""
     path = tmp_path / "bad.wbt"
     path.write_bytes(b"#VRML_SIM R2023b utf8\nColosseum { }\n")
 
@@ -48,20 +48,20 @@ def test_nothing_starts_from_a_wrong_world(ros, tmp_path):
     ],
 )
 def test_arguments_that_the_stub_cannot_follow_are_refused(start, world, simple_robot, change, fact):
-    """The stub does not simulate a robot that is not synchronized or has another controller."""
+    """The stub cannot simulate a robot that is not synchronized, or that has another controller."""
     with pytest.raises(WorldError, match=fact):
         start(world(robot=simple_robot.replace(*change)))
 
 
 def test_unknown_arguments_are_ignored(ros, start, world, simple_robot):
-    """The real controller logs them and continues."""
+    """The real controller logs an unknown argument and continues."""
     start(world(robot=simple_robot.replace('"--synchronize"', '"--synchronize" "--speed=7"')))
 
     assert ros.node("robotino").get("robot/get_time") == 0.0
 
 
 def test_a_reload_ends_the_controllers_and_starts_new_ones(ros, start):
-    """Services disappear and come back, sensors are disabled, and the file's state is restored."""
+    """Services disappear and come back, sensors are disabled, and the world is as in its file."""
     start()
     old = ros.node("robotino")
     old.call("ir1/enable", value=32)
@@ -77,7 +77,7 @@ def test_a_reload_ends_the_controllers_and_starts_new_ones(ros, start):
 
 
 def test_handles_do_not_survive_a_reload(ros, start):
-    """In Webots they dangle; here they fail."""
+    """In Webots such a handle is a dangling pointer; here the call fails."""
     start()
     old = ros.node("robotino")
     handle = old.get("supervisor/get_from_def", name="TARGET")
@@ -90,7 +90,7 @@ def test_handles_do_not_survive_a_reload(ros, start):
 
 
 def test_revert_is_the_old_name_of_reload(ros, start):
-    """It is deprecated, but still served."""
+    """`revert` is deprecated in Webots, but its controller still serves it."""
     start()
 
     ros.node("robotino").call("supervisor/simulation_revert")
@@ -99,7 +99,7 @@ def test_revert_is_the_old_name_of_reload(ros, start):
 
 
 def test_a_reload_reads_the_file_again(ros, start):
-    """Changes of the file take effect, and the mode stays."""
+    """A change of the file takes effect; the mode of the simulation stays."""
     simulator = start(mode=Mode.FAST)
     text = simulator.world_path.read_bytes()
     simulator.world_path.write_bytes(text.replace(b"basicTimeStep 32", b"basicTimeStep 16"))
@@ -111,7 +111,7 @@ def test_a_reload_reads_the_file_again(ros, start):
 
 
 def test_another_world_can_be_loaded(ros, start, world, tmp_path):
-    """The path must be absolute."""
+    """The path of the new world must be absolute."""
     start()
     other = tmp_path / "other.wbt"
     other.write_bytes(world())
@@ -123,7 +123,7 @@ def test_another_world_can_be_loaded(ros, start, world, tmp_path):
 
 @pytest.mark.parametrize("content", [None, b"", b"#VRML_SIM R2023b utf8\nSphere { }"])
 def test_a_world_that_cannot_be_loaded_leaves_the_present_one(ros, start, tmp_path, content):
-    """The file may be missing, empty, or not supported by the stub."""
+    """The file may be missing or empty, or the stub cannot simulate its world."""
     start()
     other = tmp_path / "other.wbt"
     if content is not None:
@@ -135,7 +135,7 @@ def test_a_world_that_cannot_be_loaded_leaves_the_present_one(ros, start, tmp_pa
 
 
 def test_a_reload_with_two_robots_restarts_both(two_robots, ros):
-    """The world then waits for both again."""
+    """After the reload, a step waits for both robots again."""
     supervisor, _ = two_robots
 
     supervisor.call("supervisor/world_reload")
@@ -148,7 +148,7 @@ def test_a_reload_with_two_robots_restarts_both(two_robots, ros):
 
 
 def test_one_controller_can_be_restarted_alone(two_robots, ros):
-    """The world and the other robot continue."""
+    """The world and the other robot's controller continue."""
     supervisor, robotino = two_robots
     handle = supervisor.get("supervisor/get_from_def", name="ROBOTINO")
     for node in (supervisor, robotino):
@@ -163,7 +163,7 @@ def test_one_controller_can_be_restarted_alone(two_robots, ros):
 
 
 def test_restarting_the_controller_of_what_is_no_robot_does_nothing(two_robots):
-    """Webots logs that it is not a robot, but its controller returns success."""
+    """Webots logs that the node is not a robot, but the call still succeeds."""
     supervisor, robotino = two_robots
     handle = supervisor.get("supervisor/get_from_def", name="TARGET")
 
@@ -173,7 +173,7 @@ def test_restarting_the_controller_of_what_is_no_robot_does_nothing(two_robots):
 
 
 def test_quit_tells_the_process_its_exit_status(ros, start):
-    """The response is sent first."""
+    """The client gets the response before the simulator ends."""
     simulator = start()
     statuses = []
     simulator.on_quit(statuses.append)
@@ -189,7 +189,7 @@ def test_quit_tells_the_process_its_exit_status(ros, start):
 
 
 def test_quit_ends_pending_steps_without_success(two_robots):
-    """wb_robot_step returns -1, so the controller ends."""
+    """wb_robot_step returns -1 in the real controller, and the controller ends."""
     supervisor, robotino = two_robots
     pending = robotino.ask("robot/time_step", value=32)
 
@@ -199,7 +199,7 @@ def test_quit_ends_pending_steps_without_success(two_robots):
 
 
 def test_quitting_twice_keeps_the_first_status(ros, start):
-    """The second request comes too late."""
+    """The second request comes after the simulator began to end."""
     simulator = start()
     robot = ros.node("robotino")
 
@@ -211,7 +211,7 @@ def test_quitting_twice_keeps_the_first_status(ros, start):
 
 
 def test_closing_ends_every_controller(ros, start):
-    """As on SIGTERM, services are unregistered in order."""
+    """As on SIGTERM, each controller unregisters its services before the process ends."""
     simulator = start(builtin("two_robots"))
 
     simulator.close()
@@ -221,7 +221,7 @@ def test_closing_ends_every_controller(ros, start):
 
 
 def test_messages_that_were_due_at_a_reload_never_come(ros, start):
-    """Their controller no longer exists."""
+    """The controller whose messages they are does not exist any more."""
     start(publish_delay_s=0.01)
     old = ros.node("robotino")
     inbox = old.inbox("ir1/value")
@@ -235,7 +235,7 @@ def test_messages_that_were_due_at_a_reload_never_come(ros, start):
 
 
 def test_a_step_that_sleeps_through_a_restart_is_not_answered(ros, start):
-    """The connection is closed by then."""
+    """When the sleep ends, the connection is already closed."""
     start(builtin("two_robots"), step_sleep_s=0.01)
     supervisor, robotino = ros.node("supervisor"), ros.node("robotino")
     numbers = [node.ask("robot/time_step", value=32) for node in (supervisor, robotino)]
@@ -251,7 +251,7 @@ def test_a_step_that_sleeps_through_a_restart_is_not_answered(ros, start):
 
 
 def test_reset_through_the_supervisor_needs_a_step(robot, drive, position):
-    """The call sets a flag, and the next basic step does the work; nothing restarts."""
+    """The call sets a flag, and the reset happens in the next basic step; no controller restarts."""
     drive(robot, 0.3, 0.0, 0.0)
     robot.call("ir1/enable", value=192)
     inbox = robot.inbox("ir1/value")
@@ -268,7 +268,7 @@ def test_reset_through_the_supervisor_needs_a_step(robot, drive, position):
 
 
 def test_reset_physics_through_the_supervisor_is_at_once(robot, drive):
-    """It needs no step."""
+    """The call has its effect without a step."""
     drive(robot, 1.0, 0.0, 0.0)
     robot.call("robot/time_step", value=320)
     handle = robot.get("supervisor/get_self")

@@ -1,4 +1,4 @@
-"""`time_step`: accepted values, the time of the response, and how controllers wait for each other."""
+"""`time_step`: the accepted values, the time of the response, and the synchronization of controllers."""
 
 import pytest
 from hypothesis import given
@@ -13,27 +13,27 @@ PENDING = "pending"
 
 
 def outcome(node, number):
-    """Return the success of a request, or PENDING."""
+    """Return whether a request succeeded, or PENDING before its response."""
     answer = node.answers.get(number)
     return PENDING if answer is None else answer.success
 
 
 @pytest.mark.parametrize("step_ms", [32, 64, 192, 3200])
 def test_a_multiple_of_the_basic_step_is_simulated(robot, step_ms):
-    """The time advances by exactly the requested value."""
+    """The time advances by exactly the requested duration."""
     assert robot.get("robot/time_step", value=step_ms) is True
     assert robot.get("robot/get_time") == pytest.approx(step_ms / 1000)
 
 
 @pytest.mark.parametrize("step_ms", [1, 31, 33, 100, -1, -32, -192])
 def test_any_other_step_is_refused_and_changes_nothing(robot, step_ms):
-    """`success` is false, and no time passes."""
+    """The response has `success` false, and the time does not advance."""
     assert robot.get("robot/time_step", value=step_ms) is False
     assert robot.get("robot/get_time") == 0.0
 
 
 def test_a_step_of_0_is_one_basic_step(robot):
-    """Webots uses 0 as the message that a client leaves."""
+    """In Webots, a client that leaves sends a step of 0."""
     robot.call("robot/time_step", value=192)
 
     assert robot.get("robot/time_step", value=0) is True
@@ -41,7 +41,7 @@ def test_a_step_of_0_is_one_basic_step(robot):
 
 
 def test_a_step_in_pause_is_not_answered(ros, start):
-    """Webots holds the controller's mutex until the step is done."""
+    """Webots holds the mutex of the controller until the step is done."""
     start(mode=Mode.PAUSE)
     robot = ros.node("robotino")
 
@@ -53,7 +53,7 @@ def test_a_step_in_pause_is_not_answered(ros, start):
 
 
 def test_every_other_service_waits_behind_a_pending_step(ros, start):
-    """A client that steps while paused and then requests the same controller's run mode is deadlocked."""
+    """A client that steps while paused, and then sets the run mode at the same controller, is deadlocked."""
     start(mode=Mode.PAUSE)
     robot = ros.node("robotino")
     robot.ask("robot/time_step", value=32)
@@ -67,7 +67,7 @@ def test_every_other_service_waits_behind_a_pending_step(ros, start):
 
 
 def test_another_supervisor_ends_the_deadlock(ros, start):
-    """The pending step is done, and then the waiting calls get their responses in order."""
+    """The pending step is done first, and then the waiting calls get their responses in order."""
     start(builtin("two_robots"), mode=Mode.PAUSE)
     supervisor, robotino = ros.node("supervisor"), ros.node("robotino")
     step = robotino.ask("robot/time_step", value=32)
@@ -82,9 +82,9 @@ def test_another_supervisor_ends_the_deadlock(ros, start):
 
 
 def test_the_world_waits_until_all_synchronised_robots_asked(two_robots, ros):
-    """A step gets its response when the world has moved.
+    """The world moves when each robot has requested a step.
 
-    The world moves when every robot has requested a step.
+    Then each robot gets the response to its step.
     """
     supervisor, robotino = two_robots
 
@@ -100,7 +100,7 @@ def test_the_world_waits_until_all_synchronised_robots_asked(two_robots, ros):
 
 
 def test_steps_of_different_length_are_served_piece_by_piece(two_robots):
-    """Six short steps of one robot make one long step of the other."""
+    """One robot makes six short steps while the other one makes a long step."""
     supervisor, robotino = two_robots
     long = supervisor.ask("robot/time_step", value=192)
 
@@ -114,7 +114,7 @@ def test_steps_of_different_length_are_served_piece_by_piece(two_robots):
 
 
 def test_a_robot_with_synchronization_false_holds_nobody(ros, start):
-    """Its own steps end when another robot has moved the world."""
+    """The step of such a robot ends when another robot has moved the world."""
     world = builtin("two_robots").replace(b'name "supervisor"', b'name "supervisor" synchronization FALSE', 1)
     start(world)
     supervisor, robotino = ros.node("supervisor"), ros.node("robotino")
@@ -130,7 +130,7 @@ def test_a_robot_with_synchronization_false_holds_nobody(ros, start):
 
 
 def test_a_sleeping_stub_answers_after_its_sleep(ros, start):
-    """The sleep stands for a world that takes time to simulate."""
+    """The sleep imitates a world that takes long to simulate."""
     start(step_sleep_s=0.003)
     robot = ros.node("robotino")
 
@@ -144,7 +144,7 @@ def test_a_sleeping_stub_answers_after_its_sleep(ros, start):
 
 
 def test_real_time_takes_as_long_as_it_says(ros, start):
-    """100 steps of 32 ms take 3.2 s, however fast they are requested."""
+    """A hundred steps of 32 ms take 3.2 s, however fast a client requests them."""
     start(mode=Mode.REAL_TIME)
     robot = ros.node("robotino")
     begun_s = ros.now_s
@@ -158,7 +158,7 @@ def test_real_time_takes_as_long_as_it_says(ros, start):
 
 
 def test_real_time_does_not_make_up_for_a_client_that_was_away(ros, start):
-    """One basic step is done at once, and the other nine take their time."""
+    """The first of ten basic steps is done at once, and the other nine take their time."""
     start(mode=Mode.REAL_TIME)
     robot = ros.node("robotino")
     robot.ask("robot/time_step", value=32)
@@ -174,7 +174,7 @@ def test_real_time_does_not_make_up_for_a_client_that_was_away(ros, start):
 
 @pytest.mark.parametrize(("mode", "known"), [(0, True), (1, True), (2, True), (3, False), (-1, False)])
 def test_modes_are_those_since_r2021a(robot, mode, known):
-    """They are PAUSE 0, REAL_TIME 1 and FAST 2; the old FAST, 3, is not among them."""
+    """The modes are PAUSE 0, REAL_TIME 1 and FAST 2. The former FAST, 3, is rejected."""
     assert robot.get("supervisor/simulation_set_mode", value=mode) is known
     assert robot.get("supervisor/simulation_get_mode") == (mode if known else Mode.FAST)
 
@@ -183,7 +183,7 @@ def test_modes_are_those_since_r2021a(robot, mode, known):
     orders=st.lists(st.tuples(st.integers(0, 1), st.sampled_from([32, 64, 96, 192])), min_size=1, max_size=30)
 )
 def test_no_robot_is_ever_ahead_of_another_by_more_than_it_asked_for(orders):
-    """The world's time is the smallest of the totals that the robots have requested."""
+    """The time of the world is the smallest of the total times that the robots have requested."""
     simulation = load_scene(builtin("two_robots"))
     stepping = Stepping(simulation)
     for robot in simulation.robots:
@@ -202,7 +202,7 @@ def test_no_robot_is_ever_ahead_of_another_by_more_than_it_asked_for(orders):
 
 
 class OtherSimulation:
-    """A different simulation, which records the calls of its steps."""
+    """A simulation of another simulator, which records calls."""
 
     def __init__(self):
         self.mode = Mode.FAST
@@ -210,16 +210,16 @@ class OtherSimulation:
         self.asked = []
 
     def advance(self, duration_ms):
-        """Record the duration."""
+        """Record the duration of a step."""
         self.asked.append(duration_ms)
 
     def sample(self):
-        """Record a sampling of the sensors."""
+        """Record that the sensors were sampled."""
         self.asked.append("sample")
 
 
 def test_any_simulation_can_be_stepped():
-    """Other simulators use the same controllers; they move, then sample once a step."""
+    """Each simulator has the same controllers. A step advances the simulation, and then samples once."""
     simulation, answers = OtherSimulation(), []
     stepping = Stepping(simulation)
 

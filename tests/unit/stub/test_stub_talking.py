@@ -1,4 +1,4 @@
-"""Emitters, receivers, connectors, speakers, pens and grippers, which affect each other."""
+"""Emitters, receivers, connectors, speakers, pens and grippers: devices that affect other devices."""
 
 import pytest
 
@@ -12,7 +12,7 @@ RECEIVER = 'Receiver { name "ear" channel 1 rotation 0 0 1 1.5707963 }'
 
 @pytest.fixture
 def pair(start, world, ros):
-    """`pair(here, there, distance)` returns the nodes of two robots with these devices."""
+    """`pair(here, there, distance)` returns the nodes of two robots, each with one of these devices."""
 
     def begin(here, there, distance_m=1.0):
         start(world(robot=f"{TALKER.format('here', 0, here)} {TALKER.format('there', distance_m, there)}"))
@@ -22,7 +22,7 @@ def pair(start, world, ros):
 
 
 def step(*robots):
-    """Make a basic step of each robot."""
+    """Make one basic step with each robot."""
     for robot in robots:
         robot.call("robot/time_step", value=32)
 
@@ -30,7 +30,7 @@ def step(*robots):
 def test_a_packet_arrives_after_the_next_step(pair):
     """The receiver is turned by 90 degrees, and gets the direction in its own frame.
 
-    The strength is 1 / distance squared.
+    The signal strength is 1 / distance squared.
     """
     here, there = pair(EMITTER, RECEIVER, 2.0)
     heard = there.inbox("ear/data")
@@ -48,7 +48,7 @@ def test_a_packet_arrives_after_the_next_step(pair):
 
 
 def test_a_robot_does_not_hear_itself(pair):
-    """Webots sends no packet from a robot to itself, on any channel."""
+    """In Webots too, a robot's receiver gets no packet from the robot's own emitter, on any channel."""
     here, there = pair(EMITTER + RECEIVER, RECEIVER)
     for robot in (here, there):
         robot.call("ear/enable", value=32)
@@ -60,7 +60,7 @@ def test_a_robot_does_not_hear_itself(pair):
 
 
 def test_packets_wait_in_a_queue(pair):
-    """`next_packet` drops the oldest one; an empty queue has no packet to read."""
+    """`next_packet` drops the oldest packet. In an empty queue there is no packet to read."""
     here, there = pair(EMITTER, RECEIVER)
     there.call("ear/enable", value=32)
     here.call("mouth/send", value="one")
@@ -84,7 +84,7 @@ def test_packets_wait_in_a_queue(pair):
     ],
 )
 def test_a_channel_is_heard_by_those_who_listen_to_it(pair, emitter, receiver, arrives):
-    """The channel -1 means all."""
+    """A receiver on channel -1 gets the packets of all channels."""
     here, there = pair(EMITTER, RECEIVER)
     there.call("ear/enable", value=32)
     assert here.get("mouth/set_channel", value=emitter) is True
@@ -98,7 +98,7 @@ def test_a_channel_is_heard_by_those_who_listen_to_it(pair, emitter, receiver, a
 
 
 def test_a_packet_does_not_reach_beyond_the_range(pair):
-    """A larger range than `maxRange` is cut, -1 means `maxRange`, and other negative values are ignored."""
+    """A range above `maxRange` is limited, and -1 means `maxRange`. Other negative values are ignored."""
     here, there = pair(EMITTER, RECEIVER, 3.0)
     there.call("ear/enable", value=32)
     for range_m in (2.0, 4.0, 6.0):
@@ -114,7 +114,7 @@ def test_a_packet_does_not_reach_beyond_the_range(pair):
 
 
 def test_a_receiver_that_is_not_enabled_hears_nothing(pair):
-    """It drops its packets when it is disabled."""
+    """A receiver drops its packets when a client disables it."""
     here, there = pair(EMITTER, RECEIVER)
     here.call("mouth/send", value="early")
     step(here, there)
@@ -128,7 +128,7 @@ def test_a_receiver_that_is_not_enabled_hears_nothing(pair):
 
 
 def test_a_full_buffer_takes_no_more(pair):
-    """It has 10 bytes; as in Webots, the call still succeeds."""
+    """The buffer has 10 bytes. As in Webots, a send to a full buffer still succeeds."""
     here, there = pair(EMITTER, RECEIVER)
     there.call("ear/enable", value=32)
     for text in ("0123456", "789a", "bcd"):
@@ -149,7 +149,7 @@ def test_a_full_buffer_takes_no_more(pair):
     ],
 )
 def test_a_connector_feels_a_fitting_one_that_faces_it(pair, there, presence):
-    """The other connector has the same model and type, is near, and its axis is aligned."""
+    """The other connector has the same model and type, is near, and faces along the same axis."""
     here, _ = pair('Connector { name "socket" model "a" }', there, 0.005)
     felt = here.inbox("socket/presence")
     assert here.get("socket/presence_sensor/enable", value=32) is True
@@ -160,7 +160,7 @@ def test_a_connector_feels_a_fitting_one_that_faces_it(pair, there, presence):
 
 
 def test_a_passive_connector_has_no_sensor_and_every_one_can_be_locked(pair):
-    """A lock alone joins nothing."""
+    """A lock without presence of another connector joins nothing."""
     here, _ = pair('Connector { name "socket" type "passive" }', "")
     felt = here.inbox("socket/presence")
     here.call("socket/presence_sensor/enable", value=32)
@@ -173,7 +173,7 @@ def test_a_passive_connector_has_no_sensor_and_every_one_can_be_locked(pair):
 
 
 def test_a_speaker_loops_a_sound_until_it_is_stopped(pair):
-    """Nobody hears the sound, so one that does not loop ends at once."""
+    """The stub plays no sound, so a sound that does not loop ends at once."""
     here, _ = pair('Speaker { name "horn" }', "")
     play = {"volume": 1.0, "pitch": 1.0, "balance": 0.0}
     for sound, loop in (("a.wav", False), ("b.wav", True), ("c.wav", True)):
@@ -188,7 +188,7 @@ def test_a_speaker_loops_a_sound_until_it_is_stopped(pair):
 
 
 def test_a_speaker_knows_the_languages_of_its_engine(pair):
-    """The response refuses other languages."""
+    """For another language, the response is a failure."""
     here, _ = pair('Speaker { name "horn" }', "")
 
     assert here.get("horn/get_engine") == "pico"
@@ -202,7 +202,7 @@ def test_a_speaker_knows_the_languages_of_its_engine(pair):
 
 
 def test_a_pen_takes_its_ink(pair):
-    """Its strokes are not drawn, but its services respond as in Webots."""
+    """The stub draws no strokes, but the services respond as in Webots."""
     here, _ = pair('Pen { name "pen" }', "")
 
     assert here.get("pen/write", value=False) is True
@@ -210,7 +210,7 @@ def test_a_pen_takes_its_ink(pair):
 
 
 def test_a_gripper_that_nothing_can_touch_holds_nothing(pair):
-    """In Webots a gripper needs a boundingObject to hold objects."""
+    """In Webots, a gripper without a boundingObject cannot hold an object."""
     here, _ = pair('VacuumGripper { name "cup" }', "")
     felt = here.inbox("cup/presence")
     assert here.get("cup/presence_sensor/enable", value=32) is True
@@ -226,7 +226,7 @@ def test_a_gripper_that_nothing_can_touch_holds_nothing(pair):
 
 
 def test_a_gripper_that_would_hold_something_is_not_switched_on(pair):
-    """After a success, the client would believe that it holds the object."""
+    """If the call succeeded, the client would believe that the gripper holds the object."""
     here, _ = pair('VacuumGripper { name "cup" boundingObject Box { size 0.1 0.1 0.1 } }', "")
 
     with pytest.raises(ServiceFailed, match="cup has a boundingObject"):
@@ -235,7 +235,7 @@ def test_a_gripper_that_would_hold_something_is_not_switched_on(pair):
 
 
 def test_connectors_that_fit_are_not_locked(pair):
-    """In Webots the lock would join them."""
+    """In Webots the lock would join the two robots, which the stub cannot simulate."""
     other = 'Connector { name "plug" model "a" rotation 0 0 1 3.14159 }'
     here, _ = pair('Connector { name "socket" model "a" }', other, 0.005)
 

@@ -1,4 +1,4 @@
-"""Messages of sensors: the reading is in the last field, by the definition of the type."""
+"""Messages of sensors: the reading is in the last field of the message type."""
 
 import pytest
 
@@ -8,19 +8,19 @@ from palaestra_sim.ros.topics import PublishedTopic, Publisher
 
 
 class Link:
-    """A subscriber's connection that keeps the messages."""
+    """The connection of a subscriber, which keeps the messages."""
 
     def __init__(self):
         self.sent = []
 
     def send_newest(self, data):
-        """Keep the newest message."""
+        """Keep the message."""
         self.sent.append(data)
 
 
 @pytest.fixture
 def publish():
-    """`publish(type_name, value, **template)` returns the message that a subscriber decodes."""
+    """`publish(type_name, value, **template)` returns the message as a subscriber decodes it."""
 
     def send(type_name, value, **template):
         link = Link()
@@ -35,7 +35,7 @@ def publish():
 
 
 def test_a_reading_of_one_number_fills_the_last_field(publish):
-    """Header and constants keep the values of the template."""
+    """The header and the constants keep the values of the template."""
     message = publish("sensor_msgs/Range", 0.5, header={"frame_id": "robotino/ir1"}, max_range=3.0)
 
     assert (message.range, message.max_range, message.header.frame_id) == (0.5, 3.0, "robotino/ir1")
@@ -43,7 +43,7 @@ def test_a_reading_of_one_number_fills_the_last_field(publish):
 
 
 def test_a_reading_of_several_numbers_fills_the_message_inside(publish):
-    """An example is the three coordinates of a GPS."""
+    """An example is the position of a GPS with its three coordinates."""
     message = publish("geometry_msgs/PointStamped", (1.0, 2.0, 3.0), header={"frame_id": "robotino/gps"})
 
     assert (message.point.x, message.point.y, message.point.z) == (1.0, 2.0, 3.0)
@@ -51,7 +51,7 @@ def test_a_reading_of_several_numbers_fills_the_message_inside(publish):
 
 @pytest.mark.parametrize("type_name", ["webots_ros/StringStamped", "std_msgs/Header", "rosgraph_msgs/Clock"])
 def test_a_message_that_ends_with_something_else_has_no_reading(publish, type_name):
-    """Otherwise the reading would overwrite text."""
+    """The reading would otherwise overwrite the text at the end of the message."""
     assert last_field(type_name) is None
 
     with pytest.raises(TypeError, match=f"{type_name} does not end with numbers; use `send`"):

@@ -1,4 +1,4 @@
-"""The drive of a robot is derived from the positions of its wheels.
+"""The drive of a robot follows from the positions and axles of its wheels.
 
 The expected numbers are computed by hand.
 """
@@ -14,7 +14,7 @@ from palaestra_sim.scene.wheel_kinematics import STANDING, Ring, Wheel, find_dri
 from tests.robotino import ROBOTINO, twist, wheel_speeds
 
 H = math.sqrt(0.5)
-LEFT = (0.0, 1.0)  # an axle to the left: a positive speed rolls forward
+LEFT = (0.0, 1.0)  # an axle that points left: a positive speed rolls the wheel forward
 small = st.floats(-2.0, 2.0)
 velocities = st.tuples(small, small, small)
 angles = st.floats(-math.pi, math.pi)
@@ -22,12 +22,12 @@ radii = st.floats(0.01, 0.5)
 
 
 def unit(angle):
-    """Return a direction."""
+    """Return the direction at an angle."""
     return math.cos(angle), math.sin(angle)
 
 
 def row(places, radius_m, **changes):
-    """Return plain wheels at these positions that roll forward."""
+    """Return wheels without rollers at these positions, which roll forward."""
     return [Wheel(x_m=x, y_m=y, axle=LEFT, radius_m=radius_m, **changes) for x, y in places]
 
 
@@ -47,7 +47,7 @@ PIONEER_3AT = row([(i * 0.134, j * 0.197) for i in (1, -1) for j in (1, -1)], 0.
 
 @given(speeds=st.tuples(*[st.floats(-140, 140)] * 3), velocity=velocities)
 def test_the_robotino_drives_as_its_sample_controller_says(speeds, velocity):
-    """The general solution must equal the closed form of base.c."""
+    """The general solution must equal the formulas of base.c for this robot."""
     drive = find_drive(ROBOTINO)
 
     assert drive.twist(speeds) == pytest.approx(twist(*speeds), abs=1e-12)
@@ -55,14 +55,17 @@ def test_the_robotino_drives_as_its_sample_controller_says(speeds, velocity):
 
 
 def test_wheel_speeds_are_those_of_the_sample_controller():
-    """In base.c, wheel 0 stands still on the way forward, and the front wheels turn against each other."""
+    """As in base.c, a robot that drives forward turns its front wheels in opposite directions.
+
+    Wheel 0 stands still.
+    """
     assert wheel_speeds(1.0, 0.0, 0.0) == pytest.approx((0.0, -13.7464, 13.7464), abs=1e-4)
     assert wheel_speeds(0.0, 0.0, 1.0) == pytest.approx((-0.1826 / 0.063,) * 3)
 
 
 @given(speed=st.floats(-140, 140))
 def test_mirrored_wheels_drive_exactly_straight(speed):
-    """Rounding must not turn the robot, so it drives straight for hours."""
+    """A rounding error must not turn the robot while it drives straight for hours."""
     drive = find_drive(ROBOTINO)
 
     assert drive.twist((0.0, -speed, speed))[1:] == (0.0, 0.0)
@@ -81,19 +84,19 @@ def test_mirrored_wheels_drive_exactly_straight(speed):
     ],
 )
 def test_tires_in_rows_drive_straight_and_turn(wheels, speeds, expected):
-    """E-puck and Pioneer 3-DX are differential, Pioneer 3-AT is skid-steer."""
+    """E-puck and Pioneer 3-DX have a differential drive, Pioneer 3-AT has four skid-steered wheels."""
     assert find_drive(wheels).twist(speeds) == pytest.approx(expected)
 
 
 def test_six_wheels_are_steered_like_four():
-    """Each side rolls as one; the robot turns about the center of all wheels."""
+    """The wheels of a side have the same speed, and the robot turns about the center of all wheels."""
     rover = row([(i * 0.3, j * 0.25) for i in (1, 0, -1) for j in (1, -1)], 0.1)
 
     assert find_drive(rover).twist((-1.0, 1.0) * 3) == pytest.approx((0.0, 0.0, 0.4))
 
 
 def test_an_axle_that_turns_backward_rolls_the_wheel_backward():
-    """Webots' E-puck has both axles in the same direction; on many users' robots they are opposed."""
+    """Both axles of the E-puck point in the same direction; many users' robots have opposed axles."""
     right = replace(E_PUCK[1], axle=(0.0, -1.0))
 
     assert find_drive([E_PUCK[0], right]).twist((2.0, -2.0)) == pytest.approx((0.04, 0.0, 0.0))
@@ -107,14 +110,14 @@ def test_a_robot_may_drive_along_any_axis():
 
 
 def test_an_axle_ahead_of_the_origin_swings_the_origin_aside():
-    """A left turn about a point 0.1 m ahead moves the origin to the right."""
+    """The robot turns left about a point 0.1 m ahead, so its origin moves to the right."""
     pair = row([(0.1, 0.2), (0.1, -0.2)], 0.05)
 
     assert find_drive(pair).twist((-4.0, 4.0)) == pytest.approx((0.0, -0.1, 1.0))
 
 
 def test_where_tires_and_rollers_are_mixed_the_tires_hold_sideways():
-    """Two tires at the rear and two omnidirectional wheels in front turn about the rear axle."""
+    """Two tires at the rear hold the robot sideways. It turns about the rear axle."""
     front = row([(0.3, 0.2), (0.3, -0.2)], 0.05, roller=(1.0, 0.0))
     rear = row([(0.0, 0.2), (0.0, -0.2)], 0.05)
 
@@ -122,7 +125,7 @@ def test_where_tires_and_rollers_are_mixed_the_tires_hold_sideways():
 
 
 def test_a_parallel_row_of_rollers_turns_about_its_middle():
-    """No force holds it sideways, and none drives it there."""
+    """No wheel holds the robot sideways, and no wheel drives it sideways."""
     wheels = row([(0.3, 0.2), (-0.1, 0.2), (0.3, -0.2), (-0.1, -0.2)], 0.05, roller=(-1.0, 0.0))
 
     assert find_drive(wheels).twist((-4.0, -4.0, 4.0, 4.0)) == pytest.approx((0.0, -0.1, 1.0))
@@ -145,7 +148,7 @@ def test_a_mecanum_robot_drives_in_every_direction(speeds, expected):
 
 
 def test_four_crossed_wheels_move_in_every_direction():
-    """A square has an omnidirectional wheel on each side, with rollers or with low friction."""
+    """Each side of a square has an omnidirectional wheel, which has rollers or low friction."""
     cross = [
         Wheel(x_m=0.2 * c, y_m=0.2 * s, axle=(c, s), radius_m=0.05)
         for c, s in ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))
@@ -166,7 +169,7 @@ def test_four_crossed_wheels_move_in_every_direction():
     velocity=st.tuples(small, small),
 )
 def test_a_pair_of_wheels_follows_all_that_it_can(middle, heading, half, radius, velocity):
-    """Wherever the wheels are, forward speed and rotation are recovered."""
+    """For every position of the wheels, forward speed and rotation are recovered."""
     c, s = unit(heading)
     x, y = middle
     pair = [Wheel(x_m=x - i * half * s, y_m=y + i * half * c, axle=(-s, c), radius_m=radius) for i in (1, -1)]
@@ -192,7 +195,7 @@ def test_a_pair_of_wheels_follows_all_that_it_can(middle, heading, half, radius,
     velocity=velocities,
 )
 def test_a_drive_is_finite_and_gives_back_what_it_can_follow(wheels, velocity):
-    """For any wheels, a motion that they once produced is produced again."""
+    """For all wheels, a motion that the drive has once computed is computed again."""
     drive = find_drive(wheels)
     assume(drive is not None)
 
@@ -207,24 +210,24 @@ def test_a_drive_is_finite_and_gives_back_what_it_can_follow(wheels, velocity):
     [
         [],
         E_PUCK[:1],
-        row([(0.2, 0.0), (-0.2, 0.0)], 0.05),  # a bicycle
+        row([(0.2, 0.0), (-0.2, 0.0)], 0.05),  # one wheel behind the other, as on a bicycle
         [*row([(0.0, 0.1)], 0.05), Wheel(x_m=0.0, y_m=-0.1, axle=(1.0, 0.0), radius_m=0.05)],  # two, crossed
         [replace(wheel, radius_m=0.0) for wheel in E_PUCK],
         [replace(wheel, x_m=math.nan) for wheel in E_PUCK],
         [replace(wheel, y_m=math.inf) for wheel in E_PUCK],
-        [replace(wheel, roller=LEFT) for wheel in E_PUCK],  # rollers about the axle hold nothing
+        [replace(wheel, roller=LEFT) for wheel in E_PUCK],  # rollers about the axle, which transmit no force
         mecanum(0.2, 0.2, 0.05)[:2],
         [replace(it, roller=(it.x_m, it.y_m)) for it in mecanum(H, H, 0.05)],  # all rollers at the middle
-        [Wheel(x_m=1.0, y_m=1.0, axle=unit(i), radius_m=0.1) for i in range(3)],  # all at one position
+        [Wheel(x_m=1.0, y_m=1.0, axle=unit(i), radius_m=0.1) for i in range(3)],  # all wheels at one position
     ],
 )
 def test_wheels_that_cannot_steer_drive_nothing(wheels):
-    """The loader then refuses the robot, or lets its joints turn in the air."""
+    """The loader then rejects the robot, or lets its joints turn without driving the robot."""
     assert find_drive(wheels) is None
 
 
 def test_axles_that_are_parallel_but_for_rounding_are_parallel():
-    """Two degrees of toe make a pair of wheels, not a robot that drives sideways."""
+    """With two degrees of toe, two wheels are still a pair; otherwise the robot would drive sideways."""
     toed = [replace(wheel, axle=unit(math.pi / 2 + i * 0.02)) for i, wheel in enumerate(PIONEER_3AT)]
 
     assert abs(find_drive(toed).twist((1.0, 1.0, 1.0, 1.0))[0]) == pytest.approx(0.11, rel=0.01)
@@ -232,13 +235,13 @@ def test_axles_that_are_parallel_but_for_rounding_are_parallel():
 
 
 def test_no_wheels_do_not_move():
-    """This is the drive of a robot that does not move."""
+    """A robot without wheels has this drive, which never moves it."""
     assert STANDING.twist(()) == (0.0, 0.0, 0.0)
     assert STANDING.wheel_speeds(1.0, 1.0, 1.0) == ()
 
 
 def test_a_ring_of_wheels_that_a_file_rounds_is_exact():
-    """The arena has four digits, but its Robotino drives by the closed form of its own controller."""
+    """The arena's file has four digits. Its Robotino must still drive exactly as by its own controller."""
     rounded = [
         Wheel(
             x_m=round(it.x_m, 4),
@@ -257,14 +260,14 @@ def test_a_ring_of_wheels_that_a_file_rounds_is_exact():
 
 @pytest.mark.parametrize("changed", [{"radius_m": 0.07}, {"x_m": 0.1}, {"axle": (0.6, -0.8)}])
 def test_wheels_that_are_no_ring_are_taken_as_they_are(changed):
-    """A robot may really be built that way."""
+    """A user's robot may really be built with such wheels."""
     assert isinstance(find_drive(ROBOTINO), Ring)
     assert not isinstance(find_drive([ROBOTINO[0], replace(ROBOTINO[1], **changed), ROBOTINO[2]]), Ring)
 
 
 @given(angle=angles, velocity=velocities)
 def test_a_ring_may_be_turned(angle, velocity):
-    """The wheels are the same, in another frame."""
+    """These are the wheels of the Robotino in a turned frame."""
     c, s = math.cos(angle), math.sin(angle)
     turned = [
         replace(
@@ -282,6 +285,6 @@ def test_a_ring_may_be_turned(angle, velocity):
 
 
 def rounded_direction(direction, digits):
-    """Return a direction that is rounded to some digits and has length 1 again."""
+    """Return a direction that is rounded to some digits and scaled to length 1 again."""
     x, y = (round(part, digits) for part in direction)
     return x / math.hypot(x, y), y / math.hypot(x, y)

@@ -1,4 +1,4 @@
-"""`palaestra-stub --check` reports the changes to a world before anything starts."""
+"""`palaestra-stub --check` reports how the stub changes a world, before anything starts."""
 
 import pytest
 
@@ -10,7 +10,7 @@ HEAD = "#VRML_SIM R2023b utf8\n"
 
 @pytest.fixture
 def check(tmp_path, capsys):
-    """`check(world)` returns exit code and lines."""
+    """`check(world)` returns the exit code and the printed lines."""
 
     def run(world, *options):
         path = tmp_path / "my.wbt"
@@ -23,7 +23,7 @@ def check(tmp_path, capsys):
 
 
 def test_a_world_that_can_start_is_described(check):
-    """The report has robots with their drives and devices; no ROS master is needed."""
+    """The report lists the robots with their drives and devices; it needs no ROS master."""
     assert check(builtin("arena")) == (
         0,
         [
@@ -36,7 +36,7 @@ def test_a_world_that_can_start_is_described(check):
 
 
 def test_an_old_world_is_turned_and_the_check_says_so(check):
-    """Such worlds were refused before, but a fifth of public worlds are that old."""
+    """The axes of a fifth of public worlds are so old, and the stub converts them."""
     old = b"#VRML_SIM R2020a utf8\nWorldInfo { } WoodenBox { }"
 
     code, lines = check(old)
@@ -46,7 +46,7 @@ def test_an_old_world_is_turned_and_the_check_says_so(check):
 
 
 def test_stand_ins_and_controllers_that_do_not_run_are_named(check):
-    """Both differ from Webots without an error."""
+    """Stand-ins and controllers that do not run differ from Webots, so the report names both."""
     code, lines = check('E-puck { name "a" controller "patrol" } WoodenBox { } WoodenBox { } Floor { }')
 
     assert code == 0
@@ -57,7 +57,7 @@ def test_stand_ins_and_controllers_that_do_not_run_are_named(check):
 
 
 def test_all_that_the_stub_lacks_is_listed_at_once(check):
-    """The exit code is 2, as for a start."""
+    """The exit code is 2, as it would be at a start."""
     code, lines = check('Colosseum { }\nRobot { controller "ros" children [ Minotaur { } ] }\nColosseum { }')
 
     assert code == 2
@@ -77,12 +77,12 @@ def test_devices_without_readings_are_named(check):
 
 
 def test_a_name_that_the_sidecar_puts_in_is_not_missed(check):
-    """Most worlds for the ros controller lack it."""
+    """The sidecar adds `--name`, which most worlds with the controller ros lack."""
     assert check('Robot { controller "ros" }')[0] == 0
 
 
 def test_a_node_that_uses_itself_ends_in_one_sentence(check):
-    """It raised a RecursionError before."""
+    """Before, a node that uses itself caused a RecursionError."""
     code, lines = check("DEF A Group { children [ USE A ] }")
 
     assert (code, len(lines)) == (2, 1)
@@ -90,7 +90,7 @@ def test_a_node_that_uses_itself_ends_in_one_sentence(check):
 
 
 def test_nodes_that_double_end_in_one_sentence(check, monkeypatch):
-    """Sixty such lines would be 2 to the 60th nodes."""
+    """Sixty such lines would make 2 to the 60th nodes."""
     monkeypatch.setattr("palaestra_sim.scene.nodes.instantiate.MAX_NODES", 500)
     lines = [
         f"DEF A{level} Group {{ children [ USE A{level - 1} USE A{level - 1} ] }}" for level in range(1, 60)
@@ -103,7 +103,7 @@ def test_nodes_that_double_end_in_one_sentence(check, monkeypatch):
 
 
 def test_a_link_to_a_device_is_not_read(tmp_path, capsys):
-    """/dev/zero has no end."""
+    """A link may lead to /dev/zero, which has no end."""
     (tmp_path / "my.wbt").symlink_to("/dev/zero")
 
     assert main([str(tmp_path / "my.wbt"), "--check"]) == 2
@@ -111,7 +111,7 @@ def test_a_link_to_a_device_is_not_read(tmp_path, capsys):
 
 
 def test_stand_ins_that_are_no_text_are_refused(check, tmp_path):
-    """The table may be a device without an end, or be saved by another editor."""
+    """The table may be a link to a device without an end, or be saved in another encoding."""
     endless, latin = tmp_path / "endless.toml", tmp_path / "latin.toml"
     endless.symlink_to("/dev/zero")
     latin.write_bytes("# Stühle".encode("latin-1"))
@@ -121,7 +121,7 @@ def test_stand_ins_that_are_no_text_are_refused(check, tmp_path):
 
 
 def test_what_is_left_out_by_choice_is_no_obstacle(check):
-    """The check named --leave-out as the remedy, but printed the same line with it."""
+    """With `--leave-out all` the world can start, so the check must succeed."""
     world = "Colosseum { } Solid { boundingObject Cone { } }"
 
     assert check(world)[0] == 2
@@ -134,7 +134,7 @@ def test_what_is_left_out_by_choice_is_no_obstacle(check):
 
 
 def test_a_field_that_a_proto_does_not_have_is_named_and_no_obstacle(check, tmp_path):
-    """Webots warns about it in the same way."""
+    """Webots also warns about such a field and ignores it."""
     folder = tmp_path / "protos"
     folder.mkdir()
     (folder / "Stool.proto").write_text(f"{HEAD}PROTO Stool [ field SFFloat size 1 ] {{ Solid {{ }} }}")
@@ -146,7 +146,7 @@ def test_a_field_that_a_proto_does_not_have_is_named_and_no_obstacle(check, tmp_
 
 
 def test_a_user_s_stand_ins_count(check, tmp_path):
-    """The check applies to the world as it would start."""
+    """The check describes the world as it would start with the same options."""
     table = tmp_path / "mine.toml"
     table.write_text("[Colosseum]\nflat = true\n")
 
@@ -154,7 +154,7 @@ def test_a_user_s_stand_ins_count(check, tmp_path):
 
 
 def test_a_mistake_is_an_error(check):
-    """Such a world has no description."""
+    """A world with a mistake cannot start, so there is no report on it."""
     code, [line] = check("Solid { translation 1 }")
 
     assert code == 2
@@ -162,7 +162,7 @@ def test_a_mistake_is_an_error(check):
 
 
 def test_values_that_differ_from_webots_are_named(check):
-    """A policy that is trained with these values gets others in Webots."""
+    """A policy that is trained with these values would read other values in Webots."""
     mesh = "IndexedFaceSet { coord Coordinate { point [ 0 0 0, 1 0 0, 1 1 0, 0 0 1 ] } }"
     devices = """DistanceSensor { type "infra-red" } Lidar { numberOfLayers 4 }
         DistanceSensor { name "up" type "Sonar" rotation 0 1 0 -1 } Gyro { }

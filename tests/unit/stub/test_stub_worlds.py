@@ -1,4 +1,4 @@
-"""Users' worlds: PROTOs, stand-ins, robots by geometry, and left-out parts."""
+"""Users' worlds: PROTOs, stand-ins, robots whose drive follows from geometry, and left-out nodes."""
 
 import math
 
@@ -36,7 +36,7 @@ def load_world(text, *protos, stand_ins=None, leave_out=None):
 
 
 def obstacles(simulation):
-    """Return kind, x, y and size of each obstacle, rounded to millimeters."""
+    """Return the shape, x, y and size of each obstacle, rounded to millimeters."""
     found = []
     for shape in simulation.scene.solids:
         x, y, _ = shape.pose.position
@@ -45,7 +45,7 @@ def obstacles(simulation):
 
 
 def test_an_instance_of_a_proto_has_its_values_or_the_defaults():
-    """`IS` uses the value of the instance first."""
+    """`IS` takes the value of the instance, or else the default of the PROTO."""
     simulation = load_world("Stool { translation 1 2 0 } Stool { radius 0.1 }", STOOL)
 
     assert obstacles(simulation) == [
@@ -55,7 +55,7 @@ def test_an_instance_of_a_proto_has_its_values_or_the_defaults():
 
 
 def test_a_proto_may_be_made_of_protos_and_take_nodes():
-    """Nested values are read in the file in which they were written."""
+    """A value is read in the file in which it was written, however deeply PROTOs are nested."""
     perch = """PROTO Perch [ field SFFloat wide 0.3 ] { Pose { translation 5 0 0 children [
       Stool { radius IS wide parts [ DEF TOP Stool { radius 0.7 } ] } ] } }"""
     simulation = load_world("DEF A Perch { wide 0.6 }", STOOL, perch)
@@ -67,7 +67,7 @@ def test_a_proto_may_be_made_of_protos_and_take_nodes():
 
 
 def test_two_instances_are_nodes_of_their_own():
-    """Each has its own id and frame, and the position of its instance in the file."""
+    """Each instance has its own number and frame, and its own position in the file."""
     simulation = load_world("DEF A Stool { } DEF B Stool { }", STOOL)
     a, b = (simulation.tree.of_def(name) for name in "AB")
 
@@ -77,7 +77,7 @@ def test_two_instances_are_nodes_of_their_own():
 
 
 def test_a_def_inside_of_a_proto_is_found_through_its_instance():
-    """Each instance has its own node of that name."""
+    """Each instance has its own node with that DEF."""
     tree = load_world("DEF A Stool { } DEF B Stool { }", STOOL).tree
     seats = [tree.of_def("SEAT", tree.of_def(name)) for name in ("A", "B")]
 
@@ -86,9 +86,9 @@ def test_a_def_inside_of_a_proto_is_found_through_its_instance():
 
 
 def test_a_field_that_a_proto_does_not_have_is_ignored_and_named():
-    """Webots warns: fields change with its releases, and exporters are late.
+    """Webots warns too: fields change with its releases, and exporters write old ones.
 
-    The warning also shows a typo.
+    The warning also helps to find a typo.
     """
     simulation = load_world("Stool { colour 1 }", STOOL)
 
@@ -97,13 +97,13 @@ def test_a_field_that_a_proto_does_not_have_is_ignored_and_named():
 
 
 def test_a_proto_inside_itself_ends():
-    """Such files are refused earlier, but a table of descriptions may still have such a PROTO."""
+    """Files with such a PROTO are rejected earlier, but a table of PROTOs may still contain one."""
     with pytest.raises(WorldError, match="PROTOs are nested more than 20 deep"):
         load_world("Loop { }", "PROTO Loop [ ] { Group { children [ Loop { } ] } }")
 
 
 def test_protos_that_double_at_each_level_end(monkeypatch):
-    """Twenty levels would be a million nodes, so the world is refused."""
+    """Twenty such levels would make a million nodes, so the world is rejected."""
     monkeypatch.setattr(instantiate, "MAX_NODES", 1000)
 
     with pytest.raises(WorldError, match="the world has more than 1000 nodes"):
@@ -118,13 +118,13 @@ def test_protos_that_double_at_each_level_end(monkeypatch):
     ],
 )
 def test_a_number_of_rays_that_is_a_slip_is_refused(sensor, fact):
-    """Otherwise the start would silently take minutes."""
+    """With too many rays the start would take minutes, without any message."""
     with pytest.raises(WorldError, match=fact):
         load_world(f'Robot {{ controller "ros" children [ {sensor} ] }}', leave_out=LeaveOut(names=True))
 
 
 def test_a_stand_in_has_the_size_of_its_instance_and_can_be_moved():
-    """Rays and robots meet a crate where a supervisor has moved it."""
+    """Rays and robots meet the crate at the position to which a supervisor has moved it."""
     simulation = load_world('DEF BOX WoodenBox { translation 1 2 0.3 size 1 1 0.6 name "b" }')
     node = simulation.tree.of_def("BOX")
 
@@ -136,21 +136,21 @@ def test_a_stand_in_has_the_size_of_its_instance_and_can_be_moved():
 
 
 def test_a_stand_in_stands_where_its_proto_would_without_a_translation():
-    """The origin of a crate is in its center, and the default puts it on the floor."""
+    """The origin of a crate is its center, and its default translation puts it on the floor."""
     simulation = load_world("OilBarrel { }")
 
     assert simulation.scene.solids[0].heights() == pytest.approx((0.0, 0.88))
 
 
 def test_a_user_s_stand_in_comes_before_one_that_ships():
-    """The users have measured their own crate."""
+    """A user may have measured a crate that differs from the built-in one."""
     own = {**shipped(), **load("[WoodenBox]\nsphere = 0.5", "mine.toml")}
 
     assert obstacles(load_world("WoodenBox { }", stand_ins=own))[0][0] == "ball"
 
 
 def test_a_robot_for_ros_is_never_replaced_by_a_stand_in():
-    """A client would wait for the robot for ever."""
+    """A client would wait for the replaced robot for ever."""
     own = load("[Rover]\nbox = [1, 1, 1]", "mine.toml")
 
     assert obstacles(load_world("Rover { }", stand_ins=own))
@@ -160,7 +160,7 @@ def test_a_robot_for_ros_is_never_replaced_by_a_stand_in():
 
 @pytest.mark.parametrize("leave_out", [LeaveOut(everything=True), LeaveOut(types=frozenset({"Colosseum"}))])
 def test_what_is_left_out_is_not_there_and_is_reported(leave_out):
-    """The log has one line for each, with its position."""
+    """The log has a line for each left-out node, with the position of the node."""
     simulation = load_world("Colosseum { } WoodenBox { }", leave_out=leave_out)
 
     assert len(simulation.scene.solids) == 1
@@ -170,7 +170,7 @@ def test_what_is_left_out_is_not_there_and_is_reported(leave_out):
 
 
 def test_what_could_be_simulated_is_never_left_out():
-    """`--leave-out WoodenBox` is not a way to remove crates."""
+    """`--leave-out WoodenBox` does not remove crates, because the stub can simulate them."""
     simulation = load_world("WoodenBox { }", leave_out=LeaveOut(everything=True))
 
     assert len(simulation.scene.solids) == 1
@@ -178,13 +178,13 @@ def test_what_could_be_simulated_is_never_left_out():
 
 
 def test_a_mistake_is_refused_even_if_everything_may_be_left_out():
-    """A translation of two numbers is wrong for every simulator."""
+    """A translation of two numbers is wrong in every simulator."""
     with pytest.raises(WorldError, match=r"Solid\.translation is not 3 numbers"):
         load_world("Solid { translation 1 2 }", leave_out=LeaveOut(everything=True))
 
 
 def test_a_stand_in_that_leans_has_the_outline_of_one_that_stands():
-    """In saved worlds crates have tumbled by a few degrees, and the shape is simplified anyway."""
+    """In saved worlds, crates often lean by a few degrees, and a stand-in is a simplified shape anyway."""
     (shape,) = load_world("CardboardBox { size 0.6 0.4 0.5 rotation 1 0 0 0.1 }").scene.solids
     outline = obstacle(shape)
 
@@ -192,7 +192,10 @@ def test_a_stand_in_that_leans_has_the_outline_of_one_that_stands():
 
 
 def test_a_robot_of_webots_stands_still_unless_a_client_drives_it():
-    """Its own controller does not run here; with the controller "ros" a client would look for its motors."""
+    """The robot's own controller does not run here.
+
+    With controller ros, a client would use motors that are missing.
+    """
     (shape,) = load_world('Nao { translation 1 0 0.3 controller "soccer" }').scene.solids
     assert shape.pose.position[:2] == (1.0, 0.0)
 
@@ -201,28 +204,28 @@ def test_a_robot_of_webots_stands_still_unless_a_client_drives_it():
 
 
 def test_a_ceiling_is_in_nobody_s_way():
-    """A Plane that faces down is not an obstacle."""
+    """A Plane that faces down is a ceiling and not an obstacle."""
     roof = "Solid { translation 0 0 2.4 rotation 1 0 0 3.14 boundingObject Plane { } }"
 
     assert load_world(roof).scene.solids == []
 
 
 def test_a_loose_crate_that_is_left_out_is_nowhere():
-    """Webots would let a robot push it, so it must not be fixed here."""
+    """A robot could push the crate in Webots, so the stub must not keep it as a fixed obstacle."""
     crate = 'Solid { name "crate" physics Physics { } boundingObject Box { } }'
 
     assert load_world(crate, leave_out=LeaveOut(types=frozenset({"Solid"}))).scene.solids == []
 
 
 def test_a_device_without_a_robot_is_a_solid():
-    """Users have cameras on tripods in their worlds; nobody reads them, but a robot can hit them."""
+    """Users put cameras on tripods; nobody reads these cameras, but a robot can hit the tripod."""
     tripod = "Pose { translation 1 0 0 children [ Camera { boundingObject Box { size 0.1 0.1 1 } } ] }"
 
     assert obstacles(load_world(tripod)) == [("box", 1.0, 0.0, (0.1, 0.1, 1.0))]
 
 
 def test_a_second_device_of_a_name_can_be_left_out():
-    """Webots starts such worlds, and finds the first device by that name."""
+    """Webots starts such a world, and finds the first device by that name."""
     robot = 'Robot { controller "ros" children [ GPS { } Pose { translation 0 0 1 children [ GPS { } ] } ] }'
     simulation = load_world(robot, leave_out=LeaveOut(everything=True, names=True))
 
@@ -236,24 +239,24 @@ DOOR = """Pose { translation 1 0 0 children [ HingeJoint { endPoint Solid { tran
 
 
 def test_a_door_on_a_hinge_without_physics_stands_where_it_is():
-    """Nothing moves it in Webots either."""
+    """A door without physics does not move in Webots either."""
     assert obstacles(load_world(DOOR % "")) == [("box", 1.0, 2.0, (1.0, 0.1, 2.0))]
 
 
 def test_a_door_that_swings_is_refused():
-    """A robot would push it open in Webots."""
+    """A robot in Webots would push the door open."""
     with pytest.raises(WorldError, match="a Solid with physics moves when it is pushed"):
         load_world(DOOR % "physics Physics { }")
 
 
 def test_a_conveyor_belt_is_refused():
-    """It would move the objects on it in Webots."""
+    """A conveyor belt in Webots moves the objects on it."""
     with pytest.raises(WorldError, match="a Track with devices moves the objects on it"):
         load_world("Track { device [ LinearMotor { } ] boundingObject Box { } }")
 
 
 def test_the_cylinders_of_an_old_proto_stand_along_its_y_axis():
-    """Webots turns cylinders when it loads the file; a box and a stand-in have no such axis."""
+    """As in Webots, cylinders of an old file are turned. Boxes and stand-ins have no such axis."""
     post = "PROTO Post [ ] { Solid { boundingObject Cylinder { radius 0.1 height 2 } } }"
     old = parse_proto(f"#VRML_SIM R2021b utf8\n{post}".encode(), "Post.proto")
     simulation = Simulation.of(
@@ -291,7 +294,7 @@ BOX = "Solid { translation 1 0 0 boundingObject Box { size 1 2 3 } }"
     ],
 )
 def test_a_scale_makes_what_is_in_a_transform_larger(world, found):
-    """This holds for positions and sizes, also of a Solid from before R2023a."""
+    """Positions and sizes are scaled, also those of a Solid from before R2023a."""
     assert obstacles(load_world(world)) == [found]
 
 
@@ -315,7 +318,7 @@ def test_a_scale_makes_what_is_in_a_transform_larger(world, found):
     ],
 )
 def test_a_scale_that_the_stub_cannot_follow_is_refused(world, fact):
-    """The node can be left out, and then no part of it exists."""
+    """A user can leave out the node, and then none of its parts exists."""
     with pytest.raises(WorldError, match=fact):
         load_world(world, leave_out=LeaveOut(names=True))
 
@@ -323,14 +326,14 @@ def test_a_scale_that_the_stub_cannot_follow_is_refused(world, fact):
 
 
 def test_the_scale_of_a_stand_in_is_a_field_of_its_own():
-    """Some PROTOs have a field of that name with one number."""
+    """Some PROTOs have a field `scale` of one number, which is not the scale of a Transform."""
     own = load("[Bush]\nfields = 'SFFloat scale 1'\nbox = ['scale', 1, 1]", "mine.toml")
 
     assert obstacles(load_world("Bush { scale 3 }", stand_ins=own)) == [("box", 0.0, 0.0, (3.0, 1.0, 1.0))]
 
 
 def test_a_mesh_as_a_bounding_object_is_refused_by_name_and_can_be_left_out():
-    """The file that it names is never read."""
+    """The stub rejects the node by its type, without reading the mesh file."""
     world = 'Solid { boundingObject Mesh { url "gone.dae" } } Solid { boundingObject Box { } }'
     with pytest.raises(WorldError, match="the stub simulates no Mesh as a boundingObject"):
         load_world(world)
@@ -339,7 +342,7 @@ def test_a_mesh_as_a_bounding_object_is_refused_by_name_and_can_be_left_out():
 
 
 def drive(simulation, seconds, **speeds):
-    """Turn the motors of the only robot at these speeds in rad/s, and return its new position."""
+    """Turn the motors of the only robot at these speeds in rad/s, and return the robot's new position."""
     (robot,) = simulation.robots
     for name, motor in robot.motors.items():
         if name.replace(" ", "_") in speeds:
@@ -365,7 +368,7 @@ def drive(simulation, seconds, **speeds):
     ],
 )
 def test_robots_of_webots_drive_by_their_wheels(robot, left, right, radius, track):
-    """The motion follows from the radius of the wheels and the distance between them."""
+    """The motion follows from the radius of the wheels and from the distance between them."""
     straight = drive(load_world(f"{robot} {{ }}"), 0.8, **dict.fromkeys([*left, *right], 1.0))
     assert straight.x == pytest.approx(0.8 * radius, rel=0.02)
     assert straight.y == pytest.approx(0.0, abs=1e-6)
@@ -376,21 +379,21 @@ def test_robots_of_webots_drive_by_their_wheels(robot, left, right, radius, trac
 
 
 def test_a_robotino_of_webots_drives_as_the_one_of_the_arena():
-    """Its wheels have a radius of 0.063 m and are 120 degrees apart."""
+    """The PROTO's wheels have a radius of 0.063 m and are 120 degrees apart."""
     body = drive(load_world("Robotino3 { }"), 0.8, wheel0_joint=0.0, wheel1_joint=-1.0, wheel2_joint=1.0)
 
     assert body.x == pytest.approx(0.8 * 0.063 / math.sqrt(0.75), rel=0.01)
 
 
 def test_a_robot_that_no_client_reaches_needs_no_device_of_the_table():
-    """Its own controller does not run here, so it is only an obstacle."""
+    """The robot's own controller does not run here, so the robot is only an obstacle."""
     statue = 'Robot { controller "patrol" children [ Radar { } ] boundingObject Box { size 1 1 1 } }'
 
     assert load_world(statue).robots[0].body.radius > 0.4
 
 
 def test_a_world_in_a_project_finds_its_protos(ros, tmp_path):
-    """Their addresses are relative to the folder of the world."""
+    """The addresses of the PROTOs are relative to the folder of the world."""
     (tmp_path / "protos").mkdir()
     (tmp_path / "worlds").mkdir()
     (tmp_path / "protos" / "Stool.proto").write_text(HEAD + STOOL)
@@ -428,7 +431,7 @@ ARM = """Robot { name "arm" children [ HingeJoint {
 
 
 def test_a_lidar_of_webots_can_be_mounted_on_any_robot():
-    """Its PROTO is bundled, with the rays of the real one."""
+    """The lidar's PROTO is bundled, with the rays of the real device."""
     robot = 'Robot { controller "ros" controllerArgs [ "--name=r" "--synchronize" ] children [ Sick { } ] }'
     (found,) = load_world(robot.replace("Sick", "SickLms291")).robots
 
@@ -437,7 +440,7 @@ def test_a_lidar_of_webots_can_be_mounted_on_any_robot():
 
 
 def test_a_joint_begins_at_its_position_and_ends_at_its_stop():
-    """The pose in the file is that at the joint's position in the file."""
+    """The pose of the end in the file belongs to the joint's position in the file."""
     simulation = load_world(ARM)
     (robot,) = simulation.robots
     tip = simulation.tree.of_def("TIP")

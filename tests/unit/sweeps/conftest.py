@@ -1,4 +1,4 @@
-"""Sweeps as users write them, and the figures of trials."""
+"""Builders of sweeps, as users write them, and of results of trials."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -16,7 +16,7 @@ JOB = make_job("j")
 
 @pytest.fixture
 def sweep(tmp_path: Path) -> Callable[..., Sweep]:
-    """Return a builder of sweeps with these fields."""
+    """Return a builder of sweeps; its keywords are fields of the spec."""
 
     def make(**spec: Any) -> Sweep:
         file = tmp_path / "sweep.yaml"
@@ -30,7 +30,7 @@ def sweep(tmp_path: Path) -> Callable[..., Sweep]:
 def figures(
     *curves: dict[int, float], ended: bool = True, succeeded: bool = True, reason: str = ""
 ) -> TrialFigures:
-    """Return the figures of a trial whose runs have these success rates by step."""
+    """Return the results of a trial whose runs have these success rates by step."""
     return TrialFigures.of(
         tuple(
             RunFigures(

@@ -1,4 +1,4 @@
-"""The trials of a Sweep come from a pure function."""
+"""The trials of a Sweep follow from the file alone, by a pure function."""
 
 import math
 from itertools import product
@@ -18,13 +18,13 @@ SHARES = st.floats(0, 1, exclude_max=True)
 
 
 def plain(**spec):
-    """Return a sweep without a file."""
+    """Return a sweep that was not read from a file."""
     return Sweep(metadata=SweepName(name="s"), spec=SweepSpec(job=JOB, **spec))
 
 
 @given(st.dictionaries(st.sampled_from(["seed", "trainer.steps", "replicas"]), VALUES, min_size=1))
 def test_a_matrix_is_every_combination_once_in_the_order_of_the_file(matrix) -> None:
-    """The number of a trial must always mean the same values."""
+    """A person compares trials by number, so the same number must always have the same values."""
     found = list(settings(plain(matrix={field: tuple(values) for field, values in matrix.items()})))
 
     assert [tuple(point.values()) for point in found] == list(product(*matrix.values()))
@@ -33,7 +33,7 @@ def test_a_matrix_is_every_combination_once_in_the_order_of_the_file(matrix) -> 
 
 @given(st.integers(1, 10**9), st.integers(1, 10**9), SHARES, st.booleans())
 def test_what_is_drawn_from_a_range_lies_in_it(low, more, share, log) -> None:
-    """Integers stay integers, and other numbers are not rounded."""
+    """An integer stays an integer, and other numbers are not rounded."""
     whole = drawn(Distribution(low=low, high=low + more, log=log), share)
     real = drawn(Distribution(low=float(low), high=float(low + more), log=log), share)
 
@@ -45,12 +45,12 @@ def test_what_is_drawn_from_a_range_lies_in_it(low, more, share, log) -> None:
 
 @given(st.lists(st.integers(), min_size=1), SHARES)
 def test_a_choice_is_one_of_its_values(choice, share) -> None:
-    """All values have the same probability."""
+    """Each value of the list has the same probability."""
     assert drawn(Distribution(choice=tuple(choice)), share) in choice
 
 
 def test_chance_is_uniform_and_repeats() -> None:
-    """The values are the same on every machine and with every Python."""
+    """A sweep has the same trials on every machine and in every release of Python."""
     drawn_numbers = [chance(1, number, "seed") for number in range(2000)]
 
     assert drawn_numbers[0] == chance(1, 0, "seed") == pytest.approx(0.568875, abs=1e-6)
@@ -59,7 +59,7 @@ def test_chance_is_uniform_and_repeats() -> None:
 
 
 def test_more_trials_and_fields_change_no_earlier_value(sweep) -> None:
-    """The number of a finished trial keeps its meaning."""
+    """A sweep may be extended after some trials have ended, whose numbers must keep their values."""
     rate = {RATE: {"low": 1e-5, "high": 1e-2, "log": True}}
     few = list(settings(sweep(random=rate, trials=2)))
     more = list(settings(sweep(random={"seed": {"low": 1, "high": 9}, **rate}, trials=4)))
@@ -69,7 +69,7 @@ def test_more_trials_and_fields_change_no_earlier_value(sweep) -> None:
 
 
 def test_a_trial_is_a_job_with_the_label_and_a_replica_for_each_seed(sweep) -> None:
-    """A cluster can run it unchanged, and list it by the label."""
+    """A cluster can run the job unchanged, and `kubectl` lists the jobs of a sweep by the label."""
     first, second = trials(sweep(matrix={RATE: [1e-3, 1e-4]}, seeds=3))
 
     assert (first.name, second.name) == ("s-0", "s-1")
@@ -79,7 +79,7 @@ def test_a_trial_is_a_job_with_the_label_and_a_replica_for_each_seed(sweep) -> N
 
 
 def test_the_mistakes_of_all_trials_are_reported_at_once(sweep) -> None:
-    """The error comes before the first trial starts; each mistake names the first trial that has it."""
+    """The error comes before the first trial starts, and names the first trial with each mistake."""
     with pytest.raises(SpecErrors) as refused:
         trials(sweep(matrix={"trainer.steps": [1, 0], "seed": [-1, 1]}))
 
@@ -90,7 +90,7 @@ def test_the_mistakes_of_all_trials_are_reported_at_once(sweep) -> None:
 
 
 def test_a_search_is_checked_at_its_bounds(sweep) -> None:
-    """Otherwise Optuna may suggest an invalid value hours later."""
+    """Without this check, Optuna could suggest an invalid value after hours."""
     found = sweep(
         random={"seed": {"low": -1, "high": 9}, "trainer.steps": {"choice": [1, 2, 3]}}, trials=9, optuna={}
     )
@@ -109,5 +109,5 @@ def test_a_search_is_checked_at_its_bounds(sweep) -> None:
     [(["a.b", "a.c"], ["b", "c"]), (["a.b.c", "a.d.c"], ["b.c", "d.c"]), (["c", "a.c"], ["c", "a.c"])],
 )
 def test_a_heading_is_as_short_as_it_can_be(fields, shown) -> None:
-    """With whole paths a table is too wide to read."""
+    """A table whose headings were whole field paths would be too wide for a terminal."""
     assert list(short(fields).values()) == shown

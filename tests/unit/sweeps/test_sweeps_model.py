@@ -1,4 +1,4 @@
-"""The reader of a Sweep reports every mistake in one line with the remedy."""
+"""The reader of a Sweep reports each mistake in one line, with the remedy."""
 
 import pytest
 import yaml
@@ -12,7 +12,7 @@ RANDOM = {"random": {"seed": {"low": 1, "high": 9}}, "trials": 3}
 
 
 def test_the_job_is_inline_or_a_file_beside_the_sweep(sweep, tmp_path):
-    """A sweep and its job can then be moved together."""
+    """A path is relative to the sweep, so a person can move both files together."""
     (tmp_path / "job.yaml").write_text(yaml.safe_dump(JOB))
 
     assert sweep(job="job.yaml", **MATRIX).spec.job == sweep(**MATRIX).spec.job == JOB
@@ -62,7 +62,7 @@ def test_the_job_is_inline_or_a_file_beside_the_sweep(sweep, tmp_path):
     ],
 )
 def test_a_mistake_is_one_line_with_the_remedy(sweep, spec, problem):
-    """A TrainingJob has the same rule."""
+    """The reader of a TrainingJob reports its mistakes in the same way."""
     with pytest.raises(SpecErrors) as refused:
         sweep(**spec)
 
@@ -71,7 +71,7 @@ def test_a_mistake_is_one_line_with_the_remedy(sweep, spec, problem):
 
 
 def test_a_file_of_another_kind_is_refused(tmp_path):
-    """The most likely other file is the job itself."""
+    """A person most likely gives the file of the job by mistake."""
     file = tmp_path / "job.yaml"
     file.write_text(yaml.safe_dump(JOB))
 

@@ -1,4 +1,4 @@
-"""A search with Optuna suggests trials, prunes them, and continues after an interruption."""
+"""A search with Optuna: it suggests trials, prunes them, and continues after an interruption."""
 
 import pytest
 
@@ -11,7 +11,7 @@ SPACE = {"seed": {"low": 1, "high": 99}, "trainer.steps": {"choice": [1000, 2000
 
 @pytest.fixture
 def search(sweep, tmp_path):
-    """Return a function that makes the same search again from its journal."""
+    """Return a function that opens the same search again from its journal."""
 
     def make(trials=4, **optuna):
         return OptunaSearch(
@@ -22,9 +22,9 @@ def search(sweep, tmp_path):
 
 
 def test_a_trial_below_the_median_is_pruned(search) -> None:
-    """It is compared at the same step, with the medians over the seeds."""
+    """The median over the seeds is compared at a step that all seeds have reached."""
     found = search()
-    found.learn(found.next(), figures({5: 0.8}, {5: 0.9}))  # it ended before its first report
+    found.learn(found.next(), figures({5: 0.8}, {5: 0.9}))  # this trial ended before its first report
     other = found.next()
 
     assert not found.hopeless(other, figures({5: 0.1}, {}, ended=False))
@@ -34,7 +34,7 @@ def test_a_trial_below_the_median_is_pruned(search) -> None:
 
 
 def test_nothing_is_pruned_if_the_sweep_does_not_want_it(search) -> None:
-    """Every curve is then complete."""
+    """With `prune: false` each trial runs to its end, so each curve is complete."""
     found = search(prune=False)
     found.learn(found.next(), figures({5: 0.9}))
 
@@ -42,7 +42,10 @@ def test_nothing_is_pruned_if_the_sweep_does_not_want_it(search) -> None:
 
 
 def test_an_interrupted_search_suggests_its_running_trial_again_under_its_number(search) -> None:
-    """The number finds its run directory; after it come new trials, up to the wanted number."""
+    """The run directory is found by the number of the trial.
+
+    New trials follow until the wanted number is reached.
+    """
     first = search()
     done, running = first.next(), first.next()
     first.learn(done, figures({5: 0.9}))
@@ -61,7 +64,7 @@ def test_an_interrupted_search_suggests_its_running_trial_again_under_its_number
 
 
 def test_a_kill_at_any_moment_of_a_restart_loses_no_trial(search, tmp_path) -> None:
-    """The journal is cut after each write of the restart."""
+    """The test cuts the journal after each write of a restart, as a kill at that moment would."""
     first, journal = search(trials=2), tmp_path / JOURNAL
     done, running = first.next(), first.next()
     first.learn(done, figures({5: 0.9}))
@@ -79,7 +82,7 @@ def test_a_kill_at_any_moment_of_a_restart_loses_no_trial(search, tmp_path) -> N
 
 
 def test_a_trial_that_fails_or_has_no_figure_has_no_value(search) -> None:
-    """The search learns nothing from it and continues."""
+    """The search learns nothing from such a trial, and continues with the next one."""
     found = search(trials=3)
     found.learn(found.next(), figures({5: 1.0}, succeeded=False))
     found.learn(found.next(), figures({}))

@@ -1,4 +1,4 @@
-"""The loop of a sweep, with a backend without processes."""
+"""The loop of a sweep, with a backend that starts no processes."""
 
 from collections import Counter
 from dataclasses import replace
@@ -15,7 +15,7 @@ from tests.unit.sweeps.conftest import figures
 
 
 class Stage:
-    """A backend with room for two trials; a trial ends after as many reports as it has steps."""
+    """A backend for two trials at a time; each trial ends after as many reports as it has steps."""
 
     def __init__(self, fails=(), *, success=True):
         self.begun, self.looks, self.most, self._active, self._fails = [], Counter(), 0, set(), fails
@@ -32,10 +32,10 @@ class Stage:
         self.most = max(self.most, len(self._active))
 
     def wait(self):
-        """Return at once."""
+        """Return at once, because no process needs time."""
 
     def look(self, trial):
-        """Return figures; the last report ends the trial."""
+        """Return the results of a trial, which ends with its last report."""
         self.looks[trial.number] += 1
         ended = self.looks[trial.number] == trial.job.spec.trainer.steps
         if ended:
@@ -47,18 +47,18 @@ class Stage:
         return found if self._success else without_success(found)
 
     def prune(self, trial):
-        """Free the room of the trial."""
+        """End a trial early."""
         self._active.discard(trial.number)
 
 
 def without_success(found):
-    """Return figures of the same runs in an environment that reports no success."""
+    """Return results of the same runs, for an environment that reports no success."""
     runs = [replace(run, curve=(replace(run.curve[0], success_rate=None),)) for run in found.runs]
     return replace(found, runs=tuple(runs))
 
 
 def carried_out(sweep, folder, objective=Objective.SUCCESS_RATE, **options):
-    """Run a sweep of three trials, and return the backend, the log and the reported lines."""
+    """Run a sweep of three trials; return the backend, the ended trials and the printed lines."""
     stage, reported = Stage(**options), []
     found = trials(sweep(matrix={"trainer.steps": [3, 1, 2]}))
     carry_out(InTurn(found, trial_log.ended(folder)), stage, folder, objective, reported.append)
@@ -66,7 +66,7 @@ def carried_out(sweep, folder, objective=Objective.SUCCESS_RATE, **options):
 
 
 def test_trials_run_in_order_as_many_as_there_is_room_for(sweep, tmp_path) -> None:
-    """The second trial ends first, and the third starts in its room."""
+    """The second trial ends first, and the third trial starts in its place."""
     stage, ended, reported = carried_out(sweep, tmp_path)
 
     assert (stage.begun, stage.most) == ([0, 1, 2], 2)
@@ -83,7 +83,7 @@ def test_trials_run_in_order_as_many_as_there_is_room_for(sweep, tmp_path) -> No
 
 
 def test_a_trial_that_failed_says_why(sweep, tmp_path) -> None:
-    """A reason of several seeds is shown once, so nobody has to search the logs of every run."""
+    """Several seeds with the same reason show it once, so a person need not search the log of each run."""
     _, _, reported = carried_out(sweep, tmp_path, fails={2})
 
     assert [line for line in reported if "failed" in line] == [
@@ -92,7 +92,7 @@ def test_a_trial_that_failed_says_why(sweep, tmp_path) -> None:
 
 
 def test_a_sweep_of_success_where_there_is_none_ends_with_the_objective_to_write(sweep, tmp_path) -> None:
-    """Otherwise every trial would train for hours, and the table would be empty."""
+    """Without the error, every trial would train for hours, and the table would then be empty."""
     with pytest.raises(
         NoSuccess, match=r"spec\.objective: .* write objective: MeanReturn, or set is_success"
     ):
@@ -104,7 +104,7 @@ def test_a_sweep_of_success_where_there_is_none_ends_with_the_objective_to_write
 
 
 def test_a_sweep_of_success_that_has_ended_without_any_is_refused_too(sweep, tmp_path) -> None:
-    """The same command would print an empty table as if nothing were wrong."""
+    """Without the error, a repeated command would print an empty table as if all were well."""
     carried_out(sweep, tmp_path, Objective.MEAN_RETURN, success=False)
 
     with pytest.raises(NoSuccess):
@@ -112,7 +112,7 @@ def test_a_sweep_of_success_that_has_ended_without_any_is_refused_too(sweep, tmp
 
 
 def test_a_second_time_only_trials_that_failed_are_begun(sweep, tmp_path) -> None:
-    """If a crash has cut the last line, its trial counts as not ended."""
+    """A trial whose last line was truncated by a crash counts as not ended."""
     _, ended, _ = carried_out(sweep, tmp_path, fails={2})
     assert ended[2].state is TrialProgress.FAILED
 

@@ -1,4 +1,4 @@
-"""The result has medians and quartiles over seeds, as text and as a picture."""
+"""The result of a sweep has medians and quartiles over seeds, as a table and as a chart."""
 
 from palaestra.sweeps.model import Objective
 from palaestra.sweeps.plot import draw
@@ -24,7 +24,7 @@ ROWS = [
 
 
 def test_the_table_has_median_and_quartiles_and_the_best_complete_trial() -> None:
-    """A failed trial is never the best one, whatever its figure was."""
+    """A failed trial is never the best trial, whatever its success rate was."""
     assert list(lines(ROWS, RATE)) == [
         "trial  a       b  state     seeds  success rate  quartiles",
         "s-0    0.0001  x  complete  2/2    0.6           0.5 to 0.7",
@@ -37,7 +37,7 @@ def test_the_table_has_median_and_quartiles_and_the_best_complete_trial() -> Non
 
 
 def test_a_curve_goes_as_far_as_all_of_its_seeds() -> None:
-    """A median over the fastest seeds would compare seeds, not settings."""
+    """Beyond that, a median over the fastest seeds would compare seeds instead of settings."""
     found = figures({5: 0.2, 10: 0.4, 15: 1.0}, {4: 0.1, 10: 0.8}, ended=False)
 
     assert found.common(RATE) == {5: 0.15000000000000002, 10: 0.6000000000000001}
@@ -46,7 +46,7 @@ def test_a_curve_goes_as_far_as_all_of_its_seeds() -> None:
 
 
 def test_curves_are_drawn_where_there_are_some(tmp_path) -> None:
-    """A sweep that was interrupted at once has no picture."""
+    """A sweep that was interrupted at once has no curves to plot."""
     assert draw(ROWS, RATE, tmp_path / "curves.png")
     assert not draw(ROWS[3:], RATE, tmp_path / "none.png")
 

@@ -1,4 +1,4 @@
-"""The folder of a sweep belongs to one sweep."""
+"""The folder of a sweep belongs to exactly one sweep."""
 
 import pytest
 
@@ -10,7 +10,7 @@ RANDOM = {"random": {"seed": {"low": 1, "high": 9}}}
 
 
 def test_more_trials_are_the_same_sweep_and_other_values_are_not(sweep, tmp_path) -> None:
-    """A table with results of two sweeps would be useless."""
+    """A table that mixes the results of two sweeps would mislead its reader."""
     folder = tmp_path / "s"
     trial_log.begin(folder, sweep(**RANDOM, trials=3))
     trial_log.begin(folder, sweep(**RANDOM, trials=5))
@@ -24,7 +24,7 @@ def test_more_trials_are_the_same_sweep_and_other_values_are_not(sweep, tmp_path
 def test_another_objective_compares_the_same_trials_unless_optuna_has_learned_from_the_first(
     sweep, tmp_path
 ) -> None:
-    """The correction of the file must not train every trial again."""
+    """A person who corrects the objective in the file must not train all trials again."""
     trial_log.begin(tmp_path / "s", sweep(**RANDOM, trials=3))
     trial_log.begin(tmp_path / "s", sweep(**RANDOM, trials=3, objective="MeanReturn"))
     trial_log.begin(tmp_path / "o", sweep(**RANDOM, trials=3, optuna={}))
@@ -34,7 +34,7 @@ def test_another_objective_compares_the_same_trials_unless_optuna_has_learned_fr
 
 
 def test_a_line_that_a_crash_has_cut_spoils_no_later_one(sweep, tmp_path) -> None:
-    """Otherwise later lines would be appended to it, and the sweep could not continue."""
+    """The next entry must not be appended to the truncated one, or the sweep could not continue."""
     folder = tmp_path / "s"
     trial_log.begin(folder, sweep(**RANDOM, trials=3))
     trial_log.note(folder, 0, TrialFigures(state=TrialProgress.COMPLETE))

@@ -7,7 +7,7 @@ ACTUATOR = '<actuator><motor joint="hinge"/></actuator>'
 
 
 def test_only_models_with_an_actuator_count_and_a_refused_one_is_named(tmp_path, capsys):
-    """Parts of models and files that MuJoCo refuses do not count."""
+    """A model without an actuator is a part of another model, and is not counted."""
     skin = tmp_path / "skin.png"
     texture = f'<asset><texture type="2d" file="{skin}" width="1" height="1" builtin="flat"/></asset>'
     for name, text in {"good": BODY + ACTUATOR, "part": BODY, "bad": texture + BODY + ACTUATOR}.items():

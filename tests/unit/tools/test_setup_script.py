@@ -1,4 +1,4 @@
-"""What `make setup` and `make test` do for somebody who may not install packages of the distribution."""
+"""`make setup` and `make test` for a person who may not install packages of the distribution."""
 
 import os
 import re
@@ -25,7 +25,7 @@ NOBODY = ("setpriv", "--reuid", "65534", "--clear-groups")
 
 @pytest.fixture
 def checkout():
-    """A folder with the scripts alone, that anybody may write into, and modules that cannot be imported."""
+    """Yield a folder with the scripts, writable for everyone, and with modules that cannot be imported."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder)
         (path / "modules").mkdir()
@@ -60,7 +60,7 @@ def checkout():
     ],
 )
 def test_without_root_it_prints_the_one_line_to_type_and_stops(checkout, script, lines):
-    """Nothing is installed behind the back of a person, and nothing is half done; ROS is for tests alone."""
+    """The scripts install nothing without the person's knowledge. Only the tests need ROS."""
     before = sorted(checkout.rglob("*"))
 
     done = subprocess.run(
@@ -116,7 +116,7 @@ EDITABLE = "pip install --quiet --no-deps --no-build-isolation -e operator -e tr
 
 @pytest.fixture
 def set_up(tmp_path):
-    """`set_up(TORCH_INDEX=...)`: what setup.sh prints, and the commands of a uv that installs nothing."""
+    """`set_up(TORCH_INDEX=...)` returns the output of setup.sh and the commands of a fake `uv`."""
     (tmp_path / "tools").mkdir()
     (tmp_path / ".venv/bin").mkdir(parents=True)
     shutil.copy(TOOLS / "setup.sh", tmp_path / "tools/setup.sh")
@@ -147,7 +147,10 @@ def set_up(tmp_path):
 
 
 def test_the_size_of_the_download_is_said_before_it_begins(set_up):
-    """On a slow line 3 GB take an hour, and the page has a smaller PyTorch for machines without a GPU."""
+    """On a slow line, 3 GB take an hour.
+
+    The page that is named has a smaller PyTorch for machines without a GPU.
+    """
     printed, commands = set_up()
 
     assert "3 GB to download" in printed
@@ -156,7 +159,7 @@ def test_the_size_of_the_download_is_said_before_it_begins(set_up):
 
 
 def test_with_an_index_pytorch_comes_from_there_and_cuda_is_left_out(set_up, tmp_path):
-    """Nothing else comes from that index, and the rest keeps its hashes."""
+    """Only PyTorch comes from that index; all other packages keep their hashes."""
     printed, commands = set_up(TORCH_INDEX=INDEX)
 
     assert f"torch==2.6.0 from {INDEX} (a build for the processor alone is 0.2 GB)" in printed
@@ -170,7 +173,7 @@ def test_with_an_index_pytorch_comes_from_there_and_cuda_is_left_out(set_up, tmp
 
 
 def test_the_index_is_kept_and_cuda_is_removed(set_up, tmp_path):
-    """A later `make setup` without the variable must not bring 3 GB back; nor may they stay."""
+    """A later `make setup` without the variable must neither keep CUDA nor download its 3 GB again."""
     (tmp_path / "freeze.txt").write_text(
         "nvidia-nccl-cu12==2.21.5\nnumpy==2.0.0\ntorch==2.6.0\ntriton==3.2.0\n"
     )
@@ -183,7 +186,7 @@ def test_the_index_is_kept_and_cuda_is_removed(set_up, tmp_path):
 
 
 def test_make_installs_again_only_for_another_index(set_up, tmp_path):
-    """The variable may be set for good, and `make run` starts at once."""
+    """A person may set the variable permanently, and `make run` must still start at once."""
     for package in ("operator", "trainer", "sim_image"):
         (tmp_path / package).mkdir()
         (tmp_path / package / "pyproject.toml").touch()
@@ -200,7 +203,7 @@ def test_make_installs_again_only_for_another_index(set_up, tmp_path):
 
 
 def test_the_page_names_the_pytorch_of_the_lock():
-    """A person who types the command of the page gets the version that the trainer asks for."""
+    """The command on the page must install the version that the trainer requires."""
     root = TOOLS.parent
 
     named = re.findall(r"torch==[0-9.]+", (root / "docs/start/laptop.md").read_text())

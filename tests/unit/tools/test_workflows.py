@@ -1,4 +1,4 @@
-"""The actions that the workflows use are fixed versions that somebody has reviewed."""
+"""Workflows use only reviewed versions of actions."""
 
 import re
 from pathlib import Path
@@ -7,7 +7,7 @@ WORKFLOWS = Path(__file__).parents[3] / ".github" / "workflows"
 
 
 def test_every_action_is_named_by_a_commit_and_its_release():
-    """A tag can be moved to another commit, and an action can read whatever its workflow can."""
+    """A tag can be moved to another commit, and an action can read all that its workflow can read."""
     uses = [
         line.split("uses:", 1)[1].strip()
         for path in WORKFLOWS.glob("*.yaml")

@@ -1,4 +1,4 @@
-"""The count of other people's worlds: which are counted, and what of them."""
+"""The count of public worlds that start in a simulator."""
 
 import pytest
 
@@ -13,19 +13,22 @@ ARM = "HingeJoint { device [ RotationalMotor { } PositionSensor { } ] endPoint S
 
 @pytest.fixture
 def folder(tmp_path):
-    """Return the folder of a project with worlds."""
+    """Return the folder of a project with an empty folder `worlds`."""
     (tmp_path / "worlds").mkdir()
     return tmp_path
 
 
 def count(folder, capsys):
-    """Return the last line of the count with the stub."""
+    """Return the exit code and the printed lines of the count with the stub."""
     code = main([str(folder), "--simulator", "palaestra-stub"])
     return code, capsys.readouterr().out.splitlines()
 
 
 def test_robots_get_the_controller_ros_and_equal_worlds_count_once(folder, capsys):
-    """A robot that keeps a motor and a sensor can be trained; a part of a world is not a world."""
+    """A world counts as trainable if a robot keeps a motor and a sensor.
+
+    A file without a world's header is not counted.
+    """
     worlds = {
         "arm.wbt": WORLD.replace("CONTROLLER", "mine").replace("PARTS", ARM),
         "arm again.wbt": WORLD.replace("CONTROLLER", "mine").replace("PARTS", ARM),

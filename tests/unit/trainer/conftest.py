@@ -1,4 +1,4 @@
-"""A corridor to walk in, members that break at chosen steps, and runs with them."""
+"""A corridor as environment, simulators that break at chosen steps, and runs with them."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ ALGORITHMS = {
 
 @pytest.fixture(autouse=True)
 def scratch(monkeypatch, tmp_path):
-    """Keep Stable-Baselines3's folders in the test's folder: without a logger it makes one per `learn`."""
+    """Keep Stable-Baselines3's folders in the test's folder; without a logger it makes one per `learn`."""
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
 
 
@@ -54,10 +54,10 @@ def clock() -> Clock:
 
 
 class Corridor(gymnasium.Env[np.ndarray, Any]):
-    """Walk right (1) to the goal, three steps away; left (0) leads nowhere, for eight steps.
+    """A corridor: right (1) leads to the goal, three steps away; left (0) leads nowhere, for eight steps.
 
-    The observation is the position and the seed's last digit, both over 10. The info says by `report`
-    whether an episode that reached the goal, or did not, succeeded; `report` may be replaced.
+    The observation is the position and the seed's last digit, both divided by 10. `report` returns the info's
+    entry about success, from the seed and whether the goal was reached; a test may replace it.
     """
 
     observation_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
@@ -73,7 +73,7 @@ class Corridor(gymnasium.Env[np.ndarray, Any]):
         }
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None):
-        """Begin an episode."""
+        """Begin an episode, or break."""
         super().reset(seed=seed)
         self._member.take_reset()
         self.seeds.append(seed)
@@ -83,7 +83,7 @@ class Corridor(gymnasium.Env[np.ndarray, Any]):
         return self._observe(), {"seed": seed}
 
     def step(self, action: Any):
-        """Walk one step."""
+        """Take a step in the corridor, or break."""
         self._member.take_step()
         self._steps += 1
         self._position += 1 if np.asarray(action).item() > 0.5 else -1
@@ -102,10 +102,10 @@ class Corridor(gymnasium.Env[np.ndarray, Any]):
 
 
 class FakeMember:
-    """A member that breaks at chosen steps, resets and starts, counted from 1 over its life.
+    """A simulator that breaks at chosen steps, resets and starts, each counted from 1 over its whole life.
 
-    It is due to be recycled after so many resets as `recycle_after` says. Where `held`, a restart waits until
-    `release` is set, or fails once it is abandoned.
+    After `recycle_after` resets it is due to be recycled. With `held`, a restart waits until `release` is
+    set, and fails if the simulator is abandoned.
     """
 
     def __init__(
@@ -131,7 +131,7 @@ class FakeMember:
         self._counts = dict.fromkeys(self._faults, 0)
 
     def due(self, episodes: int = 1) -> str | None:
-        """Return the reason to recycle the member, or None."""
+        """Return the reason to recycle the simulator, or None."""
         worn = self._recycle_after is not None and self.resets + episodes > self._recycle_after
         return f"{self.resets} resets" if worn else None
 
@@ -142,7 +142,7 @@ class FakeMember:
         self.resets = 0
 
     def stop(self) -> None:
-        """Log the call."""
+        """Record the call."""
         self.log.append("stop")
 
     def restart(self) -> None:
@@ -155,24 +155,24 @@ class FakeMember:
         self.resets = 0
 
     def abandon(self) -> None:
-        """Make a held restart fail."""
+        """Let a held restart fail."""
         self._abandoned = True
         self.release.set()
 
     def pause(self) -> None:
-        """Log the call."""
+        """Record the call."""
         self.log.append("pause")
 
     def unpause(self) -> None:
-        """Log the call."""
+        """Record the call."""
         self.log.append("run")
 
     def take_step(self) -> None:
-        """Count a step, or break."""
+        """Count a step, and break if a fault is set for it."""
         self._take("step")
 
     def take_reset(self) -> None:
-        """Count a reset, or break."""
+        """Count a reset, and break if a fault is set for it."""
         self._take("reset")
         self.resets += 1
 
@@ -189,13 +189,13 @@ class FakeMember:
 
 @pytest.fixture
 def make_member() -> Callable[..., FakeMember]:
-    """Make a member of the corridor."""
+    """Return a function that makes a simulator of the corridor."""
     return FakeMember
 
 
 @pytest.fixture
 def make_configuration(tmp_path: Path) -> Callable[..., Configuration]:
-    """Make a configuration; a test passes the fields that matter, with their names in the file."""
+    """Return a function that makes a configuration; its keywords are fields of the file."""
     del tmp_path
 
     def make(*, collectors: int = 1, evaluators: int = 1, **changes: Any) -> Configuration:
@@ -229,7 +229,7 @@ def directory(tmp_path):
 
 @pytest.fixture
 def last_word(tmp_path, monkeypatch):
-    """Return a function that reads the termination message."""
+    """Return a function that reads and decodes the termination message."""
     path = tmp_path / "word"
     monkeypatch.setenv("PALAESTRA_TERMINATION_LOG", str(path))
     return lambda: Termination.from_message(path.read_text())
@@ -237,7 +237,7 @@ def last_word(tmp_path, monkeypatch):
 
 @pytest.fixture
 def job(make_configuration):
-    """Make a configuration of a short run of an algorithm."""
+    """Return a function that makes the configuration of a short run of an algorithm."""
 
     def make(name="DQN", **changes):
         defaults = {
@@ -252,10 +252,10 @@ def job(make_configuration):
 
 @pytest.fixture
 def play(directory, make_member):
-    """Train; return the exit code and the members by name. Faults are given by a member's name.
+    """Return a function that trains; it returns the exit code and the simulators by name.
 
-    `on_step` is called after each step of one member, by default of `collect-0`; environments report their
-    success by `report`; the run is kept `into` a run directory, by default that of the test.
+    `faults` has the faults by a simulator's name. `on_step` is called after each step of the simulator `of`.
+    The environments report success by `report`. The run is written to the run directory `into`.
     """
 
     def run(  # noqa: PLR0913 - what a test changes of a run

@@ -1,4 +1,4 @@
-"""Every attempt of every pod pays for the modules that a trainer imports at its start."""
+"""Imports at the start of a trainer: each attempt of each pod spends time on them."""
 
 import json
 import subprocess
@@ -34,9 +34,9 @@ def _run(program: str, *arguments: object):
 
 
 def test_a_trainer_imports_no_library_before_it_uses_it(tmp_path):
-    """pandas, Matplotlib, TensorBoard and rich took 40 % of its start.
+    """The imports of pandas, Matplotlib, TensorBoard and rich took 40 % of the trainer's start.
 
-    The libraries still work where they are used.
+    The libraries still work when a program uses them.
     """
     imported, used = _run(IMPORT + USE + "print(json.dumps([imported, used]))", tmp_path)
 
@@ -69,15 +69,15 @@ print(json.dumps([before, compiled, real, hasattr(answer, "_torchdynamo_disable"
 
 
 def test_an_optimizer_brings_no_compiler_before_a_program_compiles():
-    """The compiler took a third of a trainer's start.
+    """The import of PyTorch's compiler took a third of the trainer's start.
 
-    Functions that PyTorch excludes from it stay excluded.
+    Functions that PyTorch excludes from compiling stay excluded.
     """
     assert _run(OPTIMIZE + COMPILE) == [False, 2.0, True, True]
 
 
 def test_what_a_user_keeps_from_being_compiled_is_kept_from_it():
-    """A placeholder's mark would be lost when another function is compiled."""
+    """If the mark were only on the placeholder, it would be lost when another function is compiled."""
     program = OPTIMIZE + "kept = torch._dynamo.disable(lambda x: x)\n"
 
     assert _run(program + "print(json.dumps([before, hasattr(kept, '_torchdynamo_disable')]))") == [
@@ -87,14 +87,14 @@ def test_what_a_user_keeps_from_being_compiled_is_kept_from_it():
 
 
 def test_a_part_of_the_compiler_can_be_imported_first():
-    """A module that runs twice would have its state twice."""
+    """A module that is executed twice would have two copies of its state."""
     program = OPTIMIZE + "import torch._dynamo.config as part\nfrom torch._dynamo import optimize\n"
 
     assert _run(program + "print(json.dumps(part is torch._dynamo.config))") is True
 
 
 def test_a_library_that_a_user_imports_first_is_the_real_one_everywhere():
-    """Otherwise the placeholder would be a second module of the same name."""
+    """If a placeholder were imported later, the library would exist twice under one name."""
     first = "import matplotlib.figure, pandas\n"
     same = "logger.matplotlib is matplotlib, logger.pandas is pandas"
     program = first + IMPORT + f"from stable_baselines3.common import logger\nprint(json.dumps([{same}]))"

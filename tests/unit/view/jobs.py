@@ -1,4 +1,4 @@
-"""Build a TrainingJob in the middle of its life; a test sets the differences."""
+"""Build a TrainingJob in the middle of its run; a test sets the fields that differ."""
 
 from copy import deepcopy
 from datetime import UTC, datetime
@@ -48,7 +48,7 @@ REPLICA: dict[str, Any] = {
 def running_job(
     *, name: str = "job", phase: str = "Running", spec: Any = None, **replica: Any
 ) -> TrainingJob:
-    """Return a job with one replica; keywords are fields of its status."""
+    """Return a job with one replica; the keywords are fields of the replica's status."""
     condition = {
         "type": phase,
         "status": "True",

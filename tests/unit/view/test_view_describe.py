@@ -1,4 +1,4 @@
-"""The lines that `palaestra describe` prints about a job."""
+"""The lines about a job that `palaestra describe` prints."""
 
 from datetime import timedelta
 
@@ -8,12 +8,12 @@ from tests.unit.view.jobs import CREATED, NOW, running_job
 
 
 def told(job):
-    """Return the lines about a job, without indentation."""
+    """Return the lines about a job, without their indentation."""
     return [line.strip() for line in describe(job, CREATED, NOW)]
 
 
 def test_a_running_job_is_described_from_spec_to_last_attempt():
-    """A person reads them in this order."""
+    """A person reads first what the job is, then how far it is, and last how its previous attempt ended."""
     lines = told(running_job())
 
     assert "Algorithm:     DQN, 50,000 steps, seed 1" in lines
@@ -26,7 +26,7 @@ def test_a_running_job_is_described_from_spec_to_last_attempt():
 
 
 def test_a_success_rate_has_its_interval_and_that_of_an_older_trainer_has_none():
-    """Without it, a rate of twenty episodes looks as certain as one of a thousand."""
+    """Without the interval, a rate over twenty episodes looks as certain as a rate over a thousand."""
     interval = {"low": 0.91, "high": 0.99, "episodes": 100}
 
     assert "Success rate:   40% in the last evaluation" in told(running_job())
@@ -36,7 +36,7 @@ def test_a_success_rate_has_its_interval_and_that_of_an_older_trainer_has_none()
 
 
 def test_simulators_have_a_line_each_with_what_is_wrong_with_them():
-    """The mark `given up` is more important than its last state."""
+    """A simulator that the trainer has given up shows `given up` in place of its last state."""
     lines = told(running_job())
 
     assert "collect-0    Collect    ready      3          -         did not answer" in lines
@@ -44,7 +44,7 @@ def test_simulators_have_a_line_each_with_what_is_wrong_with_them():
 
 
 def test_what_simulators_leave_out_has_lines_of_its_own():
-    """The results of a job mean less if its world was incomplete."""
+    """A success rate means less if the simulators left out parts of the world."""
     line = "collect: the stub simulates no Drone: 1 node left out (line 7)"
     job = running_job()
     status = job.status.model_copy(update={"left_out": (line,)})
@@ -56,7 +56,7 @@ def test_what_simulators_leave_out_has_lines_of_its_own():
 
 
 def test_what_is_not_known_is_left_out():
-    """A job that no operator has reconciled has a name, but no progress."""
+    """A job that no operator has reconciled has a name, but no progress to show."""
     lines = told(running_job(phase="Pending", step=None, target=None, goodput=None, lastAttempt=None))
 
     assert not [line for line in lines if line.startswith(("Step", "Time spent", "Last attempt"))]
@@ -64,12 +64,12 @@ def test_what_is_not_known_is_left_out():
 
 
 def test_a_time_ledger_of_no_seconds_is_left_out():
-    """The first poll of a trainer comes before its first whole second."""
+    """The first poll of a trainer comes before the trainer has counted a whole second."""
     assert not [line for line in told(running_job(goodput={})) if line.startswith("Time spent")]
 
 
 def test_slow_steps_are_listed_apart_from_faults():
-    """People searched for a broken simulator because of `Faults: slow 1`."""
+    """People searched for a broken simulator when they read `Faults: slow 1`."""
     both = told(running_job(faults={"dead": 2, "slow": 1}))
 
     assert "Faults:         dead 2" in both
@@ -78,14 +78,14 @@ def test_slow_steps_are_listed_apart_from_faults():
 
 
 def test_recycling_is_listed_apart_from_recovering():
-    """Recycling is planned: nothing has to be repaired."""
+    """Recycling is a planned restart, so nobody has to look for a fault."""
     lines = told(running_job(goodput={"stepping": 75, "recycling": 25}))
 
     assert "Time spent:     stepping 75%, recycling 25%" in lines
 
 
 def test_the_storage_of_the_run_is_shown():
-    """It determines what is left when the job is deleted."""
+    """The storage decides which files are left after the job is deleted."""
     assert "Storage:       in the pod, deleted with it" in told(
         running_job(spec={"storage": {"ephemeral": True}})
     )
@@ -93,7 +93,7 @@ def test_the_storage_of_the_run_is_shown():
 
 
 def test_events_have_an_age_and_a_count():
-    """A message that the API server has split into lines is shown as one."""
+    """The API server may split a message into lines; the view shows it as one line."""
     event = Event(
         time=NOW - timedelta(minutes=3),
         warning=True,
@@ -109,7 +109,7 @@ def test_events_have_an_age_and_a_count():
 
 
 def test_an_event_about_a_container_names_it():
-    """A pod of five containers had five lines `Container created`."""
+    """A pod with five containers had five equal lines `Container created`."""
     event = Event(
         time=NOW,
         warning=False,
@@ -126,5 +126,5 @@ def test_an_event_about_a_container_names_it():
 
 
 def test_a_line_says_that_there_are_no_events():
-    """A cluster deletes events after an hour."""
+    """A cluster deletes events after an hour, so an old job has none."""
     assert happened([], NOW) == ["none that the cluster still has"]

@@ -12,7 +12,7 @@ from tests.unit.view.jobs import NOW, running_job
 
 @pytest.fixture
 def draw():
-    """Return the screen, on a terminal of 80 columns, of a job with these earlier states."""
+    """Return the screen for a job and its earlier states, on a terminal of 80 columns."""
 
     def drawn(job, *before):
         history = History()
@@ -26,7 +26,7 @@ def draw():
 
 
 def test_a_line_rises_as_training_goes_on(draw):
-    """The height stands for success from 0 to 1."""
+    """The height of a bar is the success rate, from 0 to 1."""
     before = [running_job(step=step, successRate=rate) for step, rate in ((1000, 0.0), (2000, 0.5))]
 
     text = draw(running_job(step=3000, successRate=1.0), *before)
@@ -36,7 +36,7 @@ def test_a_line_rises_as_training_goes_on(draw):
 
 
 def test_a_full_history_fits_into_a_terminal_of_80_columns(draw):
-    """If the newest end of a line were cut off, the wrong values would be shown."""
+    """If the terminal cut off the newest bars, a person would see only old values."""
     before = [running_job(step=step, successRate=0.0) for step in range(MOST)]
 
     text = draw(running_job(step=MOST, successRate=1.0), *before)
@@ -46,7 +46,7 @@ def test_a_full_history_fits_into_a_terminal_of_80_columns(draw):
 
 
 def test_the_phase_its_reason_and_the_simulators_are_shown(draw):
-    """The reason of a state must be visible without another command."""
+    """A person sees the reason of the phase without another command."""
     text = draw(running_job())
 
     assert "job  Running" in text
@@ -56,7 +56,7 @@ def test_the_phase_its_reason_and_the_simulators_are_shown(draw):
 
 
 def test_a_job_that_nobody_has_seen_is_drawn(draw):
-    """People run the command right after `kubectl apply`."""
+    """People run the command right after `kubectl apply`, before an operator has reconciled the job."""
     job = running_job(step=None, target=None, simulators=[], lastCheckpoint=None)
     unseen = job.model_copy(update={"status": type(job.status)()})
 
@@ -64,7 +64,7 @@ def test_a_job_that_nobody_has_seen_is_drawn(draw):
 
 
 def test_a_status_without_news_adds_nothing_to_the_history():
-    """Ages change each second, but figures do not."""
+    """Only ages have changed since the last poll, so the history gets no new point."""
     history = History()
     history.add(running_job().status)
     history.add(running_job().status)
@@ -73,7 +73,7 @@ def test_a_status_without_news_adds_nothing_to_the_history():
 
 
 def test_the_history_forgets_what_no_line_has_room_for():
-    """A week of watching must not fill the memory."""
+    """A command that runs for a week must not use more and more memory."""
     history = History()
     for step in range(MOST + 5):
         history.add(running_job(step=step).status)

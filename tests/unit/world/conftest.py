@@ -1,4 +1,4 @@
-"""Small worlds and the identity of one simulator, for the tests of worlds."""
+"""Small worlds, and the identity of one simulator."""
 
 from collections.abc import Callable
 
@@ -11,11 +11,11 @@ HEADER = b"#VRML_SIM R2023b utf8\n"
 
 @pytest.fixture
 def world() -> Callable[[str], bytes]:
-    """Return a function that adds the first line to the text of a world."""
+    """Return a function that puts the header of a world before a text."""
     return lambda text: HEADER + text.encode()
 
 
 @pytest.fixture
 def identity() -> RunIdentity:
-    """Return the second collecting simulator of the first replica of a job."""
+    """Return the identity of the second collecting simulator of a job's first replica."""
     return RunIdentity(job="move-to-target", uid="6f1c", replica=0, group="collect", index=1)

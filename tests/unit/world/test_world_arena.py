@@ -1,4 +1,4 @@
-"""The built-in worlds: their content, and the generation of simulators' worlds from them."""
+"""The built-in worlds: their content, and the worlds that are generated from them."""
 
 import math
 from itertools import pairwise
@@ -17,7 +17,7 @@ from palaestra_sim.world import (
     robots,
 )
 
-# Every type of node in the built-in worlds; all are Webots' own, so nothing is ever downloaded.
+# All node types in the built-in worlds. They belong to Webots itself, so no file is downloaded.
 PLAIN = {
     "Background", "Box", "Camera", "ContactProperties", "Cylinder", "DirectionalLight", "DistanceSensor",
     "HingeJoint", "HingeJointParameters", "PBRAppearance", "Physics", "Pose", "PositionSensor",
@@ -43,18 +43,18 @@ def of_type(world: World, type_name: str) -> list[Node]:
 
 
 def defined(world: World, name: str) -> Node:
-    """Return the node of a DEF name."""
+    """Return the node with a DEF name."""
     (node,) = [node for node in world.walk() if node.def_name == name]
     return node
 
 
 def sees(world: World) -> bool:
-    """Return whether it is the world with cameras."""
+    """Return whether a world has cameras."""
     return bool(of_type(world, "Camera"))
 
 
 def test_an_unknown_world_names_those_that_ship() -> None:
-    """The argument is a name, not a path."""
+    """The argument is the name of a built-in world, not a path."""
     message = 'no built-in world is called "../secret"; choose one of arena, court, pen, seeing, two_robots'
 
     with pytest.raises(UnknownWorldError, match=message):
@@ -62,7 +62,7 @@ def test_an_unknown_world_names_those_that_ship() -> None:
 
 
 def test_the_arena_has_one_robot_that_is_its_own_supervisor() -> None:
-    """One ROS node then steps the simulation, reads the sensors and places the scene."""
+    """Through a single ROS node, a trainer then steps the simulation, reads sensors and moves objects."""
     assert robots(builtin("arena")) == (
         WorldRobot(
             robot="robotino", ros_name="robotino", supervisor=True, synchronize=True, definition="ROBOTINO"
@@ -71,7 +71,7 @@ def test_the_arena_has_one_robot_that_is_its_own_supervisor() -> None:
 
 
 def test_worlds_with_a_separate_supervisor_work_too() -> None:
-    """Only one of its two robots has the option for the clock."""
+    """Only the supervisor of the two robots has the option `--clock`."""
     supervisor, robotino = robots(builtin("two_robots"))
 
     assert (supervisor.robot, supervisor.supervisor) == ("supervisor", True)
@@ -80,7 +80,7 @@ def test_worlds_with_a_separate_supervisor_work_too() -> None:
 
 
 def test_simulators_can_be_made_of_it(shipped: bytes, identity: RunIdentity) -> None:
-    """The generation needs no other file and can be repeated."""
+    """Generation reads no other file, and a second generation changes nothing."""
     made = generate(shipped, identity, clock=True)
 
     assert generate(made, identity, clock=True) == made
@@ -88,13 +88,13 @@ def test_simulators_can_be_made_of_it(shipped: bytes, identity: RunIdentity) -> 
 
 
 def test_it_needs_nothing_from_elsewhere(scene: World) -> None:
-    """A pod has no network and no folder of PROTOs."""
+    """A simulator's pod has no network and no folder of PROTOs."""
     assert scene.externs == ()
     assert {node.type_name for node in scene.walk() if not node.uses} <= PLAIN
 
 
 def test_every_use_has_its_def_before_it(scene: World) -> None:
-    """Webots leaves out a USE whose DEF comes later."""
+    """Webots ignores a USE whose DEF comes later in the file."""
     seen = set()
     for node in scene.walk():
         seen.add(node.def_name)
@@ -102,7 +102,7 @@ def test_every_use_has_its_def_before_it(scene: World) -> None:
 
 
 def test_time_goes_in_steps_of_32_ms_and_wheels_slide_sideways(scene: World) -> None:
-    """Rollers are modeled by zero friction across the wheel."""
+    """The wheels' rollers are modeled by zero friction across the wheel."""
     (info,) = of_type(scene, "WorldInfo")
     (contact,) = info.nodes("contactProperties")
 
@@ -113,7 +113,7 @@ def test_time_goes_in_steps_of_32_ms_and_wheels_slide_sideways(scene: World) -> 
 
 
 def test_the_floor_is_4_by_4_m_with_its_top_at_zero(scene: World) -> None:
-    """It is centered on the origin."""
+    """The floor is centered on the origin, and its upper side is at height 0."""
     floor = defined(scene, "FLOOR")
     size = defined(scene, "FLOOR_BOX").numbers("size") or ()
 
@@ -125,7 +125,7 @@ def test_the_floor_is_4_by_4_m_with_its_top_at_zero(scene: World) -> None:
 def test_walls_stand_with_their_inner_faces_2_m_from_the_origin(
     scene: World, wall: int, axis: int, side: int
 ) -> None:
-    """They are 0.1 m thick and 0.3 m high; their shape for collisions equals the visible one."""
+    """The walls are 0.1 m thick and 0.3 m high; their collision shape equals the visible shape."""
     center = defined(scene, f"WALL_{wall}").numbers("translation") or ()
     size = defined(scene, f"WALL_{wall}_BOX").numbers("size") or ()
 
@@ -137,11 +137,11 @@ def test_walls_stand_with_their_inner_faces_2_m_from_the_origin(
 
 
 def test_four_cylinders_stand_in_the_corners_of_a_square(scene: World) -> None:
-    """A robot must drive around them, if an episode uses them."""
+    """In some episodes, a robot must drive around the cylinders."""
     cylinders = [defined(scene, f"CYLINDER_{number}") for number in range(4)]
     shapes = [defined(scene, f"CYLINDER_{number}_SHAPE") for number in range(4)]
 
-    z = -0.7 if sees(scene) else 0.2  # the world with cameras keeps them under the floor
+    z = -0.7 if sees(scene) else 0.2  # in the world with cameras they are below the floor
     assert [cylinder.numbers("translation") for cylinder in cylinders] == [
         (0.8, 0.8, z),
         (-0.8, 0.8, z),
@@ -153,7 +153,10 @@ def test_four_cylinders_stand_in_the_corners_of_a_square(scene: World) -> None:
 
 
 def test_the_target_is_seen_and_never_felt(scene: World) -> None:
-    """It is a disk with the radius within which it counts as reached; for cameras, a pole of 0.5 m."""
+    """The target is a disk with the radius within which it counts as reached.
+
+    For cameras it is a pole of 0.5 m.
+    """
     target = defined(scene, "TARGET")
     (shape,) = target.nodes("children")[0].nodes("geometry")
     form = tuple(shape.numbers(name) for name in ("radius", "height"))
@@ -166,7 +169,7 @@ def test_the_target_is_seen_and_never_felt(scene: World) -> None:
 
 @pytest.mark.parametrize("wheel", [0, 1, 2])
 def test_wheels_turn_about_the_line_from_the_middle_of_the_robot(scene: World, wheel: int) -> None:
-    """A positive speed then turns the robot clockwise, as in the Robotino 3 of Webots."""
+    """As in the Robotino 3 of Webots, a positive wheel speed turns the robot clockwise."""
     joint = of_type(scene, "HingeJoint")[wheel]
     motor, sensor = joint.nodes("device")
     (parameters,) = joint.nodes("jointParameters")
@@ -186,7 +189,7 @@ def test_wheels_turn_about_the_line_from_the_middle_of_the_robot(scene: World, w
 
 
 def test_nine_infrared_rays_leave_the_rim_every_40_degrees(scene: World) -> None:
-    """They start at the front and go counterclockwise; each looks along its own x axis."""
+    """The rays go counterclockwise from the front; each looks along the x axis of its sensor."""
     sensors = of_type(scene, "DistanceSensor")
 
     assert [sensor.text("name") for sensor in sensors] == [f"ir{n}" for n in range(1, 10)]
@@ -199,7 +202,7 @@ def test_nine_infrared_rays_leave_the_rim_every_40_degrees(scene: World) -> None
 
 
 def test_infrared_sensors_answer_in_volts_with_noise(scene: World) -> None:
-    """The table is that of the Sharp GP2Y0A41SK0F: farther gives less."""
+    """The table is that of the sensor Sharp GP2Y0A41SK0F, whose voltage falls with the distance."""
     for sensor in of_type(scene, "DistanceSensor"):
         table = sensor.numbers("lookupTable") or ()
         meters, volts, noise = table[0::3], table[1::3], table[2::3]
@@ -212,7 +215,7 @@ def test_infrared_sensors_answer_in_volts_with_noise(scene: World) -> None:
 
 
 def test_the_bumper_is_wider_than_the_body_and_clear_of_the_floor(scene: World) -> None:
-    """The bumper of Webots' PROTO has no boundingObject, so it never fires."""
+    """The bumper in the PROTO of Webots has no boundingObject, so it never reports a contact."""
     (bumper,) = of_type(scene, "TouchSensor")
     (rim,) = bumper.nodes("boundingObject")
     (height,) = rim.numbers("height") or ()
@@ -225,7 +228,7 @@ def test_the_bumper_is_wider_than_the_body_and_clear_of_the_floor(scene: World) 
 
 
 def test_the_body_weighs_20_kg(scene: World) -> None:
-    """Its shape for collisions equals the visible one."""
+    """The collision shape of the body equals its visible shape."""
     robot = defined(scene, "ROBOTINO")
     (physics,) = robot.nodes("physics")
     (bounds,) = robot.nodes("boundingObject")
@@ -235,7 +238,7 @@ def test_the_body_weighs_20_kg(scene: World) -> None:
 
 
 def test_both_cameras_look_forward_from_one_place() -> None:
-    """A pixel of the depth image then belongs to the same pixel of the color image."""
+    """A pixel of the depth image and the same pixel of the color image then show the same point."""
     scene = parse(builtin("seeing"))
     (camera,), (depth_camera,) = of_type(scene, "Camera"), of_type(scene, "RangeFinder")
 

@@ -1,7 +1,7 @@
-"""The time to read a world is proportional to its bytes, whatever it contains.
+"""The time to read a world is proportional to its size, whatever the world contains.
 
-An operator reads worlds of authors who may want to keep it busy. Each shape is written at one size and at
-four times that size; a quadratic time would be sixteen times as long.
+An operator reads worlds of people who may want to keep it busy. Each test reads a world of one size and a
+world of four times that size. A quadratic time would be sixteen times as long.
 """
 
 import time
@@ -13,7 +13,7 @@ import pytest
 from palaestra_sim.world import RunIdentity, WorldError, check, generate
 
 SMALL, GROWTH = 32 << 10, 4
-MOST = 2.5  # times the growth, which is far from quadratic and leaves room for a busy machine
+MOST = 2.5  # How many times longer than proportional the large world may take, since the machine may be busy
 TRIES = 4
 HEADER = b"#VRML_SIM R2023b utf8\n"
 ROBOT = b'Robot{controller "ros"}'
@@ -23,7 +23,7 @@ Shape = Callable[[int], bytes]
 
 
 def filled(head: bytes, unit: bytes, tail: bytes = b"", first: bytes = HEADER + ROBOT) -> Shape:
-    """Return a shape that repeats `unit` between a head and a tail."""
+    """Return a function that builds a world of a given size: `unit`, repeated between a head and a tail."""
 
     def shape(size: int) -> bytes:
         room = size - len(first) - len(head) - len(tail)
@@ -33,7 +33,7 @@ def filled(head: bytes, unit: bytes, tail: bytes = b"", first: bytes = HEADER + 
 
 
 def numbered(head: bytes, unit: str, tail: bytes = b"", first: bytes = HEADER) -> Shape:
-    """Return a shape that repeats `unit` with a different number each time."""
+    """Return a function that builds a world of a given size: `unit` with a new number at each repetition."""
 
     def shape(size: int) -> bytes:
         count = (size - len(first) - len(head) - len(tail)) // (len(unit) + 2)
@@ -43,17 +43,17 @@ def numbered(head: bytes, unit: str, tail: bytes = b"", first: bytes = HEADER) -
 
 
 def halves(first: Shape, second: Shape) -> Shape:
-    """Return a shape whose halves are of two shapes, with only the first one's header."""
+    """Return a function that builds a world from two others, each for one half of the size."""
     return lambda size: first(size // 2) + second(size // 2).removeprefix(HEADER)
 
 
 def model(head: bytes, unit: bytes, tail: bytes = b"") -> Shape:
-    """Return a shape of MJCF that repeats `unit`."""
+    """Return a function that builds an MJCF model of a given size from repetitions of `unit`."""
     return filled(b"<mujoco><actuator><motor/></actuator>" + head, unit, tail + b"</mujoco>", first=b"  \n")
 
 
 def several(head: str, unit: str, tail: str) -> Shape:
-    """Return a shape of MJCF that repeats `unit` with a different number each time."""
+    """Return a function that builds an MJCF model from repetitions of `unit` with a new number each."""
     root = b"<mujoco><actuator><motor/></actuator>"
     return numbered(head.encode(), unit, tail.encode() + b"</mujoco>", first=root)
 
@@ -123,7 +123,7 @@ SHAPES: dict[str, Shape] = {
 
 
 def seconds(source: bytes) -> float:
-    """Return the processor time of a check, and of a generation if the world is valid."""
+    """Return the processor time of checking a world and, if it is valid, of generating from it."""
     began = time.process_time()
     with suppress(WorldError):
         check(source)
@@ -133,7 +133,7 @@ def seconds(source: bytes) -> float:
 
 @pytest.mark.parametrize("unit", [b'<a file="/"/>', b'<a file="b"/>\n'])
 def test_an_error_has_so_many_places_and_no_more(unit: bytes) -> None:
-    """A message with 80,000 positions helps nobody, and each position costs memory."""
+    """A message with 80,000 positions helps nobody, and each position takes memory."""
     with pytest.raises(WorldError, match=r"100 or more places") as caught:
         check(model(b"", unit)(SMALL))
 
@@ -142,7 +142,7 @@ def test_an_error_has_so_many_places_and_no_more(unit: bytes) -> None:
 
 @pytest.mark.parametrize("shape", SHAPES.values(), ids=SHAPES)
 def test_a_larger_world_costs_more_only_in_proportion(shape: Shape) -> None:
-    """If a world of a megabyte took minutes, an operator could not serve other jobs."""
+    """If a world of one megabyte took minutes, the operator could not serve other jobs meanwhile."""
     ratios = []
     for _ in range(TRIES):
         small = seconds(shape(SMALL))

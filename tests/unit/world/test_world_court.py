@@ -1,4 +1,4 @@
-"""The world of a TurtleBot3 Burger has its robot, and the same obstacles as the fake."""
+"""The world of a TurtleBot3 Burger: its robot, and the same obstacles as in the fake environment."""
 
 import pytest
 
@@ -9,13 +9,13 @@ WORLD = parse(builtin("court"))
 
 
 def defined(name: str) -> Node:
-    """Return the node of a DEF name."""
+    """Return the node with a DEF name."""
     (node,) = [node for node in WORLD.walk() if node.def_name == name]
     return node
 
 
 def test_the_court_has_one_robot_that_is_its_own_supervisor() -> None:
-    """It is an instance of a PROTO of Webots, which the stub has too."""
+    """The robot is an instance of a PROTO of Webots, whose description the stub has."""
     assert defined("BURGER").type_name == "TurtleBot3Burger"
     assert robots(builtin("court")) == (
         WorldRobot(robot="burger", ros_name="burger", supervisor=True, synchronize=True, definition="BURGER"),
@@ -23,7 +23,7 @@ def test_the_court_has_one_robot_that_is_its_own_supervisor() -> None:
 
 
 def test_simulators_can_be_made_of_it(identity: RunIdentity) -> None:
-    """Its only address is that of one of Webots' own files."""
+    """The world refers to one other file, which every installation of Webots has."""
     made = generate(builtin("court"), identity, clock=True)
 
     assert generate(made, identity, clock=True) == made
@@ -32,7 +32,7 @@ def test_simulators_can_be_made_of_it(identity: RunIdentity) -> None:
 
 @pytest.mark.parametrize("thing", COURT.obstacles, ids=lambda thing: thing.name)
 def test_the_fake_has_the_things_of_the_world(thing) -> None:
-    """A policy that learned in one must find the same obstacles in the other."""
+    """A policy that learned in the fake environment must find the same obstacles in this world."""
     node, shape = defined(thing.name), defined(f"{thing.name}_SHAPE")
     size = shape.numbers("size") or (0.0, 0.0, 0.3)
 
@@ -44,7 +44,7 @@ def test_the_fake_has_the_things_of_the_world(thing) -> None:
 
 
 def test_the_floor_is_that_of_the_fake() -> None:
-    """Its edges are the inner faces of the walls."""
+    """The floor ends at the inner faces of the walls."""
     size = defined("FLOOR_SHAPE").numbers("size") or ()
 
     assert size[:2] == (2 * COURT.high[0], 2 * COURT.high[1])

@@ -1,4 +1,4 @@
-"""Every invalid world is refused with position, fact and remedy, and in no other way."""
+"""Each invalid world is rejected with a WorldError that has the position, the fact and the remedy."""
 
 import pickle
 from collections.abc import Callable
@@ -20,7 +20,7 @@ def refusal(source: bytes) -> str:
 
 
 def problem(attempt: Callable[[], object]) -> WorldError | None:
-    """Return the WorldError of a call, or None; any other exception fails the test."""
+    """Return the WorldError that a call raises, or None; any other exception fails the test."""
     try:
         attempt()
     except WorldError as error:
@@ -65,7 +65,7 @@ def problem(attempt: Callable[[], object]) -> WorldError | None:
     ],
 )
 def test_a_mistake_is_pointed_at(world: Callable[[str], bytes], text: str, message: str) -> None:
-    """Line and column count from 1, and the column counts characters, as an editor does."""
+    """Lines and columns count from 1, and columns count characters, as in an editor."""
     assert refusal(world(text)).startswith(f"arena.wbt:{message}")
 
 
@@ -74,21 +74,21 @@ def test_a_mistake_is_pointed_at(world: Callable[[str], bytes], text: str, messa
     [b"", b"Robot { }", b"#VRML V2.0 utf8", b"#VRML_SIM", b"#VRML_SIM utf8", b" #VRML_SIM R2023b"],
 )
 def test_a_file_without_the_header_of_a_world_is_refused(first_line: bytes) -> None:
-    """Webots refuses it too."""
+    """Webots rejects such a file too."""
     assert refusal(first_line + b"\n") == (
         "arena.wbt:1:1: the first line is not the header of a Webots world; make it #VRML_SIM R2023b utf8"
     )
 
 
 def test_a_byte_that_is_not_utf_8_is_pointed_at(world: Callable[[str], bytes]) -> None:
-    """Each character before it counts as one."""
+    """The column counts each character before that byte as one, however many bytes it has."""
     assert refusal(world("# ü ") + b"\xff\n") == (
         "arena.wbt:2:5: byte 0xff is not UTF-8; save the world as UTF-8"
     )
 
 
 def test_nodes_a_hundred_deep_are_read_and_more_are_refused(world: Callable[[str], bytes]) -> None:
-    """The limit is Palaestra's own, so Python's stack never overflows."""
+    """Palaestra's own limit comes before Python's recursion limit."""
     deepest = "Group { children " * 99 + "Group { }" + " }" * 99
 
     assert len(list(parse(world(deepest)).walk())) == 100
@@ -96,7 +96,7 @@ def test_nodes_a_hundred_deep_are_read_and_more_are_refused(world: Callable[[str
 
 
 def test_an_error_can_be_taken_apart_and_sent_on() -> None:
-    """A tool that shows errors in an editor needs the numbers, and a process pool needs a copy."""
+    """A tool that shows errors in an editor needs line and column, and a process pool pickles the error."""
     error = WorldError("arena.wbt", 12, 5, "this is wrong", "do that")
 
     copy = pickle.loads(pickle.dumps(error))
@@ -109,7 +109,7 @@ def test_an_error_can_be_taken_apart_and_sent_on() -> None:
 
 @given(st.binary())
 def test_arbitrary_bytes_are_a_world_or_a_world_error(data: bytes) -> None:
-    """For any file, the reader may raise no other exception."""
+    """For any bytes, the reader raises no other exception than WorldError."""
     error = problem(lambda: parse(b"#VRML_SIM R2023b utf8\n" + data))
 
     assert error is None or (error.line >= 1 and error.column >= 1)
@@ -124,7 +124,7 @@ def test_arbitrary_bytes_are_a_world_or_a_world_error(data: bytes) -> None:
     ),
 )
 def test_a_damaged_world_is_generated_from_or_refused(at: float, cut: int, new: bytes) -> None:
-    """The file may be half saved or lack braces; the check must find what the generator would."""
+    """The file may be half saved or lack braces. `check` must find the same mistake as `generate`."""
     arena = builtin("two_robots")
     place = int(at * len(arena))
     damaged = arena[:place] + new + arena[place + cut :]

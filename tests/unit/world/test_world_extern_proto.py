@@ -1,4 +1,4 @@
-"""PROTO files next to a world are found by their EXTERNPROTO lines, and read only from there."""
+"""PROTO files next to a world are found by EXTERNPROTO lines and read from the disk only."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,7 +12,7 @@ WORLD = Path("/project/worlds/room.wbt")
 
 
 def found(world: str, files: Mapping[str, str], **options: object) -> Protos:
-    """Return the PROTOs of a world whose files are in memory, as texts without the first line."""
+    """Return the PROTOs of a world whose files are in memory, without their first lines."""
 
     def read(path: Path) -> bytes:
         text = files.get(
@@ -27,19 +27,19 @@ def found(world: str, files: Mapping[str, str], **options: object) -> Protos:
 
 
 def proto(name: str, *externs: str) -> str:
-    """Return a PROTO of one Solid that names other files."""
+    """Return a PROTO of one Solid that refers to other files."""
     return (
         "".join(f'EXTERNPROTO "{address}"\n' for address in externs) + f"PROTO {name} [ ] {{ Solid {{ }} }}"
     )
 
 
 def refusals(result: Protos) -> dict[str, str]:
-    """Return the message of each refused type."""
+    """Return the message for each type that was rejected."""
     return {name: str(error) for name, error in result.refused.items()}
 
 
 def test_relative_addresses_count_from_the_file_that_names_them() -> None:
-    """A PROTO refers to its neighbors, wherever the world is."""
+    """A PROTO finds the files next to it, whatever folder the world is in."""
     result = found(
         'EXTERNPROTO "../protos/Stool.proto"',
         {
@@ -54,7 +54,7 @@ def test_relative_addresses_count_from_the_file_that_names_them() -> None:
 
 
 def test_an_address_with_a_scheme_is_a_name_only() -> None:
-    """Webots provides those PROTOs; nothing is loaded from a network."""
+    """Webots provides these PROTOs, so only their names count; nothing is loaded from a network."""
     result = found(
         'EXTERNPROTO "https://example.com/objects/protos/WoodenBox.proto"\n'
         'IMPORTABLE EXTERNPROTO "webots://projects/objects/floors/protos/Floor.proto"\n'
@@ -67,7 +67,7 @@ def test_an_address_with_a_scheme_is_a_name_only() -> None:
 
 
 def test_a_file_that_several_name_is_read_once() -> None:
-    """Two spellings of its address mean the same file."""
+    """Both spellings of the address lead to the same file."""
     result = found(
         'EXTERNPROTO "../protos/A.proto"\nEXTERNPROTO "../protos/Leg.proto"',
         {
@@ -81,7 +81,7 @@ def test_a_file_that_several_name_is_read_once() -> None:
 
 
 def test_a_missing_file_is_refused_at_the_line_that_names_it() -> None:
-    """The error is in the file with the EXTERNPROTO line, which is a world or a PROTO."""
+    """The position in the error is that of the EXTERNPROTO line, in a world or in a PROTO."""
     result = found(
         'EXTERNPROTO "Gone.proto"\nEXTERNPROTO "Stool.proto"',
         {"/project/worlds/Stool.proto": proto("Stool", "Leg.proto")},
@@ -97,7 +97,7 @@ def test_a_missing_file_is_refused_at_the_line_that_names_it() -> None:
 
 
 def test_protos_that_are_made_of_each_other_are_refused_with_both_names() -> None:
-    """An instance of them could never be completed."""
+    """An instance of such a PROTO would never be complete."""
     result = found(
         'EXTERNPROTO "A.proto"',
         {
@@ -113,14 +113,14 @@ def test_protos_that_are_made_of_each_other_are_refused_with_both_names() -> Non
 
 
 def test_a_proto_that_is_made_of_itself_is_refused() -> None:
-    """The shortest cycle has one file."""
+    """A PROTO that contains itself is the shortest possible cycle."""
     result = found('EXTERNPROTO "A.proto"', {"/project/worlds/A.proto": proto("A", "A.proto")})
 
     assert refusals(result)["A"].endswith("A contains itself; remove A from A")
 
 
 def test_a_chain_of_files_has_a_bounded_length() -> None:
-    """The limit is Palaestra's own, so Python's stack never overflows."""
+    """Palaestra's own limit comes before Python's recursion limit."""
     files = {f"/project/worlds/P{n}.proto": proto(f"P{n}", f"P{n + 1}.proto") for n in range(200)}
 
     result = found('EXTERNPROTO "P0.proto"', files)
@@ -130,7 +130,7 @@ def test_a_chain_of_files_has_a_bounded_length() -> None:
 
 
 def test_a_file_that_is_no_proto_is_refused_under_its_type() -> None:
-    """The world may not need that type, so the caller decides."""
+    """The world may contain no node of that type, so the caller decides whether this is an error."""
     result = found(
         'EXTERNPROTO "A.proto"\nEXTERNPROTO "B.proto"\nEXTERNPROTO "C.proto"',
         {
@@ -148,7 +148,7 @@ def test_a_file_that_is_no_proto_is_refused_under_its_type() -> None:
 
 
 def test_two_files_of_one_type_are_refused() -> None:
-    """A type has only one meaning in a world."""
+    """A type must have exactly one meaning in a world."""
     result = found(
         'EXTERNPROTO "Leg.proto"\nEXTERNPROTO "a/A.proto"',
         {
@@ -162,14 +162,14 @@ def test_two_files_of_one_type_are_refused() -> None:
 
 
 def test_types_that_are_described_otherwise_are_not_read() -> None:
-    """A stand-in replaces a PROTO that has a template or no file."""
+    """A stand-in replaces a PROTO whose file has a template or is missing."""
     result = found('EXTERNPROTO "Gone.proto"', {}, without={"Gone"})
 
     assert result == Protos()
 
 
 def test_a_world_without_a_file_has_no_relative_addresses() -> None:
-    """A world from a ConfigMap has no folder."""
+    """A world from a ConfigMap has no folder to which an address could be relative."""
     source = f'{HEADER}EXTERNPROTO "Stool.proto"'.encode()
 
     error = local_protos(None, parse(source)).refused["Stool"]
@@ -181,7 +181,7 @@ def test_a_world_without_a_file_has_no_relative_addresses() -> None:
 
 
 def test_files_are_read_from_the_disk(tmp_path: Path) -> None:
-    """The caller gives no reader of its own."""
+    """By default, the files are read from the disk."""
     (tmp_path / "Stool.proto").write_text(HEADER + proto("Stool"))
     source = f'{HEADER}EXTERNPROTO "Stool.proto"\nEXTERNPROTO "a\0b.proto"'.encode()
     with pytest.raises(WorldError):
@@ -194,7 +194,10 @@ def test_files_are_read_from_the_disk(tmp_path: Path) -> None:
 
 
 def test_files_from_before_r2022b_find_the_protos_of_their_project_by_name(tmp_path: Path) -> None:
-    """Neither the world nor its PROTOs have EXTERNPROTO lines; folders below protos/ are searched too."""
+    """Neither the world nor its PROTOs have EXTERNPROTO lines.
+
+    The folders below `protos/` are searched too.
+    """
     (tmp_path / "worlds").mkdir()
     (tmp_path / "protos" / "parts").mkdir(parents=True)
     old = "#VRML_SIM R2022a utf8\n"
@@ -215,5 +218,5 @@ def test_files_from_before_r2022b_find_the_protos_of_their_project_by_name(tmp_p
 
 
 def test_a_world_without_a_file_has_no_project() -> None:
-    """No files are searched next to it."""
+    """Without a file there is no project whose folder `protos` could be searched."""
     assert local_protos(None, parse(b"#VRML_SIM R2021b utf8\nStool { }")) == Protos()

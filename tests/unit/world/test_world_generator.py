@@ -1,6 +1,6 @@
-"""The generator's changes to each way of writing a robot, and its refusals.
+"""The changes that the generator makes to a world, for each way of writing a robot, and its rejections.
 
-Each example shows a world before and after; `NAME` stands for the generated name.
+An example is a world before and after. `NAME` stands for the generated name.
 """
 
 from collections.abc import Callable
@@ -12,12 +12,12 @@ from palaestra_sim.world import RunIdentity, WorldError, WorldRobot, generate, r
 Make = Callable[[str], bytes]
 
 COMPLETE = '\nRobot { name "robotino" controller "ros" controllerArgs ["--name=NAME" "--synchronize"] }'
-"""A robot to which nothing has to be done but to give it its name."""
+"""A robot in which the generator changes only the name."""
 
 
 @pytest.fixture
 def generated(world: Make, identity: RunIdentity) -> Callable[..., str]:
-    """Return a function that generates from the text of a world and shortens the names."""
+    """Return a function that generates from the text of a world and puts NAME for the generated names."""
 
     def make(text: str, robot: str = "robotino", *, clock: bool = True) -> str:
         made = generate(world(text), identity, clock=clock)
@@ -29,7 +29,7 @@ def generated(world: Make, identity: RunIdentity) -> Callable[..., str]:
 
 @pytest.fixture
 def refusal(world: Make, identity: RunIdentity) -> Callable[..., str]:
-    """Return a function that returns the error for a world."""
+    """Return a function that returns the error message for the text of a world."""
 
     def tell(text: str, *, relative_addresses: bool = False) -> str:
         with pytest.raises(WorldError) as caught:
@@ -46,7 +46,7 @@ def refusal(world: Make, identity: RunIdentity) -> Callable[..., str]:
 
 
 def robot(arguments: str, name: str = "robotino") -> str:
-    """Return a robot on one line, with these arguments."""
+    """Return a robot on one line, with this text of arguments."""
     return f'Robot {{ name "{name}" controller "ros" {arguments} }}'
 
 
@@ -126,12 +126,12 @@ def robot(arguments: str, name: str = "robotino") -> str:
     ],
 )
 def test_the_arguments_of_a_robot(generated: Callable[..., str], before: str, after: str) -> None:
-    """Only the text between controllerArgs and its end may change."""
+    """Only the text from `controllerArgs` to its end changes."""
     assert generated(robot(before)) == robot(after)
 
 
 def test_lines_and_comments_stay_where_they_are(generated: Callable[..., str]) -> None:
-    """People read a generated world next to its source."""
+    """People compare a generated world with its source."""
     before = """Robot {
   name "robotino"  # the one and only
   controllerArgs [
@@ -150,7 +150,7 @@ def test_lines_and_comments_stay_where_they_are(generated: Callable[..., str]) -
 def test_added_strings_are_on_lines_of_their_own_in_a_list_that_is(
     generated: Callable[..., str],
 ) -> None:
-    """Webots would save it in the same way, with the line ends of the file."""
+    """Webots would save the list in the same form, with the line ends of the file."""
     text = 'Robot {{\r\n  name "robotino"\r\n  controller "ros"\r\n  controllerArgs [{}\r\n  ]\r\n}}\r\n'
     before = text.format('\r\n    "--name=a"')
     after = text.format('\r\n    "--name=NAME"\r\n    "--synchronize"')
@@ -161,7 +161,7 @@ def test_added_strings_are_on_lines_of_their_own_in_a_list_that_is(
 def test_an_added_list_is_on_lines_of_its_own_if_the_controller_is(
     generated: Callable[..., str],
 ) -> None:
-    """The indentation is that of the robot."""
+    """The new lines have the indentation of the robot's other fields."""
     before = (
         'Group {\n  children [\n    Robot {\n      name "robotino"\n      controller "ros"\n    }\n  ]\n}'
     )
@@ -171,7 +171,7 @@ def test_an_added_list_is_on_lines_of_its_own_if_the_controller_is(
 
 
 def test_a_clock_goes_with_the_gap_before_it(generated: Callable[..., str]) -> None:
-    """If the gap has a comment, it stays."""
+    """A gap with a comment stays, because the comment is the author's."""
     arguments = 'controllerArgs ["--clock"\n"--name=a" "--synchronize"{}"--clock" ]'
     kept = 'controllerArgs [\n"--name=NAME" "--synchronize"{} ]'
 
@@ -182,7 +182,7 @@ def test_a_clock_goes_with_the_gap_before_it(generated: Callable[..., str]) -> N
 def test_one_clock_of_a_world_may_stay_and_it_is_the_first(
     generated: Callable[..., str],
 ) -> None:
-    """Two on one ROS master would publish two times on one topic."""
+    """Two robots with one ROS master would publish two different times on `/clock`."""
     first = robot('controllerArgs ["--synchronize" "--clock" "--clock"]')
     second = robot('controllerArgs ["--clock"]', name="b")
 
@@ -194,7 +194,7 @@ def test_one_clock_of_a_world_may_stay_and_it_is_the_first(
 
 
 def test_a_clock_is_never_added(generated: Callable[..., str]) -> None:
-    """The world decides whether a clock is needed; `clock` only allows it."""
+    """The world decides whether a robot publishes a clock; the option `clock` only allows it."""
     assert "--clock" not in generated(robot('controllerArgs ["--name=a"]'), clock=True)
 
 
@@ -208,12 +208,12 @@ def test_a_clock_is_never_added(generated: Callable[..., str]) -> None:
     ],
 )
 def test_a_robot_is_found_wherever_it_is_nested(generated: Callable[..., str], around: str) -> None:
-    """Webots allows a robot wherever it allows a node."""
+    """Webots allows a robot at every place where it allows a node."""
     assert generated(around.format(robot(""))).count("NAME") == 1
 
 
 def test_a_robot_within_a_robot_gets_its_own_name(world: Make, identity: RunIdentity) -> None:
-    """The arguments of the outer robot may be anywhere."""
+    """The outer robot's arguments may come before or after the inner robot."""
     inner = robot('controllerArgs ["--name=a"]', name="arm")
     made = generate(world(robot(f'children [ {inner} ] controllerArgs "--name=b"')), identity, clock=False)
 
@@ -224,7 +224,10 @@ def test_a_robot_within_a_robot_gets_its_own_name(world: Make, identity: RunIden
 
 
 def test_a_proto_whose_controller_is_ros_is_a_robot(world: Make, identity: RunIdentity) -> None:
-    """Its default name is in the PROTO file, so its type is used instead."""
+    """The generator does not read the PROTO's file, which has the default name.
+
+    So it uses the type as the name.
+    """
     made = generate(world('Robotino3 { controller "ros" }'), identity, clock=False)
 
     assert [found.robot for found in robots(made)] == ["Robotino3"]
@@ -232,7 +235,7 @@ def test_a_proto_whose_controller_is_ros_is_a_robot(world: Make, identity: RunId
 
 
 def test_a_robot_without_a_name_is_called_robot(world: Make, identity: RunIdentity) -> None:
-    """This is the default of Webots."""
+    """Webots has the same default."""
     made = generate(world('Robot { controller "ros" }'), identity, clock=False)
 
     assert robots(made)[0].ros_name == ros_name(identity, "robot")
@@ -249,7 +252,7 @@ def test_a_robot_without_a_name_is_called_robot(world: Make, identity: RunIdenti
     ],
 )
 def test_other_controllers_are_left_alone(generated: Callable[..., str], text: str) -> None:
-    """They do not use ROS, so their arguments must not change."""
+    """A robot with another controller does not use ROS, and its arguments belong to its own program."""
     assert generated(text + COMPLETE, clock=False) == text + COMPLETE
 
 
@@ -274,12 +277,12 @@ def test_other_controllers_are_left_alone(generated: Callable[..., str], text: s
 def test_a_world_without_a_robot_that_speaks_ros_is_refused_with_the_controllers_that_there_are(
     refusal: Callable[..., str], text: str, message: str
 ) -> None:
-    """A run would find no robot in it."""
+    """A training run would find no robot in this world."""
     assert refusal(text) == message
 
 
 def test_all_refusals_of_a_world_come_at_once(refusal: Callable[..., str]) -> None:
-    """They are in the order of the file, one line for each kind."""
+    """The lines are in the order of the file, one line for each type of mistake."""
     text = 'EXTERNPROTO "a.proto"\n' + robot("controllerArgs 5") + "\n" + robot("") + "\n" + robot("")
 
     assert [line.partition(";")[0] for line in refusal(text).splitlines()] == [
@@ -290,7 +293,7 @@ def test_all_refusals_of_a_world_come_at_once(refusal: Callable[..., str]) -> No
 
 
 def test_a_byte_order_mark_is_accepted_and_kept(identity: RunIdentity) -> None:
-    """Some editors write it before the header, and it must not matter."""
+    """Some editors write a byte order mark before the header."""
     source = b"\xef\xbb\xbf#VRML_SIM R2023b utf8\n" + COMPLETE.encode()
 
     made = generate(source, identity, clock=False)
@@ -299,7 +302,10 @@ def test_a_byte_order_mark_is_accepted_and_kept(identity: RunIdentity) -> None:
 
 
 def test_robots_are_described_as_the_world_has_them(world: Make) -> None:
-    """This holds before and after the generation; the controller uses the last of two names."""
+    """The function describes a world before or after generation.
+
+    The last `--name=` counts, as in the controller.
+    """
     text = (
         'Robot { controller "ros" supervisor TRUE controllerArgs ["--name=a" "--name=b"] }'
         'DEF ARM Robot { controller "ros" name "arm" controllerArgs "--synchronize" }'
@@ -377,7 +383,7 @@ def test_a_world_that_no_simulator_can_have_is_refused(
 
 
 def test_using_what_holds_no_robot_is_fine(generated: Callable[..., str]) -> None:
-    """Shapes are often reused."""
+    """Many worlds use the same Shape twice."""
     text = "Solid { children DEF BODY Shape { } boundingObject USE BODY }" + COMPLETE
 
     assert generated(text) == text
@@ -397,14 +403,14 @@ def test_using_what_holds_no_robot_is_fine(generated: Callable[..., str]) -> Non
 def test_addresses_that_lead_somewhere_from_everywhere_are_fine(
     generated: Callable[..., str], text: str
 ) -> None:
-    """The same holds for text that only looks like an address."""
+    """An absolute address, or a text that only looks like an address, is valid in every folder."""
     assert generated(text + COMPLETE) == text + COMPLETE
 
 
 def test_a_world_beside_its_files_may_name_them_by_relative_addresses(
     world: Make, identity: RunIdentity, refusal: Callable[..., str]
 ) -> None:
-    """No other rule is relaxed."""
+    """All other rules still apply to such a world."""
     text = 'EXTERNPROTO "../Lamp.proto" Mesh { url "a.obj" }' + COMPLETE
 
     made = generate(world(text), identity, clock=False, relative_addresses=True)
@@ -414,7 +420,7 @@ def test_a_world_beside_its_files_may_name_them_by_relative_addresses(
 
 
 def test_a_world_beside_another_has_a_suffix_behind_its_names_and_no_clock(world: Make) -> None:
-    """Only one simulator of a master may publish the time."""
+    """Both simulators use one ROS master, so only the first may publish the time."""
     source = world(robot('controllerArgs ["--name=arm" "--clock" "--synchronize"]'))
 
     made = rename(source, "_2")
@@ -440,7 +446,7 @@ def test_a_world_beside_another_has_a_suffix_behind_its_names_and_no_clock(world
     ids=["none", "too long"],
 )
 def test_a_name_that_cannot_have_a_suffix_is_refused(world: Make, arguments: str, message: str) -> None:
-    """The controller would truncate the name."""
+    """The controller would truncate the longer name."""
     with pytest.raises(WorldError) as caught:
         rename(world(robot(arguments)), "_2", name="my.wbt")
 

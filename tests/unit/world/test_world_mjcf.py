@@ -1,4 +1,4 @@
-"""MJCF worlds as text: reading, refusals, and the bytes that change."""
+"""MJCF worlds as text: reading, rejections, and the bytes that generation changes."""
 
 import pytest
 
@@ -20,7 +20,7 @@ PLAIN = b'<mujoco>\n  <actuator><motor joint="x"/></actuator>\n</mujoco>\n'
 
 
 def with_custom(inside, top=b""):
-    """Return a world with these elements in `custom`, and others at the top."""
+    """Return a world with these elements in `custom`, and with others below the root."""
     return PLAIN.replace(b"<mujoco>", b"<mujoco><custom>" + inside + b"</custom>" + top)
 
 
@@ -38,13 +38,13 @@ def test_only_the_arguments_change():
 
 
 def test_a_clock_stays_in_the_one_simulator_that_may_keep_it():
-    """Two would publish two times on one topic."""
+    """Two simulators with one ROS master would publish two different times on `/clock`."""
     assert describe(generate(NAMED, IDENTITY, clock=True)).arguments[0] == "--clock"
     assert "--clock" not in describe(generate(NAMED, IDENTITY, clock=False)).arguments
 
 
 def test_a_world_without_arguments_gets_them_behind_its_root():
-    """Most other people's models have no such element."""
+    """Most public models have no element for the arguments."""
     made = generate(PLAIN, IDENTITY, clock=False)
 
     assert made.startswith(b'<mujoco><custom><text name="controllerArgs" data="--name=balance_')
@@ -53,25 +53,25 @@ def test_a_world_without_arguments_gets_them_behind_its_root():
 
 @pytest.mark.parametrize("source", [NAMED, PLAIN])
 def test_the_world_of_a_generated_world_is_the_same(source):
-    """A person may take the world of a simulator that ran for the source of a job."""
+    """A person may use the world of a simulator that ran as the source of another job."""
     made = generate(source, IDENTITY, clock=True)
 
     assert generate(made, IDENTITY, clock=True) == made
 
 
 def test_a_standby_has_the_same_name_with_an_ending():
-    """It runs together with the first on one ROS master."""
+    """The standby uses the same ROS master as the first simulator, so their names must differ."""
     assert robots(rename(NAMED, "_2"))[0].ros_name == "mine_2"
 
 
 def test_a_standby_of_a_world_without_a_name_is_refused():
-    """There is no name to which the suffix could be appended."""
+    """The suffix is appended to the ROS name, which this world lacks."""
     with pytest.raises(WorldError, match='the robot "robot" has no ROS name; add <text'):
         rename(PLAIN, "_2")
 
 
 def test_the_end_of_the_file_name_follows_from_the_content():
-    """A world of a ConfigMap has no file name of its own."""
+    """A world from a ConfigMap has no file name, so the content decides between .wbt and .xml."""
     assert suffix(b"\xef\xbb\xbf \n<mujoco/>") == ".xml"
     assert suffix(b"#VRML_SIM R2023b utf8\n") == ".wbt"
 
@@ -105,7 +105,7 @@ def test_the_end_of_the_file_name_follows_from_the_content():
     ],
 )
 def test_a_mistake_is_refused_with_its_place_and_what_to_write(source, message):
-    """The operator checks a world before it creates anything, and without MuJoCo."""
+    """The operator checks a world before it creates any object, and without MuJoCo."""
     with pytest.raises(WorldError, match=message):
         check(source)
 
@@ -120,7 +120,7 @@ def test_a_mistake_is_refused_with_its_place_and_what_to_write(source, message):
     ],
 )
 def test_a_path_that_does_not_count_from_the_world_is_refused(path, element):
-    """A model from somebody else must not read files of the pod."""
+    """A model from the internet must not read other files of the pod."""
     source = with_custom(b"", element.format(path).encode())
 
     with pytest.raises(WorldError, match="is not relative to the folder of the world; write its path from"):
@@ -128,7 +128,7 @@ def test_a_path_that_does_not_count_from_the_world_is_refused(path, element):
 
 
 def test_a_path_that_leads_above_the_world_is_fine():
-    """Models of a package share meshes, and only the files show where such a path leads."""
+    """Models of one package share meshes. Only the files themselves show where such a path leads."""
     assets = b'<asset><mesh file="../../arm.stl"/></asset>'
 
     check(with_custom(b"", b'<compiler meshdir="../stls/fetch"/>' + assets), relative_addresses=True)
@@ -139,7 +139,7 @@ def test_a_path_that_leads_above_the_world_is_fine():
     [("0.00831", "0.008 or 0.009"), ("0.0123", "0.012 or 0.013"), ("1e-09", "1e-05 or 1.0101e-05")],
 )
 def test_a_timestep_that_makes_no_short_step_is_refused_with_those_that_do(timestep, near):
-    """A basic step is whole milliseconds, at most 100, and has a limited number of MuJoCo's steps."""
+    """A basic step is a whole number of milliseconds, at most 100, and a limited number of MuJoCo's steps."""
     with pytest.raises(WorldError, match=f"fits the timestep of {timestep} s; write {near}"):
         check(with_custom(b"", f'<option timestep="{timestep}"/>'.encode()))
 
@@ -157,7 +157,7 @@ def test_a_timestep_that_makes_no_short_step_is_refused_with_those_that_do(times
     ],
 )
 def test_a_rounded_timestep_makes_the_step_that_is_meant(timestep, step_ms):
-    """1/240, 1/60, 1/120 and 1/300 of a second have no finite decimal form."""
+    """Steps of 1/240, 1/60, 1/120 and 1/300 s have no finite decimal form, so a file rounds them."""
     assert whole_step_ms(float(timestep)) == step_ms
 
 
@@ -176,7 +176,7 @@ GROWING = [
 
 @for_each("element, fact", GROWING)
 def test_a_line_that_would_take_all_memory_is_refused(element, fact):
-    """MuJoCo allocates whatever size it reads, which takes minutes or gigabytes."""
+    """MuJoCo allocates memory for any size in the file, which could take gigabytes or minutes."""
     with pytest.raises(WorldError) as refused:
         check(with_custom(b"", element.encode()))
 
@@ -184,12 +184,12 @@ def test_a_line_that_would_take_all_memory_is_refused(element, fact):
 
 
 def test_large_models_are_no_attack():
-    """Examples are a height field of a few kilometers, and a rope with a thousand parts."""
+    """A height field of a few kilometers and a rope of a thousand parts are legitimate."""
     check(with_custom(b"", b'<asset><hfield nrow="2000" ncol="2000"/></asset><replicate count="1000"/>'))
 
 
 def test_files_beside_the_world_need_a_world_with_a_file():
-    """A ConfigMap has no folder."""
+    """A world from a ConfigMap has no folder in which its files could be."""
     source = with_custom(b"", b'<asset><mesh file="meshes/arm.obj"/></asset>')
 
     check(source, relative_addresses=True)

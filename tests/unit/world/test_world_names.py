@@ -1,4 +1,4 @@
-"""The ROS names of robots are valid, short, readable and unique."""
+"""The ROS names of robots: valid, short, readable and unique."""
 
 import re
 from dataclasses import replace
@@ -24,30 +24,30 @@ identities = st.builds(
 
 
 def test_a_name_says_whose_it_is(identity: RunIdentity) -> None:
-    """A reader of `rosnode list` sees job, replica, simulator and robot."""
+    """A person who reads `rosnode list` sees the job, the replica, the simulator and the robot."""
     name = ros_name(identity, "robotino")
 
     assert re.fullmatch("move_to_target_r0_collect_1a_robotino_[0-9a-f]{6}", name)
 
 
 def test_the_robots_of_a_simulator_share_a_prefix(identity: RunIdentity) -> None:
-    """A person searches for it when several simulators write messages at once."""
+    """A person searches for the prefix where several simulators log at once."""
     assert name_prefix(identity) == "move_to_target_r0_collect_1a"
     assert ros_name(identity, "supervisor").startswith("move_to_target_r0_collect_1a_supervisor_")
 
 
 def test_a_name_never_changes(identity: RunIdentity) -> None:
-    """A simulator that restarts after an upgrade has the name that its run's logs have."""
+    """A simulator that restarts after an upgrade must have the name that is in the logs of its run."""
     assert ros_name(identity, "robotino") == "move_to_target_r0_collect_1a_robotino_682bd3"
 
 
 def test_a_job_that_begins_with_a_digit_gets_a_letter_in_front(identity: RunIdentity) -> None:
-    """Kubernetes allows such names, but ROS does not."""
+    """Kubernetes allows names that begin with a digit, but ROS does not."""
     assert name_prefix(replace(identity, job="3d")).startswith("j3d_r0_")
 
 
 def test_a_long_job_gives_way_to_what_tells_simulators_apart(identity: RunIdentity) -> None:
-    """A job's name may have 63 characters, and so may all the rest together."""
+    """A job's name alone may have 63 characters, which is the limit for the whole ROS name."""
     name = ros_name(replace(identity, job="x" * 63, replica=12), "robotino")
 
     assert len(name) <= 63
@@ -55,7 +55,7 @@ def test_a_long_job_gives_way_to_what_tells_simulators_apart(identity: RunIdenti
 
 
 def test_two_names_that_look_alike_differ_in_their_hash(identity: RunIdentity) -> None:
-    """Replaced or cut characters may make the readable parts equal, but not the names."""
+    """Replaced and cut characters may make the readable parts equal, but the hashes still differ."""
     dotted, dashed = ros_name(identity, "arm.left"), ros_name(identity, "arm-left")
 
     assert dotted[:-6] == dashed[:-6]
@@ -63,17 +63,17 @@ def test_two_names_that_look_alike_differ_in_their_hash(identity: RunIdentity) -
 
 
 def test_a_standby_beside_a_simulator_has_a_name_of_its_own(identity: RunIdentity) -> None:
-    """Both run at the same time, on one ROS master."""
+    """The standby and the first simulator run at the same time, with one ROS master."""
     assert name_prefix(replace(identity, slot="b")) == "move_to_target_r0_collect_1b"
 
 
 def test_the_same_job_created_again_has_other_names(identity: RunIdentity) -> None:
-    """Remains of the first job must not be taken for the second."""
+    """Names of the deleted job may still be registered, and must not be taken for those of the new job."""
     assert ros_name(identity, "robotino") != ros_name(replace(identity, uid="7a20"), "robotino")
 
 
 def test_the_border_between_two_parts_of_the_hash_cannot_be_shifted() -> None:
-    """Otherwise the end of one part could look like the beginning of the next."""
+    """Without a safe separator, the end of one part could pass for the beginning of the next."""
     one = RunIdentity(job="j", namespace='a", "b', uid="c", replica=0, group="g", index=0)
     other = RunIdentity(job="j", namespace="a", uid='b", "c', replica=0, group="g", index=0)
 
@@ -100,7 +100,7 @@ def test_every_name_is_legal_and_fits(identity: RunIdentity, robot: str) -> None
 def test_no_two_robots_of_a_job_share_a_name(
     job: str, groups: set[str], robots: set[str], replicas: set[int], indices: set[int]
 ) -> None:
-    """This holds over replicas, groups, indices, slots and robots together."""
+    """The names differ by replica, group, index, slot and robot."""
     names = [
         ros_name(RunIdentity(job=job, replica=r, group=g, index=i, slot=s), robot)
         for r, g, i, s, robot in product(replicas, groups, indices, "ab", robots)

@@ -1,4 +1,4 @@
-"""The generator checks its own patches: each must have the declared effect and no other."""
+"""The generator verifies that each of its patches has exactly the declared effect."""
 
 import pytest
 
@@ -11,12 +11,12 @@ SOURCE = Source(data=b"Robot { name TRUE }", name="my.wbt")
 
 
 def change(*edits: Patch) -> bytes:
-    """Return the source after these patches."""
+    """Return the source with these patches applied."""
     return edited(SOURCE, tokenize(SOURCE), edits)
 
 
 def test_edits_replace_insert_and_remove_tokens() -> None:
-    """They are applied in source order, and the text between them is copied."""
+    """Patches are applied in source order, and the text between them is copied."""
     replace = Patch(start=0, end=5, text=b"Pose", tokens=(b"Pose",))
     insert = Patch(start=7, end=7, text=b" a 1", tokens=(b"a", b"1"))
     remove = Patch(start=7, end=17, text=b"", tokens=())
@@ -36,6 +36,6 @@ def test_edits_replace_insert_and_remove_tokens() -> None:
     ],
 )
 def test_an_edit_that_does_not_do_what_it_says_is_refused(edit: Patch) -> None:
-    """Otherwise only a simulator would notice the wrong world."""
+    """Without this check, only a simulator would notice the wrong world."""
     with pytest.raises(WorldError, match=r"my\.wbt:1:\d+: the generated world has .* was meant"):
         change(edit)

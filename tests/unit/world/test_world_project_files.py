@@ -1,4 +1,4 @@
-"""Files that the nodes of a world name: inside its project, and regular ones alone."""
+"""Files to which a world's nodes refer: only regular files inside the world's project are read."""
 
 import os
 
@@ -12,7 +12,7 @@ WORLD = b"#VRML_SIM R2023b utf8\n"
 
 @pytest.fixture
 def project(tmp_path):
-    """Return the folder of a world in a project, with one file next to it and one next to the folder."""
+    """Return the folder of a world in a project, with a file in that folder and a file next to it."""
     folder = tmp_path / "football" / "worlds"
     (folder / "textures").mkdir(parents=True)
     (folder / "textures" / "line.png").write_bytes(b"line")
@@ -23,19 +23,19 @@ def project(tmp_path):
 
 
 def read(folder, address, namer=None):
-    """Return the bytes of a file that the world, or another file, names."""
+    """Return the bytes of a file to which the world, or another file, refers."""
     files = ProjectFiles(folder / "w.wbt", WORLD)
     return files.read(namer or Source(data=WORLD, name="w.wbt"), address)
 
 
 def test_an_address_counts_from_the_folder_of_the_world(project):
-    """The project, beside whose folder controllers are, is the parent of that."""
+    """The project is the parent of that folder, so `..` is still inside."""
     assert read(project, "textures/line.png") == b"line"
     assert read(project, "../field.png") == b"field"
 
 
 def test_an_address_in_a_proto_counts_from_the_file_of_the_proto(project):
-    """Webots looks there, wherever the world is."""
+    """Webots searches relative to the PROTO too, wherever the world is."""
     proto = Source(data=b"", name=str(project.parent / "protos" / "Field.proto"), kind="PROTO")
 
     assert read(project, "../worlds/textures/line.png", proto) == b"line"
@@ -52,13 +52,13 @@ def test_an_address_in_a_proto_counts_from_the_file_of_the_proto(project):
     ],
 )
 def test_a_file_outside_of_the_project_is_not_read(project, address):
-    """A world of a stranger must not read files of the pod."""
+    """A world from the internet must not read other files of the pod."""
     with pytest.raises(OSError, match=r"outside|not a path"):
         read(project, address)
 
 
 def test_the_whole_file_system_is_no_project(project):
-    """A world that names a file above all its folders would otherwise make it one."""
+    """Without this rule, a world with enough `../` in an address would make `/` its project."""
     climbing = "../" * len(project.parts) + "etc/hostname"
     world = WORLD + f'ImageTexture {{ url "{climbing}" }}'.encode()
     files = ProjectFiles(project / "w.wbt", world)
@@ -68,7 +68,7 @@ def test_the_whole_file_system_is_no_project(project):
 
 
 def test_a_link_that_leads_out_of_the_project_is_not_followed(project, tmp_path):
-    """This holds for links to files and to folders."""
+    """Both a link to a file and a link to a folder may lead outside."""
     (project / "textures" / "other.png").symlink_to(tmp_path / "secret.png")
     (project / "up").symlink_to("../..")
 
@@ -78,7 +78,7 @@ def test_a_link_that_leads_out_of_the_project_is_not_followed(project, tmp_path)
 
 
 def test_what_is_no_regular_file_is_not_read(project):
-    """Opening a pipe would wait for ever."""
+    """Opening a pipe would block for ever."""
     os.mkfifo(project / "pipe.png")
 
     for address in ("pipe.png", "textures"):
@@ -87,7 +87,10 @@ def test_what_is_no_regular_file_is_not_read(project):
 
 
 def test_the_links_of_a_generated_world_lead_to_the_source_project(project, tmp_path):
-    """The sidecar links the files next to the source world; from there, nothing leads on."""
+    """The sidecar links files of the source project into the folder of a generated world.
+
+    A link from the source project to another place is not followed.
+    """
     generated = tmp_path / "work" / "project" / "worlds"
     generated.mkdir(parents=True)
     (generated / "textures").symlink_to(project / "textures")

@@ -1,4 +1,4 @@
-"""Properties of all worlds; hypothesis draws worlds with random gaps between their tokens."""
+"""Properties of all worlds: hypothesis draws worlds with random gaps between their tokens."""
 
 from itertools import chain, product
 
@@ -31,7 +31,7 @@ def listed(items: st.SearchStrategy[list[str]]) -> st.SearchStrategy[list[str]]:
 
 @st.composite
 def nodes(draw: st.DrawFn, inner: st.SearchStrategy[list[str]]) -> list[str]:
-    """Draw the tokens of a node of any kind; `inner` draws those inside it."""
+    """Draw the tokens of a node of any type; `inner` draws the tokens of nodes inside it."""
     values = st.one_of(SCALARS, listed(SCALARS), inner, listed(inner))
     fields = draw(st.dictionaries(st.sampled_from(["f", "g", "name", "hidden x"]), values))
     body = [token for name, value in fields.items() for token in (*name.split(), *value)]
@@ -40,7 +40,7 @@ def nodes(draw: st.DrawFn, inner: st.SearchStrategy[list[str]]) -> list[str]:
 
 @st.composite
 def ros_robots(draw: st.DrawFn, inner: st.SearchStrategy[list[str]]) -> list[str]:
-    """Draw the tokens of a robot with the ros controller; `Robot.name` is filled in later."""
+    """Draw the tokens of a robot with the controller ros; its field `name` gets its value later."""
     controller = ["controller", '"ros"']
     arguments = draw(
         st.one_of(
@@ -63,7 +63,7 @@ TREES = st.recursive(
 
 @st.composite
 def worlds(draw: st.DrawFn) -> bytes:
-    """Draw a world whose robots have different names; at least one has the ros controller."""
+    """Draw a world whose robots have different names. At least one robot has the controller ros."""
     lamp = st.just(["Lamp", "{", "}"])
     tokens = chain(*draw(st.lists(TREES, max_size=3)), draw(ros_robots(lamp)))
     pieces = [draw(st.sampled_from(["#VRML_SIM R2023b utf8\n", "#VRML_SIM V8.6.2 utf8 \r\n"]))]
@@ -73,7 +73,7 @@ def worlds(draw: st.DrawFn) -> bytes:
 
 
 def without_arguments(source: bytes) -> bytes:
-    """Return a world without its robots' controllerArgs and the gap before each of them."""
+    """Return a world without the `controllerArgs` of its robots and the gaps before them."""
     world = parse(source)
     cuts = sorted(
         (world.tokens[world.index(value.span[0]) - 2].end, value.span[1])
@@ -86,12 +86,12 @@ def without_arguments(source: bytes) -> bytes:
 
 
 def rewritten(world: World) -> str:
-    """Return a world that is written from its tree, without comments and formatting."""
+    """Return a world written from its parsed tree, without comments and formatting."""
     return " ".join(token for node in world.nodes for token in written(node))
 
 
 def written(node: Node) -> list[str]:
-    """Return the tokens of a node, written from its tree."""
+    """Return the tokens of a node, written from the node's parsed tree."""
     tokens = [node.type_name, "{"]
     for name, value in node.fields.items():
         tokens += [name, "["] if value.bracketed else [name]
@@ -111,7 +111,7 @@ def written(node: Node) -> list[str]:
 
 @given(worlds())
 def test_a_world_survives_being_read_and_written_anew(source: bytes) -> None:
-    """The tree holds the whole meaning of a world, but not its formatting."""
+    """The parsed tree keeps the meaning of a world, but not its formatting."""
     once = rewritten(parse(source))
 
     assert rewritten(parse(f"#VRML_SIM R2023b utf8\n{once}".encode())) == once
@@ -119,7 +119,7 @@ def test_a_world_survives_being_read_and_written_anew(source: bytes) -> None:
 
 @given(source=worlds(), clock=st.booleans())
 def test_only_the_arguments_of_robots_change(source: bytes, *, clock: bool) -> None:
-    """All other bytes stay, including comments, commas, line ends and saved states."""
+    """All other bytes stay the same, including comments, commas, line ends and saved states."""
     made = generate(source, IDENTITY, clock=clock)
 
     assert without_arguments(made) == without_arguments(source)
@@ -127,7 +127,7 @@ def test_only_the_arguments_of_robots_change(source: bytes, *, clock: bool) -> N
 
 @given(source=worlds(), clock=st.booleans())
 def test_generating_twice_changes_nothing(source: bytes, *, clock: bool) -> None:
-    """The sidecar generates again what the operator has generated."""
+    """A sidecar may get a world that was already generated."""
     made = generate(source, IDENTITY, clock=clock)
 
     assert generate(made, IDENTITY, clock=clock) == made
@@ -139,7 +139,7 @@ def test_generating_twice_changes_nothing(source: bytes, *, clock: bool) -> None
     b'Robot { name "r" controller "ros" controllerArgs [ "--name=a"  # c\n"--name=a" "--clock" ] } '
 )
 def test_taking_the_clock_away_later_is_the_same_as_never_allowing_it(source: bytes) -> None:
-    """The order of the two generations must not matter."""
+    """The clock may be removed in a first or in a second generation, with the same result."""
     allowed = generate(source, IDENTITY, clock=True)
 
     assert generate(allowed, IDENTITY, clock=False) == generate(source, IDENTITY, clock=False)
@@ -147,7 +147,7 @@ def test_taking_the_clock_away_later_is_the_same_as_never_allowing_it(source: by
 
 @given(source=worlds(), clock=st.booleans())
 def test_every_robot_has_its_name_and_waits_for_its_client(source: bytes, *, clock: bool) -> None:
-    """They are the robots of the source, in its order."""
+    """The generated world has the robots of the source, in the same order."""
     made = robots(generate(source, IDENTITY, clock=clock))
 
     assert [robot.robot for robot in made] == [robot.robot for robot in robots(source)]
@@ -157,7 +157,7 @@ def test_every_robot_has_its_name_and_waits_for_its_client(source: bytes, *, clo
 
 @given(source=worlds(), clock=st.booleans())
 def test_no_world_has_two_clocks_or_two_names(source: bytes, *, clock: bool) -> None:
-    """A world has one clock if it is allowed and the source has one."""
+    """The world has one clock if it is allowed and the source has at least one."""
     world = parse(generate(source, IDENTITY, clock=clock))
     found = [node.texts("controllerArgs") for node in world.walk() if node.text("controller")]
 
@@ -170,7 +170,7 @@ def test_no_world_has_two_clocks_or_two_names(source: bytes, *, clock: bool) -> 
 def test_no_two_worlds_of_a_job_share_a_ros_name(
     source: bytes, replicas: set[int], indices: set[int]
 ) -> None:
-    """This holds over replicas, groups, indices and robots."""
+    """The names differ by replica, group, index and robot."""
     names = [
         robot.ros_name
         for replica, group, index in product(replicas, ("collect", "evaluate"), indices)

@@ -1,4 +1,4 @@
-"""A PROTO file without a template is read; every other one is refused with position, fact and remedy."""
+"""PROTO files without a template are read; others are rejected with position, fact and remedy."""
 
 import pytest
 from hypothesis import given
@@ -35,24 +35,24 @@ PROTO Stool [
 
 
 def read(text: str) -> Proto:
-    """Return the PROTO of a text without its first line."""
+    """Return the PROTO of a text that lacks the header."""
     return parse_proto((HEADER + text).encode(), "Stool.proto")
 
 
 def refusal(text: str) -> str:
-    """Return the message for a PROTO that cannot be read."""
+    """Return the message about a PROTO that cannot be read."""
     with pytest.raises(WorldError) as caught:
         read(text)
     return str(caught.value).removeprefix("Stool.proto:")
 
 
 def declaring(declaration: str) -> str:
-    """Return a PROTO with one declaration, on line 3."""
+    """Return a PROTO with one field declaration, on line 3."""
     return f"PROTO Stool [\n{declaration}\n] {{ Solid {{ }} }}"
 
 
 def test_a_proto_has_its_type_fields_files_and_body() -> None:
-    """The fields keep their order, because Webots lists them in it."""
+    """Webots lists the fields in their declared order, so the reader keeps it."""
     stool = read(STOOL)
 
     assert stool.name == "Stool"
@@ -68,7 +68,7 @@ def test_a_proto_has_its_type_fields_files_and_body() -> None:
 
 
 def test_a_field_has_its_type_access_default_and_allowed_values() -> None:
-    """As in a world, a list of one item needs no brackets."""
+    """As in a world, a list of one value needs no brackets."""
     fields = read(STOOL).fields
 
     assert (fields["translation"].type, fields["translation"].default.items) == ("SFVec3f", (0, 0, 0.5))
@@ -80,7 +80,7 @@ def test_a_field_has_its_type_access_default_and_allowed_values() -> None:
 
 
 def test_is_refers_to_a_field_of_the_proto() -> None:
-    """The reader does not resolve it, because only an instance has the value."""
+    """The reader does not replace IS by a value, because only an instance has the value."""
     body = read(STOOL).body
 
     assert body.fields["translation"].items == (Is(name="translation"),)
@@ -89,7 +89,7 @@ def test_is_refers_to_a_field_of_the_proto() -> None:
 
 
 def test_a_world_still_has_no_is() -> None:
-    """IS refers to a field of a PROTO, and a world declares no fields."""
+    """IS refers to a field that a PROTO declares, and a world declares no fields."""
     with pytest.raises(WorldError, match="2:21: IS outside a PROTO file; write the value of translation"):
         parse(f"{HEADER}Solid {{ translation IS place }}".encode())
 
@@ -134,12 +134,12 @@ def test_a_world_still_has_no_is() -> None:
     ],
 )
 def test_a_mistake_is_pointed_at(text: str, message: str) -> None:
-    """Each message begins with line and column in the PROTO's own file."""
+    """A message begins with the line and the column in the PROTO's own file."""
     assert refusal(text).startswith(message)
 
 
 def test_every_is_without_a_field_is_named_at_once() -> None:
-    """A renamed field is usually used in several places."""
+    """A person who renames a field often has to correct several places."""
     message = refusal("PROTO Stool [ ] { Solid { name IS a model IS b } }")
 
     assert "no field a" in message
@@ -156,7 +156,7 @@ def test_every_is_without_a_field_is_named_at_once() -> None:
     ],
 )
 def test_a_template_is_refused_with_its_line_and_the_remedies(text: str, line: int) -> None:
-    """Only an engine of Lua or JavaScript could run its code."""
+    """Only an interpreter of Lua or JavaScript could run the code of a template."""
     message = refusal(text)
 
     assert message.startswith(f"{line}:")
@@ -166,14 +166,14 @@ def test_a_template_is_refused_with_its_line_and_the_remedies(text: str, line: i
 
 
 def test_a_percent_sign_in_a_comment_or_alone_is_no_template() -> None:
-    """Comments have percentages, and addresses have escapes."""
+    """Comments contain percentages, and addresses contain escapes such as %20."""
     text = 'PROTO Stool [ ] # 5 %{ of all\n{ Solid { name "%20" } } # %<'
 
     assert read(text).body.text("name") == "%20"
 
 
 def test_the_first_line_of_a_proto_is_checked_as_that_of_a_world() -> None:
-    """The message has the kind of file."""
+    """The message says that the file is meant to be a PROTO."""
     with pytest.raises(WorldError, match="the first line is not the header of a Webots PROTO"):
         parse_proto(b"PROTO Stool [ ] { Solid { } }", "Stool.proto")
     with pytest.raises(WorldError, match="save the PROTO as UTF-8"):
@@ -181,7 +181,7 @@ def test_the_first_line_of_a_proto_is_checked_as_that_of_a_world() -> None:
 
 
 def problem(data: bytes) -> WorldError | None:
-    """Return the error of a PROTO; any other exception fails the test."""
+    """Return the error about a PROTO; any other exception fails the test."""
     try:
         parse_proto(data, "Stool.proto")
     except WorldError as error:
@@ -191,7 +191,7 @@ def problem(data: bytes) -> WorldError | None:
 
 @given(st.binary())
 def test_arbitrary_bytes_are_a_proto_or_a_world_error(data: bytes) -> None:
-    """For any file, the reader may raise no other exception."""
+    """For any bytes, the reader raises no other exception than WorldError."""
     error = problem(HEADER.encode() + data)
 
     assert error is None or (error.line >= 1 and error.column >= 1)
@@ -203,7 +203,7 @@ def test_arbitrary_bytes_are_a_proto_or_a_world_error(data: bytes) -> None:
     new=st.sampled_from(["", '"', "{", "}", "[", "]", " IS ", "#", "\r\n", "%", "%<", " field ", "SFBool"]),
 )
 def test_a_damaged_proto_is_read_or_refused(at: float, cut: int, new: str) -> None:
-    """Half-saved files and missing braces have no other result."""
+    """The file may be half saved or lack braces."""
     place = int(at * len(STOOL))
     damaged = STOOL[:place] + new + STOOL[place + cut :]
 
@@ -213,7 +213,7 @@ def test_a_damaged_proto_is_read_or_refused(at: float, cut: int, new: str) -> No
 
 
 def test_of_two_values_of_a_field_in_a_body_the_last_counts() -> None:
-    """Published PROTOs have such fields, and Webots reads them; a world is still refused."""
+    """Published PROTOs have such fields, and Webots reads them. A world with two values is still rejected."""
     proto = read("PROTO Stool [ field SFVec3f at 1 1 1 ] { Solid { translation IS at translation 0 0 2 } }")
 
     assert proto.body.numbers("translation") == (0, 0, 2)

@@ -1,6 +1,6 @@
-"""The descriptions of Webots' robots have the fields, devices and wheels that Webots documents.
+"""The descriptions of Webots' robots have the fields, devices and wheels of Webots' documentation.
 
-The numbers here were taken from Webots' user guide and PROTO files, not from the descriptions.
+The numbers here come from Webots' user guide and PROTO files, not from the descriptions.
 """
 
 import math
@@ -29,14 +29,15 @@ LIDARS = {
     "VelodyneHDL-32E": (90, 4500, 1, 70),
     "VelodyneHDL-64E": (90, 4500, 0.8, 120),
 }
-# Layers, the elevation of the highest and of the lowest in degrees, and the noise in meters.
+# The number of layers, the elevations of the highest and the lowest layer in degrees, and the noise in
+# meters.
 LAYERS = {
     "VelodynePuck": (16, 15, -15, 0.03),
     "VelodyneVLP-16": (16, 15, -15, 0.03),
     "VelodyneHDL-32E": (32, 0.7, -40.7, 0.02),
     "VelodyneHDL-64E": (64, 2, -24.8, 0.02),
 }
-# The range in meters by the data sheet, and the volts at its two ends.
+# The range in meters by the data sheet, and the volts at both ends of the range.
 INFRARED = {
     "SharpGP2D120": ((0.04, 2.72), (0.3, 0.42)),
     "SharpGP2Y0A02YK0F": ((0.2, 2.51), (1.5, 0.45)),
@@ -68,7 +69,7 @@ NAMES = {
     "TurtleBot3Burger": "TurtleBot3Burger",
     "BmwX5": "vehicle",
 }
-# Fields that choose among variants; only the default variant is described.
+# Fields that choose a variant of a robot. The descriptions have only the default variant.
 WITHOUT_EFFECT = {
     "E-puck": {"version", "kinematic"},
     "Robotino3": {"infraredSensorModel"},
@@ -110,7 +111,7 @@ TYPES_OF_DEVICES = {
     "Accelerometer", "Brake", "Camera", "Compass", "DistanceSensor", "Emitter", "Gyro", "InertialUnit", "LED",
     "Lidar", "LightSensor", "PositionSensor", "Receiver", "RotationalMotor", "Skin", "Speaker", "TouchSensor",
 }  # fmt: skip
-# Nodes that need no PROTO of Webots and no file of its installation.
+# Node types that need no PROTO and no file of a Webots installation.
 PLAIN = TYPES_OF_DEVICES | {
     "Box", "Cylinder", "Group", "HingeJoint", "HingeJointParameters", "Physics", "Pose", "Robot", "Solid",
     "Sphere", "Zoom",
@@ -124,7 +125,7 @@ _IS = re.compile(r"\bIS (\w+)")
 
 
 class Description(NamedTuple):
-    """A PROTO file: its name, its fields with their defaults, and its body with the defaults filled in."""
+    """A PROTO file: its name, its fields with their defaults, and its body with these defaults filled in."""
 
     name: str
     defaults: dict[str, str]
@@ -133,7 +134,7 @@ class Description(NamedTuple):
 
 
 class Drive(NamedTuple):
-    """Documented values of a drive, in m, rad/s and kg."""
+    """The documented values of a drive, in m, rad/s and kg."""
 
     radius: float
     wheels: set[tuple[float, float]]
@@ -153,7 +154,7 @@ DRIVES = {
 
 
 def described(name: str) -> Description:
-    """Return a description, with the default of each field in place of `IS`."""
+    """Return a description, in whose body each `IS` is replaced by the default of the field."""
     text = (PROTOS / f"{name}.proto").read_text()
     header, _, _ = text.partition("\n")
     found = _FILE.search(text)
@@ -174,7 +175,7 @@ def of_type(nodes: Iterable[Node], *types: str) -> list[Node]:
 
 
 def numbers(node: Node, field: str) -> tuple[float, ...]:
-    """Return the numbers of a field that the node must have."""
+    """Return the numbers of a field, which the node must have."""
     found = node.numbers(field)
     assert found is not None, f"{node.type_name} without {field}"
     return found
@@ -187,7 +188,7 @@ def within(node: Node, world: World) -> list[Node]:
 
 
 def driven(name: str) -> list[tuple[Node, Node]]:
-    """Return the motor and the wheel of each driven joint."""
+    """Return the motor and the wheel of each joint with a motor."""
     return [
         (of_type(joint.nodes("device"), "RotationalMotor")[0], joint.nodes("endPoint")[0])
         for joint in of_type(described(name).body.walk(), "HingeJoint")
@@ -196,7 +197,7 @@ def driven(name: str) -> list[tuple[Node, Node]]:
 
 
 def headings(name: str, prefix: str) -> list[float]:
-    """Return the directions of the distance sensors with a name prefix, in degrees about z, by number."""
+    """Return the azimuths in degrees of the distance sensors with a name prefix, ordered by their number."""
     found = {}
     for sensor in of_type(described(name).body.walk(), "DistanceSensor"):
         number = (sensor.text("name") or "").removeprefix(prefix)
@@ -205,14 +206,14 @@ def headings(name: str, prefix: str) -> list[float]:
 
 
 def heading(rotation: tuple[float, ...]) -> float:
-    """Return the heading of the x axis after a rotation, in rad."""
+    """Return the azimuth of the x axis after a rotation, in radians."""
     x, y, z, angle = rotation
     cosine, sine = math.cos(angle), math.sin(angle)
     return math.atan2(x * y * (1 - cosine) + z * sine, x * x * (1 - cosine) + cosine)
 
 
 def test_each_description_is_of_the_proto_that_its_file_is_named_after() -> None:
-    """A world names a PROTO, and its file is found by that name."""
+    """The reader looks for a PROTO in the file of the same name."""
     files = sorted(path.stem for path in PROTOS.glob("*.proto"))
 
     assert files == sorted(ROBOTS + CARS + PARTS)
@@ -221,14 +222,14 @@ def test_each_description_is_of_the_proto_that_its_file_is_named_after() -> None
 
 @pytest.mark.parametrize("name", ROBOTS + CARS)
 def test_a_world_can_set_every_documented_field(name: str) -> None:
-    """No other field is accepted: a misspelled field is an error in Webots too."""
+    """Any other field is an error, because Webots would also reject a misspelled field."""
     common = set(COMMON.split()) - ({"customData"} if name in CARS else set())
     assert set(described(name).defaults) == common | set(FIELDS[name].split())
 
 
 @pytest.mark.parametrize("name", ROBOTS + CARS + PARTS)
 def test_a_field_without_effect_is_one_that_chooses_a_variant(name: str) -> None:
-    """The body uses all other fields, so they have the same effect as in Webots."""
+    """The body uses all other fields, so these have the same effect as in Webots."""
     description = described(name)
     is_light = name in {"RobotisLds01", "SickS300"} or name.startswith(("Hokuyo", "Velodyne"))
     without = ({"enablePhysics"} if is_light else set()) | WITHOUT_EFFECT.get(name, set())
@@ -238,7 +239,7 @@ def test_a_field_without_effect_is_one_that_chooses_a_variant(name: str) -> None
 
 @pytest.mark.parametrize("name", ROBOTS + CARS)
 def test_a_robot_has_its_documented_name(name: str) -> None:
-    """ROS names are made from it."""
+    """The ROS name of a robot contains this name."""
     (robot,) = described(name).body.nodes
 
     assert robot.type_name == "Robot"
@@ -247,7 +248,10 @@ def test_a_robot_has_its_documented_name(name: str) -> None:
 
 @pytest.mark.parametrize("name", ROBOTS + CARS + PARTS)
 def test_descriptions_need_no_other_file_and_draw_nothing(name: str) -> None:
-    """They are for simulators without Webots' files. Only a lidar is another description."""
+    """A simulator without an installation of Webots uses the descriptions.
+
+    They refer to no other file, except to the lidar's description.
+    """
     description = described(name)
     types = {node.type_name for node in description.body.walk()}
 
@@ -256,7 +260,7 @@ def test_descriptions_need_no_other_file_and_draw_nothing(name: str) -> None:
 
 
 def test_the_lidar_of_the_turtlebot_is_described_beside_it() -> None:
-    """It is the default of extensionSlot, so a world that leaves the slot out has a lidar."""
+    """The lidar is the default of `extensionSlot`, so a world that does not set the slot has a lidar."""
     text = (PROTOS / "TurtleBot3Burger.proto").read_text()
     (address,) = re.findall(r'^EXTERNPROTO "(.*)"$', text, re.MULTILINE)
     (lidar,) = described("RobotisLds01").body.nodes
@@ -269,7 +273,7 @@ def test_the_lidar_of_the_turtlebot_is_described_beside_it() -> None:
 
 @pytest.mark.parametrize("name", LIDARS)
 def test_a_lidar_has_the_documented_rays(name: str) -> None:
-    """These are the field of view in degrees, the number of rays, and the range."""
+    """The values are the field of view in degrees, the number of rays, and the range."""
     (lidar,) = described(name).body.nodes
     degrees, rays, nearest, farthest = LIDARS[name]
 
@@ -281,7 +285,7 @@ def test_a_lidar_has_the_documented_rays(name: str) -> None:
 
 @pytest.mark.parametrize("name", LAYERS)
 def test_a_lidar_of_many_layers_looks_up_and_down_as_documented(name: str) -> None:
-    """The tilt moves all layers; the noise is a share of the range."""
+    """The tilt moves all layers, and the noise is a fraction of the range."""
     (lidar,) = described(name).body.nodes
     layers, highest, lowest, noise_m = LAYERS[name]
     (tilt,), (high,) = lidar.numbers("tiltAngle") or (0.0,), numbers(lidar, "verticalFieldOfView")
@@ -295,7 +299,7 @@ def test_a_lidar_of_many_layers_looks_up_and_down_as_documented(name: str) -> No
 
 @pytest.mark.parametrize("name", INFRARED)
 def test_an_infra_red_sensor_returns_the_volts_of_its_data_sheet(name: str) -> None:
-    """The farther an object is, the lower is the voltage, also beyond the range."""
+    """The voltage falls with the distance, also beyond the documented range."""
     (sensor,) = described(name).body.nodes
     table = numbers(sensor, "lookupTable")
     distances, volts = table[::3], table[1::3]
@@ -308,7 +312,7 @@ def test_an_infra_red_sensor_returns_the_volts_of_its_data_sheet(name: str) -> N
 
 @pytest.mark.parametrize("name", ROBOTS + CARS)
 def test_a_robot_has_the_documented_devices(name: str) -> None:
-    """Each occurs once, because programs look them up by name."""
+    """A program finds devices by name, so each name occurs once."""
     devices = of_type(described(name).body.walk(), *TYPES_OF_DEVICES)
     names = [device.text("name") for device in devices]
 
@@ -317,7 +321,7 @@ def test_a_robot_has_the_documented_devices(name: str) -> None:
 
 
 def test_the_ground_sensors_of_the_e_puck_look_down_from_left_to_right() -> None:
-    """They are only added through groundSensorsSlot."""
+    """The ground sensors are part of the robot only if `groundSensorsSlot` contains them."""
     sensors = of_type(described("E-puckGroundSensors").body.walk(), "DistanceSensor")
 
     assert [it.text("name") for it in sensors] == ["gs0", "gs1", "gs2"]
@@ -327,7 +331,7 @@ def test_the_ground_sensors_of_the_e_puck_look_down_from_left_to_right() -> None
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_wheels_are_where_webots_has_them_and_as_large(name: str) -> None:
-    """A program's odometry from wheel radius and track is then right."""
+    """A program's odometry uses the wheel radius and the track."""
     body = described(name).body
     centers = {numbers(wheel, "translation")[:2] for _, wheel in driven(name)}
     radii = [
@@ -341,9 +345,9 @@ def test_wheels_are_where_webots_has_them_and_as_large(name: str) -> None:
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_wheels_stand_on_the_floor(name: str) -> None:
-    """This holds for the default translation.
+    """The height is that of the default translation.
 
-    Those of the Robotino 3 are pressed in by 4 mm, as in Webots.
+    As in Webots, the wheels of the Robotino 3 are 4 mm below the floor.
     """
     height = float(described(name).defaults["translation"].split()[2])
 
@@ -354,7 +358,7 @@ def test_wheels_stand_on_the_floor(name: str) -> None:
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_a_wheel_turns_about_its_axle(name: str) -> None:
-    """The anchor of a joint is any point on the axle: the e-puck's is between its wheels."""
+    """The anchor of a joint may be any point on the axle; the e-puck's anchor is between its wheels."""
     for joint in of_type(described(name).body.walk(), "HingeJoint"):
         if joint.nodes("device"):
             (parameters,), (wheel,) = joint.nodes("jointParameters"), joint.nodes("endPoint")
@@ -368,7 +372,7 @@ def test_a_wheel_turns_about_its_axle(name: str) -> None:
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_motors_and_bodies_have_the_documented_limits_and_masses(name: str) -> None:
-    """A program reads maxVelocity of the motors to scale its commands."""
+    """A program scales its commands by the `maxVelocity` of the motors."""
     (robot,) = described(name).body.nodes
     (physics,) = robot.nodes("physics")
 
@@ -378,7 +382,7 @@ def test_motors_and_bodies_have_the_documented_limits_and_masses(name: str) -> N
 
 
 def test_infrared_sensors_of_the_e_puck_look_where_the_user_guide_says() -> None:
-    """The guide counts from the negative y axis, in rad."""
+    """The user guide counts angles from the negative y axis, in radians."""
     guide = [1.27, 0.77, 0.0, 5.21, 4.21, math.pi, 2.37, 1.87]
     expected = [math.remainder(it - math.pi / 2, math.tau) for it in guide]
 
@@ -387,7 +391,7 @@ def test_infrared_sensors_of_the_e_puck_look_where_the_user_guide_says() -> None
 
 @pytest.mark.parametrize("name", ["Pioneer3at", "Pioneer3dx"])
 def test_sonars_of_the_pioneers_are_20_degrees_apart_and_40_at_the_sides(name: str) -> None:
-    """They go clockwise from the left, as in the user guide's figure."""
+    """As in the figure of the user guide, the sonars go clockwise from the left."""
     front = [90, 50, 30, 10, -10, -30, -50, -90]
     expected = front + [-180 - it if it <= 0 else 180 - it for it in reversed(front)]
 
@@ -395,7 +399,7 @@ def test_sonars_of_the_pioneers_are_20_degrees_apart_and_40_at_the_sides(name: s
 
 
 def test_the_robotino_is_the_one_of_the_arena() -> None:
-    """Wheels, rollers and infrared sensors are the same, so a policy fits both."""
+    """Wheels, rollers and infrared sensors are the same as in the arena, so a policy fits both robots."""
     arena, robotino = parse(builtin("arena")), described("Robotino3").body
     ours = {it.text("name"): it for it in of_type(arena.walk(), "DistanceSensor")}
     theirs = {it.text("name"): it for it in of_type(robotino.walk(), "DistanceSensor")}
@@ -412,7 +416,7 @@ def test_the_robotino_is_the_one_of_the_arena() -> None:
 
 
 def test_the_car_has_the_wheels_that_its_documentation_names() -> None:
-    """A client computes the angles of the front wheels from wheelbase and track."""
+    """A client computes the steering angles from wheelbase and track."""
     body = described("BmwX5").body
     wheels = {
         wheel.text("name"): wheel

@@ -1,4 +1,4 @@
-"""Stand-ins: the bundled ones are complete and sensible, and mistakes in a user's file are located."""
+"""Stand-ins: the bundled ones are complete and plausible, and mistakes in a user's file are located."""
 
 import math
 import tomllib
@@ -20,7 +20,7 @@ from palaestra_sim.world import (
 from palaestra_sim.world.expressions import parse_formula
 
 PAGE = Path(__file__).parents[3] / "docs/reference/simulators.md"
-# The most frequent types in public worlds, besides robots and devices.
+# The most frequent types in public worlds, apart from robots and devices.
 COMMON = """
 RectangleArena Floor WoodenBox StraightRoadSegment Wall HighwayPole CurvedRoadSegment
 RoadIntersection TeslaModel3Simple CardboardBox OilBarrel WoodenChair BmwX5 RangeRoverSportSVRSimple
@@ -33,18 +33,18 @@ TexturedBackgroundLight LegoWall MazeBlock TinkerbotsBase SumoInterface Pedestri
 
 
 def parts(name: str, **values: Sequence[Item]) -> tuple[ShapePart, ...]:
-    """Return the parts of an object of a bundled type."""
+    """Return the parts of a stand-in of a bundled type, with these values of its fields."""
     return expand(shipped_stand_ins()[name], values)
 
 
 def made(text: str, **values: Sequence[Item]) -> tuple[ShapePart, ...]:
-    """Return the parts of an object of the only type in a file."""
+    """Return the parts of a stand-in of the only type in a file."""
     (stand_in,) = load_stand_ins(text, "mine.toml").values()
     return expand(stand_in, values)
 
 
 def refusal(text: str) -> str:
-    """Return the message for a file that cannot be used."""
+    """Return the message about a file that cannot be used."""
     with pytest.raises(StandInError) as caught:
         load_stand_ins(text, "mine.toml")
     return str(caught.value)
@@ -52,12 +52,12 @@ def refusal(text: str) -> str:
 
 @pytest.mark.parametrize("name", COMMON.split())
 def test_what_most_worlds_are_made_of_has_a_stand_in(name: str) -> None:
-    """The list comes from a count over worlds of public projects."""
+    """The list of types comes from a count over public worlds."""
     assert name in shipped_stand_ins()
 
 
 def test_every_solid_that_ships_has_parts_of_a_sensible_size() -> None:
-    """They range from a bolt to a tower; a barrier that is off and a tile without walls have no parts."""
+    """The sizes go from a bolt to a tower. A barrier that is off and a tile without walls have no parts."""
     for name, stand_in in shipped_stand_ins().items():
         found = expand(stand_in, {})
         assert bool(found) == (
@@ -68,7 +68,7 @@ def test_every_solid_that_ships_has_parts_of_a_sensible_size() -> None:
 
 
 def test_every_object_has_a_place_and_a_name() -> None:
-    """The fields of the type come after these, and may replace them."""
+    """Each type has the common fields first; its own fields follow, and may replace a common one."""
     barrel = shipped_stand_ins()["OilBarrel"].fields
 
     assert list(barrel) == [
@@ -86,26 +86,26 @@ def test_every_object_has_a_place_and_a_name() -> None:
 
 
 def test_a_box_has_the_size_of_its_field() -> None:
-    """This holds for the default and for the value in the world."""
+    """The size is the default, or the value that the world sets."""
     assert parts("WoodenBox") == (ShapePart(shape="box", size=(0.6, 0.6, 0.6)),)
     assert parts("WoodenBox", size=(1.0, 2.0, 3.0)) == (ShapePart(shape="box", size=(1, 2, 3)),)
 
 
 @pytest.mark.parametrize("value", [(), (1.0, 2.0), ("a", "b", "c"), (None,)])
 def test_a_value_that_does_not_fit_is_the_default(value: Sequence[Item]) -> None:
-    """Webots does the same and logs a message."""
+    """Webots also uses the default, and logs a message."""
     assert parts("WoodenBox", size=value) == parts("WoodenBox")
 
 
 def test_a_wall_stands_on_its_origin_and_a_box_is_around_it() -> None:
-    """A building stands on its origin, but most movable objects have it in their center."""
+    """The origin of a building is on the ground, while the origin of a movable object is its center."""
     (wall,) = parts("Wall")
 
     assert wall == ShapePart(shape="box", size=(0.2, 1, 2.4), position=(0, 0, 1.2))
 
 
 def test_an_arena_is_a_floor_within_four_walls() -> None:
-    """The walls are around the floor, not on it."""
+    """The walls stand around the floor, and not on it."""
     floor, front, back, left, right = parts("RectangleArena", floorSize=(3.0, 2.0), wallHeight=(0.4,))
 
     assert floor == ShapePart(shape="plane", size=(3, 2))
@@ -116,7 +116,7 @@ def test_an_arena_is_a_floor_within_four_walls() -> None:
 
 
 def test_a_round_arena_is_closed() -> None:
-    """Its wall is a ring of boxes that overlap at the corners."""
+    """The wall is a ring of boxes that overlap at their corners."""
     floor, *ring = parts("CircleArena", radius=(2.0,))
 
     assert floor == ShapePart(shape="plane", size=(4, 4))
@@ -126,7 +126,7 @@ def test_a_round_arena_is_closed() -> None:
 
 
 def test_a_building_has_a_wall_between_each_two_corners() -> None:
-    """One wall leads from the last corner to the first."""
+    """The last wall leads from the last corner back to the first."""
     corners = (0.0, 0.0, 6.0, 0.0, 6.0, 4.0)
 
     first, second, third = parts("SimpleBuilding", corners=corners, floorNumber=(2.0,))
@@ -137,13 +137,13 @@ def test_a_building_has_a_wall_between_each_two_corners() -> None:
 
 
 def test_a_door_that_is_open_leaves_its_frame() -> None:
-    """A robot can drive through; a closed door is a wall."""
+    """A robot can drive through an open door; a closed door is like a wall."""
     assert len(parts("Door")) == 4
     assert len(parts("Door", position=(1.2,))) == 3
 
 
 def test_a_cabinet_is_as_large_as_its_rows_and_columns() -> None:
-    """Its origin is at its back."""
+    """The origin of a cabinet is at its back."""
     (box,) = parts("Cabinet", rowsHeights=(0.5,), columnsWidths=(0.3, 0.3))
 
     assert box.size == pytest.approx((0.5, 0.66, 0.56))
@@ -151,7 +151,7 @@ def test_a_cabinet_is_as_large_as_its_rows_and_columns() -> None:
 
 
 def test_a_bounding_object_can_be_off() -> None:
-    """Robots drive through such an object in Webots too."""
+    """In Webots, robots drive through such an object too."""
     assert parts("SolidBox", enableBoundingObject=(False,)) == ()
 
 
@@ -159,14 +159,14 @@ def test_a_bounding_object_can_be_off() -> None:
     ("name", "kind"), [("Carpet", "flat"), ("RoadIntersection", "flat"), ("Asphalt", "drawn")]
 )
 def test_what_nothing_runs_into_has_no_parts(name: str, kind: str) -> None:
-    """Examples are objects flat on the ground and purely visual ones."""
+    """Examples are objects that lie flat on the ground, and purely visual objects."""
     stand_in = shipped_stand_ins()[name]
 
     assert (stand_in.kind, expand(stand_in, {})) == (kind, ())
 
 
 def test_a_part_is_placed_turned_and_left_out_by_formulas() -> None:
-    """Each number may come from a field of the object."""
+    """Each number may be computed from fields of the object."""
     text = """
         [Stool]
         fields = "SFFloat height 0.5  SFFloat angle 0.1  SFBool hasBack FALSE"
@@ -188,12 +188,12 @@ def test_a_part_is_placed_turned_and_left_out_by_formulas() -> None:
 
 @pytest.mark.parametrize("height", [0.0, -1.0, math.inf, math.nan])
 def test_a_length_that_is_none_makes_no_part(height: float) -> None:
-    """Nothing can hit such a part, and no physics may fail on it."""
+    """Nothing can touch such a part, and a simulator may fail to load it."""
     assert made('[A]\nfields = "SFFloat height 1"\nbox = [1, 1, "height"]', height=(height,)) == ()
 
 
 def test_a_users_file_is_what_the_manual_shows() -> None:
-    """The example on the page must be valid as it is."""
+    """The example in the manual must be valid without changes."""
     text = PAGE.read_text().partition("```toml stand-ins\n")[2].partition("```")[0]
 
     mine = load_stand_ins(text, "mine.toml")
@@ -302,7 +302,7 @@ def test_a_users_file_is_what_the_manual_shows() -> None:
     ],
 )
 def test_a_mistake_is_named_with_file_type_field_and_remedy(text: str, message: str) -> None:
-    """TOML gives no lines for keys, so the path of keys is the position."""
+    """TOML has no line numbers for keys, so the message has the path of the key."""
     assert refusal(text).startswith(message)
 
 
@@ -319,7 +319,10 @@ def test_a_mistake_is_named_with_file_type_field_and_remedy(text: str, message: 
     ],
 )
 def test_a_formula_is_arithmetic_over_fields(text: object, value: float) -> None:
-    """Products come before sums, from the left; a division by zero must not end a simulator."""
+    """Multiplication comes before addition, from left to right.
+
+    A division by zero must not end a simulator.
+    """
     numbers: Mapping[str, Sequence[float]] = {"a": (1.0,), "b": (10.0, 20.0, 30.0)}
 
     assert parse_formula(text).value(numbers.__getitem__) == value
@@ -327,7 +330,7 @@ def test_a_formula_is_arithmetic_over_fields(text: object, value: float) -> None
 
 @given(st.one_of(st.text(max_size=60), st.text("0.5abx+-*/() ", max_size=300), st.floats(), st.none()))
 def test_any_formula_is_read_or_refused(written: object) -> None:
-    """For any text of a user, the reader may raise no other exception."""
+    """For any text, the reader raises no other exception than ValueError."""
     try:
         formula = parse_formula(written)
     except ValueError as error:
@@ -339,7 +342,7 @@ def test_any_formula_is_read_or_refused(written: object) -> None:
 
 @given(st.text("[]{}=\"'ab1 \n,.#", max_size=80))
 def test_any_file_is_read_or_refused(text: str) -> None:
-    """A user's file has no other result."""
+    """For any file, the reader raises no other exception than StandInError."""
     try:
         found = load_stand_ins(text, "mine.toml")
     except StandInError as error:
@@ -350,7 +353,7 @@ def test_any_file_is_read_or_refused(text: str) -> None:
 
 
 def test_types_stand_once_in_the_file_that_ships() -> None:
-    """TOML refuses a second table, but here a list could repeat a type."""
+    """TOML rejects a second table of a type, but a list may contain a type twice."""
     lists = tomllib.loads((Path(expand.__code__.co_filename).parent / "stand_ins.toml").read_text())
     names = [*lists["flat"], *lists["drawn"]]
 

@@ -1,4 +1,4 @@
-"""The bytes of a world become tokens, and strings are written."""
+"""The bytes of a world become tokens; strings are written with escapes."""
 
 import pytest
 from hypothesis import given
@@ -15,27 +15,27 @@ def tokens(text: str) -> tuple[Token, ...]:
 
 
 def words(text: str) -> list[str]:
-    """Return the texts of the tokens."""
+    """Return the texts of the tokens in a text."""
     return [token.text.decode() for token in tokens(text)]
 
 
 def test_a_comma_is_as_good_as_a_blank() -> None:
-    """Webots writes vectors with commas between them, and reads commas as blanks."""
+    """Webots separates vectors by commas, and reads a comma as a blank."""
     assert words("point [ 0 0 1, 1 0 0 ]") == words("point [ 0 0 1 1 0 0 ]")
 
 
 def test_braces_and_brackets_need_no_blanks() -> None:
-    """People write worlds by hand."""
+    """People also write worlds by hand, without blanks."""
     assert words("Group{children[Robot{}]}") == words("Group { children [ Robot { } ] }")
 
 
 def test_a_comment_ends_with_its_line_even_glued_to_a_word() -> None:
-    """Outside a string, a number sign always begins a comment."""
+    """Outside a string, `#` always begins a comment."""
     assert words("name#the robot\n  TRUE") == ["name", "TRUE"]
 
 
 def test_a_number_sign_in_a_string_is_data() -> None:
-    """Addresses and colors have number signs."""
+    """Addresses and colors contain `#`."""
     assert words('url "https://host/a#b"') == ["url", '"https://host/a#b"']
 
 
@@ -53,32 +53,32 @@ def test_every_token_knows_where_it_stands() -> None:
 
 @pytest.mark.parametrize("number", ["0", "-1", "+.5", "1.", "1e5", "-1.5E-3"])
 def test_a_number_is_what_begins_like_one(number: str) -> None:
-    """Webots reads these forms."""
+    """Webots reads all these forms of numbers."""
     assert [token.kind for token in tokens(number)] == ["number"]
 
 
 @pytest.mark.parametrize("text", ["1x", "-", ".", "1.2.3", "+-1", "3D", '1"a"'])
 def test_what_begins_like_a_number_and_is_none_is_refused(text: str) -> None:
-    """A name cannot begin with a digit, so such a token has no meaning."""
+    """A name cannot begin with a digit, so such a token is neither a number nor a name."""
     with pytest.raises(WorldError, match=r"world:1:1: .* is neither a number nor a name"):
         tokens(text)
 
 
 @pytest.mark.parametrize("text", ['"', '"abc', 'name "abc\n"', '"\\"', '"a\\\n"'])
 def test_a_string_ends_on_its_line(text: str) -> None:
-    """Webots never writes a line end into a string, so a missing quote is found on its line."""
+    """Webots never writes a line end into a string, so the error is on the line of the missing quote."""
     with pytest.raises(WorldError, match="this string is not closed on its line"):
         tokens(text)
 
 
 def test_a_control_character_is_refused() -> None:
-    """It is invisible, so the message must locate it."""
+    """A control character is invisible in an editor, so the message must have its position."""
     with pytest.raises(WorldError, match=r"world:2:3: control character 0x00 outside a string"):
         tokens("\n  \x00")
 
 
 def test_only_quotes_and_backslashes_are_escaped() -> None:
-    """Any other backslash stands for itself, as in a path of Windows."""
+    """Every other backslash stands for itself, as in a path of Windows."""
     (token,) = tokens(r'"a \" b \\ c \n"')
 
     assert unquoted(token) == r'a " b \ c \n'
@@ -86,7 +86,7 @@ def test_only_quotes_and_backslashes_are_escaped() -> None:
 
 @given(st.text(st.characters(exclude_characters="\n", exclude_categories=["Cs"])))
 def test_a_written_string_reads_as_what_it_was(text: str) -> None:
-    """There is one writer of strings, and this is its contract."""
+    """The reader returns the text that `quoted` wrote."""
     (token,) = tokens(quoted(text).decode())
 
     assert unquoted(token) == text

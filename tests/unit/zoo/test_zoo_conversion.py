@@ -1,4 +1,4 @@
-"""Files of RL-Baselines3-Zoo are converted to TrainingJobs, with a note for each difference."""
+"""The conversion of RL-Baselines3-Zoo files to TrainingJobs, with a note for each difference."""
 
 import pytest
 
@@ -42,7 +42,7 @@ OFF_POLICY = "a-v1:\n  n_timesteps: 1000\n"
 
 @pytest.fixture
 def converted():
-    """Return a function that converts an entry with more lines, and returns its trainer and notes."""
+    """Return a function that converts an entry with more lines to a trainer's spec and notes."""
 
     def convert_words(*words, algorithm="SAC"):
         text = OFF_POLICY + "".join(f"  {word}\n" for word in words)
@@ -54,7 +54,7 @@ def converted():
 
 
 def test_each_word_of_an_entry_has_its_place():
-    """The values of a published entry must arrive unchanged."""
+    """The job must train with exactly the values of the published entry."""
     spec = load(convert(FILE, "hyperparams/ppo.yml", env="Reach-v1").text).spec
 
     assert spec.trainer.steps == 250_000
@@ -83,7 +83,7 @@ def test_each_word_of_an_entry_has_its_place():
 
 
 def test_an_entry_that_refers_to_another_has_its_words_too():
-    """Half of Zoo's entries are references that change one value."""
+    """Half of Zoo's entries refer to another entry and change one value."""
     spec = load(convert(FILE, "ppo.yml", env="Push-v1").text).spec
 
     assert spec.trainer.steps == 250_000
@@ -92,7 +92,7 @@ def test_an_entry_that_refers_to_another_has_its_words_too():
 
 
 def test_an_environment_that_the_file_does_not_name_gets_the_default_with_a_note():
-    """Zoo does the same; without the note a mistyped id would silently get general values."""
+    """Zoo does the same. Without the note, a mistyped id would get general values and nobody would notice."""
     result = convert(FILE, "ppo.yml", env="Own-v0")
 
     assert load(result.text).spec.trainer.steps == 1_000_000
@@ -100,7 +100,7 @@ def test_an_environment_that_the_file_does_not_name_gets_the_default_with_a_note
 
 
 def test_every_note_is_a_comment_in_the_job():
-    """The output on standard error is gone when the file is opened weeks later."""
+    """Weeks later a person opens the job, and the notes on standard error are lost."""
     result = convert(OFF_POLICY + '  frame_stack: 4\n  vec_env_wrapper: "a\\nb: 1"\n', "td3.yml")
 
     assert all(f"# - {note}\n" in result.text for note in result.notes)
@@ -117,7 +117,7 @@ def test_every_note_is_a_comment_in_the_job():
     ],
 )
 def test_the_algorithm_is_the_given_one_else_the_files(file, algorithm, name):
-    """Zoo's files are named after their algorithm and do not contain the name."""
+    """Zoo's files are named after their algorithm, and do not contain its name."""
     result = convert(OFF_POLICY, file, algorithm=algorithm)
 
     assert load(result.text).spec.trainer.algorithm.name == name
@@ -151,7 +151,7 @@ def test_the_algorithm_is_the_given_one_else_the_files(file, algorithm, name):
     ],
 )
 def test_a_file_or_option_that_is_wrong_is_an_error_with_a_remedy(text, file, options, problem):
-    """A guess would train something else for hours."""
+    """A guess would train with wrong values for hours."""
     with pytest.raises(ZooError) as error:
         convert(text, file, **options)
 
@@ -159,13 +159,13 @@ def test_a_file_or_option_that_is_wrong_is_an_error_with_a_remedy(text, file, op
 
 
 def test_a_value_beyond_the_bounds_of_a_job_is_refused_by_the_job():
-    """A job that no command accepts must not be written."""
+    """The converter must not write a job that no command accepts."""
     with pytest.raises(SpecErrors, match=r"spec\.trainer\.steps"):
         convert("a-v1: {n_timesteps: 1e12}", "sac.yml")
 
 
 def test_a_flat_file_is_one_entry():
-    """Users keep the keys of one run in a separate file."""
+    """Users keep the keys of a single run in a separate file, without an entry around them."""
     spec = load(convert("n_timesteps: 5\ngamma: 0.9", "sac.yml", env="a-v1").text).spec
 
     assert spec.trainer.algorithm.hyperparameters == {"gamma": 0.9}
@@ -214,21 +214,21 @@ NOTED = [
 
 @pytest.mark.parametrize(("word", "note"), NOTED)
 def test_what_a_job_cannot_hold_exactly_is_noted(converted, word, note):
-    """If a key were dropped silently, the job would train something else than the file says."""
+    """Without a note, a person would not learn that the job trains differently from the file."""
     _, notes = converted(word)
 
     assert any(note in line for line in notes)
 
 
 def test_the_rest_of_an_expression_is_kept_where_one_part_cannot_be_read(converted):
-    """One unknown class must not cost the architecture."""
+    """One unknown class must not remove the network architecture next to it."""
     trainer, _ = converted('policy_kwargs: "dict(a=Own, net_arch=[8])"')
 
     assert trainer.algorithm.hyperparameters == {"policy_kwargs": {"net_arch": [8]}}
 
 
 def test_hindsight_is_written_as_in_a_job(converted):
-    """The current form and that of Zoo's her.yml give the same replay."""
+    """The current form and the older form of Zoo's her.yml give the same replay buffer."""
     buffer = {
         "replay_buffer_class": "HerReplayBuffer",
         "replay_buffer_kwargs": {"n_sampled_goal": 4, "goal_selection_strategy": "future"},
@@ -248,7 +248,7 @@ def test_hindsight_is_written_as_in_a_job(converted):
 
 @pytest.mark.parametrize(("kind", "algorithm"), [("replay", "DQN"), ("rollout", "PPO")])
 def test_a_buffer_of_ones_own_is_named_as_in_a_job(converted, kind, algorithm):
-    """It keeps its own options; settings that a run has anyway are left out."""
+    """The buffer keeps its own options; a note names the settings that each run has anyway."""
     trainer, notes = converted(
         f"{kind}_buffer_class: my.lab.Own",
         f'{kind}_buffer_kwargs: "dict(alpha=0.5, handle_timeout_termination=True)"',
@@ -264,7 +264,7 @@ def test_a_buffer_of_ones_own_is_named_as_in_a_job(converted, kind, algorithm):
 
 @pytest.mark.parametrize("word", ["frame_stack: 4", "vec_env_wrapper: [{sb3.VecFrameStack: {n_stack: 4}}]"])
 def test_wrappers_and_stacked_frames_are_fields_of_the_environment(converted, word):
-    """Zoo stacks in the same layout as a job, with both of its keys."""
+    """Both of Zoo's keys for frame stacking give the layout that a job has."""
     trainer, notes = converted("env_wrapper: [a.b.Own: {k: 1}, a.Other]", word)
 
     own, other = trainer.environment.wrappers
@@ -274,7 +274,7 @@ def test_wrappers_and_stacked_frames_are_fields_of_the_environment(converted, wo
 
 
 def test_frames_of_normalized_observations_have_a_note(converted):
-    """Zoo stacks after the normalization; rewards are the same either way."""
+    """The order of stacking and normalization differs from Zoo, but only if observations are normalized."""
     _, notes = converted("frame_stack: 4", "normalize: true")
     _, of_rewards = converted("frame_stack: 4", "normalize: {norm_obs: false}")
 
@@ -283,7 +283,7 @@ def test_frames_of_normalized_observations_have_a_note(converted):
 
 
 def test_own_callbacks_and_policies_are_classes_of_the_job(converted):
-    """A job names them as module:Class, and Zoo with a dot."""
+    """A job names such a class as `module:Class`, Zoo as `module.Class`."""
     trainer, notes = converted("callback: [a.b.Own: {k: 1}, a.Other]", "policy: a.b.Policy")
 
     own, other = trainer.algorithm.callbacks
@@ -309,7 +309,7 @@ def test_own_callbacks_and_policies_are_classes_of_the_job(converted):
     ],
 )
 def test_words_mean_what_they_mean_in_zoo(converted, words, hyperparameters):
-    """Noise of 0 means no noise, a schedule with any name falls linearly, and null counts as absent."""
+    """In Zoo, noise of 0 means no noise, each schedule name a linear decrease, and null an absent key."""
     trainer, _ = converted(*words)
 
     assert trainer.algorithm.hyperparameters == hyperparameters
@@ -324,7 +324,7 @@ def test_words_mean_what_they_mean_in_zoo(converted, words, hyperparameters):
     ],
 )
 def test_normalization_keeps_only_limits_that_have_an_effect(converted, normalize, expected):
-    """The job refuses a limit for values that are not normalized, and Zoo ignores it."""
+    """A job rejects a limit for values that are not normalized, while Zoo ignores such a limit."""
     trainer, _ = converted(f"normalize: {normalize}")
 
     found = trainer.algorithm.normalize
@@ -332,7 +332,7 @@ def test_normalization_keeps_only_limits_that_have_an_effect(converted, normaliz
 
 
 def test_normalizing_nothing_is_no_normalization(converted):
-    """A job refuses a section without an effect."""
+    """A job rejects a section `normalize` without an effect."""
     trainer, _ = converted('normalize: "dict(norm_obs=False, norm_reward=False)"')
 
     assert trainer.algorithm.normalize is None
@@ -340,7 +340,10 @@ def test_normalizing_nothing_is_no_normalization(converted):
 
 @pytest.mark.parametrize("environment", ["MoveToTargetEnv-v0", "Navigate-v0"])
 def test_the_environments_of_palaestra_need_no_note_about_simulators(environment):
-    """They take a robot. Only the arena has its own defaults, which the file does not show."""
+    """These environments take a robot, which needs simulators.
+
+    Only the arena has defaults that the file does not show.
+    """
     result = convert("n_timesteps: 5", "ppo.yml", env=environment)
 
     assert [note.partition(":")[0] for note in result.notes] == (

@@ -1,4 +1,4 @@
-"""Python expressions are read as data, and never evaluated."""
+"""Python expressions are parsed as data and never evaluated."""
 
 import pytest
 
@@ -19,7 +19,7 @@ from palaestra.zoo.expressions import NotPlain, entries, value
     ],
 )
 def test_literals_and_classes_are_read(text, expected):
-    """Zoo's own files contain nothing else."""
+    """Zoo's own files contain only literals and names of classes."""
     assert value(text) == expected
 
 
@@ -46,13 +46,13 @@ def test_literals_and_classes_are_read(text, expected):
     ],
 )
 def test_anything_else_is_refused(text):
-    """The file may be from anybody, and an expression could run code."""
+    """Any person may have written the file, and an evaluated expression could run code."""
     with pytest.raises(NotPlain):
         value(text)
 
 
 def test_an_entry_that_cannot_be_read_does_not_hide_the_others():
-    """The error takes the place of its value."""
+    """The other entries keep their values; the unreadable entry has the error in place of a value."""
     read = dict(entries("dict(a=1, b=f(), c={'d': 2})"))
 
     assert (read["a"], read["c"]) == (1, {"d": 2})

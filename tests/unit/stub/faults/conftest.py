@@ -1,4 +1,4 @@
-"""Fault specifications, and the state of a simulator's life with them."""
+"""Builders of fault schedules, and of the fault state during one run of a simulator."""
 
 import pytest
 
@@ -9,7 +9,7 @@ from palaestra_sim.faults.schedule import FaultSchedule, Life
 
 @pytest.fixture
 def schedule():
-    """`schedule("crash:step=3 slow:latency_ms=5", seed=0, simulator="robotino", number=1)`."""
+    """`schedule(text, simulator="robotino", number=1)` returns the schedule of the faults in `text`."""
 
     def make(text, **life):
         return FaultSchedule(faults=parse(text, "test"), life=Life(**{"simulator": "robotino", **life}))
@@ -19,5 +19,5 @@ def schedule():
 
 @pytest.fixture
 def course(schedule):
-    """Return the fault state of a life; it takes the same arguments as `schedule`."""
+    """Return a builder of the fault state of a run; it takes the same arguments as `schedule`."""
     return lambda text, **life: FaultState(schedule(text, **life))

@@ -1,4 +1,4 @@
-"""Corrupted messages and responses, as bytes."""
+"""Corrupted messages and service responses, as bytes."""
 
 import math
 
@@ -14,7 +14,7 @@ WRONG_SHAPE = parse("wrong_shape", "test")
 
 
 def message(type_name, **fields):
-    """Return a framed message."""
+    """Return the frame of a message."""
     return frame(message_type(type_name).codec.encode(fields))
 
 
@@ -28,7 +28,7 @@ def payload(data):
     ("type_name", "field"), [("sensor_msgs/Range", "range"), ("webots_ros/Float64Stamped", "data")]
 )
 def test_the_reading_becomes_nan_and_the_rest_stays(type_name, field):
-    """Otherwise a client that checks only the header would notice the fault."""
+    """The header stays correct, so only a client that checks the reading notices the fault."""
     sound = message(type_name, header={"seq": 7, "frame_id": "robotino/ir1"}, **{field: 1.5})
 
     read = message_type(type_name).codec.decode(payload(damaged_message(type_name, sound, WRONG_VALUE)))
@@ -38,7 +38,7 @@ def test_the_reading_becomes_nan_and_the_rest_stays(type_name, field):
 
 
 def test_all_numbers_of_a_reading_become_nan():
-    """Otherwise a client that checks only one coordinate of a GPS would miss the fault."""
+    """If only one coordinate of a GPS became NaN, a client that checks another one would not notice."""
     sound = message("geometry_msgs/PointStamped", point={"x": 1.0, "y": 2.0, "z": 3.0})
 
     wrong = payload(damaged_message("geometry_msgs/PointStamped", sound, WRONG_VALUE))
@@ -48,7 +48,10 @@ def test_all_numbers_of_a_reading_become_nan():
 
 
 def test_a_reading_in_the_middle_of_a_message_becomes_nan_alone():
-    """A gyro and an accelerometer send the same type; -1 in a covariance marks the part without a reading."""
+    """A gyro and an accelerometer use the same message type.
+
+    In a covariance, -1 means that the sensor has no such reading.
+    """
     fields = {
         "angular_velocity": {"x": 1.0, "y": 2.0, "z": 3.0},
         "orientation_covariance": [-1.0, *[0.0] * 8],
@@ -68,18 +71,18 @@ def test_a_reading_in_the_middle_of_a_message_becomes_nan_alone():
     [("sensor_msgs/Image", "height"), ("sensor_msgs/Image", "data"), ("std_msgs/Header", "stamp")],
 )
 def test_a_field_without_a_fixed_place_or_without_numbers_has_no_reading(type_name, field):
-    """Otherwise bytes of another field would be overwritten."""
+    """Writing NaN at a guessed position would overwrite the bytes of another field."""
     assert reading_field(type_name, field) is None
 
 
 def test_a_reading_that_the_message_does_not_have_is_an_error():
-    """A wrong row in the table of devices must fail its own tests, not a client."""
+    """A wrong row in the table of devices must fail in its own tests, not in a client."""
     with pytest.raises(KeyError, match=r"sensor_msgs/Range\.distance"):
         reading_field("sensor_msgs/Range", "distance")
 
 
 def test_a_message_too_short_for_a_reading_stays_short():
-    """If a GPS message is cut three times, it has fewer bytes than its reading."""
+    """A GPS message that was cut three times is shorter than its reading."""
     sound = message("geometry_msgs/PointStamped")
     damages = (*WRONG_SHAPE * 3, *WRONG_VALUE)
 
@@ -87,14 +90,14 @@ def test_a_message_too_short_for_a_reading_stays_short():
 
 
 def test_a_bumper_has_nothing_to_become_nan():
-    """A bumper has only True and False."""
+    """The reading of a bumper is True or False, which cannot become NaN."""
     sound = message("webots_ros/BoolStamped", data=True)
 
     assert damaged_message("webots_ros/BoolStamped", sound, WRONG_VALUE) == sound
 
 
 def test_a_message_cut_short_is_a_whole_frame_that_cannot_be_read():
-    """The reader still finds the start of the next message, which is correct."""
+    """The frame has a correct length, so the reader finds the start of the next message."""
     sound = message("sensor_msgs/Range", range=1.5)
 
     short = payload(damaged_message("sensor_msgs/Range", sound, WRONG_SHAPE))
@@ -117,7 +120,7 @@ def test_a_message_cut_short_is_a_whole_frame_that_cannot_be_read():
     ],
 )
 def test_each_float_of_an_answer_is_replaced(service, fields, numbers):
-    """This includes floats inside points and lists."""
+    """Floats inside points and lists are replaced too."""
     codec = service_type(f"webots_ros/{service}").response
 
     answer = damaged_answer(codec, b"\1" + frame(codec.encode(fields)), WRONG_VALUE)
@@ -127,7 +130,7 @@ def test_each_float_of_an_answer_is_replaced(service, fields, numbers):
 
 
 def test_floats_of_messages_in_a_list_are_replaced_too():
-    """An example is the list of a robot's contact points."""
+    """An example is the response with a robot's contact points."""
     codec = service_type("webots_ros/node_get_contact_points").response
     sound = codec.encode({"contact_points": [{"node_id": 7}]})
 
@@ -143,7 +146,7 @@ def test_floats_of_messages_in_a_list_are_replaced_too():
     ("service", "fields"), [("set_int", {"success": True}), ("get_string", {"value": "robotino"})]
 )
 def test_an_answer_without_floats_keeps_its_values(service, fields):
-    """Integers, booleans and texts do not change."""
+    """Integers, booleans and texts cannot become NaN."""
     codec = service_type(f"webots_ros/{service}").response
     sound = b"\1" + frame(codec.encode(fields))
 
@@ -151,7 +154,7 @@ def test_an_answer_without_floats_keeps_its_values(service, fields):
 
 
 def test_an_answer_cut_short_is_a_whole_frame():
-    """A response of one byte becomes empty."""
+    """A response of one byte is empty after the cut."""
     codec = service_type("webots_ros/set_int").response
 
     assert damaged_answer(codec, b"\1" + frame(b"\1"), WRONG_SHAPE) == b"\1" + frame(b"")
@@ -159,7 +162,7 @@ def test_an_answer_cut_short_is_a_whole_frame():
 
 @pytest.mark.parametrize("service", ["get_float", "get_string"])
 def test_an_answer_cut_short_has_no_value_to_replace(service):
-    """Both faults may apply to one response, in either order."""
+    """Both faults may apply to the same response, in either order."""
     codec = service_type(f"webots_ros/{service}").response
     sound = b"\1" + frame(codec.encode({}))
 
@@ -169,7 +172,7 @@ def test_an_answer_cut_short_has_no_value_to_replace(service):
 
 
 def test_a_failure_stays_as_it_is():
-    """The text of a failure is not data, so faults do not corrupt it."""
+    """The text of a failed call is an error message and not data, so faults leave it alone."""
     codec = service_type("webots_ros/get_float").response
     failure = b"\0" + frame(b"no such node")
 

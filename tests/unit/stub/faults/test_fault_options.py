@@ -1,4 +1,4 @@
-"""Faults come from options or the environment, and so does the number of the life."""
+"""Options or environment variables set the faults and the number of a simulator's run."""
 
 import argparse
 
@@ -25,28 +25,28 @@ def read():
 
 @pytest.fixture
 def arena(tmp_path):
-    """The built-in arena as a file."""
+    """Return the path of a file with the built-in arena."""
     path = tmp_path / "arena.wbt"
     path.write_bytes(builtin("arena"))
     return path
 
 
 def test_nothing_is_ordered_by_default(read):
-    """An empty variable means no fault."""
+    """An empty variable means that no fault was requested."""
     assert read() is None
     assert read(PALAESTRA_STUB_FAULTS=" ") is None
     assert read("--fault-seed=7", PALAESTRA_SIMULATOR_START="x") is None
 
 
 def test_options_and_environment_add_up(read):
-    """The options' faults come first."""
+    """The faults of options come first, then those of the variable."""
     ordered = read("--fault=crash:step=5", "--fault=exit:step=6", PALAESTRA_STUB_FAULTS="hang:step=4")
 
     assert [it.text for it in ordered.faults] == ["crash:step=5", "exit:step=6", "hang:step=4"]
 
 
 def test_seed_and_life_come_from_options_before_the_environment(read):
-    """A person's option overrides the environment of a job."""
+    """A person's option overrides the variable that a job sets."""
     environment = {"PALAESTRA_STUB_FAULT_SEED": "7", "PALAESTRA_SIMULATOR_START": "3"}
 
     told, chosen = (
@@ -60,7 +60,10 @@ def test_seed_and_life_come_from_options_before_the_environment(read):
 
 
 def test_a_life_that_nobody_counts_is_drawn_and_can_be_repeated(read):
-    """If nobody numbers the lives, a restart must not repeat the faults of the previous one."""
+    """Without a number, one is drawn at random, so that a restart does not repeat the faults.
+
+    The log has the drawn number, so a person can repeat the run.
+    """
     lives = {read("--fault=crash").life for _ in range(8)}
 
     assert len(lives) > 1
@@ -80,7 +83,7 @@ def test_a_life_that_nobody_counts_is_drawn_and_can_be_repeated(read):
     ],
 )
 def test_an_error_names_the_place_of_the_mistake(read, arguments, environment, words):
-    """The message names the option, or the variable, which may be set in another file."""
+    """The message names the option or the variable, because the variable may be set in another file."""
     with pytest.raises(FaultError, match=words):
         read(*arguments, **environment)
 
@@ -97,7 +100,7 @@ def test_an_error_names_the_place_of_the_mistake(read, arguments, environment, w
     ],
 )
 def test_the_error_for_a_name_that_the_world_lacks_suggests_one_that_it_has(read, arena, fault, words):
-    """The names are found by starting the world's controllers on nodes that only register."""
+    """To find all names, the controllers of the world are started on nodes that only record registrations."""
     with pytest.raises(FaultError, match=words):
         begin(read(f"--fault={fault}"), Loader(physics=StubPhysics), arena)
 
@@ -106,14 +109,14 @@ def test_the_error_for_a_name_that_the_world_lacks_suggests_one_that_it_has(read
     "fault", ["lost:topic=touch_sensor/value", "lost:topic=/model_name", "hang:service=*/enable"]
 )
 def test_what_the_world_has_can_be_named(read, arena, fault):
-    """Topics of sensors can be named before a client enables them."""
+    """A topic can be named even before a client enables its sensor."""
     assert (
         begin(read(f"--fault={fault}"), Loader(physics=StubPhysics), arena).schedule.faults[0].text == fault
     )
 
 
 def test_the_random_part_of_a_ros_name_makes_no_difference(read, arena):
-    """The same job has the same faults again, although its UID differs."""
+    """A job that runs again with another UID has the same faults."""
     names = []
     for name in (b"job_r0_collect_0a_robotino_8c31f2", b"job_r0_collect_0a_robotino_00ff00"):
         arena.write_bytes(builtin("arena").replace(b"--name=robotino", b"--name=" + name))
@@ -123,7 +126,7 @@ def test_the_random_part_of_a_ros_name_makes_no_difference(read, arena):
 
 
 def test_faults_are_looked_up_in_the_world_as_it_will_run(read, tmp_path):
-    """A world that starts only with --leave-out can have faults too."""
+    """A world that loads only with `--leave-out` can have faults too."""
     world = tmp_path / "odd.wbt"
     world.write_bytes(builtin("arena") + b"Unheard { }")
     load = Loader(physics=StubPhysics, leave_out=LeaveOut(everything=True))

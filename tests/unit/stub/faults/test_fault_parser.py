@@ -1,4 +1,4 @@
-"""The syntax of faults, and the messages for mistakes in it."""
+"""The syntax of faults, and the messages about mistakes in it."""
 
 import math
 from signal import Signals
@@ -19,7 +19,7 @@ def one(text):
 
 
 def test_a_kind_and_its_keys_become_a_fault():
-    """Values are converted to base units: milliseconds become seconds."""
+    """Values are converted to base units, for example milliseconds to seconds."""
     fault = one("slow:service=ir1/enable,latency_ms=50,jitter_ms=20,call=3")
 
     assert fault == kinds.Slow(
@@ -32,7 +32,7 @@ def test_a_kind_and_its_keys_become_a_fault():
 
 
 def test_blanks_and_new_lines_stand_between_faults():
-    """A variable in YAML may be folded over several lines."""
+    """YAML may fold the value of a variable over several lines."""
     faults = parse(" crash:step=2000\n hang:every=5000  ", "test")
 
     assert [type(it) for it in faults] == [kinds.Crash, kinds.Hang]
@@ -41,7 +41,7 @@ def test_blanks_and_new_lines_stand_between_faults():
 
 @pytest.mark.parametrize("name", KINDS)
 def test_every_kind_makes_its_own_class(name):
-    """The code distinguishes faults by class, not by text."""
+    """The stub distinguishes faults by their class, not by their text."""
     text = f"{name}:latency_ms=1" if KINDS[name].needs else name
 
     assert type(one(text)) is KINDS[name].make
@@ -65,12 +65,12 @@ def test_every_kind_makes_its_own_class(name):
     ],
 )
 def test_the_keys_about_time_make_the_trigger(text, trigger):
-    """`every` and `probability` count steps, or calls of the service that is named."""
+    """`every` and `probability` count steps, or calls if a service is named."""
     assert one(text).trigger == trigger
 
 
 def test_messages_of_all_sensors_are_meant_unless_one_is_named():
-    """The same holds for faults that corrupt messages, unless they name a service."""
+    """A fault that corrupts messages without a topic or a service applies to all sensors."""
     assert one("lost").topic == "*"
     assert one("wrong_value").topic == "*"
     assert one("wrong_value:service=a/b").topic == ""
@@ -78,14 +78,14 @@ def test_messages_of_all_sensors_are_meant_unless_one_is_named():
 
 
 def test_a_crash_can_be_any_signal_that_ends_a_simulator():
-    """A bus error is the crash of the paper; SIGTERM is a request to end, not a crash."""
+    """The crash of the paper was a bus error; SIGTERM asks for an orderly end, so it is not a crash."""
     assert one("crash:signal=SIGBUS").signal is Signals.SIGBUS
     with pytest.raises(FaultError, match="signal is 'SIGTERM'; give one of SIGABRT, SIGBUS"):
         one("crash:signal=SIGTERM")
 
 
 def test_a_value_may_be_no_number():
-    """The narrowest field must be able to hold the value."""
+    """The value must fit the narrowest field into which it may be written."""
     assert math.isnan(one("wrong_value").value)
     assert one("wrong_value:value=-inf").value == -math.inf
     with pytest.raises(FaultError, match="value is '1e300'; give a number that fits into 32 bits"):
@@ -120,7 +120,7 @@ def test_a_value_may_be_no_number():
     ],
 )
 def test_the_error_for_a_wrong_fault_has_place_fact_and_remedy(text, words):
-    """The author can correct it without the documentation; a trailing colon is accepted."""
+    """The author can correct the mistake without the documentation. A trailing colon is accepted."""
     if words is None:
         assert one(text).trigger == Trigger(event=FaultEvent.STEP)
         return
@@ -132,7 +132,7 @@ def test_the_error_for_a_wrong_fault_has_place_fact_and_remedy(text, words):
 
 @given(st.text(alphabet="acehlnorstwy_:=,.0123456789-* ²", max_size=40))
 def test_any_text_is_a_fault_or_an_error_that_names_it(text):
-    """No text that a person types may cause a traceback."""
+    """A person may type any text, which must never cause a traceback."""
     told = None
     try:
         faults = parse(text, "test")

@@ -1,4 +1,4 @@
-"""The effects of faults on a process, except those that end it; those are tested with real processes."""
+"""The effects of faults on a process. Faults that end it are tested with real processes elsewhere."""
 
 import pytest
 
@@ -7,27 +7,27 @@ from palaestra_sim.faults.parser import parse
 
 
 class Endings:
-    """Record the effects that a process would have on itself."""
+    """A recorder of the effects that a fault would have on the process."""
 
     def __init__(self):
         self.done = []
 
     def end(self, status):
-        """Record the exit code."""
+        """Record the exit code that the process would have."""
         self.done.append(("end", status))
 
     def lose_master(self):
-        """Record the loss of the master."""
+        """Record that the simulator lost the ROS master."""
         self.done.append("lose_master")
 
     def lose_names(self):
-        """Record the loss of the names."""
+        """Record that the simulator lost its names."""
         self.done.append("lose_names")
 
 
 @pytest.fixture
 def endings():
-    """The recorder of effects."""
+    """Return the recorder of effects."""
     return Endings()
 
 
@@ -42,20 +42,20 @@ def endings():
     ],
 )
 def test_faults_happen_in_order_until_one_ends_the_stub(endings, text, done, goes_on):
-    """No fault follows after the stub has ended."""
+    """No further fault follows after the process has ended."""
     assert ProcessFaults(endings).happen(parse(text, "test")) is goes_on
 
     assert endings.done == done
 
 
 def test_no_fault_lets_the_stub_go_on(endings):
-    """Most requests have no fault."""
+    """Most requests have no fault, and must work as usual."""
     assert ProcessFaults(endings).happen(())
     assert endings.done == []
 
 
 def test_a_fault_is_logged(endings, caplog):
-    """Otherwise it would be taken for a bug of the stub."""
+    """Without the log line, a person would take the fault for a bug of the stub."""
     ProcessFaults(endings).happen(parse("exit:step=5", "test"))
 
     assert caplog.messages == ["fault: exit:step=5"]

@@ -1,4 +1,4 @@
-"""The effects on requests and messages during a life."""
+"""The effects of faults on requests and messages during one run of a simulator."""
 
 import pytest
 
@@ -10,12 +10,12 @@ RESET = "supervisor/simulation_reset"
 
 
 def texts(ruling):
-    """Return the faults that affect the process."""
+    """Return the texts of the faults that affect the process."""
     return [it.text for it in ruling.effects]
 
 
 def test_a_fault_of_the_process_happens_at_its_step(course):
-    """The requests between steps do not count."""
+    """Requests other than steps do not advance the step number."""
     life = course("crash:step=2")
 
     assert texts(life.request("robotino", STEP)) == []
@@ -25,7 +25,7 @@ def test_a_fault_of_the_process_happens_at_its_step(course):
 
 @pytest.mark.parametrize("path", sorted(RESET_PATHS))
 def test_every_way_back_to_the_start_is_a_reset(course, path):
-    """A reload also returns the world to its start."""
+    """A reload of the world counts as a reset too."""
     life = course("crash:reset=2")
     life.request("robotino", RESET)
 
@@ -33,7 +33,7 @@ def test_every_way_back_to_the_start_is_a_reset(course, path):
 
 
 def test_a_step_of_two_robots_is_counted_once(course):
-    """Only the steps of the robot that stepped first count, until its controller ends."""
+    """Only the robot that stepped first counts. After its controller has ended, another robot counts."""
     life = course("crash:step=3")
     asked = [life.request(robot, STEP) for robot in ("supervisor", "robotino", "supervisor", "robotino")]
     assert all(it == UNHARMED for it in asked)
@@ -44,7 +44,7 @@ def test_a_step_of_two_robots_is_counted_once(course):
 
 
 def test_a_robot_that_ends_and_did_not_count_changes_nothing(course):
-    """The other robot's steps still count."""
+    """The steps of the other robot still count."""
     life = course("crash:step=2")
     life.request("supervisor", STEP)
     life.closed("robotino")
@@ -54,7 +54,7 @@ def test_a_robot_that_ends_and_did_not_count_changes_nothing(course):
 
 
 def test_a_slow_step_is_slow_alone(course):
-    """Two delays of the same step add up."""
+    """The delays of two faults at the same step add up."""
     life = course("slow:latency_ms=50,every=2 slow:latency_ms=30,step=4")
 
     delays = [life.request("robotino", STEP).delay_s for _ in range(4)]
@@ -63,7 +63,7 @@ def test_a_slow_step_is_slow_alone(course):
 
 
 def test_a_service_hangs_from_its_step_on(course):
-    """Other services do not hang."""
+    """The other services still respond."""
     life = course("hang:service=ir1/enable,step=2")
     assert not life.request("robotino", "ir1/enable").lost
     for _ in range(3):
@@ -74,28 +74,28 @@ def test_a_service_hangs_from_its_step_on(course):
 
 
 def test_a_service_that_hung_at_a_call_never_comes_back(course):
-    """This lasts for the rest of the life."""
+    """From that call on, the service does not respond for the rest of the run."""
     life = course("hang:service=ir1/enable,call=2")
 
     assert [life.request("robotino", "ir1/enable").lost for _ in range(4)] == [False, True, True, True]
 
 
 def test_a_service_is_slow_at_its_calls(course):
-    """Each call is delayed on its own."""
+    """Each call has its own delay."""
     life = course("slow:service=ir1/enable,latency_ms=50,every=2")
 
     assert [life.request("robotino", "ir1/enable").delay_s for _ in range(4)] == [0, 0.05, 0, 0.05]
 
 
 def test_a_service_that_hangs_at_a_step_can_be_the_step_itself(course):
-    """The step at which it begins is the first without a response."""
+    """The step at which the fault begins already gets no response."""
     life = course("hang:service=robot/time_step,step=2")
 
     assert [life.request("robotino", STEP).lost for _ in range(3)] == [False, True, True]
 
 
 def test_a_star_counts_the_calls_of_all_its_services_together(course):
-    """Otherwise all sensors would fail at their first call, or none would."""
+    """With a count per service, all sensors would fail at their first call, or none would."""
     life = course("slow:service=ir*/enable,latency_ms=50,call=2")
 
     assert life.request("robotino", "ir1/enable").delay_s == 0
@@ -103,7 +103,7 @@ def test_a_star_counts_the_calls_of_all_its_services_together(course):
 
 
 def test_answers_go_wrong_in_the_order_that_was_written(course):
-    """Here the value comes first, and then the shape."""
+    """Here the fault of the value is applied before the fault of the shape."""
     life = course("wrong_value:service=a wrong_shape:service=a,call=2")
 
     assert len(life.request("robotino", "a").damages) == 1
@@ -111,7 +111,7 @@ def test_answers_go_wrong_in_the_order_that_was_written(course):
 
 
 def test_messages_belong_to_the_step_before_them(course):
-    """The fault applies to all messages up to the next step."""
+    """The fault of a step applies to all messages until the next step."""
     life = course("lost:topic=ir1/value,step=2")
     lost = []
     for _ in range(3):
@@ -122,7 +122,7 @@ def test_messages_belong_to_the_step_before_them(course):
 
 
 def test_a_message_can_be_late_and_wrong_at_once(course):
-    """All faults that a message meets apply."""
+    """If several faults apply to a message, all of them take effect."""
     life = course("late:latency_ms=20 late:latency_ms=30 wrong_value wrong_shape:topic=ir*")
     life.request("robotino", STEP)
 
@@ -134,7 +134,7 @@ def test_a_message_can_be_late_and_wrong_at_once(course):
 
 
 def test_a_star_is_no_global_topic(course):
-    """/clock is not a sensor's topic; a fault names it with its slash."""
+    """`*` means topics of sensors. A fault names a global topic such as /clock with its slash."""
     sensors, clock = course("lost"), course("lost:topic=/clock")
     for life in (sensors, clock):
         life.request("robotino", STEP)
@@ -154,14 +154,14 @@ def test_a_star_is_no_global_topic(course):
     ],
 )
 def test_starts_are_numbered_by_life(course, text, number, refused, delay_s):
-    """A start can be refused or slow."""
+    """A fault can refuse or delay the start with this number."""
     fault, wait_s = course(text, number=number).start()
 
     assert (fault is not None, wait_s) == (refused, delay_s)
 
 
 def test_a_life_without_anything_due_is_unharmed(course):
-    """No fault is invented."""
+    """Requests and messages without a fault pass unchanged."""
     life = course("crash:step=1000")
 
     assert life.request("robotino", STEP) == UNHARMED

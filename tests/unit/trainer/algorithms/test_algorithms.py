@@ -1,4 +1,4 @@
-"""The algorithms as the training loop uses them."""
+"""The algorithms as the training loop uses them: hyperparameters, invalid rows, saving and loading."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ DISCRETE = ["DQN", "PPO", "A2C", "REINFORCE"]
 
 @pytest.fixture
 def make_env(make_member):
-    """Make a VecEnv of corridors; `faults` are the steps at which the first member dies."""
+    """Yield a function that makes a VecEnv of corridors; the first simulator dies at the steps `faults`."""
     made = []
 
     def make(members=1, faults=()):
@@ -54,7 +54,7 @@ def model_of(name, env, **hyperparameters):
 
 
 class Boundaries(BaseCallback):
-    """Record the steps at which rollouts begin."""
+    """A callback that records the steps at which rollouts begin."""
 
     def __init__(self):
         super().__init__()
@@ -68,7 +68,7 @@ class Boundaries(BaseCallback):
 
 
 def test_all_thirteen_are_there():
-    """The pattern of a TrainingJob has all of these names."""
+    """The schema of a TrainingJob accepts exactly these names."""
     stable_baselines3 = {"DQN", "PPO", "A2C", "SAC", "TD3", "DDPG"}
     contrib = {"QRDQN", "TQC", "TRPO", "CrossQ", "RecurrentPPO", "MaskablePPO"}
 
@@ -77,12 +77,12 @@ def test_all_thirteen_are_there():
 
 @pytest.mark.parametrize("name", sorted(ALGORITHMS))
 def test_defaults_are_hyperparameters_of_the_class(name):
-    """A default that the class does not know would fail every run."""
+    """Every run with a default that the class does not have would fail."""
     assert check(Algorithm(name=name, hyperparameters=dict(ALGORITHMS[name].arena))).cls
 
 
 def test_all_mistyped_hyperparameters_are_reported_at_once_with_the_nearest_name():
-    """The error comes before a simulator is started for nothing."""
+    """A person corrects all names in one go, before a simulator is started in vain."""
     wrong = {"learning_rat": 1, "gama": 0.9, "zzz": 0}
 
     with pytest.raises(ConfigurationError) as caught:
@@ -99,19 +99,19 @@ def test_all_mistyped_hyperparameters_are_reported_at_once_with_the_nearest_name
 
 @pytest.mark.parametrize("name", ["env", "seed", "optimize_memory_usage", "device"])
 def test_what_the_training_loop_gives_itself_is_no_hyperparameter(name):
-    """Otherwise a file could disable the code that keeps invalid rows out."""
+    """A job that could set these would disable the code that keeps invalid rows out of the losses."""
     with pytest.raises(ConfigurationError, match=f"{name}: is not a hyperparameter here"):
         check(Algorithm(name="DQN", hyperparameters={name: 1}))
 
 
 def test_the_error_for_an_unknown_algorithm_has_the_nearest_name():
-    """The operator checks the name too, but a person may write the file by hand."""
+    """The operator checks the name too, but a person may also write training.yaml by hand."""
     with pytest.raises(ConfigurationError, match=r"algorithm.name: DQM .* did you mean DQN"):
         check(Algorithm(name="DQM"))
 
 
 def test_returns_over_several_steps_are_refused_where_rows_are_mixed():
-    """The next row in the buffer may come from another simulator."""
+    """Rows of several simulators alternate in the buffer, so the next row may belong to another simulator."""
     with pytest.raises(ConfigurationError, match="n_steps"):
         check(Algorithm(name="DQN", hyperparameters={"n_steps": 3}))
 
@@ -134,7 +134,7 @@ WRONG = [
 
 @pytest.mark.parametrize(("name", "hyperparameters", "line"), WRONG, ids=lambda it: str(it)[:40])
 def test_a_value_of_a_wrong_type_is_refused_by_the_signature(name, hyperparameters, line):
-    """Otherwise a simulator would be started for nothing, and again in each of four attempts."""
+    """Without the check, each of four attempts would start the simulators in vain."""
     with pytest.raises(ConfigurationError) as refusal:
         check(Algorithm(name=name, hyperparameters=hyperparameters))
 
@@ -142,7 +142,7 @@ def test_a_value_of_a_wrong_type_is_refused_by_the_signature(name, hyperparamete
 
 
 def test_what_yaml_cannot_say_has_words(make_env):
-    """YAML has no schedules, tuples or classes of PyTorch, so a job names them by words."""
+    """YAML has no schedules, tuples or classes of PyTorch, so a job writes them as texts and lists."""
     policy = {"net_arch": [8], "activation_fn": "elu", "optimizer_class": "AdamW"}
     words = {"learning_rate": "lin_0.25", "train_freq": [1, "episode"], "policy_kwargs": policy}
     check(Algorithm(name="DQN", hyperparameters=words))
@@ -157,7 +157,7 @@ def test_what_yaml_cannot_say_has_words(make_env):
 
 @pytest.mark.parametrize("place", ["", "nn.", "th.nn.", "torch.nn."])
 def test_a_class_of_pytorch_may_have_its_module(make_env, place):
-    """RL-Zoo's files write it with the name under which they import PyTorch."""
+    """Files of RL-Zoo contain the module name under which they import PyTorch."""
     policy = {
         "net_arch": [8],
         "activation_fn": f"{place}Tanh",
@@ -172,7 +172,7 @@ def test_a_class_of_pytorch_may_have_its_module(make_env, place):
 
 
 def test_a_misspelled_class_with_its_module_has_the_nearest_one_named():
-    """The module is right, so only the class name is compared."""
+    """The module is right, so the suggestion compares only class names."""
     policy = {"activation_fn": "torch.nn.Tahn"}
 
     with pytest.raises(
@@ -183,7 +183,7 @@ def test_a_misspelled_class_with_its_module_has_the_nearest_one_named():
 
 @pytest.mark.parametrize("name", sorted(ALGORITHMS))
 def test_every_algorithm_takes_a_schedule_of_its_learning_rate(name):
-    """TQC's signature has a bare Callable where others have one with arguments."""
+    """The signature of TQC has a bare Callable, where other algorithms declare its arguments."""
     for schedule in ("lin_7.3e-4", [[0, 0.001], [1, 0.0001]]):
         assert check(Algorithm(name=name, hyperparameters={"learning_rate": schedule}))
 
@@ -193,7 +193,7 @@ def test_every_algorithm_takes_a_schedule_of_its_learning_rate(name):
 
 @pytest.mark.parametrize("name", sorted(ALGORITHMS))
 def test_defaults_have_the_types_of_the_signature(name):
-    """As everywhere in YAML, an integer may stand for a float."""
+    """As everywhere in YAML, an integer is accepted for a float."""
     check(Algorithm(name=name, hyperparameters=ALGORITHMS[name].defaults))
 
 
@@ -206,14 +206,14 @@ def test_defaults_have_the_types_of_the_signature(name):
     ],
 )
 def test_wrong_values_are_configuration_errors(make_env, name, hyperparameters):
-    """Stable-Baselines3 uses assertions, which look like a bug of Palaestra."""
+    """Stable-Baselines3 raises an AssertionError, which would look like a bug of Palaestra."""
     with pytest.raises(ConfigurationError, match=f"algorithm: {name} refuses"):
         model_of(name, make_env(), **hyperparameters)
 
 
 @pytest.mark.parametrize("name", ["A2C", "PPO"])
 def test_an_update_of_one_row_whose_advantage_is_to_be_normalized_is_refused(make_env, name):
-    """One number has no deviation, so every update would silently be skipped and nothing learned."""
+    """One number has no standard deviation, so each update would be skipped and nothing would be learned."""
     with pytest.raises(ConfigurationError) as refusal:
         model_of(name, make_env(), n_steps=1, normalize_advantage=True)
 
@@ -233,7 +233,7 @@ def test_an_update_of_one_row_whose_advantage_is_to_be_normalized_is_refused(mak
 def test_an_update_of_one_row_is_accepted_without_normalization_and_of_two_with_it(
     make_env, members, hyperparameters
 ):
-    """The message about the refusal names these two remedies."""
+    """The error in the test above names these two remedies."""
     model = model_of("A2C", make_env(members), **hyperparameters)
 
     assert model.n_steps * model.n_envs >= 1 + model.normalize_advantage
@@ -242,7 +242,7 @@ def test_an_update_of_one_row_is_accepted_without_normalization_and_of_two_with_
 @pytest.mark.parametrize("steps", [100, 101, 103])
 @pytest.mark.parametrize("faults", [(), (5, 42, 90)])
 def test_dqn_ends_at_exactly_its_steps(make_env, steps, faults):
-    """This holds for steps that are not a multiple of train_freq, and with faults in between."""
+    """The steps need not be a multiple of train_freq, and simulators may die meanwhile."""
     model = model_of("DQN", make_env(faults=faults)).learn(steps)
 
     assert model.num_timesteps == steps
@@ -250,7 +250,7 @@ def test_dqn_ends_at_exactly_its_steps(make_env, steps, faults):
 
 
 def test_ppo_ends_at_its_rollout_boundary(make_env):
-    """PPO learns only from complete rollouts."""
+    """PPO learns only from complete rollouts, so it continues to the end of one."""
     model = model_of("PPO", make_env(members=2)).learn(40)
 
     assert model.num_timesteps == 64
@@ -258,7 +258,7 @@ def test_ppo_ends_at_its_rollout_boundary(make_env):
 
 @pytest.mark.parametrize("name", DISCRETE)
 def test_invalid_rows_are_not_counted_as_steps(make_env, name):
-    """A run with faults must learn from as many rows as one without."""
+    """A run with faults must learn from as many rows as a run without faults."""
     counted = []
 
     def count(locals_, _):
@@ -267,12 +267,12 @@ def test_invalid_rows_are_not_counted_as_steps(make_env, name):
 
     model = model_of(name, make_env(members=2, faults=(3, 4, 20))).learn(60, count)
 
-    # A fault makes its own row invalid, and the following rows until the next episode begins, if it does.
+    # A fault makes its own row invalid. If the next episode cannot begin, the following rows are invalid too.
     assert model.num_timesteps == sum(counted) <= len(counted) - 5
 
 
 def test_a_masked_row_is_missing_from_the_count_of_a_rollout(make_env):
-    """PPO's rollouts have a fixed number of rows, and invalid rows do not count as steps."""
+    """A rollout of PPO has a fixed number of rows, but its invalid rows do not count as steps."""
     model = model_of("PPO", make_env(faults=(3, 7)))
     boundaries = Boundaries()
 
@@ -282,7 +282,7 @@ def test_a_masked_row_is_missing_from_the_count_of_a_rollout(make_env):
 
 
 def test_a_rollout_without_a_valid_row_is_not_learned_from(make_env):
-    """The mean of no rows is NaN, and NaN spreads."""
+    """The mean of no rows is NaN, which would spread to all weights."""
     model = model_of("A2C", make_env(faults=range(1, 6)), n_steps=5)
 
     model.learn(10)
@@ -294,7 +294,10 @@ def test_a_rollout_without_a_valid_row_is_not_learned_from(make_env):
 @pytest.mark.parametrize("name", ["A2C", "PPO"])
 @pytest.mark.parametrize("faults", [range(2, 8), range(1, 8)], ids=["one row", "no row"])
 def test_an_update_of_fewer_than_two_valid_rows_is_no_divergence(make_env, name, faults):
-    """The deviation of one advantage is NaN, but the cause is a fault of the simulator."""
+    """The standard deviation of one advantage is NaN.
+
+    The cause is a fault of a simulator, so the run must not end as diverged.
+    """
     short = {"n_steps": 5, "normalize_advantage": True} | ({"batch_size": 5} if name == "PPO" else {})
     model = model_of(name, make_env(faults=faults), **short)
 
@@ -304,7 +307,7 @@ def test_an_update_of_fewer_than_two_valid_rows_is_no_divergence(make_env, name,
 
 
 def test_explained_variance_is_that_of_valid_rows(make_env):
-    """An invalid row's return equals its value, so it would count as explained."""
+    """The return of an invalid row equals its value, so the row would count as perfectly explained."""
     model = model_of("PPO", make_env(faults=(3, 7)))
     model.set_logger(Logger(folder=None, output_formats=[]))
     recorded = {}
@@ -320,7 +323,7 @@ def test_explained_variance_is_that_of_valid_rows(make_env):
 
 
 def test_dqn_with_nothing_but_faults_waits_for_a_row(make_env):
-    """It is an error to sample from an empty buffer."""
+    """Sampling from an empty buffer raises an error, so DQN must not learn before the first valid row."""
     model = model_of("DQN", make_env(faults=range(1, 10)), learning_starts=0)
 
     model.learn(8)
@@ -330,7 +333,7 @@ def test_dqn_with_nothing_but_faults_waits_for_a_row(make_env):
 
 @pytest.mark.parametrize("name", DISCRETE)
 def test_a_saved_model_chooses_the_same_actions(make_env, tmp_path, name):
-    """Stable-Baselines3's own methods save and load the model."""
+    """The model is saved and loaded by methods of Stable-Baselines3."""
     env = make_env()
     model = model_of(name, env).learn(40)
     seen = env.observation_space.sample()
@@ -343,7 +346,7 @@ def test_a_saved_model_chooses_the_same_actions(make_env, tmp_path, name):
 
 @pytest.mark.parametrize(("name", "theirs"), [("DQN", sb3.DQN), ("PPO", sb3.PPO)])
 def test_plain_stable_baselines_loads_what_ours_saved(make_env, tmp_path, name, theirs):
-    """A policy may be used where this package is not installed."""
+    """A person may use the policy on a machine without this package."""
     model = model_of(name, make_env()).learn(40)
     model.save(tmp_path / "model.zip")
 
@@ -353,14 +356,17 @@ def test_plain_stable_baselines_loads_what_ours_saved(make_env, tmp_path, name, 
 
 
 def test_several_environments_are_no_reason_to_warn(make_env):
-    """Stable-Baselines3 warns about this, but a soft update at each step is one at each vector step."""
+    """Stable-Baselines3 warns if the interval is less than the number of environments.
+
+    So the interval is raised.
+    """
     model = model_of("DQN", make_env(members=3), target_update_interval=1)
 
     assert model.target_update_interval == 3
 
 
 def test_a_frequency_in_episodes_may_be_a_list(make_env):
-    """YAML has no tuples."""
+    """YAML has no tuples, so a list stands for one."""
     model = model_of("DQN", make_env(), train_freq=[1, "episode"]).learn(20)
 
     assert model.num_timesteps >= 20
@@ -368,7 +374,7 @@ def test_a_frequency_in_episodes_may_be_a_list(make_env):
 
 @pytest.mark.parametrize("text", ["lin_0.002", "lin_2e-3"])
 def test_a_learning_rate_may_fall_to_zero(make_env, tmp_path, text):
-    """YAML has no functions; plain Stable-Baselines3 must still load the saved model."""
+    """YAML has no functions, so the schedule is a text. Plain Stable-Baselines3 still loads the model."""
     model = model_of("DQN", make_env(), learning_rate=text)
 
     rates = [model.lr_schedule(remaining) for remaining in (1.0, 0.5, 0.0)]
@@ -379,7 +385,7 @@ def test_a_learning_rate_may_fall_to_zero(make_env, tmp_path, text):
 
 
 def test_sac_learns_a_continuous_action(make_member):
-    """SAC needs another action space than the other examples."""
+    """SAC needs a continuous action space, which the other examples do not have."""
     member = make_member()
     member.env.action_space = spaces.Box(-1.0, 1.0, (1,), np.float32)
     env = SimulatorsVecEnv([Restarter(member)], run_seed=1)
@@ -390,7 +396,7 @@ def test_sac_learns_a_continuous_action(make_member):
 
 
 def test_reinforce_learns_the_corridor(make_env):
-    """This is the shortest proof that the gradient has the right sign."""
+    """If the gradient had the wrong sign, the policy would not walk right."""
     model = model_of("REINFORCE", make_env(), learning_rate=0.05, episodes_per_update=4)
 
     model.learn(500)
@@ -400,12 +406,12 @@ def test_reinforce_learns_the_corridor(make_env):
 
 
 def test_reinforce_is_a_stable_baselines_algorithm():
-    """Other projects' callbacks, wrappers and tools expect that class."""
+    """Callbacks, wrappers and tools of other projects expect this base class."""
     assert issubclass(REINFORCE, sb3.common.base_class.BaseAlgorithm)
 
 
 def test_words_of_other_projects_are_refused_with_their_place_here():
-    """A suggestion of the nearest hyperparameter would be wrong: n_timesteps is not n_steps."""
+    """The nearest hyperparameter would be a wrong suggestion: `n_timesteps` does not mean `n_steps`."""
     given = Algorithm(name="PPO", hyperparameters={"n_timesteps": 1e5, "policy": "MlpPolicy", "seed": 1})
 
     with pytest.raises(ConfigurationError) as refused:
@@ -454,7 +460,7 @@ def test_words_of_other_projects_are_refused_with_their_place_here():
     ],
 )
 def test_a_word_with_a_meaning_of_its_own_is_not_taken_for_a_misspelling(name, word, fact):
-    """A person who followed the suggestion would set another hyperparameter to that value."""
+    """A person who followed a suggestion would set another hyperparameter to this value."""
     with pytest.raises(ConfigurationError) as refused:
         check(Algorithm(name=name, hyperparameters={word: 3}))
 
@@ -464,7 +470,7 @@ def test_a_word_with_a_meaning_of_its_own_is_not_taken_for_a_misspelling(name, w
 
 
 def test_layers_that_policy_and_value_shared_have_their_form_of_today():
-    """Half of the examples on the web use the old form."""
+    """Half of the examples on the web use the old form, so the message shows the present form."""
     old = {"policy_kwargs": {"net_arch": [{"pi": [8], "vf": [8]}]}}
 
     with pytest.raises(ConfigurationError, match=r"before 1\.8, .* write \{pi: \[\.\.\.\], vf"):
@@ -472,12 +478,12 @@ def test_layers_that_policy_and_value_shared_have_their_form_of_today():
 
 
 def test_each_argument_that_a_run_gives_itself_has_its_place():
-    """A person may copy any argument from a call of Stable-Baselines3; the message shows where it belongs."""
+    """A person may copy any argument of Stable-Baselines3. The message shows the job's field for it."""
     assert OURS - {"self"} - {*buffer_options.NAMES} <= ELSEWHERE.keys()
 
 
 def test_no_word_with_a_place_elsewhere_is_a_hyperparameter():
-    """Otherwise its field would never be shown, or a hyperparameter would be refused."""
+    """A hyperparameter with such a name would be rejected, with a hint to another field of the job."""
     known = {name for entry in ALGORITHMS.values() for name in entry.known}
 
     assert known.isdisjoint(ELSEWHERE)

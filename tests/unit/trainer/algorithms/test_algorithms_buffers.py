@@ -1,4 +1,4 @@
-"""Invalid rows reach no loss."""
+"""Buffers keep invalid rows out of every loss."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def replay(size=8, members=2):
 
 
 def add(buffer, marks, valid):
-    """Add one vector step whose rows are identified by their rewards."""
+    """Add one vector step; the reward of a row serves as its number."""
     column = np.array(marks, np.float32)
     buffer.add(
         column[:, None],
@@ -36,14 +36,14 @@ def add(buffer, marks, valid):
 
 
 def in_order(buffer):
-    """Return the rows in use by column, oldest first, as lists."""
+    """Return the columns of the rows in use, oldest row first, as lists."""
     shift = buffer.positions.next if buffer.positions.full else 0
     used = {name: column[: buffer.size()] for name, column in buffer.rows().items()}
     return {name: np.roll(column, -shift, axis=0).squeeze((1,)).tolist() for name, column in used.items()}
 
 
 def rollout(rewards, valid, starts, *, kind=ValidRolloutBuffer, gamma=0.9):
-    """Return a full rollout of one member with values 1, 2, 3, ..."""
+    """Return a full rollout of one simulator with the values 1, 2, 3 and so on."""
     buffer = kind(len(rewards), SPACE, ACTIONS, "cpu", gae_lambda=0.8, gamma=gamma, n_envs=1)
     for row, (reward, is_valid, start) in enumerate(zip(rewards, valid, starts, strict=True)):
         if kind is ValidRolloutBuffer:
@@ -60,7 +60,7 @@ def rollout(rewards, valid, starts, *, kind=ValidRolloutBuffer, gamma=0.9):
 
 
 def test_a_row_is_valid_unless_it_says_otherwise():
-    """The infos of other environments have no such entry."""
+    """Environments of other projects return infos without the entry `valid`."""
     assert valid_rows([{}, {"palaestra": {"valid": True}}, {"palaestra": {"valid": False}}]).tolist() == [
         True,
         True,
@@ -70,7 +70,7 @@ def test_a_row_is_valid_unless_it_says_otherwise():
 
 @given(st.lists(st.tuples(st.booleans(), st.booleans()), max_size=20))
 def test_a_replay_buffer_holds_the_newest_valid_rows_in_order(steps):
-    """This holds for every pattern of faults."""
+    """The valid rows are stored in their order, wherever the invalid rows are."""
     buffer = replay(size=8)
     expected = []
     for number, valid in enumerate(steps):
@@ -83,7 +83,7 @@ def test_a_replay_buffer_holds_the_newest_valid_rows_in_order(steps):
 
 
 def test_the_row_before_a_fault_ends_as_truncated():
-    """Its value is bootstrapped, because the policy did not cause the fault."""
+    """The policy did not cause the fault, so the value after the last valid row is bootstrapped."""
     buffer = replay()
     add(buffer, [1, 2], [True, True])
 
@@ -96,10 +96,13 @@ def test_the_row_before_a_fault_ends_as_truncated():
 
 
 def test_a_row_that_took_the_place_of_another_member_s_newest_is_not_truncated():
-    """The buffer is full, and the broken member is away for longer than the length of the buffer."""
+    """The buffer is full.
+
+    The newest row of the broken simulator has been overwritten by a row of the other one.
+    """
     buffer = replay(size=4)
     add(buffer, [1.0, 2.0], [True, True])
-    for mark in (3.0, 4.0, 5.0):  # the last one replaces row 1.0
+    for mark in (3.0, 4.0, 5.0):  # row 5.0 replaces row 1.0
         add(buffer, [0.0, mark], [False, True])
 
     add(buffer, [0.0, 6.0], [False, True])
@@ -109,7 +112,7 @@ def test_a_row_that_took_the_place_of_another_member_s_newest_is_not_truncated()
 
 
 def test_a_fault_at_once_truncates_nothing():
-    """No row exists before the fault."""
+    """The broken simulator has no earlier row that could be marked as truncated."""
     buffer = replay()
 
     add(buffer, [1, 2], [False, False])
@@ -119,7 +122,7 @@ def test_a_fault_at_once_truncates_nothing():
 
 @pytest.mark.parametrize("steps", [0, 1, 3, 4, 7])
 def test_a_replay_buffer_goes_back_to_where_it_stood(steps):
-    """Later transitions are stored again at the same positions before anything is sampled."""
+    """After a resume, the same transitions are stored at the same positions before any row is sampled."""
     buffer = replay(size=8)
     for number in range(steps):
         add(buffer, [2 * number, 2 * number + 1], [True, True])
@@ -136,7 +139,7 @@ def test_a_replay_buffer_goes_back_to_where_it_stood(steps):
 
 @pytest.mark.parametrize("steps", [2, 7])
 def test_a_replay_buffer_can_do_without_some_rows(steps):
-    """A damaged file held them; the other rows stay in order, and the oldest is overwritten first."""
+    """Rows of a damaged file are dropped. The others stay in order, and the oldest is overwritten first."""
     buffer = replay(size=8)
     for number in range(steps):
         add(buffer, [2 * number, 2 * number + 1], [True, True])
@@ -153,8 +156,8 @@ def test_a_replay_buffer_can_do_without_some_rows(steps):
 
 
 def test_a_replay_buffer_knows_which_chunks_changed(monkeypatch):
-    """A checkpoint writes only these chunks again."""
-    monkeypatch.setattr(buffers, "CHUNK_BYTES", 4 * 28)  # a row has two observations, an action and 3 numbers
+    """A checkpoint writes only the chunks of rows that have changed."""
+    monkeypatch.setattr(buffers, "CHUNK_BYTES", 4 * 28)  # 28 bytes: two observations, an action and 3 numbers
     buffer = replay(size=10)
     add(buffer, [1, 2], [True, True])
     first = set(buffer.changed)
@@ -167,7 +170,7 @@ def test_a_replay_buffer_knows_which_chunks_changed(monkeypatch):
 
 
 def test_without_faults_a_rollout_is_what_stable_baselines_computes():
-    """Nothing else may change."""
+    """Without faults, a run must learn exactly as with plain Stable-Baselines3."""
     plan = ([1.0, 0.5, -1.0, 2.0], [True] * 4, [True, False, True, False])
     ours, theirs = rollout(*plan), rollout(*plan, kind=RolloutBuffer)
     for buffer in (ours, theirs):
@@ -178,7 +181,7 @@ def test_without_faults_a_rollout_is_what_stable_baselines_computes():
 
 
 def test_the_row_before_an_invalid_one_is_bootstrapped_with_the_state_they_share():
-    """Its advantage is r + gamma V(s') - V(s), without values from after the fault."""
+    """The advantage is r + gamma V(s') - V(s), so no value from after the fault is used."""
     buffer = rollout([1.0, 123.0, 5.0], [True, False, True], [True, False, True])
 
     buffer.compute_returns_and_advantage(torch.tensor([7.0]), np.array([False]))
@@ -189,7 +192,7 @@ def test_the_row_before_an_invalid_one_is_bootstrapped_with_the_state_they_share
 
 
 def test_an_invalid_row_at_the_end_of_a_rollout_is_no_different():
-    """The next episode's first value is available there, but must not be used."""
+    """After the last row, the first value of the next episode is known, but it must not be used."""
     buffer = rollout([1.0, 123.0], [True, False], [True, False])
 
     buffer.compute_returns_and_advantage(torch.tensor([7.0]), np.array([True]))
@@ -199,7 +202,7 @@ def test_an_invalid_row_at_the_end_of_a_rollout_is_no_different():
 
 @given(st.lists(st.booleans(), min_size=1, max_size=20), st.integers(1, 7))
 def test_minibatches_hold_every_valid_row_once_and_no_other(valid, batch_size):
-    """The mean of an empty minibatch would be NaN."""
+    """An empty minibatch would have NaN as its mean."""
     buffer = rollout([0.0] * len(valid), valid, [False] * len(valid))
     buffer.compute_returns_and_advantage(torch.tensor([0.0]), np.array([False]))
 
@@ -211,7 +214,7 @@ def test_minibatches_hold_every_valid_row_once_and_no_other(valid, batch_size):
 
 
 def test_a_rollout_is_read_several_times():
-    """PPO reads it once in each epoch."""
+    """PPO reads the rollout once per epoch."""
     buffer = rollout([0.0] * 4, [True, False, True, True], [False] * 4)
     buffer.compute_returns_and_advantage(torch.tensor([0.0]), np.array([False]))
 
@@ -221,7 +224,7 @@ def test_a_rollout_is_read_several_times():
 
 
 def test_an_emptied_rollout_has_forgotten_its_faults():
-    """The next rollout has its own faults."""
+    """The marks of the last rollout must not apply to rows of the next one."""
     buffer = rollout([0.0] * 2, [False, False], [False] * 2)
 
     buffer.reset()

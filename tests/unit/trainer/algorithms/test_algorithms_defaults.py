@@ -1,4 +1,4 @@
-"""The hyperparameters of a run that its job leaves out."""
+"""The hyperparameters of a run that its job does not set."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ARENA = "MoveToTargetEnv-v0"
 
 @pytest.fixture
 def interrupted(play, job):
-    """Interrupt a run of DQN whose job has no discount, and return its configuration."""
+    """Interrupt a run of DQN whose job sets no discount, and return the run's configuration."""
     calls = iter(range(1, 10_000))
 
     def interrupt():
@@ -38,14 +38,14 @@ def interrupted(play, job):
 
 
 def discount(directory):
-    """Return the discount in the model of the newest checkpoint."""
+    """Return the discount that the model in the newest checkpoint has."""
     with zipfile.ZipFile(checkpoint.newest(directory.checkpoints).path / "model.zip") as archive:
         return json.loads(archive.read("data"))["gamma"]
 
 
 @pytest.mark.parametrize("name", sorted(SB3))
 def test_an_own_environment_has_the_defaults_of_stable_baselines3(name):
-    """The defaults of the arena were found in the arena."""
+    """The defaults for the arena were tuned in the arena, so other environments do not get them."""
     theirs = inspect.signature(SB3[name].__init__).parameters
 
     resolved = resolve(Algorithm(name=name), "hall:Hall-v0").hyperparameters
@@ -57,7 +57,7 @@ def test_an_own_environment_has_the_defaults_of_stable_baselines3(name):
 @pytest.mark.parametrize("name", sorted(ALGORITHMS))
 @pytest.mark.parametrize("environment", [ARENA, f"palaestra_trainer.environments:{ARENA}"])
 def test_the_arena_keeps_its_own_defaults(name, environment):
-    """This does not depend on the name of its module."""
+    """The arena has the same defaults under each of its names."""
     resolved = resolve(Algorithm(name=name), environment).hyperparameters
 
     assert resolved.items() >= ALGORITHMS[name].arena.items()
@@ -65,7 +65,7 @@ def test_the_arena_keeps_its_own_defaults(name, environment):
 
 
 def test_what_a_job_gives_precedes_every_default():
-    """This holds for each hyperparameter on its own."""
+    """A hyperparameter of the job wins, while the others keep their defaults."""
     given = Algorithm(name="DQN", hyperparameters={"gamma": 0.5})
 
     resolved = resolve(given, ARENA).hyperparameters
@@ -74,7 +74,7 @@ def test_what_a_job_gives_precedes_every_default():
 
 
 def test_a_run_goes_on_with_the_hyperparameters_it_began_with(interrupted, play, directory):
-    """This run began with a release that had another discount."""
+    """The run began with a release that had another default of the discount."""
     kept = json.loads(directory.hyperparameters.read_text())
     assert kept["gamma"] == discount(directory) == 0.99
     directory.hyperparameters.write_text(json.dumps(kept | {"gamma": 0.5}))
@@ -87,7 +87,7 @@ def test_a_run_goes_on_with_the_hyperparameters_it_began_with(interrupted, play,
 
 @pytest.mark.usefixtures("interrupted")
 def test_a_run_that_prolongs_another_has_its_hyperparameters(play, job, directory, tmp_path):
-    """The run also stores them, because the other run may be deleted when it resumes."""
+    """The new run stores the hyperparameters too, because the old run may be deleted before a resume."""
     kept = json.loads(directory.hyperparameters.read_text())
     directory.hyperparameters.write_text(json.dumps(kept | {"gamma": 0.5}))
     further = RunDirectory(tmp_path / "further")
@@ -99,7 +99,7 @@ def test_a_run_that_prolongs_another_has_its_hyperparameters(play, job, director
 
 
 def test_a_run_whose_hyperparameters_cannot_be_read_is_refused(interrupted, play, directory, last_word):
-    """With defaults instead, it would be another run."""
+    """With the defaults of today, the run would continue with other hyperparameters."""
     directory.hyperparameters.write_text("{")
 
     code, _ = play(interrupted)
@@ -109,7 +109,7 @@ def test_a_run_whose_hyperparameters_cannot_be_read_is_refused(interrupted, play
 
 
 def test_a_policy_is_measured_with_the_hyperparameters_of_its_run(play, job, directory):
-    """They determine the shape of its network."""
+    """The hyperparameters decide the shape of the policy's network."""
     hyperparameters = {"learning_starts": 10, "batch_size": 8, "buffer_size": 500}
     configuration = job("DQN", algorithm={"name": "DQN", "hyperparameters": hyperparameters})
     _, members = play(configuration)

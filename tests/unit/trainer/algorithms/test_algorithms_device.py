@@ -1,4 +1,4 @@
-"""The device of networks: the CPU, or the GPU that a job requests."""
+"""The device of the networks: the CPU, or a GPU if the job requests one."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ TINY = {"policy_kwargs": {"net_arch": [8]}}
 OFF_POLICY = TINY | {"learning_starts": 10, "batch_size": 8, "buffer_size": 200}
 ALGORITHMS = {
     "DQN": OFF_POLICY,
-    # With use_sde, SAC draws exploration noise on the device before each rollout.
+    # With `use_sde`, SAC draws exploration noise on the device before each rollout.
     "SAC": OFF_POLICY | {"use_sde": True},
     "PPO": TINY | {"n_steps": 16, "batch_size": 8},
     "A2C": TINY,
@@ -39,7 +39,7 @@ def no_gpu(monkeypatch):
 
 @pytest.fixture
 def make(make_member, make_configuration):
-    """Make a small model of an algorithm on a device. Return it with its environment and configuration."""
+    """Return a function that makes a small model on a device, with its environment and configuration."""
 
     def made(name, device):
         member = make_member()
@@ -60,7 +60,7 @@ def missing_gpus(logs):
 
 @pytest.mark.usefixtures("no_gpu")
 def test_where_there_is_no_gpu_a_job_that_asks_for_one_trains_on_the_cpu_and_says_so(play, job, directory):
-    """The same file works on a laptop; in a cluster the warning has the reason and the remedy."""
+    """The same file works on a laptop. In a cluster, the warning has the reason and the remedy."""
     with capture_logs() as logs:
         code, _ = play(job("PPO", device="cuda"))
 
@@ -73,7 +73,7 @@ def test_where_there_is_no_gpu_a_job_that_asks_for_one_trains_on_the_cpu_and_say
 
 @pytest.mark.usefixtures("no_gpu")
 def test_a_run_that_asked_for_a_gpu_is_measured_where_there_is_none(play, job, directory, make_member):
-    """A user evaluates a model from a cluster on a laptop, with the cluster's training.yaml."""
+    """A person evaluates a model of a cluster on a laptop, with the training.yaml of the cluster."""
     play(job())
 
     with capture_logs() as logs:
@@ -86,7 +86,7 @@ def test_a_run_that_asked_for_a_gpu_is_measured_where_there_is_none(play, job, d
 
 
 def test_a_job_that_asks_for_no_gpu_trains_on_the_cpu_without_a_word(monkeypatch, make):
-    """This holds also if there is a GPU: small networks are faster on the CPU, and resume exactly."""
+    """A machine with a GPU also uses the CPU, because small networks are faster there and resume exactly."""
     monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
 
     with capture_logs() as logs:
@@ -108,7 +108,7 @@ def test_a_job_that_asks_for_no_gpu_trains_on_the_cpu_without_a_word(monkeypatch
     ],
 )
 def test_a_run_goes_on_from_a_checkpoint_of_either_device(make, tmp_path, name, before, after):
-    """Its networks, optimizers and noise move to the new device, where it learns."""
+    """Networks, optimizers and noise move to the new device, and the model continues to learn."""
     trained, env, configuration = make(name, before)
     trained.learn(40)
     state = checkpoint.TrainingState.of(trained, env.snapshot(), {"returns": [0.0]})
@@ -128,7 +128,7 @@ def test_a_run_goes_on_from_a_checkpoint_of_either_device(make, tmp_path, name, 
 
 
 def test_where_the_generator_of_a_gpu_stands_is_kept_with_the_others():
-    """The GPU draws actions, and would draw the same again after each interruption."""
+    """The GPU's generator draws actions. Without its state, a resumed run would draw the same ones again."""
     space = spaces.Discrete(2)
     now = Generators.now(space, torch.device("cpu"))
     state = torch.arange(16, dtype=torch.uint8)

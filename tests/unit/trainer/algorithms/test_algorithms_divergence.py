@@ -1,4 +1,4 @@
-"""The places that are checked for NaN and infinity, and the reports."""
+"""The check for NaN and infinity: the numbers that it covers, and its message."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ ALL = ("DQN", "PPO", "A2C", "REINFORCE")
 
 @pytest.fixture
 def model(job, make_member):
-    """Make a model of an algorithm in a corridor, with a logger that writes nowhere."""
+    """Return a function that makes a model of an algorithm in a corridor, whose logger writes nothing."""
 
     def make(name):
         env = SimulatorsVecEnv([Restarter(make_member())], run_seed=1)
@@ -32,14 +32,14 @@ def model(job, make_member):
 
 @pytest.mark.parametrize("name", ALL)
 def test_a_new_model_holds_numbers_only(model, name):
-    """A valid model must pass the check."""
+    """A model without training must pass the check."""
     assert Learner(model(name)).not_finite() == ""
 
 
 @pytest.mark.parametrize("name", ALL)
 @pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf])
 def test_one_wrong_number_in_any_tensor_is_found_and_named(model, name, number):
-    """The last weight of the last layer does not affect any output at first."""
+    """A wrong weight at the end of the last layer may affect no output at first."""
     made = model(name)
     learner = Learner(made)
     for tensor, parameter in made.policy.named_parameters():
@@ -52,7 +52,7 @@ def test_one_wrong_number_in_any_tensor_is_found_and_named(model, name, number):
 
 
 def test_a_refusal_names_step_loss_and_tensors(model):
-    """The message shows where to look and what to change."""
+    """A person sees where the numbers are wrong, and what to change."""
     made = model("PPO")
     made.logger.record("train/value_loss", math.inf)
     with torch.no_grad():
@@ -71,7 +71,7 @@ def test_a_refusal_names_step_loss_and_tensors(model):
 
 
 def test_a_figure_that_is_no_loss_may_be_unknown(model):
-    """If all returns are equal, the explained variance is NaN."""
+    """The explained variance is NaN if all returns are equal, which is not a divergence."""
     made = model("PPO")
     made.logger.record("train/explained_variance", math.nan)
     made.logger.record("rollout/loss", math.nan)
@@ -80,7 +80,7 @@ def test_a_figure_that_is_no_loss_may_be_unknown(model):
 
 
 def test_very_large_numbers_are_numbers(model):
-    """The norm of a tensor may be infinite although each of its numbers is finite."""
+    """The norm of a tensor overflows to infinity although each of its numbers is finite."""
     made = model("PPO")
     with torch.no_grad():
         for parameter in made.policy.parameters():
@@ -90,7 +90,7 @@ def test_very_large_numbers_are_numbers(model):
 
 
 def test_a_coefficient_that_is_learnt_beside_the_networks_is_looked_at_too(model):
-    """The temperature of SAC is a tensor of the model, not of a network."""
+    """The temperature of SAC is a tensor of the model and not of a network."""
     made = model("PPO")
     made.log_ent_coef = torch.tensor([math.nan])
 

@@ -1,4 +1,4 @@
-"""Every algorithm trains with every pair of spaces that it supports, and survives a fault and a resume."""
+"""Each algorithm trains with each pair of spaces that it supports, and survives a fault and a resume."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ pytestmark = pytest.mark.minutes(3)
 
 COLLECTORS = 2
 PATIENCE_S = 30.0
-STEPS = 26  # three rollouts of an on-policy algorithm
-# At this step of the first of two simulators, on-policy algorithms are in their second rollout, and
-# off-policy ones already learn.
+STEPS = 26  # on-policy algorithms make three rollouts
+# At this step of the first of two simulators, on-policy algorithms are in their second rollout. Off-policy
+# algorithms have begun to learn.
 SIGNAL_AT = 7
 OFF_POLICY = {
     "learning_starts": 6,
@@ -37,7 +37,8 @@ OFF_POLICY = {
     "train_freq": 3,
     "gradient_steps": 1,
 }
-# A soft update of the target comes between the boundary and the signal, so a second one would be noticed.
+# A soft update of the target comes between the end of the rollout and the signal, so a repeated update would
+# be noticed.
 SOFT = {"target_update_interval": 4, "tau": 0.5}
 NOISE = {"noise_type": "ornstein-uhlenbeck", "noise_std": 0.2}
 ON_POLICY = {"n_steps": 4, "batch_size": 8}
@@ -59,8 +60,8 @@ HYPERPARAMETERS = {
 }
 CELLS = [(name, seen, acted) for name in ALGORITHMS for seen in OBSERVATIONS for acted in ACTIONS]
 WORKING = [cell for cell in CELLS if not refusal(*cell)]
-# The content of a checkpoint depends on algorithm and observation, and on algorithm and action; the cells
-# here cover each of these pairs.
+# A checkpoint's content depends on the pair of algorithm and observation, and on the pair of algorithm and
+# action. These cells cover each such pair.
 PAIRS = [
     cell
     for place, cell in enumerate(WORKING)
@@ -71,9 +72,9 @@ PAIRS = [
 
 @pytest.fixture
 def play(make_member, make_configuration, tmp_path):
-    """Train into a folder.
+    """Return a function that trains into a folder.
 
-    The first simulator dies at each of `deaths` and gets a signal at step `signal_at`.
+    The first simulator dies at each of `deaths` and sends a signal at step `signal_at`.
     """
 
     def run(folder, cell, *, signal_at=0, deaths=(), steps=STEPS, **more):
@@ -96,7 +97,7 @@ def play(make_member, make_configuration, tmp_path):
 
         configuration = make_configuration(
             algorithm=algorithm,
-            environment={"id": "MoveToTargetEnv-v0"},  # `load_policy` needs a registered one
+            environment={"id": "MoveToTargetEnv-v0"},  # `load_policy` needs a registered environment
             steps=steps,
             collectors=COLLECTORS,
             evaluation={"everySteps": STEPS // 2, "episodes": 1, "confirmEpisodes": 0},
@@ -109,30 +110,30 @@ def play(make_member, make_configuration, tmp_path):
 
 
 class Interrupted(FakeTask):
-    """A task that sends a signal at one step."""
+    """A task that sends SIGTERM to the trainer at one of its steps."""
 
     def __init__(self, seen, acted, deaths, taken, signal_at):
         super().__init__(seen, acted, deaths)
         self._taken, self._signal_at = taken, signal_at
 
     def step(self, action):
-        """Take a step."""
+        """Send the signal if it is due, and take a step."""
         if next(self._taken) == self._signal_at:
             os.kill(os.getpid(), signal.SIGTERM)
         return super().step(action)
 
 
 class MaskedInterrupted(Interrupted, MaskedTask):
-    """A task that forbids actions and sends a signal."""
+    """A task with action masks that sends SIGTERM to the trainer at one of its steps."""
 
 
 KINDS = {"MaskablePPO": (MaskedTask, MaskedInterrupted)}
 
 
 def after_restart(member, step):
-    """Return the step of another simulator, which first waits for the end of the member's restart.
+    """Return a step function that first waits until a broken simulator has restarted.
 
-    Without it, a slow machine takes all steps of the run there before the member is up again.
+    On a slow machine, the other simulator would otherwise take all steps of the run before the restart ends.
     """
 
     def patient(action):
@@ -146,7 +147,7 @@ def after_restart(member, step):
 
 
 def tensors(path):
-    """Return every tensor of a model's file by name, as bytes, and the statistics for normalization."""
+    """Return the tensors of a model's file by name, as bytes, and the statistics for normalization."""
     with zipfile.ZipFile(path) as archive:
         parts = {name: archive.read(name) for name in archive.namelist() if name.endswith(".pth")}
         normalized = [name for name in archive.namelist() if name == "normalize.json"]
@@ -168,7 +169,7 @@ def flat(value, place=""):
 
 
 def outcome(directory):
-    """Return all results of a run by name."""
+    """Return all results of a run by name: tensors, state, experience and evaluations."""
     found = checkpoint.newest(directory.checkpoints)
     state = json.loads((found.path / "state.json").read_text())
     state["episodes"] = [episode | {"t": 0} for episode in state["episodes"]]
@@ -180,12 +181,12 @@ def outcome(directory):
 
 
 def test_the_job_names_the_algorithms_of_the_table():
-    """The operator must accept exactly the algorithms of the trainer."""
+    """The operator must accept exactly the algorithms that the trainer has."""
     assert set(NAMES) == set(ALGORITHMS)
 
 
 def test_what_is_refused_is_refused_before_a_model_is_made(play):
-    """The message is the sentence in the table of docs/reference/algorithms.md."""
+    """The error is the sentence that the table in docs/reference/algorithms.md has."""
     for cell in (("RecurrentPPO", "Box", "MultiBinary"), ("PPO", "Tuple", "Box"), ("CrossQ", "image", "Box")):
         assert play("refused", cell)[0] == 2
 
@@ -193,7 +194,7 @@ def test_what_is_refused_is_refused_before_a_model_is_made(play):
 @pytest.mark.parametrize("name", ["PPO", "SAC", "RecurrentPPO"])
 @pytest.mark.parametrize("seen", ["Dict", "Dict with image"])
 def test_a_dict_is_normalized_by_key_and_resumes_exactly(play, name, seen):
-    """Each Box of numbers has its own statistics; images and discrete values do not."""
+    """Each Box of numbers has its own statistics; images and discrete values have none."""
     cell, normalize = (name, seen, "Box"), {"normalize": {}}
     whole, reference = play("whole", cell, **normalize)
     interrupted, directory = play("cut", cell, signal_at=SIGNAL_AT, **normalize)
@@ -210,7 +211,7 @@ def test_a_dict_is_normalized_by_key_and_resumes_exactly(play, name, seen):
 
 @pytest.mark.parametrize("cell", WORKING, ids=", ".join)
 def test_it_trains_and_survives_faults(play, cell):
-    """If a row of a fault reached a loss, a number would be wrong, or the run would end."""
+    """If a row of a fault reached a loss, a number would be wrong or the run would end."""
     code, directory = play("broken", cell, deaths=(3, 8), steps=STEPS - 6)
 
     assert code == 0
@@ -219,7 +220,7 @@ def test_it_trains_and_survives_faults(play, cell):
 
 @pytest.mark.parametrize("cell", PAIRS, ids=", ".join)
 def test_it_resumes_exactly(play, cell):
-    """If a checkpoint lacked a part of the state, the resumed run would differ."""
+    """If the checkpoint lacked a part of the state, the resumed run would end with other results."""
     whole, reference = play("whole", cell)
     interrupted, directory = play("cut", cell, signal_at=SIGNAL_AT)
     resumed, _ = play("cut", cell)

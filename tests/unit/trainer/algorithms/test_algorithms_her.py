@@ -1,4 +1,4 @@
-"""Hindsight experience replay: one column per member, and episodes that are cut by faults."""
+"""Hindsight experience replay: each simulator has a column, and faults cut episodes."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ ACTIONS = spaces.Discrete(2)
 
 
 def judge():
-    """Return an object that computes rewards of goals: 1 if the goal is reached."""
+    """Return an object that computes rewards of goals: 1 if a goal is reached, otherwise 0."""
     return SimpleNamespace(
         env_method=lambda _, achieved, desired, *__, **___: [(achieved == desired).all(axis=-1)]
     )
 
 
 def buffer_of(rows=8, members=1):
-    """Return a buffer with that many rows for each member."""
+    """Return a buffer with this number of rows for each simulator."""
     return ValidHerReplayBuffer(rows * members, SPACE, ACTIONS, env=judge(), device="cpu", n_envs=members)
 
 
 def add(buffer, *steps):
-    """Append one vector step: the position of each member, with "done" and "bad" as marks."""
+    """Add one vector step: each simulator's position, with the marks "done" and "bad"."""
     places = np.array([[place] for place, *_ in steps], np.float32)
     words = [step[1:] for step in steps]
     seen = {"observation": places, "achieved_goal": places, "desired_goal": places * 0 + 50}
@@ -52,7 +52,7 @@ def add(buffer, *steps):
 
 
 def episodes(buffer, column=0):
-    """Return the positions of each closed episode, by its first row."""
+    """Return the positions of each complete episode, by the number of its first row."""
     found = {}
     for row in np.flatnonzero(buffer.ep_length[:, column]):
         start = int(buffer.ep_start[row, column])
@@ -61,7 +61,7 @@ def episodes(buffer, column=0):
 
 
 def test_each_member_has_a_column_and_only_whole_episodes_are_sampled():
-    """Members with different episode lengths must not affect each other."""
+    """An episode of one simulator ends while the other simulator's episode continues."""
     buffer = buffer_of(members=2)
     add(buffer, (0,), (10,))
     add(buffer, (1, "done"), (11,))
@@ -73,9 +73,9 @@ def test_each_member_has_a_column_and_only_whole_episodes_are_sampled():
 
 
 def test_a_fault_closes_the_episode_at_its_last_valid_row():
-    """The episode ends as truncated, so its value is bootstrapped.
+    """The episode ends as truncated, so the value of its last observation is bootstrapped.
 
-    Invalid rows are not stored, and other members continue.
+    Invalid rows are not stored, and the other simulators continue.
     """
     buffer = buffer_of(members=2)
     add(buffer, (0,), (10,))
@@ -91,7 +91,7 @@ def test_a_fault_closes_the_episode_at_its_last_valid_row():
 
 
 def test_an_episode_whose_first_row_is_overwritten_is_forgotten_from_there():
-    """Its goals would otherwise belong to another episode."""
+    """The remaining rows of the old episode would otherwise get goals of the new one."""
     buffer = buffer_of(rows=4)
     for place in (0, 1, 2):
         add(buffer, (place, *(["done"] if place == 2 else [])))
@@ -103,7 +103,7 @@ def test_an_episode_whose_first_row_is_overwritten_is_forgotten_from_there():
 
 
 def test_an_episode_longer_than_its_column_keeps_its_last_rows():
-    """It overwrites its own first rows."""
+    """A long episode overwrites its own first rows."""
     buffer = buffer_of(rows=4)
     for place in range(6):
         add(buffer, (place, *(["done"] if place == 5 else [])))
@@ -113,7 +113,7 @@ def test_an_episode_longer_than_its_column_keeps_its_last_rows():
 
 @pytest.mark.parametrize("strategy", ["future", "final", "episode"])
 def test_goals_are_places_that_the_same_episode_reached(strategy):
-    """They are of the same member, and their reward is computed again."""
+    """A goal belongs to the same simulator, and the reward is computed for the new goal."""
     buffer = ValidHerReplayBuffer(
         16, SPACE, ACTIONS, judge(), "cpu", 2, goal_selection_strategy=strategy, n_sampled_goal=3
     )
@@ -134,7 +134,7 @@ def test_goals_are_places_that_the_same_episode_reached(strategy):
 
 
 def test_nothing_is_sampled_before_an_episode_is_whole():
-    """Its length is unknown until it ends, so learning waits."""
+    """The length of an episode is unknown before its end, so no learning takes place."""
     buffer = buffer_of()
     add(buffer, (0,))
 
@@ -142,7 +142,7 @@ def test_nothing_is_sampled_before_an_episode_is_whole():
 
 
 def test_a_buffer_without_faults_is_that_of_stable_baselines3():
-    """All columns are equal, even in a full buffer, as long as each episode is shorter than a column."""
+    """As long as each episode is shorter than a column, the columns are equal, even in a full buffer."""
     ours = buffer_of(rows=15)
     theirs = HerReplayBuffer(15, SPACE, ACTIONS, env=judge(), device="cpu", n_envs=1)
     random = np.random.default_rng(1)
@@ -158,7 +158,7 @@ def test_a_buffer_without_faults_is_that_of_stable_baselines3():
 
 
 def restored(buffer, **changes):
-    """Return a new buffer with the positions and rows of another, as a checkpoint stores them."""
+    """Return a new buffer with the positions and rows of another, as after a resume."""
     again = buffer_of(buffer.buffer_size, buffer.n_envs)
     again.positions = buffer.positions._replace(**changes)
     again.fill(0, {name: column.copy() for name, column in buffer.rows(0, buffer.size()).items()})
@@ -167,7 +167,7 @@ def restored(buffer, **changes):
 
 @pytest.mark.parametrize("before", range(9))
 def test_a_restored_buffer_goes_on_as_if_nothing_had_been(before):
-    """The open episode of each member continues, too."""
+    """Each simulator's open episode continues after the resume."""
     whole = buffer_of(rows=4, members=2)
     steps = [
         ((n, *(["done"] if n % 3 == 2 else [])), (n + 20, *(["done"] if n % 5 == 4 else [])))
@@ -186,7 +186,7 @@ def test_a_restored_buffer_goes_on_as_if_nothing_had_been(before):
 
 
 def test_an_episode_that_does_not_continue_after_a_resume_is_never_sampled():
-    """Its member begins another episode, whose rows follow."""
+    """After the resume the simulator begins another episode, and its rows follow those of the cut episode."""
     buffer = buffer_of()
     add(buffer, (0,))
     add(buffer, (1,))
@@ -198,13 +198,13 @@ def test_an_episode_that_does_not_continue_after_a_resume_is_never_sampled():
 
 
 def test_a_run_with_another_number_of_simulators_is_refused():
-    """Its columns would belong to other members."""
+    """The columns would belong to other simulators."""
     with pytest.raises(ConfigurationError, match="the run has 2 columns, not 1; use as many simulators"):
         buffer_of().positions = buffer_of(members=2).positions
 
 
 def test_episodes_with_lost_rows_are_dropped():
-    """A damaged chunk of a checkpoint costs only the episodes in it."""
+    """A damaged part of a checkpoint costs only the episodes with rows in it."""
     buffer = buffer_of()
     for place in range(7):
         add(buffer, (place, *(["done"] if place in {1, 4} else [])))
@@ -219,7 +219,7 @@ def test_episodes_with_lost_rows_are_dropped():
 
 
 def test_changed_rows_are_marked_for_the_next_checkpoint():
-    """The end of an episode changes all of its rows, also in chunks that were already written."""
+    """The end of an episode changes all its rows, also rows in chunks that are already saved."""
     buffer = buffer_of()
     buffer.chunk_rows = 2
     for place in range(5):
@@ -231,7 +231,7 @@ def test_changed_rows_are_marked_for_the_next_checkpoint():
 
 
 def test_its_size_is_computed_before_it_exists():
-    """The size includes start and length of the episode for each row."""
+    """The computed size includes the start and the length of the episode for each row."""
     buffer = buffer_of(rows=10)
     algorithm = Algorithm(
         name="DQN", hyperparameters={"buffer_size": 10, "replay_buffer_class": "HerReplayBuffer"}
@@ -264,7 +264,7 @@ def test_its_size_is_computed_before_it_exists():
     ],
 )
 def test_wrong_options_are_refused_with_field_fact_and_remedy(given, fact):
-    """The error comes before a simulator starts."""
+    """The options are checked before a simulator starts, so a person waits only seconds for the error."""
     chosen = {"replay_buffer_class": "HerReplayBuffer"} | given
     if "no effect" in fact:
         del chosen["replay_buffer_class"]
@@ -276,7 +276,7 @@ def test_wrong_options_are_refused_with_field_fact_and_remedy(given, fact):
 
 
 def test_an_algorithm_without_replay_has_no_such_hyperparameter():
-    """PPO would ignore it."""
+    """PPO has no replay buffer and would ignore the setting."""
     with pytest.raises(ConfigurationError, match="PPO has no such hyperparameter"):
         check(Algorithm(name="PPO", hyperparameters={"replay_buffer_class": "HerReplayBuffer"}))
 
@@ -293,13 +293,13 @@ def test_an_algorithm_without_replay_has_no_such_hyperparameter():
     ],
 )
 def test_observations_without_goals_are_refused(space, fact):
-    """The message has the remedy."""
+    """The message names an environment with goals as the remedy."""
     with pytest.raises(ConfigurationError, match=fact):
         refuse_other_observations(space)
 
 
 def test_the_goal_environment_computes_rewards_for_a_batch():
-    """Stable-Baselines3's own vector environment would do the same."""
+    """The vector environment of Stable-Baselines3 computes them in the same way."""
     env = DummyVecEnv([lambda: MoveToTargetGoalEnv(*fake_arena())])
     goals = np.zeros((5, 2), np.float32)
 

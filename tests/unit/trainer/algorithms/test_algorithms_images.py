@@ -1,4 +1,4 @@
-"""Runs whose observations are images."""
+"""Runs with images as observations."""
 
 from __future__ import annotations
 
@@ -35,7 +35,10 @@ NORMALIZE = {"observations": False}
 
 @pytest.fixture
 def make_seeing(make_member):
-    """Make a member of the corridor that sees its position as a channels-last image."""
+    """Return a function that makes a simulator of the corridor.
+
+    Its observation is a channels-last image of its position.
+    """
 
     def make(name, shape=(ROWS, COLUMNS, 3)):
         member = make_member(name)
@@ -58,7 +61,7 @@ def make_seeing(make_member):
 
 @pytest.fixture
 def play(make_seeing, job, tmp_path):
-    """Train into a folder; a signal comes at step `signal_at` of the attempt."""
+    """Return a function that trains into a folder; a signal comes at step `signal_at` of the attempt."""
 
     def run(folder, name, collectors=1, signal_at=0, normalize=None, cnn=None):
         algorithm = {"name": name, "hyperparameters": HYPERPARAMETERS[name], "cnn": cnn}
@@ -83,7 +86,7 @@ def play(make_seeing, job, tmp_path):
 
 
 def outcome(directory):
-    """Return all results of a run: tensors and evaluations."""
+    """Return the tensors and the evaluations of a run."""
     path = checkpoint.newest(directory.checkpoints).path / "model.zip"
     with zipfile.ZipFile(path) as archive:
         tensors = torch.load(io.BytesIO(archive.read("policy.pth")), weights_only=True)
@@ -97,7 +100,7 @@ def outcome(directory):
     ids=lambda it: "rewards-normalized" if it == NORMALIZE else it,
 )
 def test_a_run_on_images_that_is_interrupted_ends_as_one_that_was_not(play, name, normalize):
-    """The results are equal to the last bit, and the layout of the images is the same before and after."""
+    """The results are equal to the last bit, although images change their layout inside Stable-Baselines3."""
     whole, reference = play("whole", name, collectors=2, normalize=normalize)
     interrupted, directory = play("cut", name, collectors=2, signal_at=28, normalize=normalize)
 
@@ -109,7 +112,7 @@ def test_a_run_on_images_that_is_interrupted_ends_as_one_that_was_not(play, name
 
 
 def test_a_checkpoint_keeps_images_as_the_environment_returned_them(play):
-    """At a resume they are compared with the values that the environments return."""
+    """At a resume, the images are compared with those that the environments return."""
     _, directory = play("run", "PPO")
 
     with np.load(checkpoint.newest(directory.checkpoints).path / "state.npz") as arrays:
@@ -119,7 +122,7 @@ def test_a_checkpoint_keeps_images_as_the_environment_returned_them(play):
 @pytest.mark.parametrize("name", sorted(HYPERPARAMETERS))
 @pytest.mark.parametrize("shape", [(ROWS, COLUMNS, 3), (3, ROWS, COLUMNS)], ids=["last", "first"])
 def test_images_get_the_policy_for_images(make_seeing, name, shape):
-    """A policy for numbers would accept flattened pixels, but learn badly."""
+    """A policy for vectors would accept flattened pixels, but learn badly."""
     env = SimulatorsVecEnv([Restarter(make_seeing("collect-0", shape))], run_seed=1)
     model = make_model(Algorithm(name=name, hyperparameters=HYPERPARAMETERS[name]), env, seed=1)
 
@@ -133,7 +136,7 @@ def test_images_get_the_policy_for_images(make_seeing, name, shape):
     ("shape", "layers"), [((ROWS, COLUMNS, 3), 3), ((20, 48, 9), 9)], ids=["1", "3 frames"]
 )
 def test_the_small_network_takes_the_place_of_the_large_one(make_seeing, name, shape, layers):
-    """This holds for every algorithm, and for one image or three.
+    """Each algorithm can use the small network, with one image or with three.
 
     The images may be too small for the large network.
     """
@@ -156,7 +159,7 @@ def test_the_small_network_takes_the_place_of_the_large_one(make_seeing, name, s
 
 
 def test_hyperparameters_change_the_small_network(make_seeing):
-    """As everywhere, `policy_kwargs` are those of the policy."""
+    """As everywhere, `policy_kwargs` are the arguments of the policy."""
     env = SimulatorsVecEnv([Restarter(make_seeing("collect-0"))], run_seed=1)
     policy_kwargs = {"net_arch": [32], "features_extractor_kwargs": {"features_dim": 64}}
     hyperparameters = {**HYPERPARAMETERS["PPO"], "policy_kwargs": policy_kwargs}
@@ -168,7 +171,7 @@ def test_hyperparameters_change_the_small_network(make_seeing):
 
 
 def test_a_run_with_the_small_network_resumes_as_others_do(play):
-    """It is exact to the last bit, although nothing in a checkpoint is unpickled."""
+    """The results are equal to the last bit, although the trainer unpickles nothing from a checkpoint."""
     _, reference = play("whole", "PPO", cnn="small")
     play("cut", "PPO", signal_at=28, cnn="small")
 
@@ -179,7 +182,7 @@ def test_a_run_with_the_small_network_resumes_as_others_do(play):
 
 
 def test_a_network_for_images_is_refused_where_there_are_none(make_member):
-    """The setting would have no effect, although the job names it."""
+    """The job sets the field, but it would have no effect."""
     env = SimulatorsVecEnv([Restarter(make_member("collect-0"))], run_seed=1)
 
     with pytest.raises(
@@ -196,7 +199,7 @@ def test_a_network_for_images_is_refused_where_there_are_none(make_member):
     ],
 )
 def test_images_that_the_policy_cannot_take_are_refused(make_seeing, shape, normalize, fact):
-    """The error names the image and comes before a simulator starts."""
+    """The error names the image, and comes before a simulator starts."""
     env = SimulatorsVecEnv([Restarter(make_seeing("collect-0", shape))], run_seed=1)
 
     with pytest.raises(ConfigurationError, match=fact):

@@ -1,6 +1,6 @@
-"""Numbers with which an algorithm would fail only when it learns are refused before a simulator starts.
+"""Numbers with which an algorithm would fail only while it learns are rejected before a simulator starts.
 
-The test lets the algorithm itself learn a few rows with each number that is not refused.
+With each number that is accepted, the algorithm learns a few rows.
 """
 
 from __future__ import annotations
@@ -33,23 +33,23 @@ SMALL = {
     "episodes_per_update": 1,
     "policy_kwargs": TINY,
 }
-# The signature refuses numbers of another type; each parameter gets some of these.
+# The signature rejects numbers of another type; each parameter gets the numbers of this list.
 NUMBERS = (0, -1, 1, 0.0, -0.5)
 
 
 class Valid(gymnasium.Wrapper):
-    """A task whose rows are marked as a collector marks them."""
+    """A task whose rows are marked as valid, as a collector marks them."""
 
     def step(self, action):
-        """Take a step."""
+        """Take a step, and mark its row as valid."""
         *results, info = self.env.step(action)
         return *results, info | {OURS: {"valid": True}}
 
 
 def refusal_of(algorithm, members=2):
-    """Return the reason for which the algorithm is refused.
+    """Return the message with which the algorithm is rejected.
 
-    If it is not refused, let it learn and return "".
+    If it is accepted, let it learn and return "".
     """
     actions = entry_of(algorithm.name).actions
     kind = "Box" if spaces.Box in actions else "Discrete"
@@ -67,7 +67,7 @@ def refusal_of(algorithm, members=2):
 
 
 def small(name, **given):
-    """Return a small algorithm; `given` replaces some of its small values."""
+    """Return an algorithm with small hyperparameters, some of which `given` replaces."""
     entry = entry_of(name)
     usual = {key: value for key, value in SMALL.items() if key in entry.known}
     if entry.replays:
@@ -78,7 +78,7 @@ def small(name, **given):
 
 
 def every_number():
-    """Yield each algorithm with each of the numbers for each of its parameters and its policy's."""
+    """Yield each algorithm with each number for each of its hyperparameters and its policy's parameters."""
     for name in ALGORITHMS:
         entry = entry_of(name)
         usual = small(name).hyperparameters["policy_kwargs"]
@@ -87,10 +87,10 @@ def every_number():
             yield from (small(name, policy_kwargs=usual | {key: value}) for value in (*NUMBERS, [0], [-1]))
 
 
-@pytest.mark.filterwarnings("ignore")  # a mean of no rows, a batch size that does not divide
+@pytest.mark.filterwarnings("ignore")  # such as a mean of no rows, or a batch size that is no divisor
 @for_each("algorithm", every_number)
 def test_what_is_not_refused_learns(algorithm):
-    """Otherwise a division by zero, or an empty loop, would come after the simulators have started."""
+    """An accepted number could otherwise cause a division by zero after the simulators have started."""
     use_threads()
     refusal_of(algorithm)
 
@@ -118,12 +118,12 @@ def test_a_number_out_of_its_range_is_refused_with_the_range(name, given, line):
 
 
 def test_a_frequency_in_episodes_fits_one_simulator():
-    """Stable-Baselines3 allows it for one environment."""
+    """Stable-Baselines3 counts train_freq in episodes only with a single environment."""
     assert not refusal_of(small("DQN", train_freq=[1, "episode"]), members=1)
 
 
 @pytest.mark.parametrize("name", ["sb3_contrib:MaskablePPO", "sb3_contrib:RecurrentPPO"])
 def test_a_class_by_its_name_has_the_ranges_of_the_algorithm_that_it_is(name):
-    """One row has no deviation, whatever name the job uses for the class."""
+    """The rule for one row applies to PPO under every name of its class."""
     with pytest.raises(ConfigurationError, match="batch_size: 1 is refused; give a number of at least 2"):
         check(Algorithm(name=name, hyperparameters={"batch_size": 1}))

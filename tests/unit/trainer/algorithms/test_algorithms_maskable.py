@@ -1,4 +1,4 @@
-"""MaskablePPO: rows keep their masks, and no forbidden action is taken."""
+"""MaskablePPO: each row keeps its mask, and no forbidden action is taken."""
 
 from __future__ import annotations
 
@@ -39,17 +39,17 @@ BUFFERS = {
 }
 OURS = [kind for kind in BUFFERS if kind is not MaskableRolloutBuffer]
 ROLLOUTS = {"n_steps": 8, "batch_size": 4, "n_epochs": 2, "policy_kwargs": {"net_arch": [8]}}
-NUMBERS = ("Box", "Discrete")  # spaces of an observation and of an action
+NUMBERS = ("Box", "Discrete")  # the spaces of observation and action
 MASKED = [(seen, acted) for seen in ("Box", "Dict") for acted in ("Discrete", "MultiDiscrete", "MultiBinary")]
 
 
 def bits(mark):
-    """Return the mask of a row, which is the last bits of its mark."""
+    """Return the mask of a row, which is made of the last bits of its mark."""
     return np.array([int(mark) >> place & 1 for place in range(FEW.n)], bool)
 
 
 def filled(kind, valid):
-    """Return a full buffer; the mark of a row is its number within its member, plus 100 for each member."""
+    """Return a full buffer; a row's mark is its number, plus 100 for each simulator before its own."""
     rows, members = valid.shape
     buffer = kind(rows, BUFFERS[kind], FEW, "cpu", 0.8, 0.9, n_envs=members)
     for row in range(rows):
@@ -67,7 +67,7 @@ def filled(kind, valid):
 
 
 def marks_in(batch):
-    """Return the marks of a batch's rows."""
+    """Return the marks of the rows in a batch."""
     seen = batch.observations["mark"] if isinstance(batch.observations, dict) else batch.observations
     return seen.flatten().tolist()
 
@@ -75,9 +75,9 @@ def marks_in(batch):
 @pytest.mark.parametrize("kind", OURS)
 @given(data=st.data())
 def test_each_valid_row_is_learned_from_once_with_its_mask_and_no_other(kind, data):
-    """Another mask gives another probability.
+    """With the mask of another row, the probability of the action would be wrong.
 
-    A batch of one row has no deviation, so no such batch is made.
+    One row has no standard deviation, so a batch has at least two.
     """
     rows, members = data.draw(st.integers(2, 9)), data.draw(st.integers(1, 3))
     marks = data.draw(st.lists(st.booleans(), min_size=rows * members, max_size=rows * members))
@@ -94,7 +94,7 @@ def test_each_valid_row_is_learned_from_once_with_its_mask_and_no_other(kind, da
 
 
 def test_without_faults_a_rollout_is_what_sb3_contrib_computes():
-    """Nothing else may change."""
+    """Without faults, a run must learn exactly as with plain sb3-contrib."""
     valid = np.ones((5, 2), bool)
     ours, theirs = (filled(kind, valid) for kind in (ValidMaskableRolloutBuffer, MaskableRolloutBuffer))
 
@@ -105,7 +105,7 @@ def test_without_faults_a_rollout_is_what_sb3_contrib_computes():
 
 
 class Asked(MaskedTask):
-    """A task that counts the requests for its masks, and breaks at some of them."""
+    """A task that counts the requests for its masks, and fails at some of them."""
 
     def __init__(self, *arguments, breaks_at=(), **options):
         super().__init__(*arguments, **options)
@@ -113,7 +113,7 @@ class Asked(MaskedTask):
         self._breaks_at = breaks_at
 
     def action_masks(self):
-        """Return the masks, or break."""
+        """Return the masks, or fail."""
         assert not self._dead, "asked while it is mended"
         self.asked += 1
         if self.asked in self._breaks_at:
@@ -123,7 +123,7 @@ class Asked(MaskedTask):
 
 
 def with_task(member, task):
-    """Return a member whose environment is the task; a restart revives the task."""
+    """Return a simulator with the task as its environment; a restart of the simulator restarts the task."""
     revive = member.restart
     member.env = task
     member.restart = lambda: (revive(), task.restart())
@@ -138,9 +138,9 @@ def task_of(kind=MaskedTask, spaces_of=NUMBERS, **options):
 
 @pytest.fixture
 def learn(make_member):
-    """Make a model with two members.
+    """Return a function that makes a model with two simulators.
 
-    The first has the given task and, with `held`, restarts only when it is released.
+    The first simulator has the given task. With `held`, it restarts only when the test releases it.
     """
 
     def make(first, *, held=False):
@@ -155,7 +155,10 @@ def learn(make_member):
 
 
 def test_a_broken_simulator_is_not_asked_and_its_rows_allow_everything(learn):
-    """Another thread restarts it, and a call of the environment could disturb that or wait for it."""
+    """Another thread restarts the simulator.
+
+    A call of its environment could disturb the restart or wait for it.
+    """
     model, members, env = learn(task_of(Asked, deaths=(5,)), held=True)
     masks, rows = [], []
 
@@ -178,7 +181,7 @@ def test_a_broken_simulator_is_not_asked_and_its_rows_allow_everything(learn):
 
 
 def test_a_simulator_that_breaks_while_masks_are_asked_for_ends_its_episode(learn):
-    """No row across the fault reaches a loss, and the other members continue, as after a fault in a step."""
+    """As after a fault in a step, no row across the fault reaches a loss. The other simulators continue."""
     model, _, env = learn(task_of(Asked, breaks_at=(3, 9), max_steps=50))
     rows = []
 
@@ -199,7 +202,7 @@ def test_a_simulator_that_breaks_while_masks_are_asked_for_ends_its_episode(lear
 
 
 def test_the_vector_offers_masks_only_of_environments_that_have_them(make_member):
-    """sb3-contrib makes the same check."""
+    """sb3-contrib checks this in the same way."""
     answers = []
     for kind in (MaskedTask, FakeTask):
         env = SimulatorsVecEnv([Restarter(with_task(make_member(), task_of(kind)))], 1)
@@ -210,7 +213,10 @@ def test_the_vector_offers_masks_only_of_environments_that_have_them(make_member
 
 @pytest.fixture
 def run(directory, make_member, make_configuration):
-    """Train with MaskablePPO, and return the exit code and the members of each kind of simulator."""
+    """Return a function that trains with MaskablePPO.
+
+    It returns the exit code, the simulators and the arguments of the run.
+    """
 
     def play(make_task, *, collectors=2, **changes):
         algorithm = {"name": "MaskablePPO", "hyperparameters": ROLLOUTS} | changes.pop("algorithm", {})
@@ -222,7 +228,7 @@ def run(directory, make_member, make_configuration):
 
         configuration = make_configuration(
             algorithm=algorithm,
-            environment={"id": "MoveToTargetEnv-v0"},  # `load_policy` needs a registered one
+            environment={"id": "MoveToTargetEnv-v0"},  # `load_policy` needs a registered environment
             collectors=collectors,
             evaluation={"everySteps": 16, "episodes": 3, "confirmEpisodes": 4},
             **({"steps": 32} | changes),
@@ -233,7 +239,7 @@ def run(directory, make_member, make_configuration):
 
 
 def test_an_environment_without_masks_is_refused_before_a_simulator_starts(run, last_word):
-    """Without masks every action would be allowed, which is PPO."""
+    """Without masks every action would be allowed, which is plain PPO."""
     code, members, _ = run(lambda: task_of(FakeTask))
 
     assert code == 2
@@ -246,9 +252,9 @@ def test_an_environment_without_masks_is_refused_before_a_simulator_starts(run, 
 
 @pytest.mark.parametrize("given", [{}, {"normalize": {}}, {"name": "sb3_contrib:MaskablePPO"}])
 def test_training_evaluations_and_confirmations_take_only_allowed_actions(run, directory, given):
-    """The task fails at any other action.
+    """The task fails at a forbidden action.
 
-    `palaestra-eval` uses masks too, and so does an algorithm that is named by its class.
+    This covers `palaestra-eval` too, and an algorithm that is named by its class.
     """
     code, _, (configuration, make_members) = run(task_of, algorithm=given)
     again = measure(configuration, directory.model, make_members, episodes=4, stream="C")
@@ -261,7 +267,7 @@ def test_training_evaluations_and_confirmations_take_only_allowed_actions(run, d
 
 
 def test_an_evaluation_outside_a_run_asks_for_masks_too(learn, make_member):
-    """The policy itself has the information that it needs them."""
+    """The policy itself knows that it needs masks."""
     model, _, env = learn(task_of())
     member = with_task(make_member(), task_of(Asked))
 
@@ -286,9 +292,9 @@ def test_palaestra_eval_refuses_an_environment_without_masks_before_a_simulator_
 
 
 def test_an_episode_that_is_played_again_ends_before_a_forbidden_action(learn):
-    """A simulator that does not repeat itself may forbid an action that it once allowed.
+    """The environment is not deterministic, so an action of the saved episode may be forbidden now.
 
-    The next episode then begins.
+    In that case the next episode begins.
     """
     saved = [EpisodeState(0, np.zeros(6, np.int64)), EpisodeState(4, np.array([1]))]
     env = learn(task_of())[2]
@@ -333,7 +339,7 @@ def test_what_is_no_mask_is_refused_with_what_came(run, last_word, masks, fact):
 
 @pytest.mark.parametrize("spaces_of", MASKED, ids=", ".join)
 def test_both_files_act_as_the_policy_with_masks(run, directory, spaces_of):
-    """The task fails at a forbidden action, and the check of the export compares the actions too."""
+    """The task fails at a forbidden action. The verification of an export compares the actions too."""
     assert run(lambda: task_of(spaces_of=spaces_of), algorithm={"normalize": {}})[0] == 0
     differences = [exporting.export(directory.path, to).largest_difference for to in exporting.FORMATS]
     policy = load_policy(directory.path)

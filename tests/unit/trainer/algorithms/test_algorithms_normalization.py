@@ -1,4 +1,4 @@
-"""Observations and rewards are normalized, and the statistics are a part of the policy."""
+"""Normalization of observations and rewards; the statistics are a part of the policy."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ HYPERPARAMETERS = {
 
 @pytest.fixture
 def make_env(make_member):
-    """Make the corridors of two members, or one for each item of `faults`."""
+    """Yield a function that makes corridors of two simulators, or one for each item of `faults`."""
 
     def make(*faults):
         members = [make_member(f"collect-{row}", **these) for row, these in enumerate(faults or ({}, {}))]
@@ -44,7 +44,7 @@ def make_env(make_member):
 
 @pytest.fixture
 def make_normal(make_env):
-    """Make a model of the corridor with normalization."""
+    """Return a function that makes a model of the corridor with normalization."""
 
     def make(name="PPO", *faults, **normalize):
         algorithm = Algorithm(
@@ -56,18 +56,18 @@ def make_normal(make_env):
 
 
 def actions(members, steps=60):
-    """Return random actions for each member, with a fixed seed."""
+    """Return random actions for each simulator, from a fixed seed."""
     return np.random.default_rng(1).integers(0, 2, (steps, members))
 
 
 def of(running):
-    """Return Stable-Baselines3's statistics as lists."""
+    """Return the statistics of Stable-Baselines3 as lists."""
     return [np.asarray(running.mean).tolist(), np.asarray(running.var).tolist(), running.count]
 
 
 @pytest.mark.parametrize(("observations", "rewards"), [(True, True), (False, True), (True, False)])
 def test_without_faults_it_is_stable_baselines3s_own(make_env, observations, rewards):
-    """The results are equal to the last bit, so the documentation of VecNormalize applies here."""
+    """The results are equal to the last bit, so the documentation of VecNormalize applies."""
     wanted = Normalize(observations=observations, rewards=rewards, clip_observations=1.5, clip_rewards=1.2)
     ours = ValidNormalize(make_env(), wanted, GAMMA)
     theirs = VecNormalize(
@@ -102,7 +102,7 @@ def test_what_a_fault_spoiled_reaches_no_statistic(make_env):
 
 
 def test_a_fault_ends_the_return_that_rewards_are_scaled_by(make_env):
-    """The next episode does not depend on the one that was cut."""
+    """The return of the cut episode must not continue in the next one."""
     env = ValidNormalize(make_env({"steps": [3]}), Normalize(), GAMMA)
     env.reset()
 
@@ -112,7 +112,7 @@ def test_a_fault_ends_the_return_that_rewards_are_scaled_by(make_env):
 
 
 def test_a_member_that_cannot_be_reset_shows_nothing_to_the_statistics(make_env):
-    """Before its first reset, the observation of a member is only zeros."""
+    """Before its first reset, a simulator's observation is all zeros, which would change the mean."""
     env = ValidNormalize(make_env({}, {"resets": [1]}), Normalize(), GAMMA)
 
     env.reset()
@@ -121,7 +121,7 @@ def test_a_member_that_cannot_be_reset_shows_nothing_to_the_statistics(make_env)
 
 
 def test_the_end_of_an_episode_is_not_seen_where_the_next_cannot_begin(make_env):
-    """A member whose reset fails returns the last observation of its episode again, in a valid row."""
+    """If the reset fails, the row has the last observation of the old episode a second time."""
     env = ValidNormalize(make_env({"resets": [2]}), Normalize(), GAMMA)
     env.reset()
 
@@ -134,7 +134,7 @@ def test_the_end_of_an_episode_is_not_seen_where_the_next_cannot_begin(make_env)
 
 
 def test_a_policy_is_not_used_with_another_epsilon(make_normal):
-    """No configuration has it, but another release may use another value."""
+    """The file may come from another release with another epsilon."""
     env = make_normal().get_vec_normalize_env()
 
     with pytest.raises(ValueError, match=r"its epsilon is 0\.5"):
@@ -142,7 +142,7 @@ def test_a_policy_is_not_used_with_another_epsilon(make_normal):
 
 
 def test_the_replay_buffer_holds_what_was_seen(make_normal):
-    """An observation is normalized when it is sampled, with the statistics of that time."""
+    """The buffer has raw observations, which are normalized with the statistics at the time of sampling."""
     model = make_normal("DQN").learn(40)
     buffer = model.replay_buffer
     env = model.get_vec_normalize_env()
@@ -156,9 +156,9 @@ def test_the_replay_buffer_holds_what_was_seen(make_normal):
 
 
 def test_a_policy_is_shown_what_it_learned_from(make_env):
-    """A caller of the policy has raw observations."""
+    """A caller of the policy has raw observations, so the policy normalizes them itself."""
     env = make_env()
-    env.action_space = spaces.Box(-1.0, 1.0, (1,), np.float32)  # a number shows more than a movement
+    env.action_space = spaces.Box(-1.0, 1.0, (1,), np.float32)  # continuous, so that small differences count
     normalizing = Algorithm(name="PPO", hyperparameters=HYPERPARAMETERS["PPO"], normalize=Normalize())
     model = make_model(normalizing, env, seed=1).learn(40)
     observation = np.array([0.2, 0.1], np.float32)
@@ -172,7 +172,7 @@ def test_a_policy_is_shown_what_it_learned_from(make_env):
 
 @pytest.mark.parametrize("name", ["DQN", "PPO"])
 def test_an_evaluation_earns_what_it_earns_and_changes_no_statistic(make_normal, make_member, name):
-    """Two policies are compared by the rewards of the environment."""
+    """Two policies are compared by the environment's rewards, not by normalized ones."""
     model = make_normal(name).learn(40)
     env = model.get_vec_normalize_env()
     before = of(env.obs_rms), of(env.ret_rms)
@@ -186,7 +186,7 @@ def test_an_evaluation_earns_what_it_earns_and_changes_no_statistic(make_normal,
 
 
 def test_a_policy_that_was_saved_sees_as_it_saw(make_normal, tmp_path):
-    """Without its statistics it would be another policy."""
+    """With other statistics, the same weights would act differently."""
     model = make_normal().learn(40)
     checkpoint.save_tensors(tmp_path / "model.zip", model)
 
@@ -204,7 +204,7 @@ def shown_in(page, name):
 
 
 def test_a_policy_is_used_without_this_package_as_the_page_says(make_normal, tmp_path):
-    """Plain Stable-Baselines3 and the statistics in the policy's file suffice."""
+    """The page needs only plain Stable-Baselines3 and the statistics in the model's file."""
     model = make_normal(clip_observations=2.0).learn(40)
     checkpoint.save_tensors(tmp_path / "model.zip", model)
     observation = np.array([0.2, 0.1], np.float32)
@@ -230,7 +230,7 @@ def test_a_policy_is_used_without_this_package_as_the_page_says(make_normal, tmp
     ],
 )
 def test_a_policy_is_not_used_with_other_eyes(make_normal, make_env, tmp_path, saved, wanted, fact):
-    """The networks would fit, but their inputs would differ."""
+    """The weights would fit, but their inputs would have another scale."""
 
     def made(normalize):
         if normalize is not None:
@@ -245,7 +245,7 @@ def test_a_policy_is_not_used_with_other_eyes(make_normal, make_env, tmp_path, s
 
 @pytest.mark.parametrize(("saved", "wanted"), [({}, {"clipRewards": 5}), ({}, None), (None, {})])
 def test_a_run_is_not_continued_with_another_normalization(make_configuration, tmp_path, saved, wanted):
-    """The same holds for any other hyperparameter; a manifest has no such field if nothing is normalized."""
+    """Hyperparameters follow the same rule. A manifest without normalization lacks the field."""
     one, other = ({"name": "PPO", "normalize": normalize} for normalize in (saved, wanted))
     found = checkpoint.SavedCheckpoint(
         path=tmp_path, manifest=checkpoint.describe(make_configuration(algorithm=one), 0, {})

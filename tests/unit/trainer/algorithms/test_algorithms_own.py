@@ -1,4 +1,4 @@
-"""A job's own classes: algorithms, policies and parts of policies."""
+"""Classes of a job's author: algorithms, policies and parts of policies."""
 
 from __future__ import annotations
 
@@ -150,7 +150,7 @@ ROLLOUTS = TINY | {"n_steps": 16, "batch_size": 8}
 
 @pytest.fixture
 def lab(tmp_path, monkeypatch):
-    """Create a user's module where Python finds it."""
+    """Write a user's module into a folder on the import path, and return the folder."""
     (tmp_path / "my_lab.py").write_text(LAB)
     monkeypatch.syspath_prepend(tmp_path)
     yield tmp_path
@@ -159,7 +159,10 @@ def lab(tmp_path, monkeypatch):
 
 @pytest.fixture
 def make(make_member):
-    """Make a model in the corridor; its first member dies at the steps `faults`."""
+    """Return a function that makes a model in the corridor.
+
+    The first simulator dies at the steps `faults`.
+    """
 
     def made(algorithm, faults=()):
         members = [make_member("collect-0", steps=faults), make_member("collect-1")]
@@ -169,7 +172,7 @@ def make(make_member):
 
 
 def test_a_class_of_ones_own_learns_from_valid_rows_only(lab, make):
-    """Its own hyperparameter is added to those that it passes on."""
+    """The class has its own hyperparameter, and passes the others on to its base class."""
     del lab
     algorithm = Algorithm(name="my_lab:Careful", hyperparameters=ROLLOUTS | {"care": 0.25})
     check(algorithm)
@@ -184,7 +187,7 @@ def test_a_class_of_ones_own_learns_from_valid_rows_only(lab, make):
 
 
 def test_its_own_hyperparameter_is_checked_by_its_type(lab):
-    """As for every other hyperparameter, the signature has the type."""
+    """The type comes from the signature, as for all other hyperparameters."""
     del lab
     wrong = Algorithm(name="my_lab:Careful", hyperparameters={"care": "much", "cares": 1})
 
@@ -196,7 +199,7 @@ def test_its_own_hyperparameter_is_checked_by_its_type(lab):
 
 
 def test_a_run_with_a_class_of_ones_own_is_saved_and_resumed(lab, play, job, directory):
-    """The run ends, and its model file is one of the class itself."""
+    """The file of the model is loaded by the class itself, without this package."""
     algorithm = {"name": "my_lab:Eager", "hyperparameters": TINY | {"learning_starts": 10, "batch_size": 8}}
 
     code, _ = play(job(algorithm=algorithm, steps=60), {"collect-0": {"steps": [9]}})
@@ -231,7 +234,7 @@ REFUSED = [
 
 @pytest.mark.parametrize(("name", "fact"), REFUSED, ids=[name for name, _ in REFUSED])
 def test_a_class_that_cannot_be_used_is_refused_in_one_sentence(lab, name, fact):
-    """The error comes before a simulator starts."""
+    """The class is checked before a simulator starts, so a person waits only seconds for the error."""
     del lab
 
     with pytest.raises(ConfigurationError, match=rf"algorithm\.name: {fact}"):
@@ -247,7 +250,7 @@ def test_a_class_that_cannot_be_used_is_refused_in_one_sentence(lab, name, fact)
     ],
 )
 def test_a_class_that_makes_its_own_buffer_is_refused(lab, make, name, buffer):
-    """The class would learn from rows that a fault spoiled; the model is made before a simulator starts."""
+    """The class would learn from rows that a fault spoiled. The model is made before a simulator starts."""
     del lab
     hyperparameters = {} if "Replay" in name else {"n_steps": 16, "batch_size": 8}
     wanted = Algorithm(name=name, hyperparameters=hyperparameters)
@@ -259,7 +262,7 @@ def test_a_class_that_makes_its_own_buffer_is_refused(lab, make, name, buffer):
 
 
 def test_parts_of_a_policy_may_be_classes_of_ones_own(lab, make):
-    """Each is named as module:Class; classes of PyTorch also by their names."""
+    """Each part is written as `module:Class`; classes of PyTorch may be written by their names alone."""
     del lab
     parts = {
         "features_extractor_class": "my_lab:Doubled",
@@ -288,7 +291,7 @@ def test_parts_of_a_policy_may_be_classes_of_ones_own(lab, make):
     ids=["extractor", "policy"],
 )
 def test_a_network_that_writes_into_its_input_changes_no_row(lab, make, name, parts):
-    """Stable-Baselines3 stores the observation after the network had access to its memory."""
+    """Stable-Baselines3 stores the observation only after the network had access to its memory."""
     del lab
     steps = {"n_steps": 16} | ({} if name == "A2C" else {"batch_size": 8})
     named = Algorithm(
@@ -330,7 +333,7 @@ def test_a_network_that_writes_into_its_input_changes_no_row(lab, make, name, pa
     ],
 )
 def test_wrong_parts_are_refused_by_field_and_remedy(lab, algorithm, fact):
-    """The error comes before a simulator starts."""
+    """The parts are checked before a simulator starts, so a person waits only seconds for the error."""
     del lab
 
     with pytest.raises(ConfigurationError, match=fact):
@@ -338,7 +341,7 @@ def test_wrong_parts_are_refused_by_field_and_remedy(lab, algorithm, fact):
 
 
 def test_a_policy_that_the_observation_does_not_fit_is_refused(make):
-    """Stable-Baselines3 only has an assertion for this."""
+    """Stable-Baselines3 only has an assertion for this case."""
     with pytest.raises(ConfigurationError, match="algorithm: PPO refuses its hyperparameters or the envir"):
         make(Algorithm(name="PPO", policy="CnnPolicy", hyperparameters=ROLLOUTS))
 
@@ -352,7 +355,7 @@ def test_a_policy_that_the_observation_does_not_fit_is_refused(make):
     ],
 )
 def test_a_part_of_a_policy_whose_constructor_raises_is_refused_with_its_line(lab, make, extractor, fact):
-    """A retry would raise the same error."""
+    """A retry would raise the same error, so the message has the line of the user's file."""
     parts = {"features_extractor_class": f"my_lab:{extractor}"}
     wanted = Algorithm(name="PPO", hyperparameters=ROLLOUTS | {"policy_kwargs": parts})
 
@@ -367,7 +370,7 @@ SHARES = {1.0: 0.01, 0.75: 0.006, 0.5: 0.002, 0.375: 0.003, 0.2: 0.004, 0.0: 0.0
 
 
 def test_a_schedule_may_have_points(make):
-    """Straight lines join the points; before the first and after the last point the value is constant."""
+    """Straight lines join the points. Before the first and after the last point the value is constant."""
     wanted = Algorithm(
         name="PPO", hyperparameters=ROLLOUTS | {"learning_rate": POINTS, "clip_range": "lin_0.3"}
     )
@@ -381,13 +384,13 @@ def test_a_schedule_may_have_points(make):
 
 @pytest.mark.parametrize("name", ALGORITHMS)
 def test_every_algorithm_takes_a_schedule(name):
-    """Some declare the type of their learning rate as a bare Callable, without arguments."""
+    """Some algorithms declare the learning rate as a bare Callable, without its arguments."""
     for rate in ("lin_0.001", POINTS):
         check(Algorithm(name=name, hyperparameters={"learning_rate": rate}))
 
 
 def test_plain_stable_baselines_loads_a_schedule_of_points(make, tmp_path):
-    """model.zip names a function of NumPy and has the points as its arguments."""
+    """The file refers to a function of NumPy, with the points as its arguments."""
     make(Algorithm(name="PPO", hyperparameters=ROLLOUTS | {"learning_rate": POINTS})).save(
         tmp_path / "model.zip"
     )
@@ -406,7 +409,7 @@ def test_plain_stable_baselines_loads_a_schedule_of_points(make, tmp_path):
 
 
 def test_a_schedule_may_be_a_function_of_ones_own_which_the_model_names(lab, make, tmp_path):
-    """A changed function must take effect in the next attempt, and a file must contain no code."""
+    """The file has only the function's name, so a changed function takes effect in the next attempt."""
     wanted = Algorithm(
         name="PPO",
         hyperparameters=ROLLOUTS | {"learning_rate": "my_lab:halving", "clip_range": "my_lab:halving"},
@@ -440,7 +443,7 @@ def test_a_schedule_may_be_a_function_of_ones_own_which_the_model_names(lab, mak
     ],
 )
 def test_a_function_that_returns_no_rate_is_refused(lab, name, fact):
-    """The first update would fail, or learn backward, after a simulator was started."""
+    """The first update would fail or increase the loss, after the simulators have started."""
     del lab
     with pytest.raises(ConfigurationError) as refusal:
         check(Algorithm(name="DQN", hyperparameters={"learning_rate": name}))
@@ -458,7 +461,7 @@ def test_points_that_make_no_schedule_are_refused(points):
 
 
 def test_noise_on_actions_is_each_members_own(make_member):
-    """The names are those of rl-baselines3-zoo."""
+    """Each simulator has its own noise. The hyperparameters have the names of rl-baselines3-zoo."""
     members = [make_member(f"collect-{row}") for row in range(2)]
     for member in members:
         member.env.action_space = spaces.Box(-1.0, 1.0, (1,), np.float32)
@@ -484,12 +487,12 @@ def test_noise_on_actions_is_each_members_own(make_member):
     ],
 )
 def test_noise_that_is_half_or_wrong_is_refused(noise, fact):
-    """The message has field, fact and remedy."""
+    """The message has the field, the mistake and the remedy."""
     with pytest.raises(ConfigurationError, match=fact):
         check(Algorithm(name="SAC", hyperparameters=noise))
 
 
 def test_an_algorithm_without_noise_has_no_such_hyperparameter():
-    """The policies of PPO are noisy themselves."""
+    """The policies of PPO are stochastic, so noise would have no effect."""
     with pytest.raises(ConfigurationError, match="noise_type: PPO has no such hyperparameter"):
         check(Algorithm(name="PPO", hyperparameters={"noise_type": "normal", "noise_std": 0.1}))

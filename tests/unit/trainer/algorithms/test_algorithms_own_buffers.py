@@ -1,4 +1,4 @@
-"""A job's own buffers: prioritized replay, own returns, and their state in a checkpoint."""
+"""Buffers of a job's author: prioritized replay, other returns, and their state in a checkpoint."""
 
 from __future__ import annotations
 
@@ -136,7 +136,7 @@ ON_POLICY = {"n_steps": 8, "batch_size": 8, "policy_kwargs": {"net_arch": [8]}}
 
 @pytest.fixture
 def lab(tmp_path, monkeypatch):
-    """Create a user's module where Python finds it, and return the module."""
+    """Write a user's module into a folder on the import path, and return the module."""
     (tmp_path / "buffer_lab.py").write_text(LAB)
     monkeypatch.syspath_prepend(tmp_path)
     yield pytest.importorskip("buffer_lab")
@@ -145,7 +145,10 @@ def lab(tmp_path, monkeypatch):
 
 @pytest.fixture
 def make(make_member):
-    """Make a model in the corridor; the first of two members dies at the steps `faults`."""
+    """Return a function that makes a model in the corridor.
+
+    The first of two simulators dies at the steps `faults`.
+    """
 
     def made(algorithm, faults=()):
         env = SimulatorsVecEnv(
@@ -163,7 +166,7 @@ def replaying(name="DQN", buffer="buffer_lab:Prioritized", **options):
 
 
 def test_a_replay_buffer_of_ones_own_stores_valid_rows_one_by_one(lab, make):
-    """Its `add` gets each row separately, whatever the number of simulators, and no row of a fault."""
+    """`add` gets each valid row separately, whatever the number of simulators."""
     algorithm = replaying(alpha=0.5)
     check(algorithm)
     model, _ = make(algorithm, faults=(3, 9))
@@ -175,11 +178,11 @@ def test_a_replay_buffer_of_ones_own_stores_valid_rows_one_by_one(lab, make):
     assert buffer.alpha == 0.5
     assert len(buffer.added) == model.num_timesteps == buffer.size()
     assert set(buffer.added) == {1}
-    assert buffer.weights.sum() > 0  # its own sample method is used
+    assert buffer.weights.sum() > 0  # the user's own `sample` is called
 
 
 def test_an_algorithm_of_ones_own_may_bring_its_buffer(lab, make):
-    """The buffer stores only valid rows, like one that the job names."""
+    """The buffer of a user's algorithm stores only valid rows too."""
     model, _ = make(Algorithm(name="buffer_lab:PrioritizedDQN", hyperparameters=OFF_POLICY), faults=(3,))
 
     model.learn(30)
@@ -189,7 +192,7 @@ def test_an_algorithm_of_ones_own_may_bring_its_buffer(lab, make):
 
 
 def test_a_rollout_buffer_of_ones_own_returns_what_it_computes(lab, make):
-    """No batch has rows of a fault, and the buffer's own advantages are used."""
+    """No batch has rows of a fault, and the losses use the user's advantages."""
     chosen = {"rollout_buffer_class": "buffer_lab:Greedy", "rollout_buffer_kwargs": {"scale": 2.0}}
     algorithm = Algorithm(name="PPO", hyperparameters=ON_POLICY | chosen)
     check(algorithm)
@@ -205,7 +208,10 @@ def test_a_rollout_buffer_of_ones_own_returns_what_it_computes(lab, make):
 
 @pytest.mark.parametrize("buffer", ["buffer_lab:Prioritized", "buffer_lab:Stated"])
 def test_a_checkpoint_keeps_what_the_buffer_adds(lab, make, make_configuration, tmp_path, buffer):
-    """These are arrays, tensors and numbers, or the result of its `state_dict`."""
+    """The checkpoint has the arrays, tensors and numbers among the attributes.
+
+    A class with `state_dict` decides itself.
+    """
     del lab
     algorithm = replaying(buffer=buffer)
     configuration = make_configuration(algorithm=algorithm.model_dump())
@@ -228,7 +234,7 @@ def test_a_checkpoint_keeps_what_the_buffer_adds(lab, make, make_configuration, 
 
 
 def test_a_run_with_a_buffer_of_ones_own_is_saved_and_resumed(lab, play, job):
-    """The run goes from the job to its end, and continues from its last checkpoint."""
+    """The run ends, and a longer run continues from its last checkpoint."""
     del lab
     algorithm = replaying().model_dump(exclude_unset=True)
 
@@ -268,7 +274,7 @@ REFUSED = [
 
 @for_each("name, given, fact", REFUSED)
 def test_buffers_that_cannot_be_used_are_refused_before_a_simulator_starts(lab, name, given, fact):
-    """The message has field, fact and remedy."""
+    """The message has the field, the mistake and the remedy."""
     del lab
     with pytest.raises(ConfigurationError) as caught:
         check(Algorithm(name=name, hyperparameters=given))
@@ -288,7 +294,7 @@ UNFIT = [
 
 @for_each("name, given, fact", UNFIT)
 def test_buffers_that_do_not_fit_are_refused_when_the_model_is_made(lab, make, name, given, fact):
-    """This depends on the environment, or on the attributes of the class."""
+    """Whether a buffer fits depends on the environment, or on attributes of the class."""
     del lab
     usual = OFF_POLICY if name == "DQN" else ON_POLICY
     with pytest.raises(ConfigurationError) as caught:
@@ -298,7 +304,7 @@ def test_buffers_that_do_not_fit_are_refused_when_the_model_is_made(lab, make, n
 
 
 def test_a_checkpoint_that_lost_rows_is_refused_for_a_buffer_of_ones_own(lab, make):
-    """Only its class knows which of its numbers belong to the lost rows."""
+    """Only the user's class knows which of its own numbers belong to lost rows."""
     del lab
     model, _ = make(replaying())
 

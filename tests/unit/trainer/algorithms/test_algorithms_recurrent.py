@@ -1,4 +1,4 @@
-"""RecurrentPPO: its sequences have no invalid rows, and its memory restarts after them."""
+"""RecurrentPPO: its sequences have no invalid rows, and the LSTM state is reset after them."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ BUFFERS = {
 
 
 class States:
-    """The states of an LSTM with one unit, all equal to a row's number."""
+    """LSTM states of one unit, all equal to the number of a row."""
 
     def __init__(self, row, members):
         self.pi = self.vf = (torch.full((1, members, 1), float(row)),) * 2
@@ -39,7 +39,7 @@ class States:
 def filled(kind, valid, starts):
     """Return a full buffer.
 
-    An observation is the row's number within its member, plus 100 for each member.
+    An observation is the number of its row, plus 100 for each simulator before its own.
     """
     rows, members = valid.shape
     buffer = kind(rows, BUFFERS[kind], spaces.Discrete(2), (rows, 1, members, 1), "cpu", n_envs=members)
@@ -62,7 +62,7 @@ def filled(kind, valid, starts):
 
 
 def drawn(batches):
-    """Return the marks of all rows that are learned from, batch by batch."""
+    """Return the marks of all rows that are learned from, by batch."""
     found = []
     for batch in batches:
         seen = batch.observations["mark"] if isinstance(batch.observations, dict) else batch.observations
@@ -73,7 +73,7 @@ def drawn(batches):
 @pytest.mark.parametrize("kind", BUFFERS)
 @given(data=st.data())
 def test_each_valid_row_is_learned_from_once_and_no_other(kind, data):
-    """This holds for every batch size. A batch of one row has no deviation, so no such batch is made."""
+    """One row has no standard deviation, so a batch has at least two, whatever the batch size."""
     rows, members = data.draw(st.integers(2, 9)), data.draw(st.integers(1, 3))
     marks = data.draw(st.lists(st.booleans(), min_size=rows * members, max_size=rows * members))
     valid = np.array(marks).reshape(rows, members)
@@ -88,7 +88,7 @@ def test_each_valid_row_is_learned_from_once_and_no_other(kind, data):
 
 
 def test_a_sequence_begins_anew_after_invalid_rows():
-    """The state of an LSTM from a broken simulator has no meaning."""
+    """The LSTM state that a broken simulator left has no meaning."""
     valid = np.array([[True], [True], [False], [False], [True], [True]])
     starts = np.array([[1], [0], [0], [0], [1], [0]], np.float32)
 
@@ -109,7 +109,7 @@ def test_a_sequence_begins_anew_after_invalid_rows():
 
 @pytest.fixture
 def model(make_member):
-    """Make a model whose first member dies twice."""
+    """Return a model whose first simulator dies twice."""
     members = [make_member("collect-0", steps=(3, 12)), make_member("collect-1")]
     wanted = Algorithm(name="RecurrentPPO", hyperparameters=HYPERPARAMETERS)
     check(wanted)
@@ -117,13 +117,16 @@ def model(make_member):
 
 
 def mended(rows):
-    """For each valid row of the first member after an invalid one, return whether an episode begins there."""
+    """Return whether an episode begins at each of the first simulator's restarts.
+
+    A restart is the first valid row after invalid rows.
+    """
     pairs = pairwise(rows)
     return [starts[0] for (before, _), (valid, starts) in pairs if valid[0] and not before[0]]
 
 
 def test_the_memory_restarts_with_the_first_valid_row(model):
-    """The last row before the restart ends an episode, so the next one begins an episode."""
+    """The last row before the restart ends an episode, so an episode begins with the next row."""
     rows = []
 
     def note(locals_, _):
@@ -139,7 +142,7 @@ def test_the_memory_restarts_with_the_first_valid_row(model):
 
 
 def test_an_evaluation_keeps_the_memory_of_an_episode(model, make_member):
-    """The memory lasts from step to step, but not from one episode to the next."""
+    """The LSTM state lasts from step to step, but not from one episode to the next."""
     first, again = (evaluate(policy_of(model), make_member(), [seed]) for seed in (5, 5))
     both = evaluate(policy_of(model), make_member(), [3, 5])
 

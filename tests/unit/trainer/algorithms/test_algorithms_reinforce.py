@@ -1,4 +1,4 @@
-"""The episodes that REINFORCE learns from, and its updates."""
+"""REINFORCE: the episodes from which it learns, and its updates."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from palaestra_trainer.simulators.restarter import Restarter
 
 @pytest.fixture
 def make_model(make_member):
-    """Make a REINFORCE model on corridors, and a list that receives its batches."""
+    """Return a function that makes a REINFORCE model on corridors, and a list that collects its batches."""
 
     def make(members=1, faults=(), **options):
         made = [make_member(f"collect-{index}", steps=() if index else faults) for index in range(members)]
@@ -32,7 +32,7 @@ def make_model(make_member):
 
 
 def play(recorder, rows):
-    """Feed a recorder with rows: for each step and each environment (done, valid)."""
+    """Add rows to a recorder: for each step and each environment a pair (done, valid)."""
     for step, row in enumerate(rows):
         if recorder.complete:
             return
@@ -42,7 +42,7 @@ def play(recorder, rows):
 
 
 def test_an_environment_that_is_away_is_not_waited_for():
-    """Its simulator may be restarting for a minute, or be given up."""
+    """The simulator of such an environment may take a minute to restart, or be given up."""
     recorder = EpisodeRecorder(environments=2, wanted=2)
 
     play(
@@ -55,7 +55,7 @@ def test_an_environment_that_is_away_is_not_waited_for():
 
 
 def test_nothing_is_learned_from_nobody():
-    """A single environment that is away must come back first."""
+    """With a single environment, the update waits until its simulator is back."""
     recorder = EpisodeRecorder(environments=1, wanted=1)
 
     play(recorder, [[(True, False)], [(False, False)], [(True, False)], [(False, True)]])
@@ -65,7 +65,7 @@ def test_nothing_is_learned_from_nobody():
 
 @given(st.lists(st.floats(-10, 10), max_size=30), st.floats(0, 1))
 def test_a_return_is_its_reward_and_the_discounted_next_return(rewards, gamma):
-    """This is the definition, computed backward."""
+    """The test computes the definition of the return backward."""
     returns = returns_to_go(rewards, gamma)
 
     later = [*returns[1:], 0.0][: len(rewards)]
@@ -74,7 +74,7 @@ def test_a_return_is_its_reward_and_the_discounted_next_return(rewards, gamma):
 
 
 def test_each_environment_gives_the_same_number_of_episodes():
-    """If the first episodes to end were used, short ones would look frequent."""
+    """If an update took the first episodes to end, short episodes would be too frequent in it."""
     recorder = EpisodeRecorder(environments=2, wanted=1)
 
     play(recorder, [[(True, True), (False, True)]] * 2 + [[(True, True), (True, True)]])
@@ -86,7 +86,7 @@ def test_each_environment_gives_the_same_number_of_episodes():
 
 
 def test_an_episode_that_a_fault_cut_is_dropped():
-    """Its return is not the one that the policy would have got."""
+    """The policy would have got another return without the fault."""
     recorder = EpisodeRecorder(environments=1, wanted=1)
 
     play(recorder, [[(False, True)], [(True, False)], [(True, True)]])
@@ -95,7 +95,7 @@ def test_an_episode_that_a_fault_cut_is_dropped():
 
 
 def test_an_update_has_whole_episodes_of_the_current_policy(make_model):
-    """There are two of each of two environments; an environment in the middle of an episode begins again."""
+    """An update has two episodes of each environment; an episode that is open at the update begins again."""
     model, batches = make_model(members=2)
 
     model.learn(20)
@@ -107,7 +107,7 @@ def test_an_update_has_whole_episodes_of_the_current_policy(make_model):
 
 
 def test_training_ends_at_the_first_episode_end_after_the_last_step(make_model):
-    """The current episode is finished, and no other begins."""
+    """The last episode is completed, and no further episode begins."""
     model, batches = make_model(episodes_per_update=1000)
 
     model.learn(10)
@@ -119,7 +119,7 @@ def test_training_ends_at_the_first_episode_end_after_the_last_step(make_model):
 def test_a_fault_is_neither_step_nor_episode(make_model):
     """Steps 1 to 3 are a complete episode before the fault at step 4.
 
-    The next one is cut at its first step.
+    The next episode is cut at its first step.
     """
     model, batches = make_model(faults=(2,))
 
@@ -129,7 +129,7 @@ def test_a_fault_is_neither_step_nor_episode(make_model):
 
 
 def test_nothing_to_learn_from_changes_nothing(make_model):
-    """All episodes may have been cut."""
+    """Faults may have cut all episodes of an update."""
     model, batches = make_model(faults=(2,))
     before = [it.clone() for it in model.policy.parameters()]
     model.learn(5)
@@ -147,7 +147,7 @@ def test_nothing_to_learn_from_changes_nothing(make_model):
 
 @pytest.mark.parametrize("baseline", ["value", "none"])
 def test_the_value_network_learns_only_as_baseline(make_model, baseline):
-    """Without a baseline the network is not used."""
+    """Without the baseline, no loss uses the value network."""
     model, _ = make_model(baseline=baseline)
     before = model.policy.value_net.weight.clone()
 
@@ -157,7 +157,7 @@ def test_the_value_network_learns_only_as_baseline(make_model, baseline):
 
 
 def test_without_a_baseline_nothing_is_subtracted_from_the_returns(make_model):
-    """The mean of an update's returns would also be a baseline; the returns are only scaled."""
+    """Subtracting the mean of the returns would also be a baseline, so the returns are only scaled."""
     model, _ = make_model(baseline="none")
     returns = torch.tensor([1.0, 7.0, 5.0, 5.0])
 
@@ -167,7 +167,7 @@ def test_without_a_baseline_nothing_is_subtracted_from_the_returns(make_model):
 
 
 def test_a_callback_can_end_training(make_model):
-    """The same holds for every other algorithm."""
+    """Other algorithms end in the same way if a callback returns False."""
     model, batches = make_model()
 
     model.learn(100, callback=lambda locals_, _: locals_["self"].num_timesteps < 5)
@@ -178,6 +178,6 @@ def test_a_callback_can_end_training(make_model):
 
 @pytest.mark.parametrize(("option", "value"), [("baseline", "mean"), ("episodes_per_update", 0)])
 def test_the_error_for_a_wrong_hyperparameter_names_it(make_model, option, value):
-    """The hyperparameters come from a file."""
+    """The hyperparameters come from a job, whose author must find the wrong one."""
     with pytest.raises(ValueError, match=option):
         make_model(**{option: value})

@@ -1,4 +1,4 @@
-"""The size of a replay buffer is computed before the buffer exists."""
+"""The size of a replay buffer is computed before the buffer is made."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ WIDE = {"float64": spaces.Box(-1.0, 1.0, (3,), np.float64)}
 
 
 def size_of(observation, action, rows=100, steps=10_000):
-    """Return the size of a buffer with that many rows."""
+    """Return the size of a buffer with this number of rows."""
     algorithm = Algorithm(name="SAC", hyperparameters={"buffer_size": rows})
     return replay_size(algorithm, observation, action, steps)
 
@@ -25,7 +25,7 @@ def size_of(observation, action, rows=100, steps=10_000):
 @pytest.mark.parametrize("action", (ACTIONS | WIDE).values(), ids=ACTIONS | WIDE)
 @pytest.mark.parametrize("observation", (SUPPORTED | WIDE).values(), ids=SUPPORTED | WIDE)
 def test_the_size_is_that_of_the_buffer_itself(observation, action):
-    """This is tested for every kind of space, because a separate computation could differ from the buffer."""
+    """The test compares every type of space, because the computation is separate from the buffer's code."""
     cls = ValidDictReplayBuffer if isinstance(observation, spaces.Dict) else ValidReplayBuffer
     buffer: BaseBuffer = cls(100, observation, action, device="cpu")
 
@@ -35,7 +35,7 @@ def test_the_size_is_that_of_the_buffer_itself(observation, action):
 
 
 def test_images_with_stable_baselines3_s_default_need_18_gb():
-    """This is the case for which the computation exists."""
+    """The run would exceed the memory of most pods, which is why the size is computed."""
     image = spaces.Box(0, 255, (48, 64, 3), np.uint8)
 
     size = size_of(image, spaces.Box(-1, 1, (2,), np.float32), rows=1_000_000, steps=2_000_000)
@@ -44,12 +44,12 @@ def test_images_with_stable_baselines3_s_default_need_18_gb():
 
 
 def test_rows_that_the_run_cannot_fill_need_no_memory():
-    """NumPy allocates rows only when they are written."""
+    """NumPy takes memory for a row only when the row is written."""
     assert size_of(spaces.Discrete(2), spaces.Discrete(2), rows=1_000_000, steps=50).rows == 50
 
 
 def test_algorithms_without_replay_and_refused_spaces_have_no_size():
-    """The space is refused later, with its own message."""
+    """The space is rejected later, with its own message."""
     on_policy = replay_size(Algorithm(name="PPO"), spaces.Discrete(2), spaces.Discrete(2), 100)
 
     assert (on_policy, size_of(OBSERVATIONS["Tuple"], ACTIONS["Box"])) == (None, None)
@@ -64,7 +64,7 @@ def test_checkpoints_share_rows_that_did_not_change(every_steps, bytes_):
 @pytest.mark.parametrize("every_steps", [1, 7, 40, 1000])
 @pytest.mark.parametrize("disk", [3, 50, 100, 400])
 def test_the_largest_buffer_fits_and_one_row_more_does_not(every_steps, disk):
-    """This holds for the disk; the limit by memory is a division."""
+    """The test covers the limit by disk space; the limit by memory is a plain division."""
     most = ReplaySize(rows=1, row_bytes=1).most_rows(10_000, disk, every_steps, keep=3)
 
     assert ReplaySize(rows=most, row_bytes=1).disk_bytes(every_steps, 3) <= disk

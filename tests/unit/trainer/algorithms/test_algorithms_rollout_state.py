@@ -1,4 +1,4 @@
-"""A checkpoint keeps everything that an algorithm changes while it collects."""
+"""A checkpoint keeps each value that an algorithm changes while it collects a rollout."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ HYPERPARAMETERS = {
     "RecurrentPPO": ON_POLICY | {"policy_kwargs": {"net_arch": [4], "lstm_hidden_size": 4}},
     "REINFORCE": {"episodes_per_update": 2},
 }
-# `checkpoint.state` and `checkpoint.experience` keep these for every algorithm. A rollout begins with an
-# empty rollout buffer.
+# `checkpoint.state` and `checkpoint.experience` save these for each algorithm. A rollout begins with an empty
+# rollout buffer.
 KEPT = {
     "num_timesteps", "_episode_num", "_current_progress_remaining", "_last_obs", "_last_original_obs",
     "_last_episode_starts", "ep_info_buffer", "ep_success_buffer", "replay_buffer", "rollout_buffer",
@@ -48,7 +48,7 @@ NOT_STATE = {"env", "_logger", "policy"}  # the policy's tensors are compared on
 
 
 def print_of(value):
-    """Return plain data that differs if the value changed."""
+    """Return plain data that is different if the value is different."""
     if isinstance(value, torch.Tensor):
         return value.detach().numpy().tobytes()
     if isinstance(value, np.ndarray):
@@ -60,7 +60,7 @@ def print_of(value):
 
 
 def parts_of(value):
-    """Return the parts of a value by name, or None if it has no parts."""
+    """Return the parts of a value by name, or None for a value without parts."""
     if isinstance(value, nn.Module):
         return value.state_dict()
     if isinstance(value, ActionNoise):
@@ -69,7 +69,7 @@ def parts_of(value):
 
 
 class Changes(BaseCallback):
-    """Record the attributes and the policy's tensors that change between start and end of a rollout."""
+    """A callback that records which attributes and tensors change during a rollout."""
 
     def __init__(self):
         super().__init__()
@@ -94,7 +94,7 @@ class Changes(BaseCallback):
 
 
 def model_of(name):
-    """Return a small model of an algorithm with two members."""
+    """Return a small model of an algorithm with two simulators."""
     seen, acted = (
         OBSERVATIONS["Box"],
         next(space for space in ACTIONS.values() if isinstance(space, ALGORITHMS[name].actions)),
@@ -108,7 +108,7 @@ def model_of(name):
 
 
 class Member:
-    """A member that never breaks."""
+    """A simulator that never breaks."""
 
     name = "collect-0"
 
@@ -116,13 +116,13 @@ class Member:
         self.env = env
 
     def due(self, episodes=1):
-        """Return None, because it needs no recycling."""
+        """Return None, because this simulator is never recycled."""
         del episodes
 
 
 @pytest.mark.parametrize("name", ALGORITHMS)
 def test_a_rollout_changes_what_is_declared_and_nothing_else(name):
-    """If a release of Stable-Baselines3 adds state, this test fails, and not a resumed run."""
+    """If a release of Stable-Baselines3 adds state, this test fails before a user's resumed run does."""
     model, changes = model_of(name), Changes()
 
     model.learn(80, changes)
@@ -139,12 +139,12 @@ def test_a_rollout_changes_what_is_declared_and_nothing_else(name):
 
 @pytest.mark.parametrize("name", ALGORITHMS)
 def test_every_algorithm_has_an_entry(name):
-    """The entry is its own, or that of a class that it extends."""
+    """An algorithm may use the entry of its base class."""
     assert any(cls in ROLLOUT_STATES for cls in ALGORITHMS[name].original.__mro__)
 
 
 def test_a_class_without_a_known_ancestor_keeps_its_whole_policy():
-    """Any part of it may change in a rollout."""
+    """Each part of such a policy may change in a rollout."""
     model = model_of("PPO")
     stranger = type("Stranger", (), {"policy": model.policy})()
 

@@ -1,7 +1,7 @@
-"""A saved model holds names and numbers, so the image's Python and a laptop's can read each other's files.
+"""A saved model refers to code by names only, so another release of Python can load it.
 
-Bytecode of another Python raises SystemError or ends the process, but that of this Python runs. These tests
-therefore check the content of the file.
+Byte code of another Python raises SystemError or crashes the process, but byte code of the same Python runs.
+These tests therefore check the content of the file.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ NOISE = {"noise_type": "ornstein-uhlenbeck", "noise_std": 0.2}
 SMALL = {
     "buffer_size": 40, "learning_starts": 4, "batch_size": 4, "n_steps": 8, "episodes_per_update": 1
 }  # fmt: skip
-# Plain Stable-Baselines3, without this package, finds every name of a model in these modules.
+# Plain Stable-Baselines3 finds each name of a model in these modules, without this package.
 PLAIN = {
     "_codecs", "builtins", "collections", "functools", "gymnasium", "numpy", "sb3_contrib",
     "stable_baselines3", "torch",
@@ -41,7 +41,7 @@ PLAIN = {
 
 @pytest.fixture
 def save(make_member, tmp_path):
-    """Save a model that has learned for some steps, and return its file."""
+    """Return a function that saves a model which has learned for some steps, and returns the file."""
 
     def made(name, seen="Box", options=None, **more):
         entry = ALGORITHMS[name]
@@ -62,14 +62,14 @@ def save(make_member, tmp_path):
 
 
 class Named(pickle.Unpickler):
-    """An unpickler that records the module and the name of everything that a pickle refers to."""
+    """An unpickler that records module and name of each object to which a pickle refers."""
 
     def __init__(self, text):
         super().__init__(io.BytesIO(text))
         self.names = set()
 
     def find_class(self, module, name):
-        """Record a name, and return its object."""
+        """Record a name, and return the object of that name."""
         self.names.add((module, name))
         return super().find_class(module, name)
 
@@ -110,7 +110,7 @@ SEEING = [
 
 @pytest.mark.parametrize("name", SEEING)
 def test_the_small_network_is_in_the_file_by_its_name(save, name):
-    """If this package is installed, Stable-Baselines3 loads it."""
+    """Stable-Baselines3 can load such a model where this package is installed."""
     named = named_in(save(name, "image", cnn="small"))
 
     assert (small_cnn.__name__, "SmallCnn") in named["policy_kwargs"]

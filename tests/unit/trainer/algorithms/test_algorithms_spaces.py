@@ -1,7 +1,7 @@
-"""Spaces that Stable-Baselines3 would mishandle are refused before a simulator starts.
+"""Spaces that Stable-Baselines3 would handle wrongly are rejected before a simulator starts.
 
-Its own checker refuses them too, or they caused a traceback. The grid of algorithms trains in every space
-that works.
+Stable-Baselines3's own checker rejects them too, or they caused a traceback. Spaces that work are tested in
+the grid of algorithms.
 """
 
 from __future__ import annotations
@@ -57,7 +57,10 @@ CASES = {f"observation: {name}": (seen, FEW, told) for name, (seen, told) in OBS
 
 @pytest.fixture
 def members(make_member):
-    """Make members of a task with these spaces; their logs show whether they were started."""
+    """Return a function that makes simulators of a task with these spaces.
+
+    Their logs show whether they were started.
+    """
 
     def make(names, seen, acted):
         made = [make_member(name) for name in names]
@@ -70,7 +73,10 @@ def members(make_member):
 
 @pytest.fixture
 def play(members, make_configuration, tmp_path):
-    """Run an attempt in such a task, and return its end and the members."""
+    """Return a function that runs an attempt in such a task.
+
+    It returns the attempt's end and the simulators.
+    """
 
     def run(seen, acted):
         configuration = make_configuration(algorithm={"name": "PPO", "hyperparameters": {"n_steps": 16}})
@@ -102,7 +108,7 @@ def test_a_run_refuses_it_before_a_simulator_starts(play, seen, acted, told):
 
 @pytest.mark.parametrize(("seen", "acted", "told"), CASES.values(), ids=CASES)
 def test_a_vector_for_a_loop_of_one_s_own_refuses_it_too(members, seen, acted, told):
-    """Stable-Baselines3 itself would send actions that are outside the space."""
+    """Stable-Baselines3 would send actions that are outside the space."""
     [member] = members(["collect-0"], seen, acted)
 
     with pytest.raises(ConfigurationError, match=told):

@@ -1,4 +1,4 @@
-"""`palaestra-install` adds a user's project to an image and changes nothing in it."""
+"""`palaestra-install` adds a user's project to an image, and changes nothing else in the image."""
 
 import subprocess
 import sys
@@ -22,7 +22,7 @@ BACKENDS = ["hatchling", "setuptools"]
 
 @pytest.fixture
 def target(tmp_path, monkeypatch):
-    """The folder on PYTHONPATH; no package index can be reached, and uv is on the PATH."""
+    """Return the folder that is on PYTHONPATH; uv is on the PATH, but no package index can be reached."""
     made = tmp_path / "packages"
     made.mkdir()
     monkeypatch.setenv("PYTHONPATH", str(made))
@@ -33,7 +33,7 @@ def target(tmp_path, monkeypatch):
 
 @pytest.fixture
 def folder(tmp_path):
-    """A bare folder with one module, as a user has it after a training."""
+    """Return a folder with one module and no project file, as a user has it after a training."""
     made = tmp_path / "src"
     made.mkdir()
     (made / "corridor.py").write_text("LENGTH_M = 3\n")
@@ -42,7 +42,7 @@ def folder(tmp_path):
 
 @pytest.fixture
 def project(folder):
-    """Return a function that turns the folder into a project with a pyproject.toml."""
+    """Return a function that makes the folder a project, with a pyproject.toml."""
 
     def make(*dependencies, backend="hatchling"):
         listed = ", ".join(f'"{each}"' for each in dependencies)
@@ -59,7 +59,7 @@ def project(folder):
 
 @pytest.fixture
 def companion(tmp_path, monkeypatch):
-    """Return a function that gives uv a wheel with its own requirement."""
+    """Return a function that gives uv a wheel which has a requirement itself."""
 
     def make(needs):
         name = "companion-1.0.dist-info"
@@ -75,20 +75,20 @@ def companion(tmp_path, monkeypatch):
 
 
 def modules(target):
-    """Return the names of the modules in the folder."""
+    """Return the names of the modules that are installed in the folder."""
     return {path.stem for path in target.glob("*.py")} | {
         path.parent.name for path in target.glob("*/__init__.py")
     }
 
 
 def refusal(capfd, *arguments):
-    """Return the message with which a folder is refused."""
+    """Return the message with which a folder is rejected."""
     assert main([str(each) for each in arguments]) == 2
     return capfd.readouterr().err
 
 
 def test_a_bare_folder_of_modules_is_importable_and_compiled(folder, target):
-    """A pod's root file system is read-only, so bytecode is made now or at every start."""
+    """The root file system of a pod is read-only, so byte code is compiled now, or again at each start."""
     assert main([str(folder)]) == 0
 
     said = subprocess.run(
@@ -103,7 +103,7 @@ def test_a_bare_folder_of_modules_is_importable_and_compiled(folder, target):
 
 
 def test_what_a_training_leaves_behind_stays_out(folder, target):
-    """A policy, a virtual environment and a Git repository can have gigabytes."""
+    """A policy, a virtual environment and a Git repository may have gigabytes."""
     for name in ("runs", ".venv", ".git", "__pycache__"):
         (folder / name).mkdir()
 
@@ -115,7 +115,7 @@ def test_what_a_training_leaves_behind_stays_out(folder, target):
 
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_a_project_needs_no_index_if_the_image_has_its_dependencies(project, target, backend):
-    """Its own folder, which is mounted read-only, stays unchanged."""
+    """The project's folder is mounted read-only, so the build must not write into it."""
     folder = project("gymnasium>=1", "torch", "stable-baselines3", backend=backend)
     before = sorted(folder.rglob("*"))
 
@@ -126,7 +126,7 @@ def test_a_project_needs_no_index_if_the_image_has_its_dependencies(project, tar
 
 
 def test_a_dependency_that_the_image_lacks_comes_without_what_the_image_has(project, target, companion):
-    """A second PyTorch has 5 GB."""
+    """A second copy of PyTorch would have 5 GB."""
     companion("torch")
 
     assert main([str(project("companion"))]) == 0
@@ -146,7 +146,7 @@ def test_a_dependency_that_the_image_lacks_comes_without_what_the_image_has(proj
 def test_what_does_not_fit_the_image_is_refused_and_installs_nothing(
     project, target, companion, capfd, needs, fact
 ):
-    """Otherwise it would fail in a pod, an hour later and with a traceback."""
+    """Without the check, the project would fail in a pod an hour later, with a traceback."""
     companion("torch>=99")
 
     assert fact in refusal(capfd, project(needs))
@@ -155,7 +155,7 @@ def test_what_does_not_fit_the_image_is_refused_and_installs_nothing(
 
 @pytest.mark.parametrize("name", ["random", "gymnasium"])
 def test_a_module_that_hides_one_of_the_image_is_refused(folder, target, capfd, name):
-    """The folder comes first on the path of every program of the image."""
+    """The user's folder is first on the import path of every program of the image."""
     (folder / f"{name}.py").touch()
 
     assert f"{name}: the project would hide the image's module of this name; rename it" in refusal(
@@ -165,7 +165,7 @@ def test_a_module_that_hides_one_of_the_image_is_refused(folder, target, capfd, 
 
 
 def test_a_newer_version_replaces_an_older_one(project, target):
-    """This happens in an image that is built from the user's first one."""
+    """A user may build an image from the user's previous one."""
     folder = project()
     assert main([str(folder)]) == 0
     file = folder / "pyproject.toml"
@@ -179,7 +179,7 @@ def test_a_newer_version_replaces_an_older_one(project, target):
 
 
 def test_a_module_that_a_newer_version_lacks_is_gone(project, target):
-    """Otherwise a job could still name an environment that the project no longer has."""
+    """If the old module stayed, a job could use an environment that the project has deleted."""
     folder = project()
     file = folder / "pyproject.toml"
     file.write_text(file.read_text().replace('["corridor.py"]', '["corridor.py", "hall.py"]'))
@@ -194,13 +194,13 @@ def test_a_module_that_a_newer_version_lacks_is_gone(project, target):
 
 
 def test_a_folder_without_a_module_is_refused(tmp_path, target, capfd):
-    """A build that installs nothing looks as if it worked."""
+    """An image without any installed module would look like a success."""
     assert f"{target}: holds neither a module nor a package" in refusal(capfd, target)
     assert "is not a folder; name the one with your project" in refusal(capfd, tmp_path / "missing")
 
 
 def test_a_folder_that_is_itself_a_package_is_refused(folder, target, capfd):
-    """Its modules would be imported by other names than they expect."""
+    """The modules of the package would be imported by other names than their own imports use."""
     (folder / "__init__.py").touch()
 
     assert f"{folder}: is itself a package; name the folder that holds your modules" in refusal(capfd, folder)
@@ -208,14 +208,14 @@ def test_a_folder_that_is_itself_a_package_is_refused(folder, target, capfd):
 
 
 def test_without_a_folder_on_the_path_there_is_no_place(folder, monkeypatch, capfd):
-    """On a laptop the user puts the folder itself on PYTHONPATH, and nothing is installed."""
+    """On a laptop, a user puts the folder itself on PYTHONPATH, and installs nothing."""
     monkeypatch.delenv("PYTHONPATH", raising=False)
 
     assert "PYTHONPATH: is not set" in refusal(capfd, folder)
 
 
 def test_a_project_that_cannot_be_built_shows_why(folder, target, capfd):
-    """The error of uv has the line; the last line reports that nothing was installed."""
+    """The message of uv names the line with the mistake; the last line reports that nothing was installed."""
     (folder / "pyproject.toml").write_text("[project]\nname = 'corridor'\n")
 
     said = refusal(capfd, folder)

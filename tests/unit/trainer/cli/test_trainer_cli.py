@@ -1,4 +1,4 @@
-"""The programs of this package, as far as they can be tested without a simulator."""
+"""The programs of the trainer package, as far as they can be tested without a simulator."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ WRONG = "job: x\nsteps: 0\nenvironment: {id: A-v0}\nsimulators: []\n"
 
 @pytest.fixture(autouse=True)
 def nothing_given(monkeypatch):
-    """Remove variables that the developer's shell may have set."""
+    """Remove the variables that the shell of a developer may have set."""
     for name in ("PALAESTRA_CONFIG", "PALAESTRA_RUN", "PALAESTRA_TERMINATION_LOG"):
         monkeypatch.delenv(name, raising=False)
 
@@ -36,7 +36,7 @@ def nothing_given(monkeypatch):
     ids=["train", "eval", "compare", "try"],
 )
 def test_help_says_what_is_read_and_written_and_the_exit_codes(program, codes, capsys):
-    """Nobody should have to read the source for them."""
+    """A person must not have to read the source to find these."""
     with pytest.raises(SystemExit) as ended:
         program(["--help"])
 
@@ -50,7 +50,7 @@ def test_help_says_what_is_read_and_written_and_the_exit_codes(program, codes, c
 
 @pytest.mark.parametrize("number", ["0", "-1", "many"])
 def test_an_evaluation_of_no_episodes_is_refused(number, capsys):
-    """The error comes before a simulator is started."""
+    """The number is checked before a simulator is started in vain."""
     with pytest.raises(SystemExit) as ended:
         evaluate(["run", "--episodes", number])
 
@@ -69,7 +69,7 @@ def test_an_evaluation_of_no_episodes_is_refused(number, capsys):
     ids=lambda it: type(it).__name__,
 )
 def test_an_evaluation_that_is_cut_ends_with_a_line_and_its_own_code(error, code, capsys, monkeypatch):
-    """Nothing is saved from which it could resume, so training's exit codes would mislead."""
+    """An evaluation saves nothing from which it could resume, so it has other exit codes than a training."""
 
     def cut(*_):
         raise error
@@ -83,7 +83,7 @@ def test_an_evaluation_that_is_cut_ends_with_a_line_and_its_own_code(error, code
 
 
 def test_a_wrong_configuration_ends_with_2_and_a_line_for_each_mistake(tmp_path, capsys, monkeypatch):
-    """There is no traceback, and the last word has the mistakes too."""
+    """No traceback is printed, and the termination message has the same lines."""
     monkeypatch.setenv("PALAESTRA_TERMINATION_LOG", str(tmp_path / "word"))
     (tmp_path / "training.yaml").write_text(WRONG)
 
@@ -109,7 +109,7 @@ def test_a_wrong_configuration_ends_with_2_and_a_line_for_each_mistake(tmp_path,
     ],
 )
 def test_what_is_missing_is_named_and_nothing_made(program, arguments, fact, capsys, monkeypatch, tmp_path):
-    """A pod has the variables, but a person types the command by hand."""
+    """A pod sets the variables, but a person types the command by hand."""
     monkeypatch.chdir(tmp_path)
 
     code = program(arguments)
@@ -120,7 +120,7 @@ def test_what_is_missing_is_named_and_nothing_made(program, arguments, fact, cap
 
 
 def test_a_wrong_configuration_is_refused_before_a_learning_library_is_imported(tmp_path):
-    """Three seconds are too long for a typing error."""
+    """An import of PyTorch takes three seconds, which is long for a typing error."""
     (tmp_path / "training.yaml").write_text(WRONG)
     program = (
         "import sys; from palaestra_trainer.cli.train import train\n"
@@ -143,7 +143,7 @@ def test_a_wrong_configuration_is_refused_before_a_learning_library_is_imported(
     ],
 )
 def test_an_option_without_meaning_is_refused_by_its_name(program, arguments, words, capsys):
-    """The remedy is in the line."""
+    """The error is one line, which names the option and the remedy."""
     with pytest.raises(SystemExit) as ended:
         program(arguments)
 
@@ -152,7 +152,7 @@ def test_an_option_without_meaning_is_refused_by_its_name(program, arguments, wo
 
 
 def test_a_pod_evaluates_in_its_own_simulators_only(tmp_path, capsys, monkeypatch):
-    """The images of a pod have no other programs."""
+    """The image of a trainer contains no simulator."""
     path = tmp_path / "training.yaml"
     path.write_text(
         "job: x\nsteps: 1\nenvironment: {id: A-v0}\n"
@@ -167,7 +167,7 @@ def test_a_pod_evaluates_in_its_own_simulators_only(tmp_path, capsys, monkeypatc
 
 
 def test_keys_are_read_from_a_terminal_only(tmp_path, capsys, monkeypatch):
-    """The program would wait for a key forever."""
+    """Without a terminal, the program would wait for a key for ever."""
     monkeypatch.setattr("sys.stdin", io.StringIO())
 
     code = attempt([str(tmp_path), "--agent", "keyboard"])

@@ -1,4 +1,4 @@
-"""Environments on the fake robot; each test sets the options that matter to it."""
+"""Environments on the fake robot."""
 
 from __future__ import annotations
 
@@ -14,7 +14,10 @@ from palaestra_trainer.testing import fake_arena
 
 @pytest.fixture
 def make_env() -> Callable[..., MoveToTargetEnv]:
-    """Make an environment on a fake robot: `deaths` are the robot's, the rest are options."""
+    """Make an environment on a fake robot.
+
+    The robot dies at the steps `deaths`; other keywords are options.
+    """
 
     def with_options(deaths: tuple[int, ...] = (), **options: Any) -> MoveToTargetEnv:
         return make(*fake_arena(deaths), **options)

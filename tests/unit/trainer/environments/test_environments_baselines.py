@@ -1,4 +1,4 @@
-"""Policies that learned nothing succeed sometimes, but not often enough."""
+"""Policies without training succeed sometimes, but not often enough."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ SEEDS = range(200)
 
 
 def test_driving_straight_succeeds_until_something_is_in_the_way(make_env):
-    """The difficulty is in the cylinders, so a trained policy can do better."""
+    """The cylinders make the task difficult, so a trained policy can do better."""
     rate = success_rate(make_env(), straight_to_target, SEEDS)
 
     assert 0.15 < rate < 0.5
 
 
 def test_random_movements_hardly_ever_succeed(make_env):
-    """A success is therefore never luck."""
+    """So the success of a policy is not luck."""
     assert success_rate(make_env(), random_movement, SEEDS) < 0.1
 
 
 @pytest.mark.parametrize("policy", BASELINES.values(), ids=BASELINES)
 @pytest.mark.parametrize("actions", ["discrete", "continuous"])
 def test_baselines_play_whatever_can_be_configured(make_env, policy, actions):
-    """They use the situation, not the observation, and their actions have the form of the action space."""
+    """A baseline reads the situation instead of the observation, and its action is in the action space."""
     env = make_env(actions=actions, observe=["time_left"], reward="Sparse")
     env.reset(seed=1)
 
@@ -38,14 +38,14 @@ def test_baselines_play_whatever_can_be_configured(make_env, policy, actions):
 
 @pytest.mark.parametrize("policy", BASELINES.values(), ids=BASELINES)
 def test_a_baseline_is_measured_the_same_twice(make_env, policy):
-    """Its result is printed next to a trained policy's and must be reproducible."""
+    """The result is printed next to that of a trained policy, and must be reproducible."""
     rates = [success_rate(make_env(), policy, range(20)) for _ in range(2)]
 
     assert rates[0] == rates[1]
 
 
 def test_straight_means_straight_also_in_a_continuous_space(make_env):
-    """Every direction can be driven in, so the route is not a zigzag."""
+    """A continuous action can point in every direction, so the robot drives no zigzag."""
     env = make_env(actions="continuous")
     env.reset(options={"start": (0.0, 0.0, 0.3), "target": (1.5, 0.2)})
 

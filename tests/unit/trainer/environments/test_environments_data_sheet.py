@@ -1,4 +1,4 @@
-"""The docstring of the environment is a data sheet, and these tests compare it with the code."""
+"""The environment's docstring is a data sheet, which these tests compare with the code."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ Row = dict[str, str]
 
 
 def tables() -> Iterator[list[Row]]:
-    """Yield the tables of the docstring; each row is a dictionary by column."""
+    """Yield the tables in the docstring; each row is a dictionary by column."""
     lines = [line.strip() for line in SHEET.splitlines()]
     for is_table, group in itertools.groupby(lines, key=lambda line: line.startswith("|")):
         if is_table:
@@ -42,7 +42,7 @@ MOVEMENTS, TWIST, OBSERVATION, REWARD = tables()
 
 
 def bounds(part: str, column: str) -> list[float]:
-    """Return a column of the sheet for one part: a bound for each of its numbers."""
+    """Return the bounds of a part of the observation, one for each number, from a column of the sheet."""
     numbers: dict[int, float] = {}
     for row in OBSERVATION:
         if row["part"] == part:
@@ -56,12 +56,12 @@ CHOICES = [choice for size in range(1, len(PARTS) + 1) for choice in itertools.p
 
 
 def test_the_sheet_knows_the_parts_in_their_order():
-    """Every part is documented, and no removed part is left."""
+    """The sheet describes each part of the observation, and no part that was removed."""
     assert list(dict.fromkeys(row["part"] for row in OBSERVATION)) == list(PARTS)
 
 
 def test_the_space_of_every_choice_of_parts_is_the_one_on_the_sheet():
-    """Length, order and bounds are compared for all selections and orders of parts."""
+    """For each selection and order of parts, the length, the order and the bounds are compared."""
     robot, scene = fake_arena()
     for choice in CHOICES:
         space = MoveToTargetEnv(robot, scene, MoveToTargetOptions(observe=choice)).observation_space
@@ -73,7 +73,7 @@ def test_the_space_of_every_choice_of_parts_is_the_one_on_the_sheet():
 
 
 def test_movements_are_on_the_sheet_with_their_speeds():
-    """The number of a row is the number of its action."""
+    """The number of a row in the table is the number of the action."""
     on_the_sheet = [
         (int(action), name, (float(forward), float(left), float(turning)))
         for action, name, forward, left, turning in (row.values() for row in MOVEMENTS)
@@ -83,7 +83,7 @@ def test_movements_are_on_the_sheet_with_their_speeds():
 
 
 def test_the_continuous_action_is_on_the_sheet_with_its_units():
-    """The unit column gives the meaning of 1."""
+    """The unit column gives the velocity that an action of 1 means."""
     space = MoveToTargetEnv(*fake_arena(), MoveToTargetOptions(actions="continuous")).action_space
 
     assert isinstance(space, spaces.Box)
@@ -93,7 +93,7 @@ def test_the_continuous_action_is_on_the_sheet_with_its_units():
 
 
 def test_rewards_are_on_the_sheet_with_their_weights():
-    """An empty cell stands for a term that this reward lacks."""
+    """An empty cell means that this reward does not have the term."""
     assert [row["term"] for row in REWARD] == list(TERMS)
     for reward, weights in WEIGHTS.items():
         assert {row["term"]: float(row[reward]) for row in REWARD if row[reward]} == weights
@@ -105,7 +105,7 @@ def test_rewards_are_on_the_sheet_with_their_weights():
     outcome=st.sampled_from(EpisodeOutcome),
 )
 def test_terms_stay_in_the_ranges_on_the_sheet(driven_m, nearest_m, outcome):
-    """A weight depends on the range of its term; the robot drives a tenth of a meter per step."""
+    """The weight of a term is chosen for its range. The robot drives a tenth of a meter per step."""
     step = Transition(before_m=1.0, after_m=1.0 - driven_m, nearest_m=nearest_m, outcome=outcome)
 
     for row in REWARD:
@@ -116,14 +116,14 @@ def test_terms_stay_in_the_ranges_on_the_sheet(driven_m, nearest_m, outcome):
 
 @pytest.mark.parametrize("distance", [SENSOR_RANGE_M[0], MARGIN_M])
 def test_the_range_of_proximity_is_on_the_sheet(distance):
-    """The sheet has the distances at which the cost begins and at which it is greatest."""
+    """The sheet has the distance at which the cost begins, and the distance at which it is greatest."""
     (row,) = (row for row in REWARD if row["term"] == "proximity")
 
     assert f"{distance:.2f}" in row["is"]
 
 
 def test_the_example_chooses_the_movements_that_the_sheet_says():
-    """The example uses the first five, because a Robotino need not turn."""
+    """The example uses the first five movements, because a Robotino need not turn."""
     job = yaml.safe_load(EXAMPLE.read_text())
     chosen = job["spec"]["trainer"]["environment"]["options"]["movements"]
 
@@ -133,11 +133,11 @@ def test_the_example_chooses_the_movements_that_the_sheet_says():
 
 @pytest.mark.parametrize("constant", [f"{REACHED_M:.2f} m", f"{STANDING_M_S:.2f} m/s"])
 def test_the_task_is_on_the_sheet_with_its_numbers(constant):
-    """The definition of standing on the target must not be hidden in the code."""
+    """A user must find in the docstring when the target counts as reached."""
     assert constant in SHEET
 
 
 @pytest.mark.parametrize("word", [*(f'actions="{it}"' for it in ACTIONS), "max_steps", "observe", "time_up"])
 def test_options_are_on_the_sheet(word):
-    """Each option is described where it takes effect."""
+    """The docstring describes each option in the section about its effect."""
     assert f"`{word}`" in SHEET

@@ -1,4 +1,4 @@
-"""Three targets in turn, in the world with one target."""
+"""An environment in which the robot visits three targets in turn, in a world with one target marker."""
 
 from __future__ import annotations
 
@@ -21,14 +21,17 @@ from palaestra_trainer.testing.fake_scene import arena
 
 @pytest.fixture
 def empty():
-    """An environment on a floor without cylinders, where driving straight delivers, and its scene."""
+    """Return an environment without cylinders, and its scene.
+
+    There the robot delivers by driving straight.
+    """
     robot = FakeRobotino()
     scene = FakeScene(robot, arena(()))
     return make_delivering(robot, scene), scene
 
 
 def play(env, seed):
-    """Drive straight from target to target, and return the rows of the episode."""
+    """Drive straight from target to target, and return the results of the episode's steps."""
     env.reset(seed=seed)
     rows = []
     while not rows or not (rows[-1][2] or rows[-1][3]):
@@ -37,19 +40,19 @@ def play(env, seed):
 
 
 def test_gymnasium_has_nothing_to_object_to():
-    """It checks seeds, spaces, types and determinism."""
+    """Gymnasium's checker tests seeds, spaces, types and determinism."""
     check_env(make_delivering(*fake_arena()), skip_render_check=True)
 
 
 def test_the_environment_is_made_by_name():
-    """This works after an import of the package."""
+    """After an import of the package, the environment is registered with gymnasium."""
     env = gymnasium.make("Deliver-v0", simulator=fake_arena, targets=2)
 
     assert isinstance(env.unwrapped, DeliverEnv)
 
 
 def test_three_targets_are_delivered_before_the_episode_ends(empty):
-    """Each is rewarded, but only the last is a success."""
+    """Each delivery is rewarded, but only the last one is a success."""
     env, _ = empty
 
     rows = play(env, seed=4)
@@ -61,7 +64,7 @@ def test_three_targets_are_delivered_before_the_episode_ends(empty):
 
 
 def test_the_mark_moves_to_a_target_far_from_the_last(empty):
-    """Otherwise the robot would reach the next target without driving."""
+    """If the next target were near, the robot would reach it without driving."""
     env, scene = empty
     env.reset(seed=4)
     marks, over = [scene.target], False
@@ -76,7 +79,7 @@ def test_the_mark_moves_to_a_target_far_from_the_last(empty):
 
 
 def test_what_is_left_is_observed(empty):
-    """The last number of an observation is 1, 2/3 or 1/3."""
+    """The last number of an observation is 1, 2/3 or 1/3: the share of targets that are left."""
     env, _ = empty
 
     left = [round(float(row[0][-1]), 3) for row in play(env, seed=4)]
@@ -86,7 +89,7 @@ def test_what_is_left_is_observed(empty):
 
 
 def test_the_observation_after_a_delivery_shows_the_next_target(empty):
-    """The robot still stands on the old one."""
+    """After a delivery the robot still stands on the old target."""
     env, _ = empty
     env.reset(seed=4)
 
@@ -99,6 +102,6 @@ def test_the_observation_after_a_delivery_shows_the_next_target(empty):
 
 
 def test_no_targets_are_refused():
-    """An episode without targets could not succeed."""
+    """An episode without targets could not end in success."""
     with pytest.raises(ConfigurationError, match="targets: 0 are too few"):
         make_delivering(*fake_arena(), targets=0)

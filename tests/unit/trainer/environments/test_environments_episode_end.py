@@ -1,4 +1,4 @@
-"""An episode that does not end, and the code that waits for its end."""
+"""Episodes that do not end, and code that waits for their end."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from palaestra_trainer.testing.fake_task import ACTIONS, OBSERVATIONS
 
 
 class Endless(FakeTask):
-    """A task without an end."""
+    """A task whose episodes never end."""
 
     def step(self, action):
-        """Take a step."""
+        """Take a step that does not end the episode."""
         observation, reward, _, _, info = super().step(action)
         return observation, reward, False, False, info
 
 
 class First:
-    """A policy that takes the first action."""
+    """A policy that always takes action 0."""
 
     def predict(self, _observation, state=None, _episode_start=None, **_options):
         """Return the action."""
@@ -35,7 +35,7 @@ class First:
 
 @pytest.fixture
 def restarter(make_member):
-    """The restarter of a member with the task."""
+    """Return the restarter of a simulator with the task."""
     member = make_member("collect-0")
     member.env = Endless(OBSERVATIONS["Box"], ACTIONS["Discrete"])
     return Restarter(member)
@@ -43,18 +43,18 @@ def restarter(make_member):
 
 @pytest.fixture(autouse=True)
 def few(monkeypatch):
-    """Lower the limit of steps."""
+    """Lower the limit of steps to 50."""
     monkeypatch.setattr(episode_end, "MOST_STEPS", 50)
 
 
 def test_an_evaluation_gives_an_endless_episode_up(restarter):
-    """A policy that stands still would keep the run for ever, and its steps count as progress."""
+    """Steps of an endless episode count as progress, so no watchdog would end the run."""
     with pytest.raises(ConfigurationError, match="not ended after 50 steps, and an evaluation waits"):
         evaluate(First(), restarter, [1])
 
 
 def test_reinforce_gives_an_endless_episode_up(restarter):
-    """It learns from whole episodes."""
+    """REINFORCE learns only from complete episodes."""
     model = REINFORCE("MlpPolicy", SimulatorsVecEnv([restarter], 1), policy_kwargs={"net_arch": [4]})
 
     with pytest.raises(ConfigurationError, match="REINFORCE waits for its end; return truncated after"):
@@ -62,7 +62,7 @@ def test_reinforce_gives_an_endless_episode_up(restarter):
 
 
 def test_a_long_episode_is_a_line_in_the_log_every_minute(clock):
-    """Otherwise nothing would show that the run continues."""
+    """Without these lines, a person could not see that the run continues."""
     end = EpisodeEnd("an evaluation", clock)
     with structlog.testing.capture_logs() as logged:
         for steps in range(40):

@@ -1,4 +1,4 @@
-"""The fake robot passes the conformance suite, has simple physics, and dies at chosen steps."""
+"""The fake robot: it passes the conformance suite, has simple physics, and dies at chosen steps."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ from palaestra_trainer.testing import conformance as rules
 
 
 def test_the_fake_is_a_robotino():
-    """It passes the same checks as the simulated robot and the real one."""
+    """The conformance suite is the same for the fake, the simulated and the real robot."""
     check_robot(FakeRobotino())
 
 
 def test_the_fake_with_cameras_is_a_robotino():
-    """The checks include its images."""
+    """The suite also checks the camera images."""
     check_robot(fake_seeing()[0])
 
 
 def test_the_fake_e_puck_is_a_robot_with_a_scene():
-    """Its floor is smaller than those of the other fakes."""
+    """The fake e-puck has a smaller floor than the other fakes."""
     robot, scene = fake_pen()
 
     check_robot(robot)
@@ -53,13 +53,13 @@ def test_the_fake_e_puck_is_a_robot_with_a_scene():
     ids=["wall ahead", "cylinder to the left", "cylinder to the right"],
 )
 def test_each_infrared_sensor_of_the_fake_e_puck_looks_its_way(pose, sensor, meters):
-    """Each looks outward from its position on the rim; the sensors are in the order of their bearings."""
+    """The sensors look outward from the rim, in the order of their bearings."""
     robot, _ = fake_pen()
 
     robot.place(pose, seed=1)
 
     assert robot.distances()[sensor] == pytest.approx(meters, abs=0.004)
-    assert robot.distances()[3] == pytest.approx(0.07, abs=0.004)  # no obstacle is behind it
+    assert robot.distances()[3] == pytest.approx(0.07, abs=0.004)  # no obstacle is behind the robot
 
 
 def test_the_fake_has_a_scene():
@@ -68,7 +68,7 @@ def test_the_fake_has_a_scene():
 
 
 def test_it_slides_along_a_wall_and_says_so():
-    """A robot that hits a wall at an angle loses only the component toward the wall."""
+    """Only the velocity component toward the wall is lost."""
     robot, scene = fake_arena()
     scene.reset(0, Pose(1.7, 0.0, math.pi / 4), (0.0, 0.0))
 
@@ -82,7 +82,7 @@ def test_it_slides_along_a_wall_and_says_so():
 
 
 def test_a_bump_is_over_once_the_robot_is_free():
-    """The bumper reports only the last step."""
+    """The bumper reports contacts of the last step only."""
     robot, scene = fake_arena()
     scene.reset(0, Pose(1.72, 0.0, 0.0), (0.0, 0.0))
     robot.move(Movement.FORWARD)
@@ -98,7 +98,7 @@ def test_a_bump_is_over_once_the_robot_is_free():
 
 
 def test_speeding_up_takes_time():
-    """The first control period of a movement covers less distance than the second."""
+    """In its first control period, a robot that starts covers less distance than in the second."""
     robot = FakeRobotino()
     robot.move(Movement.FORWARD)
 
@@ -111,7 +111,7 @@ def test_speeding_up_takes_time():
 
 
 def test_infrared_measures_from_the_body_to_the_wall():
-    """With a wall 0.2 m in front of the body, the front sensor reads 0.2 m, and the left one nothing."""
+    """With a wall 0.2 m ahead of the body, the front sensor measures 0.2 m, and the left one its maximum."""
     robot, scene = fake_arena()
 
     scene.reset(0, Pose(2.0 - RADIUS_M - 0.2, 0.0, 0.0), (0.0, 0.0))
@@ -121,7 +121,7 @@ def test_infrared_measures_from_the_body_to_the_wall():
 
 
 def test_infrared_sees_a_cylinder_on_the_left_with_the_sensors_on_the_left():
-    """They count counterclockwise from the front: of nine, the third looks 80 degrees to the left."""
+    """Sensors count counterclockwise from the front: the third of nine looks 80 degrees to the left."""
     robot, scene = fake_arena()
 
     scene.reset(0, Pose(0.8, 0.25, math.radians(10.0)), (0.0, 0.0))
@@ -135,7 +135,7 @@ def test_infrared_sees_a_cylinder_on_the_left_with_the_sensors_on_the_left():
     heading_rad=st.floats(-math.pi, math.pi, exclude_min=True),
 )
 def test_it_never_leaves_the_floor_and_its_readings_never_leave_their_range(seed, moves, heading_rad):
-    """For every movement the body stays out of walls and cylinders, and distances stay within 3 to 40 cm."""
+    """After every movement, the body touches no wall and no cylinder, and distances are within 3 to 40 cm."""
     robot, scene = fake_arena()
     scene.reset(seed, Pose(0.0, 0.0, heading_rad), (0.0, 0.0))
 
@@ -151,7 +151,10 @@ def test_it_never_leaves_the_floor_and_its_readings_never_leave_their_range(seed
 
 
 def test_it_dies_at_the_steps_that_are_named():
-    """A training test chooses the steps at which its simulator breaks; steps count over the whole life."""
+    """A training test sets the steps at which its simulator dies.
+
+    They count over the simulator's whole life.
+    """
     robot, _ = fake_arena(deaths=(2, 3))
     robot.advance()
 
@@ -166,7 +169,7 @@ def test_it_dies_at_the_steps_that_are_named():
 
 
 def test_the_dead_answer_nothing_until_they_are_restarted():
-    """A dead simulator neither reads sensors nor resets."""
+    """Reading a sensor or a reset of a dead simulator raises the fault."""
     robot, scene = fake_arena(deaths=(1,))
     with pytest.raises(SimulatorDead):
         robot.advance()
@@ -186,7 +189,7 @@ OWN_ARRAY = np.full(9, 0.3, np.float32)
 
 
 class _Flawed(FakeSeeingRobotino):
-    """A robot that breaks one rule, through one overridden method."""
+    """A fake robot with one method that breaks a rule."""
 
     def __init__(self, method: str, answer) -> None:
         super().__init__()
@@ -234,7 +237,7 @@ def _backwards(robot: RobotinoAbc) -> Pose:
     ],
 )
 def test_conformance_names_the_rule_that_a_robot_breaks(method, answer, rule):
-    """Every rule fails for some robot; a check that cannot fail would prove nothing."""
+    """If a check never failed for any robot, it would prove nothing."""
     with pytest.raises(NotConforming) as caught:
         check_robot(_Flawed(method, answer))
 
@@ -256,7 +259,7 @@ def test_conformance_sees_a_robot_that_rolls_on():
 
 
 def test_conformance_sees_readings_that_change_between_steps():
-    """Two reads of the pose in one step must be equal."""
+    """An environment reads the pose several times per step, and needs the same value each time."""
 
     class Restless(FakeRobotino):
         def pose(self) -> Pose:
@@ -270,7 +273,7 @@ def test_conformance_sees_readings_that_change_between_steps():
 
 
 def test_conformance_sees_a_scene_that_leaves_the_robot_where_it_was():
-    """Otherwise an episode would begin where the last one ended."""
+    """Without a placed robot, an episode would begin where the last one ended."""
 
     class Idle:
         def reset(self, seed: int, start: Pose, target: tuple[float, float]) -> None:
@@ -283,7 +286,7 @@ def test_conformance_sees_a_scene_that_leaves_the_robot_where_it_was():
 
 
 def test_conformance_sees_chance_that_no_seed_decides():
-    """Otherwise an evaluation could not be repeated."""
+    """Without determinism, no evaluation could be repeated."""
     robot = FakeRobotino()
 
     class Careless:

@@ -1,4 +1,4 @@
-"""The images of the fake's cameras, checked with geometry by hand; the cameras equal those of the world."""
+"""The images of the fake's cameras are compared with geometry that was computed by hand."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ MIDDLE = fake_camera.WIDTH // 2
 
 @pytest.fixture
 def look():
-    """`look(pose, target)` returns the color and the depth image, with cylinders if wanted."""
+    """`look(pose, target)` returns the color image and the depth image, with cylinders if requested."""
     robot, scene = fake_seeing()
     robot.use_cameras(color=True, depth=True)
 
@@ -32,17 +32,17 @@ def look():
 
 
 def columns(colors, color):
-    """Return the columns with a pixel of a color."""
+    """Return the image columns that contain a pixel of a color."""
     return np.flatnonzero((colors == np.array(color)).all(axis=2).any(axis=0))
 
 
 def rows(colors, color):
-    """Return the rows with a pixel of a color."""
+    """Return the image rows that contain a pixel of a color."""
     return np.flatnonzero((colors == np.array(color)).all(axis=2).any(axis=1))
 
 
 def test_a_pole_straight_ahead_is_in_the_middle_at_its_distance(look):
-    """The distance is from the camera to its front; it is higher than the wall."""
+    """The distance is from the camera to the front of the pole, which is higher than the wall."""
     colors, depths = look(Pose(0.0, 0.0, 0.0), (1.0, 0.0))
 
     seen = columns(colors, POLE)
@@ -53,7 +53,7 @@ def test_a_pole_straight_ahead_is_in_the_middle_at_its_distance(look):
 
 @pytest.mark.parametrize(("left", "heading_rad"), [(0.3, 0.0), (0.0, -0.3)])
 def test_what_is_on_the_left_is_left_in_the_image(look, left, heading_rad):
-    """This is tested with its position and with a turn to the right."""
+    """The pole is moved to the left, or the robot is turned to the right."""
     colors, _ = look(Pose(0.0, 0.0, heading_rad), (1.0, left))
 
     assert len(columns(colors, POLE)) > 0
@@ -61,21 +61,21 @@ def test_what_is_on_the_left_is_left_in_the_image(look, left, heading_rad):
 
 
 def test_the_pole_fills_more_of_the_image_as_it_comes_nearer(look):
-    """A policy can see the distance."""
+    """A policy can estimate the distance from the size of the pole."""
     widths = [len(columns(look(Pose(0.0, 0.0, 0.0), (x, 0.0))[0], POLE)) for x in (1.6, 0.8, 0.5)]
 
     assert widths == sorted(set(widths))
 
 
 def test_the_pole_leaves_the_image_above_and_below_when_it_is_reached(look):
-    """At 0.45 m its top and its foot are outside the picture."""
+    """At a distance of 0.45 m, the top and the foot of the pole are outside the image."""
     colors, _ = look(Pose(0.0, 0.0, 0.0), (0.45, 0.0))
 
     assert len(rows(colors, POLE)) == fake_camera.HEIGHT
 
 
 def test_a_pole_beside_or_behind_the_robot_is_not_seen(look):
-    """The field of view is 60 degrees."""
+    """The camera has a field of view of 60 degrees."""
     for target in ((0.0, 1.0), (-1.0, 0.0), (0.5, -1.0)):
         colors, _ = look(Pose(0.0, 0.0, 0.0), target)
 
@@ -83,7 +83,7 @@ def test_a_pole_beside_or_behind_the_robot_is_not_seen(look):
 
 
 def test_a_cylinder_hides_what_is_behind_it(look):
-    """The upper part of the pole stays visible above it."""
+    """The upper part of the pole is visible above the cylinder."""
     colors, depths = look(Pose(0.0, 0.8, 0.0), (1.6, 0.8), cylinders=True)
 
     assert tuple(colors[24, MIDDLE]) == CYLINDER
@@ -92,7 +92,7 @@ def test_a_cylinder_hides_what_is_behind_it(look):
 
 
 def test_walls_hide_the_floor_behind_them_and_the_sky_is_infinitely_far(look):
-    """The wall is as high as the camera, so it ends in the middle of the image."""
+    """The wall is as high as the camera, so the upper edge of the wall is in the middle of the image."""
     colors, depths = look(Pose(0.0, 0.0, 0.0), (-1.0, 0.0))
 
     assert [tuple(colors[row, 0]) for row in (0, 23, 24, -1)] == [SKY, SKY, WALL, FLOOR]
@@ -101,7 +101,7 @@ def test_walls_hide_the_floor_behind_them_and_the_sky_is_infinitely_far(look):
 
 
 def test_a_reset_takes_the_cylinders_away_again(look):
-    """The world file has them under the floor."""
+    """The world file has the cylinders below the floor, and a reset puts them there."""
     look(Pose(0.0, 0.8, 0.0), (1.6, 0.8), cylinders=True)
 
     colors, _ = look(Pose(0.0, 0.8, 0.0), (1.6, 0.8))
@@ -110,7 +110,7 @@ def test_a_reset_takes_the_cylinders_away_again(look):
 
 
 def test_the_cameras_are_those_of_the_shipped_world():
-    """A policy that learned on the fake then sees the same pole from the same position."""
+    """A policy that was trained on the fake must see the same pole in the same place in the simulator."""
     nodes = list(parse(builtin("seeing")).walk())
     (camera,) = [node for node in nodes if node.type_name == "Camera"]
     (depth_camera,) = [node for node in nodes if node.type_name == "RangeFinder"]

@@ -1,4 +1,4 @@
-"""A user's own environment: its arguments, and the reasons to refuse it."""
+"""Making a user's environment: the arguments that it gets, and the reasons to reject it."""
 
 # ruff: noqa: ARG002 - gymnasium names the arguments of its methods
 
@@ -23,7 +23,7 @@ PAIR = spaces.Dict({"a": spaces.Discrete(2), "image": spaces.Box(0, 255, (36, 36
 
 
 class Hall(gymnasium.Env):
-    """A hall that stores its arguments, and returns the values of its class attributes."""
+    """An environment that keeps its arguments and returns the values of its class attributes."""
 
     observation_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
     action_space = spaces.Discrete(2)
@@ -50,7 +50,7 @@ class Hall(gymnasium.Env):
 
 @pytest.fixture
 def register():
-    """Register a class under `Hall-v0`, and remove it at the end."""
+    """Return a function that registers a class under `Hall-v0` until the end of the test."""
 
     def as_hall(creator, **options):
         gymnasium.register(id=NAME, entry_point=creator, **options)
@@ -61,7 +61,7 @@ def register():
 
 @pytest.fixture
 def made(register):
-    """Register a class, and make the environment as a run does."""
+    """Register a class, and make the environment as a run makes it."""
 
     def make(creator, registration=(), **task):
         register(creator, **dict(registration))
@@ -71,14 +71,14 @@ def made(register):
 
 
 def refused(made, creator, **task):
-    """Return the message of the refusal."""
+    """Return the message with which a class is rejected."""
     with pytest.raises(ConfigurationError) as refusal:
         made(creator, **task)
     return str(refusal.value)
 
 
 def test_an_environment_without_reward_works(made):
-    """The field has a default; only the arena's environments give it a meaning."""
+    """The field `reward` has a default that only the arena's environments use."""
     env = made(Hall, options={"size": 6.0})
 
     assert env.unwrapped.given["size"] == 6.0
@@ -87,7 +87,7 @@ def test_an_environment_without_reward_works(made):
 
 
 def test_an_environment_gets_what_its_signature_accepts(made):
-    """The choice is among robot, scene and reward."""
+    """An environment gets those of robot, scene and reward that its constructor accepts."""
 
     class OnlyRobot(Hall):
         def __init__(self, robot, reward):
@@ -97,7 +97,7 @@ def test_an_environment_gets_what_its_signature_accepts(made):
 
 
 def test_an_environment_with_any_keyword_gets_all(made):
-    """It may pass them on to a base class."""
+    """The environment may pass the keywords on to a base class."""
 
     class Anything(Hall):
         def __init__(self, **given):
@@ -107,7 +107,7 @@ def test_an_environment_with_any_keyword_gets_all(made):
 
 
 def test_an_environment_that_accepts_neither_robot_nor_scene_is_refused(made):
-    """It would train without the simulators."""
+    """Without a robot and a scene, the environment would not use the simulators at all."""
 
     class Alone(Hall):
         def __init__(self, size=1.0):
@@ -117,12 +117,12 @@ def test_an_environment_that_accepts_neither_robot_nor_scene_is_refused(made):
 
 
 def test_a_reward_that_nothing_accepts_is_refused(made):
-    """Sparse was requested, and the reward would silently be another one."""
+    """The job asks for Sparse, but the environment would use another reward."""
     assert "environment.reward: Hall-v0 has no argument reward" in refused(made, Hall, reward="Sparse")
 
 
 def test_all_options_that_do_not_fit_are_reported_at_once(made):
-    """Each has the nearest valid name."""
+    """Each line has the nearest valid name."""
 
     class Needy(Hall):
         def __init__(self, robot, scene, width):
@@ -139,7 +139,7 @@ def test_all_options_that_do_not_fit_are_reported_at_once(made):
 
 @pytest.mark.parametrize("error", [ValueError, RuntimeError, AttributeError, OSError])
 def test_an_environment_whose_constructor_raises_is_a_mistake_of_the_configuration(made, error):
-    """A retry would raise the same error, whatever it is; the author needs the line."""
+    """A retry would raise the same error, so the message has the line for the author."""
 
     class Strict(Hall):
         def __init__(self, robot, scene):
@@ -151,7 +151,7 @@ def test_an_environment_whose_constructor_raises_is_a_mistake_of_the_configurati
 
 
 def test_a_fault_of_a_simulator_in_a_constructor_is_no_mistake_of_the_configuration(made):
-    """A constructor may use a connected robot, and another simulator may respond."""
+    """A constructor may use a connected robot, and a restarted simulator may respond."""
 
     class Asking(Hall):
         def __init__(self, robot, scene):
@@ -166,25 +166,25 @@ def test_a_fault_of_a_simulator_in_a_constructor_is_no_mistake_of_the_configurat
     [("Nowhere-v0", "cannot be created"), ("no_such_module:Hall-v0", "cannot be imported")],
 )
 def test_an_unknown_environment_is_refused(name, fact):
-    """Either the name or the module is wrong."""
+    """The name is wrong, or the module that registers it."""
     with pytest.raises(ConfigurationError, match=f"environment.id: {name} {fact}"):
         make_environment(Environment(id=name), *fake_arena())
 
 
 def test_a_registration_of_nothing_is_refused(made):
-    """The class was renamed."""
+    """The author may have renamed the class that the registration refers to."""
     assert "entry point palaestra_trainer.testing:Gone" in refused(made, "palaestra_trainer.testing:Gone")
 
 
 def test_a_name_without_version_means_the_newest(register):
-    """gymnasium.make does the same."""
+    """`gymnasium.make` also takes the newest version."""
     register(Hall)
 
     assert keywords(Environment(id="Hall", options={"size": 2.0})) == {"size": 2.0}
 
 
 def test_gymnasium_s_own_options_are_its_own(made):
-    """A time limit is not an argument of the class."""
+    """`max_episode_steps` is an option of gymnasium and not an argument of the class."""
     env = made(Hall, options={"max_episode_steps": 2})
     env.reset(seed=1)
 
@@ -192,7 +192,7 @@ def test_gymnasium_s_own_options_are_its_own(made):
 
 
 class NoSeed(Hall):
-    """A hall with the old `reset` without a seed."""
+    """An environment whose `reset` accepts no seed, as in old releases of gym."""
 
     def reset(self):
         """Begin an episode."""
@@ -200,7 +200,7 @@ class NoSeed(Hall):
 
 
 class OldStep(Hall):
-    """A hall with the old `step` without truncation."""
+    """An environment whose `step` returns no truncation, as in old releases of gym."""
 
     def step(self, action):
         """Take a step."""
@@ -208,7 +208,7 @@ class OldStep(Hall):
 
 
 class NoInfo(Hall):
-    """A hall whose `reset` returns only the observation."""
+    """An environment whose `reset` returns only the observation."""
 
     def reset(self, *, seed=None, options=None):
         """Begin an episode."""
@@ -216,7 +216,7 @@ class NoInfo(Hall):
 
 
 class NumberAsEnd(Hall):
-    """A hall whose `terminated` is a number."""
+    """An environment whose `terminated` is a number."""
 
     def step(self, action):
         """Take a step."""
@@ -224,19 +224,19 @@ class NumberAsEnd(Hall):
 
 
 class NoSpace(Hall):
-    """A hall without an observation space."""
+    """An environment without an observation space."""
 
     observation_space = None
 
 
 class Wide(Hall):
-    """A hall whose observation is too long."""
+    """An environment whose observation is too long."""
 
     seen = (0.0, 0.0, 0.0)
 
 
 class Listed(Hall):
-    """A hall whose observation is a list."""
+    """An environment whose observation is a list."""
 
     def observe(self):
         """Return the list."""
@@ -244,19 +244,19 @@ class Listed(Hall):
 
 
 class Double(Hall):
-    """A hall with observations in double precision."""
+    """An environment whose observation has double precision."""
 
     dtype = np.float64
 
 
 class Outside(Hall):
-    """A hall with an observation outside its space."""
+    """An environment whose observation is outside its space."""
 
     seen = (0.0, 1.5)
 
 
 class TextReward(Hall):
-    """A hall whose reward is text."""
+    """An environment whose reward is a text."""
 
     reward = "much"
 
@@ -279,7 +279,10 @@ class TextReward(Hall):
 )
 @pytest.mark.parametrize("limit", [None, 10])
 def test_a_wrong_environment_is_refused_at_its_first_reset_or_step(made, creator, facts, limit):
-    """The message has the expected and the actual value; gymnasium's time limit unpacks the step first."""
+    """The message has the expected and the actual value.
+
+    Gymnasium's time limit reads the result of `step` first.
+    """
 
     def first_step():
         env = made(creator, registration={"max_episode_steps": limit})
@@ -313,7 +316,7 @@ LATER = [
 @pytest.mark.parametrize("limit", [None, 10])
 @pytest.mark.parametrize(("answer", "fact"), [row[1:] for row in LATER], ids=[row[0] for row in LATER])
 def test_a_step_that_breaks_the_contract_later_is_refused_with_its_number(made, answer, fact, limit):
-    """Before, the error came from a tensor, from NumPy or not at all, a thousand steps after the start."""
+    """Before this check, a tensor or NumPy raised an error a thousand steps later, or nothing did."""
 
     class Later(Hall):
         steps = resets = 0
@@ -337,7 +340,7 @@ def test_a_step_that_breaks_the_contract_later_is_refused_with_its_number(made, 
 
 
 def test_a_later_reset_that_breaks_the_contract_is_refused(made):
-    """The most common case is a reset that forgets its info in one of two branches."""
+    """Often `reset` has two branches and returns no info in one of them."""
 
     class Later(Hall):
         resets = 0
@@ -355,7 +358,7 @@ def test_a_later_reset_that_breaks_the_contract_is_refused(made):
 
 
 def test_a_wrapper_of_the_registration_is_checked_too(made):
-    """It may turn a valid observation into an invalid one."""
+    """A wrapper may make a valid observation invalid."""
 
     class Stretched(gymnasium.ObservationWrapper):
         def observation(self, observation):
@@ -369,7 +372,7 @@ def test_a_wrapper_of_the_registration_is_checked_too(made):
 
 @pytest.mark.parametrize("number", [math.nan, math.inf])
 def test_numbers_that_are_not_finite_are_left_to_the_learner(made, number):
-    """They have an exit code of their own."""
+    """NaN and infinity have an exit code of their own, which the learner sets."""
 
     class Divided(Hall):
         seen = (number, 0.0)
@@ -383,7 +386,7 @@ def test_numbers_that_are_not_finite_are_left_to_the_learner(made, number):
 
 @pytest.mark.parametrize("number", [math.nan, math.inf])
 def test_numbers_in_a_dict_that_are_not_finite_are_left_to_the_learner(made, number):
-    """The learner's message names the key, and gymnasium's does not."""
+    """The learner's message has the key of the observation, while gymnasium's has not."""
 
     class Divided(Hall):
         observation_space = spaces.Dict({"a": Hall.observation_space})
@@ -398,7 +401,7 @@ def test_numbers_in_a_dict_that_are_not_finite_are_left_to_the_learner(made, num
 
 
 def test_a_simulator_s_fault_passes(made):
-    """The environment did not cause it; the first successful reset is checked."""
+    """The simulator caused the error, so the check waits for the first successful reset."""
 
     class Faulty(Hall):
         tries = 0
@@ -432,5 +435,5 @@ def test_a_simulator_s_fault_passes(made):
     ],
 )
 def test_a_mismatch_is_described_in_words(space, observation, fact):
-    """The result is empty if there is no difference."""
+    """The text is empty if the value is in the space."""
     assert mismatch(space, observation) == fact

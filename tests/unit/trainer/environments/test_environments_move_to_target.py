@@ -1,4 +1,4 @@
-"""An episode: its beginning, its steps and its end."""
+"""The task MoveToTarget: how an episode begins, proceeds and ends."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ IN_THE_OPEN = {"start": (0.0, 0.0, 0.0), "target": (1.5, 0.0)}
 
 
 def play(env: MoveToTargetEnv, episode, movements):
-    """Return the steps of one episode, each as `step` returned it."""
+    """Return the results of the steps of one episode."""
     env.reset(seed=3, options=episode)
     return [env.step(movement) for movement in movements]
 
 
 def test_the_robot_has_to_stand_on_the_target_not_to_cross_it(make_env):
-    """It must be within 0.20 m and slower than 0.05 m/s, which takes a step of STOP."""
+    """The robot must be within 0.20 m and slower than 0.05 m/s, so it needs a step of STOP."""
     env = make_env()
 
     steps = play(env, BESIDE_THE_TARGET, [FORWARD, FORWARD, STOP])
@@ -42,14 +42,14 @@ def test_the_robot_has_to_stand_on_the_target_not_to_cross_it(make_env):
 
 
 def test_standing_beside_the_target_is_not_enough(make_env):
-    """0.25 m is not 0.20 m."""
+    """A distance of 0.25 m is outside the radius of 0.20 m."""
     steps = play(make_env(), BESIDE_THE_TARGET, [STOP, STOP])
 
     assert [terminated for _, _, terminated, _, _ in steps] == [False, False]
 
 
 def test_a_collision_ends_the_episode(make_env):
-    """The robot must not bump its way along a wall."""
+    """A robot must not learn to drive along a wall by touching it."""
     env = make_env()
     env.reset(seed=3, options=BEFORE_A_WALL)
 
@@ -77,7 +77,10 @@ TERMINATED, TRUNCATED = (True, False), (False, True)
 def test_time_is_up_after_max_steps_and_ends_the_episode_as_the_option_or_else_the_reward_says(
     make_env, options, end
 ):
-    """Sparse sets a price for giving up; a value that is estimated beyond that step would be added to it."""
+    """With Sparse, giving up has a price.
+
+    If the step were truncated, the value of later steps would be added to it.
+    """
     steps = play(make_env(max_steps=3, **options), IN_THE_OPEN, [STOP] * 3)
 
     assert [step[2:4] for step in steps] == [(False, False), (False, False), end]
@@ -86,7 +89,7 @@ def test_time_is_up_after_max_steps_and_ends_the_episode_as_the_option_or_else_t
 
 
 def test_reaching_the_target_with_the_last_step_counts(make_env):
-    """The robot had the whole time."""
+    """The time limit includes the last step."""
     steps = play(make_env(max_steps=3), BESIDE_THE_TARGET, [FORWARD, FORWARD, STOP])
 
     assert steps[-1][4]["is_success"]
@@ -94,13 +97,13 @@ def test_reaching_the_target_with_the_last_step_counts(make_env):
 
 
 def test_the_reward_is_the_sum_of_the_terms_it_names(make_env):
-    """TensorBoard shows the terms by name, and they must add up to the reward."""
+    """TensorBoard shows each term by its name, so the terms must add up to the reward."""
     for _, reward, _, _, info in play(make_env(), BESIDE_THE_TARGET, [FORWARD, FORWARD, STOP]):
         assert reward == pytest.approx(sum(info["reward_terms"].values()))
 
 
 def test_dense_pays_for_progress_and_sparse_does_not(make_env):
-    """The same step is rewarded in two ways."""
+    """The same step is rewarded by each of the two rewards."""
     rewards = {
         name: play(make_env(reward=name), IN_THE_OPEN, [FORWARD, FORWARD])[-1][1]
         for name in ("Dense", "Sparse")
@@ -112,7 +115,7 @@ def test_dense_pays_for_progress_and_sparse_does_not(make_env):
 
 @given(seed=st.integers(0, 2**31 - 1))
 def test_a_seed_decides_the_whole_episode(seed):
-    """A faulted evaluation can be repeated, and two simulators can run the same episode."""
+    """An evaluation repeats an episode after a fault, and two simulators may play the same episode."""
     one, other = MoveToTargetEnv(*fake_arena()), MoveToTargetEnv(*fake_arena())
     other.reset(seed=1)
     other.step(FORWARD)
@@ -125,7 +128,7 @@ def test_a_seed_decides_the_whole_episode(seed):
 
 
 def test_without_a_seed_the_next_episode_is_another_one(make_env):
-    """As in gymnasium, the first seed still determines it."""
+    """As in gymnasium, the first seed also determines the later episodes."""
     runs = []
     for _ in range(2):
         env = make_env()
@@ -137,7 +140,7 @@ def test_without_a_seed_the_next_episode_is_another_one(make_env):
 
 
 def test_start_and_target_can_be_chosen(make_env):
-    """This is for a demonstration, a regression test, or one failing case."""
+    """A person chooses both for a demonstration, a regression test, or one failing case."""
     env = make_env()
 
     observation, info = env.reset(options={"start": (0.0, -1.0, math.pi / 2), "target": (0.0, 1.0)})
@@ -148,13 +151,13 @@ def test_start_and_target_can_be_chosen(make_env):
 
 
 def test_an_impossible_start_is_refused(make_env):
-    """Nothing can be learned inside a cylinder."""
+    """A robot that starts inside a cylinder could not move."""
     with pytest.raises(ConfigurationError, match="start"):
         make_env().reset(options={"start": (0.8, 0.8, 0.0)})
 
 
 def test_an_episode_begins_at_rest_after_one_that_was_cut_short(make_env):
-    """Neither the robot nor the observation keeps a velocity."""
+    """The robot's old velocity must not appear in the first observation."""
     env = make_env()
     play(env, IN_THE_OPEN, [FORWARD] * 3)
 
@@ -167,7 +170,7 @@ def test_an_episode_begins_at_rest_after_one_that_was_cut_short(make_env):
 
 
 def test_movements_are_the_ones_that_were_chosen(make_env):
-    """Action 1 is the second chosen movement, whatever its number in the enumeration is."""
+    """Action 1 is the second movement of the option, whatever its number in the enumeration."""
     env = make_env(movements=["STOP", "BACKWARD"])
 
     play(env, IN_THE_OPEN, [1, 1])
@@ -177,7 +180,7 @@ def test_movements_are_the_ones_that_were_chosen(make_env):
 
 
 def test_a_continuous_action_is_a_share_of_the_greatest_velocity(make_env):
-    """The example is half of 0.5 m/s to the left; values beyond the bounds are clipped."""
+    """The example is half of 0.5 m/s to the left. Values beyond the bounds are clipped."""
     env = make_env(actions="continuous")
 
     play(env, IN_THE_OPEN, [np.array([0.0, 0.5, 0.0])] * 2)
@@ -189,7 +192,7 @@ def test_a_continuous_action_is_a_share_of_the_greatest_velocity(make_env):
 
 
 class _Late(FakeRobotino):
-    """A robot with a sensor that is late in every step."""
+    """A robot whose sensor is late in each step."""
 
     def advance(self) -> int:
         super().advance()
@@ -198,7 +201,7 @@ class _Late(FakeRobotino):
 
 
 def test_extra_steps_are_reported_and_not_taken_for_speed():
-    """A late sensor costs a period; the robot did not drive twice as fast."""
+    """A late sensor costs one more control period. The robot drove for longer, and not twice as fast."""
     robot = _Late()
     env = MoveToTargetEnv(robot, FakeScene(robot))
 
@@ -209,7 +212,7 @@ def test_extra_steps_are_reported_and_not_taken_for_speed():
 
 
 def test_a_fault_of_the_simulator_passes_through(make_env):
-    """The environment does not decide what a fault means for learning."""
+    """The environment does not know what a fault means for learning."""
     env = make_env(deaths=(2,))
     env.reset(seed=0)
     env.step(STOP)
@@ -221,14 +224,14 @@ def test_a_fault_of_the_simulator_passes_through(make_env):
 
 
 def test_a_step_before_the_first_reset_is_refused(make_env):
-    """The error is gymnasium's own, which its users know."""
+    """Gymnasium raises this error, which its users know."""
     with pytest.raises(ResetNeeded, match=r"call reset\(\) first"):
         make_env().step(STOP)
 
 
 @given(seed=st.integers(0, 2**31 - 1), actions=st.lists(st.integers(0, 6), max_size=30))
 def test_every_observation_is_in_the_space_and_every_reward_is_finite(seed, actions):
-    """This holds for all actions in all episodes."""
+    """All actions in all episodes are covered."""
     env = MoveToTargetEnv(*fake_arena())
     observation, _ = env.reset(seed=seed)
 

@@ -1,4 +1,4 @@
-"""The task with its goal in the observation."""
+"""The task MoveToTarget with the goal in the observation."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ STOP, FORWARD = Movement.STOP.value, Movement.FORWARD.value
 
 @pytest.fixture
 def make_env():
-    """Make the environment on a fake."""
+    """Return a function that makes the environment on a fake robot."""
     return lambda **options: MoveToTargetGoalEnv(*fake_arena(), GoalOptions(**options))
 
 
 def drive(env, action, steps):
-    """Take the same action for some steps, and return the last result."""
+    """Take the same action for some steps, and return the result of the last one."""
     for _ in range(steps):
         result = env.step(action)
     return result
@@ -50,12 +50,12 @@ def drive(env, action, steps):
 @pytest.mark.parametrize("options", VARIANTS, ids=lambda it: "-".join(it.values()))
 @pytest.mark.parametrize("checker", [check_env, check_env_for_sb3], ids=["gymnasium", "sb3"])
 def test_the_checkers_of_other_projects_have_nothing_to_object_to(checker, options):
-    """Stable-Baselines3's checker also calls `compute_reward` with one pair of goals and with many."""
+    """Stable-Baselines3's checker also calls `compute_reward` with one pair of goals and with many pairs."""
     checker(make_goal(*fake_arena(), **options), skip_render_check=True)
 
 
 def test_it_is_made_by_name():
-    """This works after an import of the package, or with the package in the name."""
+    """After an import of the package, or with the package in the name, the environment is registered."""
     robot, scene = fake_arena()
 
     env = gymnasium.make(f"palaestra_trainer.environments:{NAME}", robot=robot, scene=scene, reward="Sparse")
@@ -66,7 +66,7 @@ def test_it_is_made_by_name():
 
 @pytest.mark.parametrize("reward", ["Dense", "Sparse"])
 def test_a_step_s_reward_is_that_of_its_goals(make_env, reward):
-    """Otherwise replayed goals would have other rewards than real ones."""
+    """Hindsight replay computes rewards again, and the same goals must give the same reward."""
     env = make_env(reward=reward)
     env.reset(seed=3)
 
@@ -84,7 +84,7 @@ def test_a_step_s_reward_is_that_of_its_goals(make_env, reward):
     ("reward", "near", "far"), [("Sparse", 1.0, 0.0), ("Dense", 1 - 0.19 / FARTHEST_M, 0.0)]
 )
 def test_rewards_are_in_the_ranges_on_the_sheet(make_env, reward, near, far):
-    """The function takes many goals at once, as hindsight experience replay does."""
+    """As in hindsight experience replay, many goals are passed in one call."""
     achieved = np.array([[0.0, 0.0], [0.19, 0.0], [-2.0, -2.0]], np.float32)
     desired = np.array([[0.0, 0.0], [0.0, 0.0], [2.0, 2.0]], np.float32)
 
@@ -95,7 +95,7 @@ def test_rewards_are_in_the_ranges_on_the_sheet(make_env, reward, near, far):
 
 
 def test_arriving_ends_no_episode_and_staying_there_is_success(make_env):
-    """The last step decides."""
+    """The robot may leave the target again, so only the position at the last step counts."""
     env = make_env(max_steps=14, reward="Sparse")
     env.reset(seed=1, options=AHEAD)
 
@@ -109,7 +109,7 @@ def test_arriving_ends_no_episode_and_staying_there_is_success(make_env):
 
 
 def test_time_that_is_up_far_from_the_target_is_no_success(make_env):
-    """The episode is truncated, because the world could continue."""
+    """The world could continue, so the episode is truncated."""
     env = make_env(max_steps=3)
     env.reset(seed=1, options=AHEAD)
 
@@ -120,7 +120,7 @@ def test_time_that_is_up_far_from_the_target_is_no_success(make_env):
 
 
 def test_a_collision_ends_the_episode(make_env):
-    """No reward follows, which is worth less than continuing."""
+    """No more reward follows a collision, so it is worse than continuing."""
     env = make_env()
     env.reset(seed=1, options={"start": (-1.7, 0.0, 3.14159), "target": (0.0, 0.0)})
 
@@ -133,7 +133,7 @@ def test_a_collision_ends_the_episode(make_env):
 
 
 def test_the_same_seed_is_the_same_episode_as_in_the_task_without_goals(make_env):
-    """Policies of both tasks can then be compared on the same episodes."""
+    """Policies of both tasks can be compared on the same episodes."""
     plain = MoveToTargetEnv(*fake_arena(), MoveToTargetOptions(observe=GoalOptions().observe))
     env = make_env()
 
@@ -154,13 +154,13 @@ def test_the_same_seed_is_the_same_episode_as_in_the_task_without_goals(make_env
     ],
 )
 def test_wrong_options_are_refused(options, fact):
-    """The rules are those of the task without goals, and the goal must not be observed twice."""
+    """The rules are those of the task without goals; in addition, the goal must not be observed twice."""
     with pytest.raises(ConfigurationError, match=fact):
         make_goal(*fake_arena(), **options)
 
 
 def test_the_sheet_has_every_key_with_its_bounds(make_env):
-    """The docstring is a data sheet, which this test compares with the code."""
+    """The docstring is a data sheet, which this test compares with the space."""
     space = make_env().observation_space
     rows = [
         line.split("|")[1:-1]

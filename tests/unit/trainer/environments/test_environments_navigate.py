@@ -1,4 +1,4 @@
-"""A task for two wheels and a scanner, and its fake robot."""
+"""The task Navigate for two wheels and a laser scanner, and its fake robot."""
 
 from __future__ import annotations
 
@@ -30,7 +30,10 @@ TO_THE_TARGET = {"start": (-0.2, 0.0, 0.0), "target": (0.4, 0.0)}
 
 @pytest.fixture
 def make_env():
-    """Make an environment on a fake robot: `deaths` are the robot's, the rest are options."""
+    """Make an environment on a fake robot.
+
+    The robot dies at the steps `deaths`; other keywords are options.
+    """
 
     def with_options(deaths=(), **options):
         return make_navigating(*fake_court(deaths), **options)
@@ -46,7 +49,7 @@ def test_nobody_has_anything_to_object_to(make_env, actions, reward):
 
 
 def test_the_environment_is_made_by_name():
-    """This works after an import of the package."""
+    """After an import of the package, the environment is registered with gymnasium."""
     env = gymnasium.make(NAME, simulator=fake_court, max_steps=7)
 
     assert isinstance(env.unwrapped, NavigateEnv)
@@ -54,7 +57,7 @@ def test_the_environment_is_made_by_name():
 
 
 def test_driving_straight_on_reaches_a_target_ahead(make_env):
-    """It covers 0.45 m at 0.198 m/s, in steps of 0.192 s."""
+    """The robot drives 0.45 m at 0.198 m/s, in steps of 0.192 s."""
     env = make_env()
     env.reset(seed=1, options=TO_THE_TARGET)
 
@@ -68,7 +71,7 @@ def test_driving_straight_on_reaches_a_target_ahead(make_env):
 
 
 def test_a_wall_ends_the_episode_before_the_scanner_goes_blind(make_env):
-    """Below 0.12 m a scanner of this kind measures nothing."""
+    """Below 0.12 m, this type of scanner measures nothing."""
     env = make_env()
     env.reset(seed=1, options={"start": (1.0, 0.0, 0.0), "target": (-1.0, 0.0)})
 
@@ -78,7 +81,7 @@ def test_a_wall_ends_the_episode_before_the_scanner_goes_blind(make_env):
 
 
 def test_time_up_truncates(make_env):
-    """The world could continue."""
+    """The world could continue after the time limit."""
     env = make_env(max_steps=2)
     env.reset(seed=1)
 
@@ -86,7 +89,7 @@ def test_time_up_truncates(make_env):
 
 
 def test_the_target_is_given_by_distance_and_bearing(make_env):
-    """For a target on the left, the cosine is 0 and the sine is 1."""
+    """For a target on the left, the cosine of the bearing is 0 and the sine is 1."""
     env = make_env()
 
     seen, _ = env.reset(seed=1, options={"start": (0.0, -0.1, 0.0), "target": (0.0, 0.9)})
@@ -95,7 +98,7 @@ def test_the_target_is_given_by_distance_and_bearing(make_env):
 
 
 def test_a_thing_on_the_left_is_in_a_sector_on_the_left(make_env):
-    """The first sectors look behind and to the right, and the last ones to the left and behind."""
+    """The first sectors look behind and to the right, the last sectors look left and behind."""
     env = make_env()
 
     seen, _ = env.reset(seed=1, options={"start": (0.0, 1.2, 0.0), "target": (0.0, 0.0)})
@@ -104,13 +107,13 @@ def test_a_thing_on_the_left_is_in_a_sector_on_the_left(make_env):
 
 
 def test_without_an_episode_there_is_no_step(make_env):
-    """All environments of gymnasium have this rule."""
+    """Gymnasium requires a reset before the first step."""
     with pytest.raises(ResetNeeded):
         make_env().step(0)
 
 
 def test_a_fault_passes(make_env):
-    """The caller decides what it means."""
+    """The caller of the environment decides what a fault means."""
     env = make_env(deaths=(1,))
     env.reset(seed=1)
 
@@ -119,20 +122,20 @@ def test_a_fault_passes(make_env):
 
 
 def test_a_robot_without_a_scanner_is_refused():
-    """The error comes before the first step, and lists what the robot has."""
+    """The error comes before the first step, and lists the devices that the robot has."""
     with pytest.raises(MissingCapability, match="FakeRobotino has no Scanner, which NavigateEnv needs"):
         make_navigating(*fake_arena())
 
 
 @pytest.mark.parametrize("options", [{"actions": "both"}, {"max_steps": 0}, {"movements": ["STOP"]}])
 def test_wrong_options_are_refused(make_env, options):
-    """The message names them."""
+    """The message has the name of each wrong option."""
     with pytest.raises(ConfigurationError, match=next(iter(options))):
         make_env(**options)
 
 
 def test_the_data_sheet_has_the_actions():
-    """The table of the docstring is compared with the code."""
+    """The table in the docstring is compared with the action space."""
     rows = [line.split("|") for line in (inspect.getdoc(NavigateEnv) or "").splitlines() if "|" in line]
     actions = [(float(row[3]), float(row[4])) for row in rows if len(row) == 6 and row[1].strip().isdigit()]
 
@@ -140,7 +143,7 @@ def test_the_data_sheet_has_the_actions():
 
 
 def test_the_fake_is_a_robot_with_a_scene():
-    """The test uses the checks for users' robots."""
+    """The fake passes the checks that users run on their own robots."""
     robot, scene = fake_court()
 
     check_robot(robot)
@@ -148,7 +151,7 @@ def test_the_fake_is_a_robot_with_a_scene():
 
 
 def test_a_wheel_that_would_run_too_fast_slows_both():
-    """The curve stays the same."""
+    """The ratio of both speeds stays, so the robot drives the same curve."""
     fast, slow = fake_court()[0], fake_court()[0]
 
     fast.steer(0.44, 1.0)
@@ -166,7 +169,7 @@ def test_a_wheel_that_would_run_too_fast_slows_both():
     heading_rad=st.floats(-math.pi, math.pi, exclude_min=True),
 )
 def test_the_fake_never_drives_into_a_thing(seed, moves, heading_rad):
-    """Its scan stays in range, too."""
+    """The distances of its scanner stay in range as well."""
     robot, scene = fake_court()
     robot.use_scanner()
     scene.reset(seed, Pose(0.0, 0.0, heading_rad), (1.0, 0.0))
@@ -182,7 +185,7 @@ def test_the_fake_never_drives_into_a_thing(seed, moves, heading_rad):
 
 
 def test_what_is_too_near_is_not_seen():
-    """The real scanner has the same limit, so an episode ends before that."""
+    """The real scanner has the same limit; the episode ends at a larger distance."""
     robot, scene = fake_court()
     robot.use_scanner()
     scene.reset(1, Pose(1.35, 0.0, 0.0), (0.0, 0.0))

@@ -1,4 +1,4 @@
-"""The options of the task in a job file, and the errors for invalid ones."""
+"""The options of a task in a job file, and the messages about invalid options."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from palaestra_trainer.robots import Movement
 
 
 def test_nothing_said_gives_the_defaults():
-    """An example of two lines must train."""
+    """An example of two lines, without options, must train."""
     assert parse({}) == MoveToTargetOptions()
 
 
 def test_a_job_file_names_movements_and_parts_as_text():
-    """YAML has no enumerations."""
+    """YAML has no enumerations, so a job names movements by texts."""
     options = parse({"movements": ["STOP", "FORWARD"], "observe": ["target"], "max_steps": 50})
 
     assert options == MoveToTargetOptions(
@@ -24,7 +24,7 @@ def test_a_job_file_names_movements_and_parts_as_text():
 
 
 def test_python_may_use_the_enumeration():
-    """A notebook may use `Movement.LEFT`."""
+    """A person may write `Movement.LEFT` in a notebook."""
     assert parse({"movements": (Movement.LEFT,)}).movements == (Movement.LEFT,)
 
 
@@ -46,13 +46,13 @@ def test_python_may_use_the_enumeration():
     ids=lambda it: next(iter(it)) + str(next(iter(it.values()))) if isinstance(it, dict) else "",
 )
 def test_a_wrong_option_is_refused_with_fact_and_remedy(given, message):
-    """The error comes before a simulator is started."""
+    """The error comes before a simulator is started, and has the remedy."""
     with pytest.raises(ConfigurationError, match=message):
         parse(given)
 
 
 def test_all_mistakes_are_reported_at_once():
-    """Each has a line, so that a file is corrected at once."""
+    """With a line for each mistake, a person corrects the file in one go."""
     with pytest.raises(ConfigurationError) as caught:
         parse({"reward": "Rich", "actions": "none", "max_steps": -1})
 
@@ -64,7 +64,7 @@ def test_all_mistakes_are_reported_at_once():
 
 
 def test_a_task_that_sees_has_options_of_its_own():
-    """It also has the options for driving, with the same names and values."""
+    """The options for driving have the same names and values as in a task without a camera."""
     options = parse_as(SeeOptions, {"frames": 3, "cylinders": True, "movements": ["FORWARD"]})
 
     assert options == SeeOptions(frames=3, cylinders=True, movements=(Movement.FORWARD,))
@@ -81,6 +81,6 @@ def test_a_task_that_sees_has_options_of_its_own():
     ids=lambda it: next(iter(it)) if isinstance(it, dict) else "",
 )
 def test_wrong_options_of_a_task_that_sees_are_refused_in_the_same_way(given, message):
-    """The message has fact and remedy, and comes before a simulator is started."""
+    """The error comes before a simulator is started, and has the fact and the remedy."""
     with pytest.raises(ConfigurationError, match=message):
         parse_as(SeeOptions, given)

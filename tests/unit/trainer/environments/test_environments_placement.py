@@ -1,4 +1,4 @@
-"""Tasks are free of obstacles, long enough, fair, and determined by their random numbers."""
+"""Placement of start and target: free of obstacles, far enough apart, fair, and reproducible."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ PLACES = FreePlaces(layout=ARENA, radius_m=OUTLINE_M)
 
 @given(seed=seeds)
 def test_every_task_can_be_done(seed):
-    """Start and target leave room for the robot, and are far enough apart."""
+    """Start and target leave space for the robot, and are far enough apart."""
     task = PLACES.draw_task(np.random.default_rng(seed))
 
     assert ARENA.gap(task.start.x_m, task.start.y_m) >= OUTLINE_M + CLEARANCE_M
@@ -33,12 +33,12 @@ def test_every_task_can_be_done(seed):
 
 @given(seed=seeds)
 def test_a_task_follows_from_its_random_numbers(seed):
-    """The seed of an episode is enough to repeat it."""
+    """The seed of an episode is then enough to repeat the episode."""
     assert PLACES.draw_task(np.random.default_rng(seed)) == PLACES.draw_task(np.random.default_rng(seed))
 
 
 def test_tasks_are_spread_over_the_whole_floor():
-    """Every quarter of the floor gets its share, so that a policy cannot specialize."""
+    """If a quarter of the floor were rare, the policy would specialize on the others."""
     random = np.random.default_rng(1)
 
     points = np.array([PLACES.draw(random) for _ in range(2000)])
@@ -52,19 +52,19 @@ def test_tasks_are_spread_over_the_whole_floor():
     [((0.0, 0.0), math.hypot(0.8, 0.8) - 0.25), ((1.9, 0.0), 0.1), ((0.8, 0.8), -0.25), ((3, 0), -1.0)],
 )
 def test_the_gap_is_to_the_nearest_wall_or_cylinder(place, expected_m):
-    """The gap is negative inside an obstacle, so one comparison shows whether a point is free."""
+    """The gap is negative inside an obstacle, so its sign shows whether a point is free."""
     assert ARENA.gap(*place) == pytest.approx(expected_m)
 
 
 def test_a_place_is_free_if_the_robot_fits():
-    """It fits between a cylinder and the wall, but not in the last centimeters of a corner."""
+    """The robot fits between a cylinder and the wall, but not into a corner."""
     assert PLACES.free(1.3, 1.3)
     assert not PLACES.free(1.9, 1.9)
     assert not PLACES.free(0.8, 0.5)
 
 
 def test_what_is_chosen_stays_and_the_rest_is_drawn_around_it():
-    """A person who sets the start still gets targets at a sufficient distance."""
+    """If a person sets only the start, the target is still drawn at a sufficient distance."""
     random = np.random.default_rng(2)
 
     tasks = [PLACES.chosen_task(random, {"start": [1.5, 0.0, 0.5]}) for _ in range(50)]
@@ -78,7 +78,7 @@ def test_what_is_chosen_stays_and_the_rest_is_drawn_around_it():
     "form", [tuple, list, np.array, np.float32], ids=["tuple", "list", "array", "float32"]
 )
 def test_a_place_may_be_chosen_in_any_form_of_numbers(form):
-    """Observations are arrays, so computed positions are arrays too."""
+    """A program may compute a position as a NumPy array, as observations are."""
     task = PLACES.chosen_task(
         np.random.default_rng(0), {"start": form((0.0, 0.5, 1.0)), "target": form((0.0, 0.0))}
     )
@@ -87,7 +87,7 @@ def test_a_place_may_be_chosen_in_any_form_of_numbers(form):
 
 
 def test_both_may_be_chosen_even_if_they_are_near():
-    """A caller that sets both has a reason, such as a test of the last centimeters."""
+    """A person who sets both has a reason, for example a test of the last centimeters."""
     task = PLACES.chosen_task(np.random.default_rng(0), {"start": Pose(0.0, 0.0, 0.0), "target": (0.1, 0.0)})
 
     assert task.target == (0.1, 0.0)
@@ -123,14 +123,14 @@ def test_the_options_that_every_reset_of_a_run_gets_change_nothing():
     ids=["unknown", "cylinder", "wall", "in", "at", "nowhere", "nan", "too few", "matrix", "text", "number"],
 )
 def test_a_place_that_cannot_be_is_refused(chosen, message):
-    """Otherwise the search for a free position would never end."""
+    """With such a position, the search for a free position would never end."""
     with pytest.raises(ConfigurationError, match=message):
         PLACES.chosen_task(np.random.default_rng(0), chosen)
 
 
 @given(x_m=st.floats(-1.5, 1.5), y_m=st.floats(-1.5, 1.5), heading_rad=st.floats(-3.0, 3.0), seed=seeds)
 def test_a_start_is_never_drawn_inside_a_thing_wherever_it_was_moved(x_m, y_m, heading_rad, seed):
-    """A box may also be turned; the current layout counts."""
+    """The current poses of obstacles count. A box may also be turned."""
     box = Obstacle(
         name="BOX", x_m=x_m, y_m=y_m, bottom_m=0.0, top_m=0.2, half_m=(0.5, 0.1), heading_rad=heading_rad
     )
@@ -143,7 +143,7 @@ def test_a_start_is_never_drawn_inside_a_thing_wherever_it_was_moved(x_m, y_m, h
 
 
 def test_what_is_stored_under_the_floor_or_hangs_above_is_in_nobody_s_way():
-    """The world `seeing` keeps its cylinders under the floor."""
+    """The world `seeing` keeps its cylinders below the floor."""
     thing = ARENA.obstacles[0]
 
     for height_m in (-0.7, 2.0):
@@ -152,7 +152,7 @@ def test_what_is_stored_under_the_floor_or_hangs_above_is_in_nobody_s_way():
 
 
 def test_a_floor_without_room_is_refused():
-    """Otherwise the search would never end."""
+    """On such a floor, the search for a free position would never end."""
     tiny = FloorLayout(low=(-0.5, -0.5), high=(0.5, 0.5))
 
     with pytest.raises(ConfigurationError, match="no free places for a robot"):

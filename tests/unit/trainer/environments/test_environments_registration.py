@@ -1,4 +1,4 @@
-"""The ways to make an environment, and the checkers of other projects."""
+"""The ways to make an environment, and other projects' checkers of environments."""
 
 from __future__ import annotations
 
@@ -33,19 +33,19 @@ VARIANTS = [
 
 @pytest.mark.parametrize("options", VARIANTS, ids=lambda it: "-".join(map(str, it.values())))
 def test_gymnasium_has_nothing_to_object_to(options):
-    """They test seeds, spaces, types and determinism; every warning is an error in these tests."""
+    """The checker tests seeds, spaces, types and determinism; each warning is an error here."""
     check_env(make(*fake_arena(), **options), skip_render_check=True)
 
 
 @pytest.mark.parametrize("options", VARIANTS, ids=lambda it: "-".join(map(str, it.values())))
 def test_stable_baselines3_has_nothing_to_object_to(options):
-    """Its checker has its own rules for learning."""
+    """The checker of Stable-Baselines3 has additional rules for learning."""
     check_env_for_sb3(make(*fake_arena(), **options), skip_render_check=True)
 
 
 @pytest.mark.parametrize("name", [NAME, f"palaestra_trainer.environments:{NAME}"])
 def test_the_environment_is_made_by_name(name):
-    """This works after an import of the package, or with the package in the name."""
+    """After an import of the package, or with the package in the name, the environment is registered."""
     robot, scene = fake_arena()
 
     env = gymnasium.make(name, robot=robot, scene=scene, movements=["STOP", "LEFT"], max_steps=7)
@@ -56,7 +56,7 @@ def test_the_environment_is_made_by_name(name):
 
 
 def test_gymnasium_adds_no_time_limit_of_its_own():
-    """The environment counts its steps itself, because Sparse rewards the last one."""
+    """The environment ends an episode at its time limit itself, because Sparse rewards the last step."""
     spec = gymnasium.spec(NAME)
 
     assert spec.max_episode_steps is None
@@ -65,7 +65,7 @@ def test_gymnasium_adds_no_time_limit_of_its_own():
 
 
 def test_a_robot_that_cannot_be_copied_can_be_used():
-    """Gymnasium copies arguments, but a robot holds sockets and threads."""
+    """Gymnasium copies the arguments of `make`, but a robot's sockets and threads cannot be copied."""
     robot, scene = fake_arena()
     robot.socket = threading.Lock()
 
@@ -78,7 +78,7 @@ def test_a_robot_that_cannot_be_copied_can_be_used():
 
 @pytest.mark.parametrize("mode", ["sync", "async"])
 def test_many_are_made_at_once_each_with_a_simulator_of_its_own(mode):
-    """`simulator` is called once per environment, and so is the configuration by default."""
+    """`simulator` is called once for each environment."""
     envs = gymnasium.make_vec(NAME, num_envs=2, vectorization_mode=mode, simulator=fake_arena)
 
     observations, infos = envs.reset(seed=[1, 2])
@@ -90,13 +90,13 @@ def test_many_are_made_at_once_each_with_a_simulator_of_its_own(mode):
 
 
 def test_a_robot_without_its_scene_is_refused():
-    """Otherwise episodes would begin wherever the last one ended."""
+    """An episode would begin where the last one ended."""
     with pytest.raises(ConfigurationError, match="give both or neither"):
         make(robot=FakeRobotino())
 
 
 def test_a_wrong_option_raises_an_error_before_a_simulator_is_requested():
-    """The start of a simulator takes seconds and another process."""
+    """A simulator takes seconds to start, and needs another process."""
 
     def never() -> tuple[FakeRobotino, FakeScene]:
         raise AssertionError("asked for a simulator")
@@ -106,13 +106,13 @@ def test_a_wrong_option_raises_an_error_before_a_simulator_is_requested():
 
 
 def test_an_unknown_role_raises_an_error_that_names_the_roles():
-    """With a misspelled role no simulator would be found, and the message would be about simulators."""
+    """With a wrong role, no simulator would be found, and the message would be about simulators."""
     with pytest.raises(ConfigurationError, match=r'^role: "collect" does not exist; choose Collect or'):
         make(role="collect")
 
 
 def test_an_environment_on_a_fake_robot_needs_no_ros():
-    """People can develop rewards and algorithms where ROS is not installed."""
+    """People can develop rewards and algorithms on a machine without ROS."""
     program = f"""
         import sys
         sys.modules["rospy"] = None  # an import of it fails from now on
@@ -128,7 +128,7 @@ def test_an_environment_on_a_fake_robot_needs_no_ros():
 
 @pytest.mark.filterwarnings("ignore:.*different from the unwrapped version")
 def test_the_checker_of_gymnasium_accepts_an_environment_that_was_made_with_a_robot():
-    """It makes the environment again from copies of its arguments, but a robot cannot be copied."""
+    """The checker makes the environment again from copied arguments, but a robot cannot be copied."""
     robot, scene = fake_arena()
     robot.socket = threading.Lock()
 

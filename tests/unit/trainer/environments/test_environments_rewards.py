@@ -1,4 +1,4 @@
-"""The value of each term, and the reward as their sum."""
+"""The terms of a reward, and the reward as their weighted sum."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from palaestra_trainer.environments.rewards import TERMS, WEIGHTS, EpisodeOutcom
 
 SINGLE = tuple(
     it for it in EpisodeOutcome if it is not EpisodeOutcome.DELIVERED
-)  # the possible outcomes of a task with one target
+)  # the possible ends of an episode with one target
 
 
 def transition(
@@ -22,24 +22,24 @@ def transition(
     outcome: EpisodeOutcome = EpisodeOutcome.RUNNING,
     nearest_m: float = 0.4,
 ) -> Transition:
-    """Return a step with these values and no other event."""
+    """Return a step with these values, in which nothing else happened."""
     return Transition(before_m=before_m, after_m=after_m, outcome=outcome, nearest_m=nearest_m)
 
 
 def test_progress_is_what_was_gained_toward_the_target():
-    """Progress is in meters, so a complete drive earns the initial distance to the target."""
+    """Progress is in meters, so all steps together earn the initial distance to the target."""
     assert rewards.progress(transition(1.0, 0.9)) == pytest.approx(0.1)
     assert rewards.progress(transition(0.9, 1.0)) == pytest.approx(-0.1)
 
 
 def test_standing_still_earns_no_progress():
-    """The value is exactly 0; otherwise a policy could exploit rounding errors."""
+    """If the value were not exactly 0, a policy could collect rounding errors."""
     assert rewards.progress(transition(0.7, 0.7)) == 0.0
 
 
 @given(st.lists(st.floats(0.0, 5.0), min_size=2, max_size=20))
 def test_no_detour_earns_more_progress_than_the_straight_way(distances):
-    """The sum of the progress telescopes, so circles earn nothing."""
+    """The progress of all steps adds up to the difference of two distances, so a circle earns nothing."""
     total = sum(
         rewards.progress(transition(before, after)) for before, after in itertools.pairwise(distances)
     )
@@ -49,7 +49,7 @@ def test_no_detour_earns_more_progress_than_the_straight_way(distances):
 
 @pytest.mark.parametrize(("nearest_m", "worth"), [(0.4, 0.0), (0.18, 0.0), (0.105, 0.5), (0.03, 1.0)])
 def test_proximity_grows_as_things_come_nearer(nearest_m, worth):
-    """The agent learns of a collision before it happens, and open floor costs nothing."""
+    """The agent gets a cost before it collides; far from obstacles the cost is 0."""
     assert rewards.proximity(transition(nearest_m=nearest_m)) == pytest.approx(worth)
 
 
@@ -62,25 +62,25 @@ def test_proximity_grows_as_things_come_nearer(nearest_m, worth):
     ],
 )
 def test_a_term_about_the_end_is_one_for_its_own_outcome_only(term, outcome):
-    """No outcome is taken for another, and none is rewarded twice."""
+    """The term of one outcome is 0 for all other outcomes."""
     paid = {it: term(transition(outcome=it)) for it in SINGLE}
 
     assert paid == {it: float(it is outcome) for it in SINGLE}
 
 
 def test_every_step_has_the_same_duration():
-    """This does not depend on the other terms."""
+    """The duration does not depend on what happened in the step."""
     assert {rewards.duration(transition(outcome=it)) for it in EpisodeOutcome} == {1.0}
 
 
 @pytest.mark.parametrize("reward", WEIGHTS)
 def test_a_reward_is_made_of_known_terms(reward):
-    """A misspelled weight would otherwise cost a training run."""
+    """With a misspelled name, the weight would be ignored for the whole training."""
     assert set(WEIGHTS[reward]) <= set(TERMS)
 
 
 def test_terms_are_reported_weighted():
-    """The plotted terms add up to the reward that the policy learns from."""
+    """The plotted terms add up to the reward from which the policy learns."""
     step = transition(1.0, 0.9, EpisodeOutcome.REACHED)
 
     terms = reward_terms("Dense", step)
@@ -89,7 +89,7 @@ def test_terms_are_reported_weighted():
 
 
 def test_sparse_pays_at_the_end_only():
-    """A step on the way earns nothing, however much progress it makes."""
+    """Before the end, a step earns nothing, however near to the target it leads."""
     assert sum(reward_terms("Sparse", transition(2.0, 1.9)).values()) == 0.0
     assert sum(reward_terms("Sparse", transition(outcome=EpisodeOutcome.REACHED)).values()) > 0.0
     assert sum(reward_terms("Sparse", transition(outcome=EpisodeOutcome.COLLIDED)).values()) < 0.0
@@ -98,7 +98,7 @@ def test_sparse_pays_at_the_end_only():
 
 @pytest.mark.parametrize("reward", WEIGHTS)
 def test_each_of_several_targets_is_worth_as_much_as_a_single_one(reward):
-    """The episode continues after all but the last."""
+    """The episode continues after each target but the last one."""
     delivered, reached = (
         reward_terms(reward, transition(outcome=it))
         for it in (EpisodeOutcome.DELIVERED, EpisodeOutcome.REACHED)
@@ -110,7 +110,7 @@ def test_each_of_several_targets_is_worth_as_much_as_a_single_one(reward):
 
 @pytest.mark.parametrize("reward", WEIGHTS)
 def test_reaching_the_target_is_the_best_end(reward):
-    """Neither giving up nor hitting a cylinder early may be better."""
+    """If an early collision or waiting had a higher return, the policy would learn that."""
     worth = {it: sum(reward_terms(reward, transition(outcome=it)).values()) for it in SINGLE}
 
     assert max(worth, key=worth.__getitem__) is EpisodeOutcome.REACHED
@@ -118,5 +118,5 @@ def test_reaching_the_target_is_the_best_end(reward):
 
 
 def test_the_end_of_the_time_is_no_end_of_the_task():
-    """A learner must then estimate the value of the remaining time."""
+    """The learner then estimates the value of the steps that the time limit cut off."""
     assert [it for it in EpisodeOutcome if it.terminal] == [EpisodeOutcome.REACHED, EpisodeOutcome.COLLIDED]

@@ -1,4 +1,4 @@
-"""The interface of a robot and the meaning of its terms."""
+"""The interface of a robot, and the meaning of its movements."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from palaestra_trainer.testing import FakeRobotino, FakeSeeingRobotino
     ],
 )
 def test_movements_come_in_opposite_pairs(movement, other):
-    """A robot that drove one way can return the same way."""
+    """A robot that drove one way can drive the same way back."""
     assert np.add(movement.twist, other.twist).tolist() == [0.0, 0.0, 0.0]
     assert np.any(movement.twist)
 
 
 def test_stop_is_the_movement_that_asks_for_nothing():
-    """Zero is also the first action, so an untrained argmax over equal values stands still."""
+    """STOP is action 0, so an untrained policy with equal values for all actions stands still."""
     assert Movement.STOP == 0
     assert Movement.STOP.twist == (0.0, 0.0, 0.0)
 
 
 def test_a_movement_drives_at_its_twist():
-    """`move` is `drive` with a movement from the enumeration."""
+    """`move(movement)` is `drive` with the velocities of the movement."""
     moving, driving = FakeRobotino(), FakeRobotino()
 
     moving.move(Movement.LEFT)
@@ -43,7 +43,7 @@ def test_a_movement_drives_at_its_twist():
 
 
 def test_a_refusal_names_the_robot_the_task_and_what_is_missing():
-    """It also lists the robot's capabilities, so that the author can choose another task."""
+    """The message also lists the devices that the robot has, so the author can choose another task."""
     with pytest.raises(MissingCapability) as refusal:
         require(FakeRobotino(), (Localization, Cameras, Joints), "Sorting-v0")
 
@@ -54,13 +54,13 @@ def test_a_refusal_names_the_robot_the_task_and_what_is_missing():
 
 
 def test_a_refusal_is_a_mistake_of_the_configuration_and_about_a_sensor():
-    """A job with it ends at once; code that requests a camera still catches the old error class."""
+    """The exit code forbids a retry. Code that catches the older error class of cameras still works."""
     assert issubclass(MissingCapability, ConfigurationError)
     assert issubclass(MissingCapability, NoSuchSensor)
 
 
 def test_a_robot_that_drives_in_every_direction_steers_too():
-    """A task for two wheels therefore works for a Robotino."""
+    """A task for two wheels therefore works with a Robotino too."""
     steered, driven = FakeRobotino(), FakeRobotino()
 
     steered.steer(0.3, 0.5)
@@ -73,7 +73,7 @@ def test_a_robot_that_drives_in_every_direction_steers_too():
 
 @pytest.mark.parametrize("camera", ["color", "depth"])
 def test_a_camera_that_is_not_in_use_has_no_image(camera):
-    """The error names the call that enables it."""
+    """The error has the name of the call that enables the camera."""
     robot = FakeSeeingRobotino()
     robot.use_cameras(**{"depth" if camera == "color" else "color": True})
 

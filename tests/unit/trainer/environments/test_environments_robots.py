@@ -1,4 +1,4 @@
-"""The class of a job's robot is found, and connected with an environment."""
+"""The class of a job's robot is found, and an environment is made with the robot."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from palaestra_trainer.testing import fake_arena, fake_court
 
 @pytest.fixture
 def module(tmp_path, monkeypatch):
-    """`module(source)` makes a module `mybots` with this source importable."""
+    """`module(source)` returns the name of an importable module with this source."""
 
     def write(source):
         (tmp_path / "mybots.py").write_text(source)
@@ -31,17 +31,17 @@ def module(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_a_robot_that_ships_has_a_short_name(name):
-    """Each short name is the name of the class."""
+    """The short name of a built-in robot is the name of its class."""
     assert robot_class(name).__name__ == name
 
 
 def test_a_job_may_name_each_robot_that_ships():
-    """The API imports no trainer, and refuses all other names that are not module:Class."""
+    """The API does not import the trainer, so it has its own list. Other robots are named as module:Class."""
     assert set(ROBOTS) == set(SHIPPED)
 
 
 def test_a_robot_of_your_own_is_named_by_its_module(module):
-    """A subclass with other device names is enough."""
+    """A user may write a subclass with other device names."""
     module(
         "from palaestra_trainer.robots.robotino import Robotino\n"
         "class MyBot(Robotino):\n    definition = 'MYBOT'\n"
@@ -66,7 +66,7 @@ def test_a_robot_of_your_own_is_named_by_its_module(module):
     ],
 )
 def test_what_is_no_class_of_a_robot_is_refused_before_anything_starts(module, name, fact):
-    """The message has the field, the fact and the remedy."""
+    """The message has the field, the mistake and the remedy."""
     module(
         "from palaestra_trainer.robots import Bumper\n"
         "from palaestra_trainer.robots.differential import TurtleBot3Burger\n"
@@ -84,7 +84,7 @@ def test_what_is_no_class_of_a_robot_is_refused_before_anything_starts(module, n
 
 @pytest.fixture
 def sorting():
-    """An environment that needs joints, registered for the test."""
+    """Register an environment that needs a robot with joints, for the time of the test."""
 
     class Sorting(gymnasium.Env):
         needs = (Joints,)
@@ -98,32 +98,32 @@ def sorting():
 
 
 def test_an_environment_is_not_made_for_a_robot_that_does_not_fit(sorting):
-    """The error has the environment's name from the job."""
+    """The message has the environment's name as the job has it."""
     with pytest.raises(MissingCapability, match="FakeRobotino has no Joints, which Sorting-v0 needs"):
         make_environment(Environment(id=sorting), *fake_arena())
 
 
 @pytest.mark.parametrize("name", ["MoveToTargetEnv-v0", "Deliver-v0", "SeeTarget-v0"])
 def test_a_task_of_the_arena_needs_a_robotino(name):
-    """Two wheels are not enough."""
+    """A robot with two wheels cannot drive sideways, as the task requires."""
     with pytest.raises(MissingCapability, match="FakeBurger has no RobotinoAbc"):
         make_environment(Environment(id=name), *fake_court())
 
 
 def test_a_robot_of_joints_without_motors_is_refused():
-    """`JointRobot` itself has no joint names."""
+    """`JointRobot` itself has no joint names; a user's subclass must set them."""
     with pytest.raises(ConfigurationError, match="JointRobot has 0 motors and 0 numbers in greatest"):
         JointRobot(None)
 
 
 def test_what_ships_inherits_what_the_page_says():
-    """docs/howto/robots.md has the table."""
+    """The table in docs/howto/robots.md must agree with the classes."""
     assert issubclass(TurtleBot3Burger, DifferentialDrive)
     assert all(issubclass(robot_class(name), RobotAbc) for name in SHIPPED)
 
 
 def test_a_wrapper_passes_everything_on_to_its_scene():
-    """A user's scene needs to override only one method."""
+    """A user's scene can then override a single method."""
     robot, scene = fake_court()
     wrapped = SceneWrapper(scene)
     pose = robot.pose()

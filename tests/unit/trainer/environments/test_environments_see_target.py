@@ -1,4 +1,4 @@
-"""An environment with camera images: its data sheet, its episodes and its images."""
+"""The task SeeTarget with camera images: its data sheet, its episodes and its images."""
 
 from __future__ import annotations
 
@@ -40,7 +40,10 @@ VARIANTS = [
 
 @pytest.fixture
 def make_env():
-    """Make an environment on a fake robot with cameras: `deaths` are the robot's, the rest are options."""
+    """Make an environment on a fake robot with cameras.
+
+    The robot dies at the steps `deaths`; other keywords are options.
+    """
 
     def with_options(deaths=(), **options):
         return make_seeing(*fake_seeing(deaths), **options)
@@ -49,7 +52,7 @@ def make_env():
 
 
 def play(env, episode, movements):
-    """Return the steps of one episode, each as `step` returned it."""
+    """Return the results of the steps of one episode."""
     env.reset(seed=3, options=episode)
     return [env.step(movement) for movement in movements]
 
@@ -68,7 +71,7 @@ OBSERVATION, REWARD = tables()
 
 @pytest.mark.parametrize("frames", [1, 3])
 def test_the_space_is_the_one_on_the_sheet(make_env, frames):
-    """Shape, bounds and type depend on the number of frames."""
+    """Shape, bounds and type of the space depend on the number of frames."""
     space = make_env(frames=frames).observation_space
 
     assert isinstance(space, spaces.Box)
@@ -79,7 +82,7 @@ def test_the_space_is_the_one_on_the_sheet(make_env, frames):
 
 
 def test_rewards_are_on_the_sheet_with_their_weights():
-    """An empty cell stands for a term that this reward lacks."""
+    """An empty cell means that this reward does not have the term."""
     assert [row["term"] for row in REWARD] == list(TERMS)
     for reward, weights in WEIGHTS.items():
         assert {row["term"]: float(row[reward]) for row in REWARD if row[reward]} == weights
@@ -89,24 +92,24 @@ def test_rewards_are_on_the_sheet_with_their_weights():
     "fact", [f"{REACHED_M:.2f} m", "64 x 48 pixels", f"{fake_camera.POLE_HEIGHT_M} m high"]
 )
 def test_the_task_is_on_the_sheet_with_its_numbers(fact):
-    """The definition of reaching the target must not be hidden in the code."""
+    """A user must find in the docstring when the target counts as reached."""
     assert fact in " ".join(SHEET.split())
 
 
 @pytest.mark.parametrize("options", VARIANTS, ids=lambda it: "-".join(map(str, it.values())))
 def test_gymnasium_has_nothing_to_object_to(make_env, options):
-    """It checks seeds, spaces, types and determinism, and that no array is used twice."""
+    """The checker tests seeds, spaces, types and determinism, and that no array is returned twice."""
     check_env(make_env(**options), skip_render_check=True)
 
 
 @pytest.mark.parametrize("options", VARIANTS[:1] + VARIANTS[2:], ids=["one frame", "three frames"])
 def test_stable_baselines3_has_nothing_to_object_to(make_env, options):
-    """Its checker has its own rules for images."""
+    """The checker of Stable-Baselines3 has additional rules for images."""
     check_env_for_sb3(make_env(**options), skip_render_check=True)
 
 
 def test_the_environment_is_made_by_name():
-    """One line is enough with a fake."""
+    """With a fake robot, one line makes the environment."""
     env = gymnasium.make(NAME, simulator=fake_seeing, frames=3, movements=["FORWARD", "TURN_LEFT"])
 
     assert isinstance(env.unwrapped, SeeTargetEnv)
@@ -114,7 +117,7 @@ def test_the_environment_is_made_by_name():
 
 
 def test_the_pole_is_reached_at_its_distance(make_env):
-    """It is enough to cross the line: the robot need not stand."""
+    """The robot need not stop at the pole."""
     env = make_env()
 
     steps = play(env, BEFORE_THE_POLE, [FORWARD] * 3)
@@ -138,7 +141,7 @@ def test_driving_toward_the_pole_earns_what_was_gained(make_env):
 
 
 def test_a_collision_ends_the_episode(make_env):
-    """The robot feels walls, but not the pole."""
+    """The bumper feels walls, but not the pole."""
     steps = play(make_env(), BEFORE_A_WALL, [FORWARD] * 4)
     ended = next(step for step in steps if step[2])
 
@@ -148,7 +151,7 @@ def test_a_collision_ends_the_episode(make_env):
 
 @pytest.mark.parametrize(("reward", "end"), [("Dense", (False, True)), ("Sparse", (True, False))])
 def test_time_is_up_after_max_steps(make_env, reward, end):
-    """With Dense the episode is truncated, so the learner estimates the rewards that would follow.
+    """With Dense the episode is truncated, so the learner estimates the later rewards.
 
     With Sparse it is terminated, because giving up must cost something.
     """
@@ -159,7 +162,7 @@ def test_time_is_up_after_max_steps(make_env, reward, end):
 
 
 def test_an_observation_is_what_the_camera_sees(make_env):
-    """The colors are in RGB order: the pole is red."""
+    """The colors are in the order red, green, blue: the pole is red."""
     observation, _ = make_env().reset(seed=1, options=BEFORE_THE_POLE)
 
     assert observation.shape == IMAGE
@@ -167,7 +170,7 @@ def test_an_observation_is_what_the_camera_sees(make_env):
 
 
 def test_an_observation_stays_as_it_was_after_the_next_step():
-    """The array of a facade does change: the next image is written to the same memory."""
+    """The facade's own array does change, because the next image is written into the same memory."""
 
     class Reusing(FakeSeeingRobotino):
         buffer = np.zeros(IMAGE, np.uint8)
@@ -188,7 +191,7 @@ def test_an_observation_stays_as_it_was_after_the_next_step():
 
 
 def test_three_frames_are_the_newest_the_oldest_first(make_env):
-    """At the start of an episode there is only one."""
+    """At the start of an episode, all three frames are the first image."""
     env, single = make_env(frames=3), make_env()
     first, _ = env.reset(seed=1)
     seen = [single.reset(seed=1)[0]]
@@ -202,7 +205,7 @@ def test_three_frames_are_the_newest_the_oldest_first(make_env):
 
 
 def test_without_cylinders_episodes_use_the_whole_floor(make_env):
-    """Starts and poles are also at the positions of the arena's cylinders."""
+    """Starts and poles may then be where the arena has its cylinders."""
     env = make_env()
 
     places = [env.reset(seed=seed)[1]["target"] for seed in range(60)]
@@ -211,7 +214,7 @@ def test_without_cylinders_episodes_use_the_whole_floor(make_env):
 
 
 def test_with_cylinders_they_stand_and_starts_keep_clear_of_them(make_env):
-    """A reset removes the cylinders, and they are then placed again."""
+    """A reset removes the cylinders, so the environment places them again."""
     env = make_env(cylinders=True)
 
     for seed in range(30):
@@ -224,7 +227,7 @@ def test_with_cylinders_they_stand_and_starts_keep_clear_of_them(make_env):
 
 
 def test_a_start_in_a_cylinder_is_refused_only_where_there_is_one(make_env):
-    """Without cylinders the position is free."""
+    """Without cylinders, the same position is free."""
     episode = {"start": (0.8, 0.8, math.pi), "target": (-1.0, 0.0)}
     make_env().reset(seed=1, options=episode)
 
@@ -233,13 +236,13 @@ def test_a_start_in_a_cylinder_is_refused_only_where_there_is_one(make_env):
 
 
 def test_a_robot_without_a_camera_is_refused_before_the_first_episode():
-    """The error has a type, and does not come in the middle of a run."""
+    """The error is a mistake of the configuration, and comes before the first step."""
     with pytest.raises(MissingCapability, match="FakeRobotino has no Cameras, which SeeTargetEnv needs"):
         make_seeing(*fake_arena())
 
 
 def test_a_simulator_is_given_back_if_its_robot_has_no_camera(monkeypatch):
-    """Another environment may use it."""
+    """Another environment of the process may then use the simulator."""
     released = []
     robot, scene = fake_arena()
     taken = type("Taken", (), {"robot": robot, "scene": scene, "release": lambda: released.append(True)})
@@ -253,7 +256,7 @@ def test_a_simulator_is_given_back_if_its_robot_has_no_camera(monkeypatch):
 
 
 def test_an_image_of_another_size_is_refused():
-    """The message has both sizes and the place where the size is set."""
+    """The message has both sizes, and the place where the size is set."""
 
     class Large(FakeSeeingRobotino):
         def color_image(self):
@@ -266,7 +269,7 @@ def test_an_image_of_another_size_is_refused():
 
 
 def test_without_mujoco_an_environment_of_its_own_is_refused(monkeypatch):
-    """The message has the package to install, and nothing is started."""
+    """The message has the package to install. No process is started."""
     monkeypatch.delenv("PALAESTRA_CONFIG", raising=False)
     monkeypatch.setattr("importlib.util.find_spec", lambda _name: None)
 
@@ -275,7 +278,7 @@ def test_without_mujoco_an_environment_of_its_own_is_refused(monkeypatch):
 
 
 def test_a_fault_of_the_simulator_comes_through_unchanged(make_env):
-    """The caller decides what it means for learning."""
+    """The caller of the environment decides what a fault means."""
     env = make_env(deaths=(1,))
     env.reset(seed=1)
 
@@ -284,13 +287,13 @@ def test_a_fault_of_the_simulator_comes_through_unchanged(make_env):
 
 
 def test_a_step_before_the_first_reset_is_refused(make_env):
-    """No pole has been placed yet."""
+    """Before the first reset, no pole has been placed."""
     with pytest.raises(ResetNeeded):
         make_env().step(FORWARD)
 
 
 def test_closing_releases_the_simulator_once_it_is_asked():
-    """`on_close` returns a simulator of a configuration."""
+    """`on_close` gives the simulator of a configuration back."""
     closed = []
     env = SeeTargetEnv(*fake_seeing(), on_close=lambda: closed.append(True))
 

@@ -29,7 +29,7 @@ SPACES = {
 
 
 class Count(gymnasium.Env):
-    """An environment that ends after three steps; with `reuses` it always returns the same array."""
+    """An environment that ends after three steps; with `reuses` it returns the same array each time."""
 
     action_space = spaces.Discrete(2)
 
@@ -56,7 +56,7 @@ class Count(gymnasium.Env):
 
 @pytest.fixture
 def registered():
-    """Register the environment, and remove it at the end."""
+    """Register the environment for the time of the test."""
     gymnasium.register(id=NAME, entry_point=Count)
     yield
     gymnasium.registry.pop(NAME, None)
@@ -69,7 +69,7 @@ def made(**task):
 
 @pytest.mark.parametrize("name", SPACES)
 def test_frames_are_stacked_as_stable_baselines_does(name):
-    """Hyperparameters that were tuned with its VecFrameStack rely on its layout and its zeros."""
+    """Hyperparameters that were tuned with VecFrameStack depend on its layout and its zeros."""
     space = SPACES[name]
     theirs = VecFrameStack(DummyVecEnv([lambda: Count(space=space, reuses=False)]), 3)
     ours = StackedFrames(Count(space=space), 3)
@@ -90,7 +90,7 @@ def test_frames_are_stacked_as_stable_baselines_does(name):
 def test_each_frame_has_the_bounds_of_its_numbers():
     """VecFrameStack of Stable-Baselines3 repeats the bounds of the first number.
 
-    Bounds that differ from the numbers' own would refuse valid observations.
+    If a number had the bounds of another one, valid observations would be rejected.
     """
     bounds = StackedFrames(Count(), 2).observation_space
 
@@ -99,7 +99,7 @@ def test_each_frame_has_the_bounds_of_its_numbers():
 
 
 def test_an_observation_that_was_returned_does_not_change_later():
-    """Otherwise every row of a buffer would have the newest frames."""
+    """A buffer keeps the returned arrays, and each row would get the newest frames."""
     env = StackedFrames(Count(), 2)
     first, _ = env.reset()
     kept = first.copy()
@@ -111,7 +111,7 @@ def test_an_observation_that_was_returned_does_not_change_later():
 
 
 def test_an_observation_of_another_kind_cannot_be_stacked():
-    """compute_reward could not use a stacked goal."""
+    """Hindsight replay calls `compute_reward` with a goal, which must not be stacked."""
     env = Count()
     env.observation_space = spaces.Dict({"a": SPACES["numbers"]})
 
@@ -121,7 +121,7 @@ def test_an_observation_of_another_kind_cannot_be_stacked():
 
 @pytest.mark.usefixtures("registered")
 def test_wrappers_are_put_around_the_environment_in_their_order():
-    """The first is the innermost: the second gets its reward."""
+    """The first wrapper is the innermost, so the second one gets its reward."""
     reward = {"name": f"{HERE}:ClipReward", "options": {"min_reward": -1, "max_reward": 2}}
     limit = {"name": f"{HERE}:TimeLimit", "options": {"max_episode_steps": 2}}
     env = made(wrappers=[reward, limit], frameStack=2)
@@ -137,7 +137,7 @@ def test_wrappers_are_put_around_the_environment_in_their_order():
 
 
 def layers(env):
-    """Yield an environment and those inside it."""
+    """Yield an environment and all environments inside it."""
     yield env
     if isinstance(env, gymnasium.Wrapper):
         yield from layers(env.env)
@@ -161,7 +161,7 @@ def layers(env):
     ],
 )
 def test_a_wrapper_that_cannot_be_used_is_refused_before_a_simulator_starts(wrapper, fact):
-    """Its class alone shows what does not fit."""
+    """The class alone shows the mistake, so no simulator need be started."""
     with pytest.raises(ConfigurationError, match=r"environment\.wrappers\[0\]") as refusal:
         keywords(Environment(id=NAME, wrappers=[wrapper]))
 
@@ -170,7 +170,7 @@ def test_a_wrapper_that_cannot_be_used_is_refused_before_a_simulator_starts(wrap
 
 @pytest.mark.usefixtures("registered")
 def test_a_wrapper_that_raises_is_named():
-    """The job's author may have written it."""
+    """The author of the job may have written the wrapper."""
     wrapper = {"name": f"{HERE}:TimeLimit", "options": {"max_episode_steps": -1}}
 
     with pytest.raises(
@@ -182,7 +182,7 @@ def test_a_wrapper_that_raises_is_named():
 @pytest.mark.usefixtures("registered")
 @pytest.mark.parametrize("name", ["NormalizeObservation", "NormalizeReward"])
 def test_wrappers_with_statistics_are_refused_as_ever(name):
-    """No model stores them, and each simulator would have its own."""
+    """No model stores these statistics, and each simulator would have its own."""
     env = made(wrappers=[{"name": f"{HERE}:{name}"}])
 
     with pytest.raises(ConfigurationError, match=f"{name} has statistics that the policy's file lacks"):
@@ -190,7 +190,7 @@ def test_wrappers_with_statistics_are_refused_as_ever(name):
 
 
 def test_without_wrappers_the_environment_stays_as_it_is():
-    """A job that asks for nothing gets nothing around it."""
+    """A job without wrappers must get the environment itself."""
     env = Count()
 
     assert wrapped(env, Environment(id=NAME)) is env

@@ -1,4 +1,4 @@
-"""The vectors for Stable-Baselines3 have the interface of the library's own, with the same environments."""
+"""The vector environments for Stable-Baselines3 have the interface of Stable-Baselines3's own."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ PICTURE = np.full((4, 6, 3), 7, np.uint8)
 
 
 class Slope(gymnasium.Env):
-    """An environment that reports its level, which a curriculum raises."""
+    """An environment that returns its level in the info; a curriculum may raise the level."""
 
-    metadata = {"render_modes": ["rgb_array"]}  # noqa: RUF012 - as in every environment
+    metadata = {"render_modes": ["rgb_array"]}  # noqa: RUF012 - as in each environment
     observation_space = spaces.Box(-1, 1, (1,), np.float32)
     action_space = spaces.Discrete(2)
     level = 0
@@ -44,22 +44,22 @@ class Slope(gymnasium.Env):
         return np.zeros(1, np.float32), 0.0, False, False, {"level": self.level}
 
     def render(self):
-        """Return the picture."""
+        """Return an image."""
         return PICTURE
 
     def twice(self, number):
-        """Return the double."""
+        """Return twice the number."""
         return 2 * number
 
 
 def wrapped(render_mode=None):
-    """Return the environment in a wrapper."""
+    """Return the environment inside a wrapper."""
     return TimeLimit(Slope(render_mode), 50)
 
 
 @pytest.fixture
 def restarters(make_member):
-    """Make restarters of members with the environment."""
+    """Return a function that makes restarters of simulators with the environment."""
 
     def make(render_mode=None):
         members = [make_member(f"collect-{index}") for index in range(MEMBERS)]
@@ -88,7 +88,7 @@ CALLS = {
 
 @pytest.fixture(scope="module", params=["in this process", "in processes"])
 def reference(request):
-    """A vector of Stable-Baselines3."""
+    """Yield a vector environment of Stable-Baselines3."""
     if request.param == "in this process":
         env = DummyVecEnv([wrapped] * MEMBERS)
     else:
@@ -100,7 +100,7 @@ def reference(request):
 @pytest.mark.parametrize("call", CALLS.values(), ids=CALLS)
 @pytest.mark.parametrize("make", VECTORS.values(), ids=VECTORS)
 def test_a_vector_answers_as_those_of_stable_baselines3(restarters, make, call, reference):
-    """Callbacks of others are written for them."""
+    """Callbacks of other projects are written for Stable-Baselines3's vectors."""
     assert call(make(restarters())) == call(reference)
 
 
@@ -108,7 +108,7 @@ def test_a_vector_answers_as_those_of_stable_baselines3(restarters, make, call, 
 @pytest.mark.parametrize("make", VECTORS.values(), ids=VECTORS)
 @pytest.mark.filterwarnings("ignore:.*render:UserWarning")
 def test_a_vector_draws_as_that_of_stable_baselines3(restarters, make, render_mode):
-    """`render` returns one picture of all members, or None."""
+    """`render` returns one image of all environments, or None without a render mode."""
     env, reference = make(restarters(render_mode)), DummyVecEnv([lambda: wrapped(render_mode)] * MEMBERS)
 
     assert np.array_equal(env.get_images(), reference.get_images())
@@ -117,7 +117,7 @@ def test_a_vector_draws_as_that_of_stable_baselines3(restarters, make, render_mo
 
 @pytest.mark.parametrize("make", VECTORS.values(), ids=VECTORS)
 def test_the_options_of_the_next_reset_reach_the_environments_once(restarters, make):
-    """A program's options are added to those that a run gives."""
+    """The options of a program are added to those that a run passes to each reset."""
     env = make(restarters())
     env.set_options([{"start": index} for index in range(MEMBERS)])
 
@@ -131,7 +131,10 @@ def test_the_options_of_the_next_reset_reach_the_environments_once(restarters, m
 
 @pytest.mark.parametrize("make", VECTORS.values(), ids=VECTORS)
 def test_an_attribute_that_is_set_is_the_one_that_the_environment_reads(restarters, make):
-    """Curricula set attributes. A new attribute is set in the environment, and not in a wrapper."""
+    """Curricula set attributes.
+
+    A new attribute must be set in the environment itself, and not in its wrapper.
+    """
     env = make(restarters())
     env.reset()
 
@@ -146,7 +149,7 @@ def test_an_attribute_that_is_set_is_the_one_that_the_environment_reads(restarte
 
 
 def test_a_simulator_that_takes_over_has_the_attributes_that_were_set(restarters):
-    """The environment of a standby is another object."""
+    """The standby has an environment of its own, which needs the attribute too."""
     [restarter, *_] = restarters()
     env = SimulatorsVecEnv([restarter], 1)
     env.reset()
@@ -161,7 +164,10 @@ def test_a_simulator_that_takes_over_has_the_attributes_that_were_set(restarters
 def test_an_attribute_that_is_set_while_a_simulator_is_mended_is_there_in_its_next_episode(
     restarters, monkeypatch
 ):
-    """The restarter's own thread uses the simulator meanwhile."""
+    """During a restart, only the restarter's thread may use the environment.
+
+    So the attribute is set later.
+    """
     [restarter, *_] = restarters()
     env = SimulatorsVecEnv([restarter], 1)
     env.reset()
@@ -176,7 +182,7 @@ def test_an_attribute_that_is_set_while_a_simulator_is_mended_is_there_in_its_ne
 
 
 def test_a_vector_of_gymnasium_has_calls_and_attributes_as_the_library_s_own(restarters):
-    """Loops of other libraries read and set them."""
+    """Training loops of other libraries call methods and read and set attributes."""
     env = FaultTolerantVectorEnv(EnvGroup(restarters("rgb_array"), lambda: None))
     reference = SyncVectorEnv([lambda: wrapped("rgb_array")] * MEMBERS)
 

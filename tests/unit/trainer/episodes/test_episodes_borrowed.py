@@ -1,6 +1,7 @@
-"""An environment may keep and change every object that it gets or returns.
+"""An environment may keep and change each object that it gets or returns.
 
-Each test uses a hostile environment, and an honest one that returns new objects. The results must be equal.
+Each test plays with a hostile environment, and with an honest one that returns new objects. The results must
+be equal.
 """
 
 from __future__ import annotations
@@ -29,33 +30,33 @@ ACTED = spaces.Box(-1, 1, (2,), np.float32)
 
 
 class Honest(gymnasium.Env):
-    """Episodes of three steps; every returned object is new."""
+    """An environment with episodes of three steps, in which each returned object is new."""
 
     observation_space, action_space = OBSERVED, ACTED
 
     def reset(self, *, seed=None, options=None):
-        """Begin an episode that does not depend on earlier ones."""
+        """Begin an episode, whose course does not depend on earlier ones."""
         super().reset(seed=seed)
         self.step_number, self.sum = 0, np.zeros(2, np.float32)
         return self.seen(np.full(2, -50, np.float32)), {"begun": [seed is not None, dict(options or {})]}
 
     def step(self, action):
-        """Add the action."""
+        """Add the action to the state."""
         self.step_number += 1
         self.sum = self.sum + action
         seen = self.seen(self.sum + self.step_number)
         return seen, float(self.sum[0]), False, self.step_number == LENGTH, {"sums": [self.sum.tolist()]}
 
     def seen(self, numbers):
-        """Return an observation."""
+        """Return a new observation."""
         return {"numbers": numbers, "place": self.step_number}
 
 
 class Hostile(Honest):
-    """An environment that always returns the same objects, and changes those that it gets."""
+    """An environment that always returns the same objects, and changes the objects that it gets."""
 
     def __init__(self):
-        self.numbers = np.zeros(4, np.float32)[::2]  # a view that is not contiguous
+        self.numbers = np.zeros(4, np.float32)[::2]  # an array that is not contiguous
         self.observation = {"numbers": self.numbers, "place": 0}
         self.sums = []
         self.info = {}
@@ -69,7 +70,7 @@ class Hostile(Honest):
         return seen, self.info
 
     def step(self, action):
-        """Add the action, and overwrite it."""
+        """Add the action to the state, and overwrite it."""
         seen, reward, terminated, truncated, info = super().step(action)
         action *= 0
         self.info.clear()
@@ -78,7 +79,7 @@ class Hostile(Honest):
         return seen, reward, terminated, truncated, self.info
 
     def seen(self, numbers):
-        """Return the only observation object."""
+        """Return the one observation object."""
         self.numbers[:] = numbers
         self.observation["place"] = self.step_number
         return self.observation
@@ -100,7 +101,7 @@ class Frozen(Hostile):
 
 @pytest.fixture
 def restarter(make_member):
-    """The restarter of a member with an environment."""
+    """Return a function that makes the restarter of a simulator with an environment."""
 
     def make(environment):
         member = make_member("collect-0")
@@ -111,32 +112,32 @@ def restarter(make_member):
 
 
 def actions():
-    """Return the actions of one simulator, the same for every environment."""
+    """Return the actions of one simulator, which are the same for each environment."""
     return np.random.default_rng(1).uniform(-1, 1, (STEPS, 1, 2)).astype(np.float32)
 
 
 def collected(restarter):
-    """Return the rows of the training loop, and the actions that an exact resume repeats."""
+    """Return the rows of the training loop, and the actions that an exact resume would repeat."""
     env = SimulatorsVecEnv([restarter], 1)
     rows = [env.reset(), *(env.step(action) for action in actions())]
     return rows, env.reset_infos, env.snapshot()[0].actions
 
 
 def tolerated(restarter):
-    """Return the rows of Stable-Baselines3's interface."""
+    """Return the rows of the vector environment for Stable-Baselines3."""
     env = FaultTolerantVecEnv(EnvGroup([restarter], lambda: None))
     env.seed(1)
     return [env.reset(), *(env.step(action) for action in actions())], env.reset_infos
 
 
 def vectorized(restarter):
-    """Return the rows of gymnasium's vector interface."""
+    """Return the rows of the vector environment for gymnasium."""
     env = FaultTolerantVectorEnv(EnvGroup([restarter], lambda: None))
     return [env.reset(seed=1, options={"word": 1}), *(env.step(action) for action in actions())]
 
 
 def alone(restarter):
-    """Return the rows of a single environment."""
+    """Return the rows of the environment for a single simulator."""
     env = FaultTolerantEnv(EnvGroup([restarter], lambda: None))
     rows = []
     for number, [action] in enumerate(actions()):
@@ -162,7 +163,7 @@ class Fixed:
 
 
 def plain(value):
-    """Return a value with its arrays as lists, and without the duration of episodes."""
+    """Return a value with its arrays as lists, and without the durations of episodes."""
     if isinstance(value, dict):
         return {key: plain(part) for key, part in value.items() if key != "t"}
     if isinstance(value, list | tuple):
@@ -173,12 +174,15 @@ def plain(value):
 @pytest.mark.parametrize("played", [collected, tolerated, vectorized, alone, evaluated])
 @pytest.mark.parametrize("hostile", [Hostile, Frozen])
 def test_what_an_environment_does_with_its_objects_changes_nothing(restarter, played, hostile):
-    """Else a last observation is the next episode's first, and an exact resume repeats other actions."""
+    """Otherwise the last observation would be the next episode's first.
+
+    A resume would repeat other actions.
+    """
     assert plain(played(restarter(hostile))) == plain(played(restarter(Honest)))
 
 
 def test_actions_of_the_training_loop_stay_as_they_are(restarter):
-    """The actions go into the buffer after the step."""
+    """The loop stores the actions in a buffer after the step."""
     given = actions()[0]
     env = SimulatorsVecEnv([restarter(Hostile)], 1)
     env.reset()
@@ -189,16 +193,16 @@ def test_actions_of_the_training_loop_stay_as_they_are(restarter):
 
 
 class Judge(Honest):
-    """A task that computes rewards in the memory of the goals."""
+    """A task that writes the rewards into the memory of the goals."""
 
     def compute_reward(self, achieved, desired, _info):
-        """Return the distance."""
+        """Return the distances of the goals."""
         achieved -= desired
         return np.abs(achieved).sum(axis=1)
 
 
 def test_goals_whose_reward_was_computed_stay_as_they_are(restarter):
-    """Hindsight replay learns from them afterwards."""
+    """Hindsight replay learns from the goals after their reward was computed."""
     env = SimulatorsVecEnv([restarter(Honest)], 1, judge=Judge())
     achieved, desired = np.ones((4, 2)), np.zeros((4, 2))
 
@@ -209,19 +213,19 @@ def test_goals_whose_reward_was_computed_stay_as_they_are(restarter):
 
 
 class Rising(Honest):
-    """An environment that raises its own level at each reset, and keeps its list."""
+    """An environment that raises its own level at each reset, and records its levels."""
 
     level, words = 0, ()
 
     def reset(self, *, seed=None, options=None):
-        """Begin an episode on the next level."""
+        """Raise the level, and begin an episode."""
         self.level += 1
         self.words = [*self.words, self.level]
         return super().reset(seed=seed, options=options)
 
 
 def test_an_attribute_is_set_once_and_what_the_environment_makes_of_it_stays(restarter):
-    """A level that a curriculum sets once, and that the environment raises, fell back at the next reset."""
+    """Before, a level that a curriculum had set once returned to that value at each reset."""
     env = SimulatorsVecEnv([restarter(Rising)], 1)
     env.reset()
     words = ["first"]
@@ -237,17 +241,20 @@ def test_an_attribute_is_set_once_and_what_the_environment_makes_of_it_stays(res
 
 
 class WithWords(Honest):
-    """An environment whose infos have keys with another meaning here and in Stable-Baselines3."""
+    """An environment with keys in its infos that have another meaning here and in Stable-Baselines3."""
 
     def step(self, action):
-        """Take a step."""
+        """Take a step, and return these keys."""
         *others, _ = super().step(action)
         words = ("valid", "episode", "sim_fault", "recovering", "extra_steps", "terminal_observation")
         return *others, {**dict.fromkeys(words, "mine"), "palaestra": "mine"}
 
 
 def test_words_of_an_environment_are_not_taken_for_ours(restarter):
-    """Words that only Stable-Baselines3 may use are moved, and the log says so; all others stay."""
+    """Keys that Stable-Baselines3 uses itself are moved to `hidden`, and a log line reports this.
+
+    All others stay.
+    """
     env = SimulatorsVecEnv([restarter(WithWords)], 1)
     env.reset()
     with structlog.testing.capture_logs() as logged:
@@ -262,7 +269,7 @@ def test_words_of_an_environment_are_not_taken_for_ours(restarter):
 
 
 def test_a_copy_shares_nothing_that_can_be_written_into():
-    """Objects of other classes are shared, because a robot in an info cannot be copied."""
+    """A robot in an info cannot be copied, so objects of other classes are shared."""
     robot = object()
     value = {"array": np.zeros((2, 2), order="F"), "parts": [({1, 2}, bytearray(b"a"))], "robot": robot}
 

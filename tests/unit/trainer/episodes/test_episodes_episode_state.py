@@ -1,4 +1,4 @@
-"""The episode state of each member is small, and is restored through the environment's interface."""
+"""The state of an episode is its number and its actions; playing the actions again restores the episode."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ RIGHT, LEFT = 1, 0
 
 @pytest.fixture
 def make_env(make_member):
-    """Make a VecEnv of corridors; each argument sets when a member breaks."""
+    """Return a function that makes a VecEnv of corridors; an argument sets the faults of a simulator."""
 
     def make(*faults, run_seed=1):
         members = [make_member(f"collect-{index}", **given) for index, given in enumerate(faults)]
@@ -25,12 +25,12 @@ def make_env(make_member):
 
 
 def play(env, actions):
-    """Return the results of vector steps with these actions."""
+    """Return the results of vector steps with these actions, the same for all simulators."""
     return [env.step(np.full(env.num_envs, action)) for action in actions]
 
 
 def told(rows):
-    """Return the parts of some rows that must be equal when they are repeated."""
+    """Return the parts of some rows that must be equal when the rows are repeated."""
     return [
         (observations.tolist(), rewards.tolist(), dones.tolist(), [told_of(info) for info in infos])
         for observations, rewards, dones, infos in rows
@@ -38,20 +38,20 @@ def told(rows):
 
 
 def told_of(info):
-    """Return return and length of the episode in an info."""
+    """Return the return and the length of the episode that ends with this info."""
     episode = info.get("episode")
     return episode and (episode["r"], episode["l"])
 
 
 def test_before_the_first_reset_no_episode_is_under_way(make_env):
-    """A run may be interrupted while its simulators start."""
+    """A signal may interrupt a run while its simulators start."""
     env, _ = make_env({}, {})
 
     assert [(state.episode, state.actions) for state in env.snapshot()] == [(0, None)] * 2
 
 
 def test_a_snapshot_has_the_episode_s_number_and_its_actions(make_env):
-    """These two suffice to restore it."""
+    """The number gives the seed, and the actions lead to the same state."""
     env, _ = make_env({})
     env.reset()
     play(env, [RIGHT, RIGHT, RIGHT, LEFT, RIGHT])
@@ -63,7 +63,7 @@ def test_a_snapshot_has_the_episode_s_number_and_its_actions(make_env):
 
 
 def test_a_snapshot_stays_as_it_was(make_env):
-    """It is taken every few steps, and may be saved after further ones."""
+    """A checkpoint may be written after the next steps."""
     env, _ = make_env({})
     env.reset()
     play(env, [LEFT] * 2)
@@ -78,7 +78,7 @@ def test_a_snapshot_stays_as_it_was(make_env):
 
 @pytest.mark.parametrize("steps", range(12))
 def test_what_follows_a_resume_is_what_would_have_been(make_env, steps):
-    """Observations, rewards, ends, returns and lengths are equal, from any step of an episode."""
+    """From each step of an episode, observations, rewards, ends, returns and lengths are equal."""
     actions = [RIGHT, LEFT, RIGHT, RIGHT, LEFT, RIGHT, RIGHT, RIGHT, LEFT, RIGHT, RIGHT, RIGHT] * 2
     env, _ = make_env({}, {})
     env.reset()
@@ -95,7 +95,7 @@ def test_what_follows_a_resume_is_what_would_have_been(make_env, steps):
 
 
 def test_members_are_resumed_where_each_one_was(make_env):
-    """One is ahead of the other, and one has no episode."""
+    """One simulator is further than another, and a third has no episode."""
     env, members = make_env({}, {}, {})
 
     observations = env.resume(
@@ -108,7 +108,10 @@ def test_members_are_resumed_where_each_one_was(make_env):
 
 
 def test_an_episode_that_ends_early_when_it_is_played_again_is_left(make_env):
-    """Training must also work with an environment that does not repeat itself."""
+    """The environment is not deterministic, so the saved actions do not fit any more.
+
+    The next episode begins.
+    """
     env, _ = make_env({})
 
     observations = env.resume([EpisodeState(4, np.array([RIGHT] * 5))])
@@ -119,7 +122,7 @@ def test_an_episode_that_ends_early_when_it_is_played_again_is_left(make_env):
 
 @pytest.mark.parametrize("action", [1, np.int64(1), np.float32(0.5), np.zeros((2, 3), np.float32)])
 def test_a_log_keeps_actions_as_they_are(action):
-    """They are equal bit for bit, also beyond the initial capacity."""
+    """The type of the actions is kept, also when the log grows beyond its first size."""
     log = ActionLog()
     early = log.taken()
     for _ in range(40):
@@ -132,7 +135,7 @@ def test_a_log_keeps_actions_as_they_are(action):
 
 
 def test_continuous_actions_are_kept_by_row():
-    """An action of velocities has several numbers."""
+    """An action of velocities consists of several numbers."""
     log = ActionLog()
     space = spaces.Box(-1.0, 1.0, (3,), np.float32, seed=1)
     wanted = [space.sample() for _ in range(20)]

@@ -1,4 +1,4 @@
-"""The evaluation of a policy."""
+"""The evaluation of a policy: its episodes, faults of simulators, and its end."""
 
 from __future__ import annotations
 
@@ -13,28 +13,28 @@ from palaestra_trainer.simulators.restarter import Restarter
 
 
 class Losses(NullWatcher):
-    """A watcher that adds up the steps of episodes that faults cut."""
+    """A watcher that counts the steps of episodes that a fault cut."""
 
     steps = 0
 
     def fault(self, simulator, fault, steps_lost):
-        """Add the steps."""
+        """Add the lost steps."""
         del simulator, fault
         self.steps += steps_lost
 
 
 class Walker:
-    """A policy that walks right if the seed's last digit is even, and left otherwise."""
+    """A policy that walks right if the seed's last digit is even, and otherwise left."""
 
     def predict(self, observation, state=None, episode_start=None, *, deterministic=False):
-        """Choose an action."""
+        """Return the action, and the state unchanged."""
         assert deterministic
         assert episode_start.shape == (1,)
         return int(round(float(observation[1]) * 10) % 2 == 0), state
 
 
 def test_every_seed_is_an_episode(make_member):
-    """Two of three seeds are even."""
+    """Two of the three seeds are even, so two episodes succeed."""
     member = make_member()
 
     evaluation = evaluate(Walker(), member, [10, 21, 32])
@@ -49,7 +49,7 @@ def test_every_seed_is_an_episode(make_member):
 
 
 def test_an_evaluation_measures_the_whole_task_at_any_time(make_member):
-    """The success rate of an early stage of a curriculum would otherwise stop the training."""
+    """With an early stage of a curriculum, the success rate would end the training too soon."""
     member = make_member()
 
     evaluate(Walker(), member, [10, 20])
@@ -58,7 +58,7 @@ def test_an_evaluation_measures_the_whole_task_at_any_time(make_member):
 
 
 def test_a_faulted_episode_is_played_again_with_its_seed(make_member):
-    """All policies are evaluated on the same episodes, even if a simulator breaks."""
+    """All policies are compared on the same episodes, even if a simulator breaks."""
     member, losses = make_member(steps=[5]), Losses()
 
     evaluation = evaluate(Walker(), Restarter(member, watcher=losses), [10, 20])
@@ -69,7 +69,7 @@ def test_a_faulted_episode_is_played_again_with_its_seed(make_member):
 
 
 def test_a_spent_budget_ends_an_evaluation(make_member):
-    """As it ends training."""
+    """A spent budget also ends training, so an evaluation must not hide it."""
     restarter = Restarter(make_member(steps=range(1, 100)), RestartLimit(restarts=3))
 
     with pytest.raises(FaultBudgetSpent):
@@ -78,7 +78,7 @@ def test_a_spent_budget_ends_an_evaluation(make_member):
 
 @pytest.mark.parametrize("evaluators", [1, 2, 3, 5])
 def test_several_simulators_share_the_episodes(make_member, evaluators):
-    """The result does not depend on how many there are, nor does its order."""
+    """The result and its order do not depend on the number of simulators."""
     restarters = [Restarter(make_member(f"evaluate-{index}")) for index in range(evaluators)]
 
     evaluation = evaluate_on_all(Walker(), restarters, [10, 21, 32, 43])
@@ -88,7 +88,7 @@ def test_several_simulators_share_the_episodes(make_member, evaluators):
 
 
 def test_an_evaluation_can_be_given_up_between_episodes(make_member):
-    """A signal must not wait for a hundred episodes."""
+    """After a signal, a run cannot wait for the rest of a hundred episodes."""
     calls = iter([None, KeyboardInterrupt()])
 
     def check():
@@ -101,7 +101,7 @@ def test_an_evaluation_can_be_given_up_between_episodes(make_member):
 
 @pytest.mark.parametrize("first", [True, False])
 def test_what_ends_one_simulator_s_episodes_ends_all(make_member, first):
-    """After Ctrl-C the other half of the episodes must not run."""
+    """After Ctrl-C, the other simulators must not continue with their episodes."""
     broken = Restarter(make_member(steps=range(1, 100)), RestartLimit(restarts=0))
     other = make_member("evaluate-1")
     restarters = [broken, Restarter(other)] if first else [Restarter(other), broken]
@@ -113,7 +113,7 @@ def test_what_ends_one_simulator_s_episodes_ends_all(make_member, first):
 
 
 def test_the_episodes_of_a_broken_simulator_move_to_the_others(make_member):
-    """The evaluation must not wait for the restart."""
+    """The evaluation must not wait for the restart of the broken simulator."""
     broken = make_member("evaluate-0", steps=[1], held=True)
     other = make_member("evaluate-1")
 
@@ -127,7 +127,7 @@ def test_the_episodes_of_a_broken_simulator_move_to_the_others(make_member):
 
 @pytest.mark.parametrize("alone", [True, False])
 def test_a_simulator_that_is_given_up_leaves_its_episodes_to_the_others(make_member, alone):
-    """This holds even if they have already finished their own."""
+    """The other simulators may already have played all their own episodes."""
     group = Group(2, least=1)
     restarters = [
         Restarter(make_member("evaluate-0", steps=range(1, 100)), RestartLimit(restarts=1), group=group),
@@ -142,7 +142,7 @@ def test_a_simulator_that_is_given_up_leaves_its_episodes_to_the_others(make_mem
 
 
 def test_without_any_simulator_left_there_is_no_evaluation(make_member):
-    """An evaluation would wait for ever."""
+    """The evaluation ends with an error, because no simulator would ever play the episodes."""
     restarter = Restarter(make_member(steps=range(1, 100)), RestartLimit(restarts=0), group=Group(2, least=1))
 
     with pytest.raises(FaultBudgetSpent, match="every evaluating simulator was given up"):
@@ -150,7 +150,7 @@ def test_without_any_simulator_left_there_is_no_evaluation(make_member):
 
 
 def test_a_signal_does_not_wait_for_a_simulator_that_is_mended(make_member):
-    """Its restart may take a minute, several times."""
+    """A restart may take a minute, several times over, but a pod has little time after SIGTERM."""
     member = make_member(steps=[1], held=True)
     looks = []
 
@@ -165,7 +165,7 @@ def test_a_signal_does_not_wait_for_a_simulator_that_is_mended(make_member):
 
 
 def test_more_success_counts_before_more_return(make_member):
-    """A policy that collects other rewards without success is not better."""
+    """A policy may collect other rewards without ever succeeding."""
     good, bad = (evaluate(Walker(), make_member(), [seed]) for seed in (10, 21))
 
     assert good.score > bad.score
@@ -173,14 +173,14 @@ def test_more_success_counts_before_more_return(make_member):
 
 
 def test_a_recurrent_policy_keeps_its_state_over_an_episode_and_begins_the_next_without_it(make_member):
-    """An LSTM that forgets its state at each step would be another policy than the trained one."""
+    """An LSTM whose state is lost at each step acts differently from the trained policy."""
     seen = []
 
     class Counter:
         """A policy whose state is the number of its steps."""
 
         def predict(self, _observation, state=None, episode_start=None, *, deterministic=False):
-            """Walk right."""
+            """Walk right, and count the step."""
             assert deterministic
             seen.append((state, episode_start.tolist()))
             return 1, (state or 0) + 1

@@ -1,4 +1,4 @@
-"""Evaluation episodes are recorded from above, in a bounded size."""
+"""Films of evaluation episodes, seen from above, in a bounded size."""
 
 from __future__ import annotations
 
@@ -20,30 +20,33 @@ FLOOR = FloorLayout(
 
 
 class Walked:
-    """A member whose robot is `at` meters from its start; the target moves at `moves` meters."""
+    """A simulator whose robot is `at` meters from its start.
+
+    The target jumps when the robot has driven `moves` meters.
+    """
 
     def __init__(self, moves: int = 10**9) -> None:
         self.moves = moves
         self.at = 0
 
     def sight(self):
-        """Return where the robot is."""
+        """Return the pose of the robot and the position of the target."""
         target = (9.0, 0.0) if self.at >= self.moves else (3.0, 0.0)
         pose = Pose(float(self.at), 0.0, 0.5)
         return Sight(pose=pose, target=target, floor=FLOOR, radius_m=0.2, period_s=0.1)
 
 
 class RightWalker:
-    """A policy that walks right, or left where the seed's last digit is odd."""
+    """A policy that walks right if the seed's last digit is even, and otherwise left."""
 
     def predict(self, observation, state=None, episode_start=None, *, deterministic=False):
-        """Choose an action."""
+        """Return the action, and the state unchanged."""
         del episode_start, deterministic
         return int(round(float(observation[1]) * 10) % 2 == 0), state
 
 
 def record(member, looks):
-    """Return the film after so many looks, one at each meter."""
+    """Return the film of a robot that drives one meter between looks."""
     filming = Filming(member)
     for at in range(looks):
         if member:
@@ -53,7 +56,7 @@ def record(member, looks):
 
 
 def test_a_film_has_each_pose_the_floor_and_the_target():
-    """A replay shows nothing else."""
+    """The replay in a report is made of these values alone."""
     content = record(Walked(moves=2), 4).to_json()
 
     assert content["poses"] == [[0.0, 0.0, 0.5], [1.0, 0.0, 0.5], [2.0, 0.0, 0.5], [3.0, 0.0, 0.5]]
@@ -65,7 +68,7 @@ def test_a_film_has_each_pose_the_floor_and_the_target():
 
 @pytest.mark.parametrize("looks", [MOST_FRAMES, MOST_FRAMES + 1, 2 * MOST_FRAMES + 2, 20_000])
 def test_a_long_episode_takes_no_more_space_than_a_short_one(looks):
-    """Its frames are further apart, by the same time each."""
+    """A film has a largest number of frames, so the frames of a long episode are further apart."""
     film = record(Walked(), looks)
 
     content = film.to_json()
@@ -76,7 +79,7 @@ def test_a_long_episode_takes_no_more_space_than_a_short_one(looks):
 
 
 def test_a_member_that_is_on_no_floor_is_not_recorded(make_member):
-    """The report then has everything but the replay."""
+    """The report has all its other parts."""
     [episode] = evaluate(RightWalker(), make_member(), [10]).episodes
 
     assert episode.film is None
@@ -84,7 +87,7 @@ def test_a_member_that_is_on_no_floor_is_not_recorded(make_member):
 
 
 def test_an_evaluation_records_its_episodes_from_the_reset_to_the_end(make_member):
-    """The first pose is that of the start."""
+    """The first pose is the one right after the reset."""
     member = make_member()
     member.sight = Walked().sight
 
@@ -94,7 +97,7 @@ def test_an_evaluation_records_its_episodes_from_the_reset_to_the_end(make_membe
 
 
 def test_the_best_a_median_and_a_failed_episode_are_kept(make_member, tmp_path):
-    """They show what the policy can do, what it usually does, and what it still does wrong."""
+    """These films show what the policy can do, what it usually does, and what it still does wrong."""
     member = make_member()
     member.sight = Walked().sight
     evaluation = evaluate(RightWalker(), member, [10, 12, 21])
@@ -107,7 +110,7 @@ def test_the_best_a_median_and_a_failed_episode_are_kept(make_member, tmp_path):
 
 
 def test_no_episode_is_kept_twice(make_member):
-    """If only one episode was played, it is the best, the median and the worst one."""
+    """A single episode is the best, the median and the worst episode at once."""
     member = make_member()
     member.sight = Walked().sight
 
@@ -115,7 +118,7 @@ def test_no_episode_is_kept_twice(make_member):
 
 
 def test_an_evaluation_without_recordings_writes_no_file(make_member, tmp_path):
-    """A report then has no section for them."""
+    """The report then has no section for films."""
     keep_replays(RunDirectory(tmp_path), evaluate(RightWalker(), make_member(), [10]), "a test")
 
     assert not RunDirectory(tmp_path).replays.exists()

@@ -1,4 +1,4 @@
-"""The difference between two policies, at any number of episodes."""
+"""The difference between two policies, which is valid at any number of episodes."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ PAIRS = st.builds(Pairs, both=COUNTS, only_a=COUNTS, only_b=COUNTS, neither=COUN
 
 
 def and_one(pairs, result):
-    """Return the counts after one more episode."""
+    """Return the counts after one more episode with this result."""
     counts = {name: getattr(pairs, name) for name in ("both", "only_a", "only_b", "neither")}
     return Pairs(**(counts | {result: counts[result] + 1}))
 
 
 def swapped(pairs):
-    """Return the counts with A and B exchanged."""
+    """Return the counts with policies A and B exchanged."""
     return Pairs(both=pairs.both, only_a=pairs.only_b, only_b=pairs.only_a, neither=pairs.neither)
 
 
 def test_results_are_counted_by_what_both_policies_did():
-    """The order of the episodes carries no more than these counts."""
+    """The order of the episodes has no more information than these four counts."""
     pairs = Pairs.of([(True, True), (True, False), (True, False), (False, True), (False, False)])
 
     assert pairs == Pairs(both=1, only_a=2, only_b=1, neither=1)
@@ -44,9 +44,9 @@ def test_results_are_counted_by_what_both_policies_did():
 
 @given(PAIRS, st.floats(0.01, 0.99), st.floats(0.01, 0.99))
 def test_a_bet_against_the_true_difference_wins_nothing_on_average(pairs, discordant, for_a):
-    """The capital is a martingale, so it reaches 20 in at most 5 % of comparisons: that bounds all errors.
+    """The capital is a martingale, so by Ville's inequality it reaches 20 in at most 5 % of all comparisons.
 
-    The probabilities of one more episode are any; the candidate is the difference that they have.
+    The test draws any probabilities for the next episode, and bets against the difference that they have.
     """
     chances = {
         "only_a": discordant * for_a,
@@ -64,9 +64,10 @@ def test_a_bet_against_the_true_difference_wins_nothing_on_average(pairs, discor
 
 
 def test_with_optional_stopping_equal_policies_are_told_apart_in_at_most_one_of_twenty_comparisons():
-    """The probability is exact: every path of 400 episodes with unequal results, looked at after each.
+    """The probability is computed exactly, over each path of 400 episodes with unequal results.
 
-    Episodes with equal results change nothing, so there are as many of them as you like.
+    The interval is looked at after each episode. Episodes with equal results change nothing, so any number of
+    them may come between.
     """
     alive, rejected = {(0, 0): 1.0}, 0.0
     for _ in range(400):
@@ -82,19 +83,22 @@ def test_with_optional_stopping_equal_policies_are_told_apart_in_at_most_one_of_
 
 
 def _log_bet(a, b):
-    """Return the closed form of the capital against difference 0."""
+    """Return the logarithm of the capital against a difference of 0, by its closed form."""
     return (a + b) * log(2) + lgamma(a + 0.5) + lgamma(b + 0.5) - lgamma(a + b + 1) - log(pi)
 
 
 @given(PAIRS)
 def test_episodes_with_equal_results_are_no_evidence_of_a_difference(pairs):
-    """McNemar's test looks at the others alone, and so does this one."""
+    """Like McNemar's test, the comparison uses only episodes with unequal results."""
     assert log_capital(pairs, 0.0) == pytest.approx(_log_bet(pairs.only_a, pairs.only_b), abs=1e-8)
 
 
 @pytest.mark.parametrize("chances", [(0.9, 0.08, 0.0, 0.02), (0.5, 0.2, 0.1, 0.2), (0.05, 0.5, 0.4, 0.05)])
 def test_whoever_looks_after_each_batch_sees_the_true_difference_inside(chances):
-    """The interval is valid at any number of episodes: of 100 comparisons, at most 5 % may ever miss."""
+    """A person may look after each batch.
+
+    In at most 5 % of comparisons may the true difference ever be outside.
+    """
     random = np.random.default_rng(1)
     missed = 0
     for _ in range(100):
@@ -110,7 +114,7 @@ def test_whoever_looks_after_each_batch_sees_the_true_difference_inside(chances)
 
 @given(PAIRS)
 def test_the_observed_difference_is_within_the_interval(pairs):
-    """An estimate outside of its own bounds would be nonsense."""
+    """The estimate that is printed next to the interval must be inside it."""
     low, high = interval(pairs)
 
     assert -1.0 <= low <= pairs.difference <= high <= 1.0
@@ -118,7 +122,7 @@ def test_the_observed_difference_is_within_the_interval(pairs):
 
 @given(PAIRS)
 def test_naming_the_policies_the_other_way_round_mirrors_the_interval(pairs):
-    """`compare A B` and `compare B A` must say the same."""
+    """`compare A B` and `compare B A` must give the same answer."""
     low, high = interval(pairs)
 
     assert interval(swapped(pairs)) == pytest.approx((-high, -low), abs=1e-9)
@@ -126,14 +130,14 @@ def test_naming_the_policies_the_other_way_round_mirrors_the_interval(pairs):
 
 @given(PAIRS)
 def test_the_interval_excludes_no_difference_exactly_if_the_bets_against_it_have_won(pairs):
-    """The interval and the verdict are one test, so they cannot contradict each other."""
+    """The interval and the verdict come from the same test, so they cannot contradict each other."""
     low, high = interval(pairs)
 
     assert (low > 0 or high < 0) == (log_capital(pairs, 0.0) >= -log(ALPHA))
 
 
 def test_without_episodes_nothing_is_known():
-    """The first line that a person sees must not claim anything."""
+    """Before the first episode, a person must not see a difference."""
     assert interval(Pairs()) == (-1.0, 1.0)
     assert verdict(Pairs(), 0.5) is Verdict.UNDECIDED
 
@@ -151,5 +155,5 @@ def test_without_episodes_nothing_is_known():
     ],
 )
 def test_a_difference_comes_before_a_bound_and_a_bound_before_no_answer(pairs, margin, expected):
-    """A difference of 1 % is a difference, even if a person would have accepted 5 %."""
+    """A difference of 1 % is reported, even if the person would have accepted 5 %."""
     assert verdict(pairs, margin) is expected

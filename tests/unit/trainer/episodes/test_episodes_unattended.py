@@ -1,4 +1,4 @@
-"""Complete runs in which simulators break, come back late, or never come back."""
+"""Complete runs in which simulators break and come back late or never."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ DISCRETE = ["DQN", "PPO", "A2C", "REINFORCE"]
 
 @pytest.fixture
 def pool(job, make_configuration):
-    """Make a configuration of a run with several collectors, of which `least` are enough."""
+    """Return a function that makes a configuration with several collectors, of which `least` are needed."""
 
     def make(name, *, least, collectors=2, evaluators=1, **changes):
         content = job(name, collectors=collectors, evaluators=evaluators, **changes).model_dump(by_alias=True)
@@ -26,13 +26,13 @@ def pool(job, make_configuration):
 
 
 def summary(directory):
-    """Return the summary of a run."""
+    """Return the content of the run's summary."""
     return json.loads(directory.summary.read_text())
 
 
 @pytest.mark.parametrize("name", DISCRETE)
 def test_a_run_goes_on_without_a_simulator_that_was_given_up(play, pool, directory, name):
-    """The run takes longer, but learns as much."""
+    """The run takes longer, but learns from as many steps."""
     code, members = play(pool(name, least=1), {"collect-0": {"steps": range(10, 1000)}})
 
     assert code == 0
@@ -42,7 +42,7 @@ def test_a_run_goes_on_without_a_simulator_that_was_given_up(play, pool, directo
 
 @pytest.mark.parametrize("name", DISCRETE)
 def test_training_begins_without_a_simulator_that_does_not_come_up(play, pool, directory, name):
-    """Its rows have no observation yet, and nothing is learned from them."""
+    """The rows of this simulator have no observation, and nothing is learned from them."""
     code, members = play(pool(name, least=1), {"collect-0": {"starts": range(1, 1000)}})
 
     assert code == 0
@@ -51,7 +51,7 @@ def test_training_begins_without_a_simulator_that_does_not_come_up(play, pool, d
 
 
 def test_an_evaluation_has_all_its_episodes_whichever_simulator_is_left(play, pool, directory):
-    """The evaluating simulator may be the one that breaks."""
+    """Either evaluating simulator may break, and the other one plays all episodes."""
     faults = {"evaluate-0": {"steps": range(3, 1000)}}
 
     code, members = play(pool("DQN", least=1, collectors=1, evaluators=2), faults)
@@ -62,7 +62,7 @@ def test_an_evaluation_has_all_its_episodes_whichever_simulator_is_left(play, po
 
 
 def test_too_few_simulators_end_the_run(play, pool, last_word):
-    """The message has the simulator, its fault and the remedy."""
+    """The message has the simulator, its last fault and the remedy."""
     code, _ = play(pool("DQN", least=2), {"collect-1": {"steps": range(10, 1000)}})
 
     assert code == 80
@@ -71,7 +71,7 @@ def test_too_few_simulators_end_the_run(play, pool, last_word):
 
 @pytest.mark.parametrize("name", DISCRETE)
 def test_a_simulator_that_is_mended_for_long_holds_up_nobody(play, pool, directory, name):
-    """The run may finish before it comes back, and then ends its restart."""
+    """The run ends before the simulator is back, and then ends the restart too."""
     code, members = play(pool(name, least=2), {"collect-0": {"steps": [10], "held": True}})
 
     assert code == 0

@@ -1,4 +1,4 @@
-"""Several simulators as one VecEnv, and the handling of their faults."""
+"""Several simulators as one VecEnv, and its handling of their faults."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ RIGHT, LEFT = 1, 0
 
 @pytest.fixture
 def make_env():
-    """Make a VecEnv of members, and close it at the end."""
+    """Yield a function that makes a VecEnv of simulators, which is closed at the end."""
     made = []
 
     def make(*members, limit=None, run_seed=1, **options):
@@ -44,12 +44,12 @@ def make_env():
 
 
 def walk(env, steps, action=RIGHT):
-    """Return the rows of some equal steps."""
+    """Return the rows of some steps with the same action."""
     return [env.step(np.full(env.num_envs, action)) for _ in range(steps)]
 
 
 def end_of_mending(name):
-    """Wait for the end of the thread that restarts a member."""
+    """Wait for the end of the thread that restarts a simulator."""
     for thread in threading.enumerate():
         if thread.name == f"restarter-{name}":
             thread.join(20.0)
@@ -57,7 +57,7 @@ def end_of_mending(name):
 
 @pytest.mark.parametrize("members", [1, 3])
 def test_a_step_has_a_row_for_each_member(make_env, make_member, members):
-    """This holds for any number of members."""
+    """One simulator and several simulators give rows of the same form."""
     env = make_env(*(make_member(f"collect-{index}") for index in range(members)))
 
     first = env.reset()
@@ -71,7 +71,7 @@ def test_a_step_has_a_row_for_each_member(make_env, make_member, members):
 
 
 def test_an_episode_is_reset_in_its_last_step(make_env, make_member):
-    """Stable-Baselines3 expects the next episode's first observation, and the last one in the info."""
+    """Stable-Baselines3 expects the next episode's first observation. The info has the last one."""
     env = make_env(make_member())
     env.reset()
 
@@ -87,7 +87,7 @@ def test_an_episode_is_reset_in_its_last_step(make_env, make_member):
 
 
 def test_a_viewer_sees_where_each_member_is_in_its_episode(make_env, make_member):
-    """A term that is not a number is left out: an environment may put anything there."""
+    """An environment may return any value as a reward term, so a term that is not a number is left out."""
 
     class Terms(Wrapper):
         def step(self, action):
@@ -108,7 +108,7 @@ def test_a_viewer_sees_where_each_member_is_in_its_episode(make_env, make_member
 
 
 def test_a_viewer_sees_the_target_of_a_robot_on_a_floor(make_env, make_member):
-    """A world need not have a mark, and without one a person cannot see where the robot shall go."""
+    """In a world without a target marker, a person would not see where the robot should drive."""
     located, unplaced = make_member("collect-0"), make_member("collect-1")
     for member, target in ((located, (1.0, -0.5)), (unplaced, None)):
         member.sight = partial(
@@ -123,7 +123,7 @@ def test_a_viewer_sees_the_target_of_a_robot_on_a_floor(make_env, make_member):
 
 
 def test_a_time_limit_is_distinguished_from_an_end(make_env, make_member):
-    """The value of the rest is bootstrapped only after a limit."""
+    """Only after a time limit is the value of later steps bootstrapped."""
     env = make_env(make_member())
     env.reset()
 
@@ -148,14 +148,14 @@ def test_each_episode_has_the_seed_of_its_number(make_env, make_member):
 
 
 def test_each_episode_begins_with_its_number_and_the_progress_of_that_moment(make_env, make_member):
-    """A curriculum needs them; a running episode keeps its values."""
+    """A curriculum needs the number and the progress; they stay the same during an episode."""
     member = make_member()
     env = make_env(member)
 
     env.reset()
     env.set_training_progress(0.25)
     begun = env.snapshot()[0].training_progress
-    walk(env, 3)  # the next episode begins
+    walk(env, 3)  # the third step ends the episode and begins the next
 
     assert begun == 0.0
     assert member.env.options == {"training_progress": 0.25, "episode": 1}
@@ -163,7 +163,7 @@ def test_each_episode_begins_with_its_number_and_the_progress_of_that_moment(mak
 
 
 def test_a_replayed_episode_begins_with_the_progress_that_it_had(make_env, make_member):
-    """Otherwise it would be another episode; the next one begins with the current progress."""
+    """With other progress it would be another episode. The next episode gets the current progress."""
     member = make_member()
     env = make_env(member)
     env.set_training_progress(0.5)
@@ -177,7 +177,10 @@ def test_a_replayed_episode_begins_with_the_progress_that_it_had(make_env, make_
 
 
 def test_a_fault_ends_the_episode_as_truncated_and_invalid(make_env, make_member):
-    """The policy did not cause it, so it gets no reward, no penalty and nothing to learn."""
+    """The policy did not cause the fault.
+
+    So it gets no reward and no penalty, and does not learn from the row.
+    """
     env = make_env(make_member(steps=[2]))
     env.reset()
 
@@ -197,7 +200,7 @@ def test_a_fault_ends_the_episode_as_truncated_and_invalid(make_env, make_member
 
 
 def test_alone_the_step_after_a_fault_waits_and_begins_the_next_episode(make_env, make_member):
-    """No other simulator steps meanwhile, and the policy does not learn from this row."""
+    """No other simulator can step meanwhile, and nothing is learned from this row."""
     member = make_member(steps=[2], held=True)
     env = make_env(member)
     env.reset()
@@ -214,7 +217,10 @@ def test_alone_the_step_after_a_fault_waits_and_begins_the_next_episode(make_env
 
 
 def test_nobody_waits_for_a_member_that_is_mended(make_env, make_member):
-    """The others continue; its own rows are invalid, and none of its episodes ends or begins."""
+    """The other simulators continue.
+
+    The rows of the broken one are invalid, and do not end or begin an episode.
+    """
     members = [make_member("collect-0"), make_member("collect-1", steps=[2], held=True)]
     env = make_env(*members)
     env.reset()
@@ -231,7 +237,7 @@ def test_nobody_waits_for_a_member_that_is_mended(make_env, make_member):
 
 
 def test_a_mended_member_begins_its_next_episode(make_env, make_member):
-    """It has the next seed; one more invalid row ends the previous episode."""
+    """The episode has the next seed. One more invalid row ends the previous episode."""
     members = [make_member("collect-0"), make_member("collect-1", steps=[2], held=True)]
     env = make_env(*members)
     env.reset()
@@ -271,7 +277,7 @@ def test_while_all_are_mended_a_step_waits_for_the_first(make_env, make_member):
 
 
 def test_a_signal_does_not_wait_for_a_member_that_is_mended(make_env, make_member):
-    """A simulator may take a minute to start, but an eviction allows half of that."""
+    """A simulator may take a minute to start, but an evicted pod has half a minute."""
 
     def check():
         raise Interrupted("SIGTERM received")
@@ -285,7 +291,7 @@ def test_a_signal_does_not_wait_for_a_member_that_is_mended(make_env, make_membe
 
 
 def test_a_fault_at_a_reset_does_not_spoil_the_step_before(make_env, make_member):
-    """The first episode had ended normally; the fault is in the next one, before its first step."""
+    """The first episode ended normally. The fault belongs to the next episode, before its first step."""
     env = make_env(make_member(resets=[2]))
     env.reset()
 
@@ -299,7 +305,7 @@ def test_a_fault_at_a_reset_does_not_spoil_the_step_before(make_env, make_member
 
 
 def test_before_anything_was_seen_there_is_an_observation_of_nothing(make_env, make_member):
-    """The first reset may fail too, and a row must have its shape."""
+    """The first reset may fail, but the row still needs an observation of the right shape."""
     env = make_env(make_member(resets=[1]))
 
     first = env.reset()
@@ -309,7 +315,7 @@ def test_before_anything_was_seen_there_is_an_observation_of_nothing(make_env, m
 
 
 def test_a_reset_leaves_a_member_alone_that_is_mended(make_env, make_member):
-    """REINFORCE begins new episodes whatever the state of the members is."""
+    """REINFORCE resets all simulators, but only the restarter's thread may use a broken one."""
     members = [make_member("collect-0"), make_member("collect-1", steps=[2], held=True)]
     env = make_env(*members)
     env.reset()
@@ -322,7 +328,7 @@ def test_a_reset_leaves_a_member_alone_that_is_mended(make_env, make_member):
 
 
 def test_a_snapshot_has_no_episode_of_a_member_that_is_mended(make_env, make_member):
-    """Its steps are lost, and a resumed run begins its next episode."""
+    """The steps of the cut episode are lost, so a resumed run begins the simulator's next episode."""
     members = [make_member("collect-0"), make_member("collect-1", steps=[2], held=True)]
     env = make_env(*members)
     env.reset()
@@ -336,7 +342,7 @@ def test_a_snapshot_has_no_episode_of_a_member_that_is_mended(make_env, make_mem
 
 
 def test_a_member_that_breaks_while_it_is_resumed_begins_the_next_episode(make_env, make_member):
-    """Its part of the run is no longer exact, but it continues."""
+    """The resume is then not exact for this simulator, but the run continues."""
     env = make_env(make_member(steps=[2]))
 
     env.resume([EpisodeState(4, np.array([LEFT, LEFT, LEFT]))])
@@ -349,7 +355,7 @@ def test_a_member_that_breaks_while_it_is_resumed_begins_the_next_episode(make_e
 
 
 def test_every_kind_of_fault_is_reported_by_its_name_and_once(make_env, make_member):
-    """A person who reads the counts looks for different causes."""
+    """A person who reads the counts looks for a different cause for each type."""
     faults = {1: SimulatorHung("x", "slow"), 2: WrongData("x", "NaN")}
     env = make_env(make_member(steps=faults))
     env.reset()
@@ -361,7 +367,7 @@ def test_every_kind_of_fault_is_reported_by_its_name_and_once(make_env, make_mem
 
 
 def test_an_observation_that_is_no_number_is_the_environment_s_mistake(make_env, make_member):
-    """The robot has checked its sensors, so a restart of the simulator would not help."""
+    """The robot has checked its sensors, so NaN comes from the environment, and a restart would not help."""
     member = make_member()
     member.env = Wrapper(member.env)
     env = make_env(member)
@@ -377,7 +383,7 @@ def test_an_observation_that_is_no_number_is_the_environment_s_mistake(make_env,
 
 
 def test_an_observation_of_a_reset_that_is_no_number_is_the_environment_s_mistake(make_env, make_member):
-    """The message has the episode, so that it can be repeated."""
+    """The message has the number of the episode, so that the author can repeat it."""
     member = make_member()
     member.env._observe = lambda: {"wheels": np.array([[0.0], [math.inf]])}
     env = make_env(member)
@@ -387,7 +393,7 @@ def test_an_observation_of_a_reset_that_is_no_number_is_the_environment_s_mistak
 
 
 def test_a_sensor_that_is_no_number_is_the_simulator_s_fault(make_env, make_member):
-    """The robot raises the error; a restart may help."""
+    """The robot raises the error, and a restart of the simulator may help."""
     env = make_env(make_member(steps={1: WrongData("ir1", "nan from ir1")}))
     env.reset()
 
@@ -397,7 +403,7 @@ def test_a_sensor_that_is_no_number_is_the_simulator_s_fault(make_env, make_memb
 
 
 def test_a_reward_that_is_no_number_is_nobody_s_fault_but_the_environment_s(make_env, make_member):
-    """A restart would not help; the message shows the place."""
+    """A restart would not help, so the run ends, and the message has the reward term."""
     member = make_member()
     member.env.step_reward = math.inf
     env = make_env(member)
@@ -411,7 +417,7 @@ def test_a_reward_that_is_no_number_is_nobody_s_fault_but_the_environment_s(make
 
 
 def test_a_simulator_that_does_not_come_back_is_tried_again(make_env, make_member):
-    """The first restart after an out-of-memory kill often fails as well."""
+    """After a simulator ran out of memory, its first restart often fails as well."""
     member = make_member(steps=[1], starts=[1, 2], resets=[2])
     env = make_env(member)
     env.reset()
@@ -432,7 +438,7 @@ def test_a_spent_budget_ends_the_run(make_env, make_member):
 
 
 def test_a_budget_is_spent_within_its_window_only(make_member):
-    """One fault an hour for a week is not a reason to give up."""
+    """One fault an hour for a week does not spend the budget."""
     times = iter([0.0, 100.0, 600.0, 650.0])
     member = make_member(steps=range(1, 100))
     restarter = Restarter(member, RestartLimit(restarts=2, within_s=600.0), clock=lambda: next(times))
@@ -446,7 +452,7 @@ def test_a_budget_is_spent_within_its_window_only(make_member):
 
 
 def test_the_run_goes_on_without_a_simulator_if_enough_are_left(make_member):
-    """Three of four learn as much, only a little slower; with too few left the run ends."""
+    """Three of four simulators learn as much, but slower. With fewer than needed, the run ends."""
     group = Group(3, least=2)
     members = [
         make_member("collect-0", steps=range(1, 100)),
@@ -471,7 +477,7 @@ def test_the_run_goes_on_without_a_simulator_if_enough_are_left(make_member):
 
 
 def test_a_member_is_recycled_between_episodes_without_a_fault(make_env, make_member):
-    """Simulators leak memory; a restart in time costs less than a crash."""
+    """Simulators leak memory, and a planned restart takes less time than a crash."""
     member = make_member(recycle_after=2)
     env = make_env(member)
     env.reset()
@@ -484,7 +490,7 @@ def test_a_member_is_recycled_between_episodes_without_a_fault(make_env, make_me
 
 
 def test_recycling_is_logged_once_a_minute_with_the_number_of_all(make_member, clock):
-    """A line every few seconds hides those that matter; the first says that the limits work."""
+    """A line every few seconds would hide other lines; the first line shows that the limits work."""
     restarter = Restarter(make_member(recycle_after=1), clock=clock)
 
     with structlog.testing.capture_logs() as logs:
@@ -497,7 +503,7 @@ def test_recycling_is_logged_once_a_minute_with_the_number_of_all(make_member, c
 
 
 def test_members_are_recycled_at_the_same_time(make_env, make_member):
-    """Members that start together reach their limits together, and this must not take twice the time."""
+    """Simulators that start together reach their limits together; one after the other would take longer."""
     both = threading.Barrier(2, timeout=20.0)
     members = [make_member(f"collect-{index}", recycle_after=1) for index in range(2)]
     for member in members:
@@ -511,7 +517,7 @@ def test_members_are_recycled_at_the_same_time(make_env, make_member):
 
 
 def test_a_recycling_that_fails_is_a_fault_like_any_other(make_env, make_member):
-    """The member is restarted, and the episode begins."""
+    """The simulator is restarted a second time, and then the episode begins."""
     member = make_member(starts=[1], recycle_after=1)
     env = make_env(member)
     env.reset()
@@ -523,7 +529,7 @@ def test_a_recycling_that_fails_is_a_fault_like_any_other(make_env, make_member)
 
 
 def test_an_error_that_is_no_fault_comes_out_when_all_rows_are_done(make_env, make_member):
-    """If the ROS master is gone nothing is restarted, and no member is left in the middle of a step."""
+    """Without a ROS master nothing can be restarted, and no simulator may be left in the middle of a step."""
     lost = MasterLost("gone")
     env = make_env(make_member("collect-0", steps={1: lost}), make_member("collect-1"))
     env.reset()
@@ -533,7 +539,7 @@ def test_an_error_that_is_no_fault_comes_out_when_all_rows_are_done(make_env, ma
 
 
 def test_members_step_at_the_same_time(make_env, make_member):
-    """Four simulators must not take four times as long, so all requests are sent before the first wait."""
+    """All requests are sent before the first wait, so four simulators do not take four times as long."""
     members = [make_member(f"collect-{index}") for index in range(4)]
     told = []
     for member in members:
@@ -566,7 +572,7 @@ def test_resting_reaches_every_member(make_env, make_member, members):
 
 
 def test_a_broken_member_is_left_for_the_next_step_to_find(make_env, make_member):
-    """The pause is optional, so its failure must not end a run."""
+    """The pause only saves processor time, so its failure must not end a run."""
     member = make_member()
     member.pause = lambda: (_ for _ in ()).throw(SimulatorHung("collect-0", "no answer"))
     env = make_env(member)
@@ -577,7 +583,7 @@ def test_a_broken_member_is_left_for_the_next_step_to_find(make_env, make_member
 
 
 def test_the_rest_of_the_interface_reaches_the_environments(make_env, make_member):
-    """Other projects' callbacks and wrappers use it."""
+    """Callbacks and wrappers of other projects use these methods."""
     members = [make_member("collect-0"), make_member("collect-1")]
     members[0].env = Wrapper(members[0].env)
     env = make_env(*members)
@@ -594,7 +600,7 @@ def test_the_rest_of_the_interface_reaches_the_environments(make_env, make_membe
 
 
 def test_observations_by_name_are_stacked_by_name(make_env, make_member):
-    """The observation of a robot with a camera is a Dict."""
+    """A robot with a camera has a Dict as its observation."""
 
     class Named(Wrapper):
         observation_space = spaces.Dict({"place": spaces.Box(-1.0, 1.0, (2,), np.float32)})

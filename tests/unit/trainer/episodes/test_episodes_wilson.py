@@ -21,7 +21,7 @@ def shares(draw):
     [(0, 10, 0.0, 0.2775), (10, 10, 0.7225, 1.0), (15, 20, 0.5313, 0.8881), (95, 100, 0.8882, 0.9785)],
 )
 def test_bounds_are_those_of_the_literature(successes, episodes, low, high):
-    """Source: The values are those of binom.test and prop.test(correct=FALSE) in R, by Wilson's method."""
+    """The values are those of binom.test and prop.test(correct=FALSE) in R, by Wilson's method."""
     interval = wilson(successes, episodes)
 
     assert (interval.low, interval.high) == pytest.approx((low, high), abs=1e-4)
@@ -29,7 +29,7 @@ def test_bounds_are_those_of_the_literature(successes, episodes, low, high):
 
 @given(shares())
 def test_the_interval_is_a_part_of_all_rates_and_holds_the_share(share):
-    """A rounded share at a bound equals the bound."""
+    """A rounded share may be equal to a bound."""
     successes, episodes = share
 
     interval = wilson(successes, episodes)
@@ -40,7 +40,7 @@ def test_the_interval_is_a_part_of_all_rates_and_holds_the_share(share):
 
 @given(shares())
 def test_more_episodes_say_more(share):
-    """The test compares four times as many episodes with the same share."""
+    """With the same share, four times as many episodes give a narrower interval."""
     successes, episodes = share
 
     few, many = wilson(successes, episodes), wilson(4 * successes, 4 * episodes)
@@ -50,6 +50,6 @@ def test_more_episodes_say_more(share):
 
 @pytest.mark.parametrize(("successes", "episodes"), [(0, 0), (3, 2), (-1, 2)])
 def test_what_is_no_share_is_refused(successes, episodes):
-    """Otherwise a caller would divide by zero or take the root of a negative number."""
+    """Without the error, a caller would divide by zero or take the root of a negative number."""
     with pytest.raises(ValueError, match="not a share"):
         wilson(successes, episodes)

@@ -1,4 +1,4 @@
-"""An export verifies that the file acts as the policy does, for all spaces."""
+"""Verification of an export: the file must act as the policy does, for all spaces."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def policy_of(cls, seen=NUMBERS, acted=FEW, scales=None, **options):
 
 
 def compared(policy, file_format=onnx_file):
-    """Return the difference between the file of a policy and the policy."""
+    """Return the largest difference between the actions of the file and of the policy."""
 
     def convert(module):
         return file_format.runner(file_format.content(module, {}), module)
@@ -54,7 +54,7 @@ def compared(policy, file_format=onnx_file):
 @pytest.mark.parametrize("bound", [1e-3, 1_000.0, 20_000.0])
 @pytest.mark.parametrize("cls", [sb3.SAC, sb3.PPO])
 def test_actions_of_any_range_are_compared_in_their_range(cls, bound):
-    """Single precision has 24 bits, so 20,000 has an error of 0.002, and 0.001 one of a billionth."""
+    """Single precision has 24 bits, so the rounding error is 0.002 at 20,000, and a billionth at 0.001."""
     policy = policy_of(cls, acted=spaces.Box(-bound, bound, (3,), np.float32))
 
     assert all(compared(policy, file_format) <= 1e-5 for file_format in FORMATS)
@@ -62,13 +62,13 @@ def test_actions_of_any_range_are_compared_in_their_range(cls, bound):
 
 @pytest.mark.parametrize("cls", [sb3_contrib.TQC, sb3_contrib.RecurrentPPO])
 def test_so_are_those_of_sb3_contrib(cls):
-    """The actors of sb3-contrib are other classes, and one has a state."""
+    """The actors of sb3-contrib are other classes, and one of them has a state."""
     assert compared(policy_of(cls, acted=spaces.Box(-20_000.0, 20_000.0, (3,), np.float32))) <= 1e-5
 
 
 @pytest.mark.parametrize("cls", [sb3.SAC, sb3.PPO])
 def test_a_file_that_is_off_by_a_thousandth_of_a_small_range_is_refused(cls):
-    """An absolute tolerance accepted every file with actions that small."""
+    """An absolute tolerance would accept every file whose actions are that small."""
     policy = policy_of(cls, acted=spaces.Box(-1e-3, 1e-3, (3,), np.float32))
     acting = PolicyModule(policy)
     right = safetensors_file.runner(safetensors_file.content(acting, {}), acting)
@@ -94,7 +94,7 @@ def test_a_file_that_is_off_by_a_thousandth_of_a_small_range_is_refused(cls):
     ],
 )
 def test_observations_of_any_range_are_drawn_within_it_at_several_scales(low, high, kind):
-    """Far from the middle, every action is at its bound; observations outside the space prove less."""
+    """Far from the middle, every action is at its bound. Observations outside the space would prove less."""
     space = spaces.Box(low, high, (3,), kind)
     policy = policy_of(sb3.PPO, space, spaces.Box(-1.0, 1.0, (2,), np.float32))
 
@@ -109,7 +109,7 @@ def test_observations_of_any_range_are_drawn_within_it_at_several_scales(low, hi
 
 
 def test_normalized_observations_are_drawn_from_what_the_run_has_seen():
-    """The normalizer would clip values near distant bounds to the same number."""
+    """Far from the mean, the normalizer clips all values to the same number."""
     scale = Scale(np.array([5.0, -3.0, 0.0]), np.array([4.0, 0.25, 1e-6]), 10.0, 1e-8)
     wide = spaces.Box(-1e6, 1e6, (3,), np.float32)
     policy = policy_of(sb3.PPO, wide, scales={"": scale})
@@ -132,7 +132,7 @@ CLASSES = {sb3.PPO: FEW, sb3.DQN: FEW, sb3_contrib.QRDQN: FEW, sb3.A2C: spaces.M
 
 
 def with_favorite(policy):
-    """Make the policy prefer one action for every observation, as after a short training."""
+    """Let the policy prefer one action for every observation, as after a short training."""
     layers = [part for part in policy.model.policy.modules() if isinstance(part, torch.nn.Linear)]
     outputs = getattr(policy.model.policy, "action_net", layers[1])
     with torch.no_grad():
@@ -143,14 +143,14 @@ def with_favorite(policy):
 @pytest.mark.parametrize("cls", CLASSES)
 @pytest.mark.parametrize("file_format", FORMATS, ids=lambda module: module.__name__.rpartition(".")[2])
 def test_a_policy_with_a_favorite_action_is_compared_by_its_scores(cls, file_format):
-    """Any file with that action would pass, but the scores depend on the observation."""
+    """The file always has the right action, but the scores of the actions depend on the observation."""
     policy = with_favorite(policy_of(cls, acted=CLASSES[cls]))
 
     assert compared(policy, file_format) == 0
 
 
 def test_a_file_with_the_favorite_action_but_other_scores_is_refused():
-    """The action alone is right for every observation that was drawn."""
+    """For every drawn observation, the file has the right action by chance."""
     policy = with_favorite(policy_of(sb3.PPO))
 
     def convert(module):
@@ -167,7 +167,7 @@ def test_a_file_with_the_favorite_action_but_other_scores_is_refused():
     "acted", [FEW, spaces.Box(-1.0, 1.0, (2,), np.float32)], ids=["discrete", "continuous"]
 )
 def test_a_policy_that_sees_nothing_is_not_exported(acted):
-    """Its actions and scores are the same, whatever the file does with an observation."""
+    """The policy acts in the same way on every observation, so any file would pass the comparison."""
     policy = policy_of(sb3.PPO, acted=acted)
     with torch.no_grad():
         policy.model.policy.action_net.weight.zero_()
@@ -177,7 +177,7 @@ def test_a_policy_that_sees_nothing_is_not_exported(acted):
 
 
 def test_a_policy_whose_actions_are_all_at_their_bounds_is_not_exported():
-    """Only the signs of such actions are compared."""
+    """A comparison of such actions compares only their signs."""
     acted = spaces.Box(-1e-6, 1e-6, (2,), np.float32)
     policy = policy_of(sb3.PPO, acted=acted)
 
@@ -186,18 +186,21 @@ def test_a_policy_whose_actions_are_all_at_their_bounds_is_not_exported():
 
 
 class Blind(BaseFeaturesExtractor):
-    """A network that uses one key of two."""
+    """A network that uses one of two keys of the observation."""
 
     def __init__(self, observation_space):
         super().__init__(observation_space, 3)
 
     def forward(self, observations):
-        """Return the features."""
+        """Return the features, which are the values of one key."""
         return observations["seen"]
 
 
 def test_an_input_that_the_network_does_not_use_is_not_in_the_file():
-    """PyTorch leaves it out, and onnxruntime refuses additional inputs; the metadata names it."""
+    """PyTorch leaves the input out, and onnxruntime rejects unknown inputs.
+
+    The metadata lists it as unused.
+    """
     seen = spaces.Dict({"ignored": NUMBERS, "seen": NUMBERS})
     policy = policy_of(sb3.PPO, seen, policy_kwargs={"net_arch": [8], "features_extractor_class": Blind})
     acting = PolicyModule(policy)
@@ -215,7 +218,7 @@ def test_an_input_that_the_network_does_not_use_is_not_in_the_file():
     ("kind", "larger"), [(np.uint16, "int32"), (np.uint32, "int64"), (np.uint64, "int64")]
 )
 def test_a_type_that_onnx_cannot_have_here_is_refused_by_the_name_of_the_input(kind, larger):
-    """PyTorch's own message has neither the input nor a remedy."""
+    """PyTorch's own message names neither the input nor a remedy."""
     policy = policy_of(sb3.PPO, spaces.Box(0, 50, (3,), kind))
 
     with pytest.raises(
@@ -226,15 +229,15 @@ def test_a_type_that_onnx_cannot_have_here_is_refused_by_the_name_of_the_input(k
 
 
 class Spectrum(CombinedExtractor):
-    """A network with complex numbers, for which ONNX has no types."""
+    """A network with complex numbers, for which ONNX has no type."""
 
     def forward(self, observations):
-        """Return the features."""
+        """Return the real part of the features' spectrum."""
         return torch.fft.fft(super().forward(observations)).real
 
 
 def test_a_network_that_onnx_cannot_express_is_refused_with_a_remedy():
-    """A traceback of the exporter would have a hundred lines about the network's code."""
+    """The exporter's own traceback has a hundred lines about the code of the network."""
     kwargs = {"net_arch": [8], "features_extractor_class": Spectrum}
     policy = policy_of(sb3.PPO, spaces.Dict({"a": NUMBERS}), policy_kwargs=kwargs)
 
@@ -246,7 +249,7 @@ def test_a_network_that_onnx_cannot_express_is_refused_with_a_remedy():
 
 @pytest.mark.parametrize("acted", [FEW, spaces.MultiDiscrete([2, 3]), spaces.MultiBinary(2)])
 def test_a_file_that_ignores_masks_is_refused(acted):
-    """It would take an action that the environment forbids."""
+    """With such a file, a robot would take an action that the environment forbids."""
     policy = policy_of(sb3_contrib.MaskablePPO, acted=acted)
     acting = PolicyModule(policy)
     right = onnx_file.runner(onnx_file.content(acting, {}), acting)
@@ -260,7 +263,7 @@ def test_a_file_that_ignores_masks_is_refused(acted):
 
 
 def test_actions_that_differ_by_their_masks_alone_show_nothing():
-    """A file with any network would take the same actions."""
+    """A file with any other network would take the same actions."""
     policy = policy_of(sb3_contrib.MaskablePPO)
     with torch.no_grad():
         policy.model.policy.action_net.weight.zero_()
@@ -271,7 +274,7 @@ def test_actions_that_differ_by_their_masks_alone_show_nothing():
 
 
 def test_an_observation_with_the_name_of_the_masks_is_refused():
-    """A file has only one input of each name."""
+    """Each input of a file needs a name of its own, and the masks have this name."""
     policy = policy_of(sb3_contrib.MaskablePPO, spaces.Dict({"action_masks": NUMBERS}))
 
     with pytest.raises(ExportError, match=r"the observation has a key action_masks, .* rename the key"):

@@ -1,6 +1,6 @@
-"""Observations of integers: every algorithm trains on them, evaluates, and exports its policy.
+"""Integer observations: each algorithm trains on them, evaluates, and exports its policy.
 
-PyTorch, ONNX and NumPy have different rules for mixed number types.
+PyTorch, ONNX and NumPy convert mixed types of numbers by different rules.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from palaestra_trainer.testing.fake_task import ACTIONS
 pytestmark = pytest.mark.minutes(1)
 
 WHOLE = {
-    "uint8": spaces.Box(0, 255, (3,), np.uint8),  # not an image: it has one dimension
+    "uint8": spaces.Box(0, 255, (3,), np.uint8),  # one dimension, so it is not an image
     "int8": spaces.Box(-5, 5, (3,), np.int8),
     "int16": spaces.Box(-5, 5, (2, 2), np.int16),
     "int32": spaces.Box(-50, 50, (3,), np.int32),
@@ -50,7 +50,7 @@ CASES = [
 
 
 class Counting(FakeTask):
-    """A task that counts to a few hundred at most, whatever its space allows."""
+    """A task whose integers stay within 300, whatever its space allows."""
 
     def _observe(self):
         numbers = np.random.default_rng(self._past)
@@ -66,12 +66,12 @@ class Counting(FakeTask):
 
 
 class CountingMasked(Counting, MaskedTask):
-    """A task that also forbids actions."""
+    """The same task with forbidden actions."""
 
 
 @pytest.fixture
 def train(make_member, make_configuration, tmp_path):
-    """Train for some steps with an evaluation, and return the run directory."""
+    """Return a function that trains for some steps with an evaluation; it returns the run directory."""
 
     def run(name, space):
         entry = ALGORITHMS[name]
@@ -87,7 +87,7 @@ def train(make_member, make_configuration, tmp_path):
         hyperparameters = {"policy_kwargs": SMALL} | HYPERPARAMETERS.get(name, OFF_POLICY)
         configuration = make_configuration(
             algorithm={"name": name, "hyperparameters": hyperparameters, "normalize": {"rewards": False}},
-            environment={"id": "MoveToTargetEnv-v0"},  # `load_policy` needs a registered one
+            environment={"id": "MoveToTargetEnv-v0"},  # `load_policy` needs a registered environment
             steps=16,
             evaluation={"everySteps": 8, "episodes": 1, "confirmEpisodes": 0},
         )
@@ -100,7 +100,7 @@ def train(make_member, make_configuration, tmp_path):
 
 @pytest.mark.parametrize(("name", "kind"), CASES)
 def test_they_are_trained_on_and_evaluated_and_both_files_act_as_the_policy(train, name, kind):
-    """This holds on observations of the task, too, not only on those that the export draws."""
+    """The file is also tested with an observation of the task, besides those that the export draws."""
     space = TOGETHER if kind == "together" else WHOLE[kind]
     directory = train(name, space)
 

@@ -1,4 +1,4 @@
-"""Environment groups of fake members."""
+"""Environment groups of fake simulators."""
 
 from __future__ import annotations
 
@@ -11,7 +11,10 @@ from palaestra_trainer.simulators.restarter import Restarter, settle
 
 @pytest.fixture
 def make_players():
-    """Make groups of members. `rows` holds the rows of their steps, and `released` counts releases."""
+    """Yield a function that makes groups of simulators.
+
+    A group's `rows` has the rows of its steps, and `released` has an item for each release.
+    """
     made = []
 
     def make(*members, restarts=10, **options):

@@ -1,4 +1,4 @@
-"""One simulator for a training loop that does not handle faults."""
+"""One simulator as an environment for a training loop that does not handle faults."""
 
 from __future__ import annotations
 
@@ -22,7 +22,10 @@ RIGHT, LEFT = 1, 0
 
 @pytest.fixture
 def make_env(make_players, make_member):
-    """Make an environment whose member breaks as the keywords say, and return both."""
+    """Return a function that makes an environment and its simulator.
+
+    The keywords set the simulator's faults.
+    """
 
     def make(*, restarts=10, deadline_s=20.0, wait_for_restart=False, **faults):
         member = make_member(**faults)
@@ -35,7 +38,7 @@ def make_env(make_players, make_member):
 
 
 def test_a_healthy_episode_is_that_of_the_environment(make_env):
-    """Nothing is added or lost, and the numbers are the environment's own."""
+    """All values of the episode are the environment's own."""
     env, member = make_env()
 
     first, info = env.reset(seed=7)
@@ -50,7 +53,7 @@ def test_a_healthy_episode_is_that_of_the_environment(make_env):
 
 
 def test_a_fault_returns_the_last_observation_as_truncated(make_env):
-    """A loop must not learn from a number that no simulator has sent."""
+    """A loop must learn only from values that a simulator has sent."""
     env, _ = make_env(steps=[2])
     env.reset(seed=7)
     before = env.step(RIGHT)[0]
@@ -67,7 +70,7 @@ def test_a_fault_returns_the_last_observation_as_truncated(make_env):
 
 
 def test_an_observation_that_the_environment_reuses_is_not_that_of_the_broken_step(make_env):
-    """Images may be views of a buffer that an interrupted step has begun to fill."""
+    """An image may be a view of a buffer that an interrupted step has partly overwritten."""
     env, member = make_env(steps=[2])
     seen = np.zeros(2, np.float32)
     member.env._observe = lambda: seen
@@ -80,7 +83,7 @@ def test_an_observation_that_the_environment_reuses_is_not_that_of_the_broken_st
 
 
 def test_the_reset_after_a_fault_waits_until_the_simulator_is_mended(make_env):
-    """The loop needs no code for it."""
+    """The loop itself then needs no code for restarts."""
     env, member = make_env(steps=[1], held=True)
     env.reset(seed=1)
     env.step(RIGHT)
@@ -93,7 +96,7 @@ def test_the_reset_after_a_fault_waits_until_the_simulator_is_mended(make_env):
 
 
 def test_a_fault_in_a_reset_begins_the_same_episode_again(make_env):
-    """Its seed determines the episode, however often the simulator breaks."""
+    """The seed determines the episode, however often the simulator breaks."""
     env, member = make_env(resets=[1, 2])
 
     observation, _ = env.reset(seed=5)
@@ -104,7 +107,10 @@ def test_a_fault_in_a_reset_begins_the_same_episode_again(make_env):
 
 
 def test_without_a_seed_the_episodes_are_those_of_the_last_seed(make_env):
-    """Gymnasium does the same; a standby's environment has its own random generator."""
+    """As in gymnasium, later episodes follow from the last seed.
+
+    A standby's environment has another generator.
+    """
     env, member = make_env()
     for seed in (3, None, None, 3, None, None):
         env.reset(seed=seed)
@@ -115,7 +121,7 @@ def test_without_a_seed_the_episodes_are_those_of_the_last_seed(make_env):
 
 
 def test_a_step_without_an_episode_is_a_mistake(make_env):
-    """The error also comes after the end of an episode, even one that a fault ended."""
+    """A step after the end of an episode is a mistake too, even if a fault ended it."""
     env, _ = make_env(steps=[1])
     with pytest.raises(ResetNeeded, match="call reset"):
         env.step(RIGHT)
@@ -127,7 +133,7 @@ def test_a_step_without_an_episode_is_a_mistake(make_env):
 
 
 def test_a_step_that_is_interrupted_ends_the_episode(make_env):
-    """After Ctrl-C in a notebook a response is unread, and the next step would take it for its own."""
+    """After Ctrl-C in a notebook, a response is still unread. The next step would take it for its own."""
     env, member = make_env()
     env.reset()
 
@@ -146,7 +152,7 @@ def test_a_step_that_is_interrupted_ends_the_episode(make_env):
 
 
 def test_a_simulator_that_breaks_too_often_ends_with_a_typed_error(make_env):
-    """The error comes at each further reset, too, instead of endless restarts."""
+    """Each further reset raises the error too, instead of restarting the simulator endlessly."""
     env, _ = make_env(restarts=1, resets=range(1, 10))
 
     for _ in range(2):
@@ -155,7 +161,7 @@ def test_a_simulator_that_breaks_too_often_ends_with_a_typed_error(make_env):
 
 
 def test_a_simulator_that_is_not_mended_in_time_ends_with_a_typed_error(make_env):
-    """The budget counts restarts, and one that never ends does not count."""
+    """The budget counts restarts, so a restart that never ends does not spend it."""
     env, _ = make_env(deadline_s=0.0, resets=[1], held=True)
 
     with pytest.raises(SimulatorHung, match="not restarted within 0 s"):
@@ -163,7 +169,7 @@ def test_a_simulator_that_is_not_mended_in_time_ends_with_a_typed_error(make_env
 
 
 def test_a_number_that_is_not_finite_is_no_fault(make_env):
-    """The environment caused it, and a restart would hide that."""
+    """The environment caused it, and a restart would hide the mistake."""
     env, member = make_env()
     env.reset()
     member.env.step_reward = float("nan")
@@ -173,7 +179,7 @@ def test_a_number_that_is_not_finite_is_no_fault(make_env):
 
 
 def test_a_step_can_wait_for_the_mending_itself(make_env):
-    """A program that pauses its simulator after each step must not do so during a restart."""
+    """A program that pauses its simulator after each step must not pause it during a restart."""
     env, member = make_env(wait_for_restart=True, steps={1: WrongData("collect-0", "nonsense")})
     env.reset()
 
@@ -182,7 +188,7 @@ def test_a_step_can_wait_for_the_mending_itself(make_env):
 
 
 def test_a_simulator_is_recycled_in_a_reset(make_env):
-    """As in the built-in loop, this happens between episodes and without a fault."""
+    """As in the built-in training loop, recycling happens between episodes and is no fault."""
     env, member = make_env(recycle_after=2)
 
     for seed in range(3):
@@ -193,7 +199,7 @@ def test_a_simulator_is_recycled_in_a_reset(make_env):
 
 
 def test_an_environment_is_closed_once(make_players, make_member):
-    """`close`, the end of the process, or both may do it."""
+    """`close` and the end of the process may each try to close the environment."""
     players = make_players(make_member())
     env = FaultTolerantEnv(players)
 
@@ -204,7 +210,7 @@ def test_an_environment_is_closed_once(make_players, make_member):
 
 
 class Seated:
-    """A member on the fake arena."""
+    """A simulator with an environment on the fake arena."""
 
     name = "collect-0"
 
@@ -213,14 +219,14 @@ class Seated:
         self.env = make_environment(Environment(id=environment), self.robot, self.scene)
 
     def due(self, episodes=1):
-        """Return None, because it needs no recycling."""
+        """Return None, because this simulator is never recycled."""
 
     def restart(self):
         """Restart the fake robot."""
         self.robot.restart()
 
     def stop(self):
-        """Do nothing, because no process runs."""
+        """Do nothing, because the fake robot has no process."""
 
     abandon = pause = unpause = start = stop
 
@@ -256,7 +262,7 @@ gymnasium.register("Painted-v0", Painted)
 
 
 def seen_from_outside(env):
-    """Return the results of a program's reads, writes and calls of an environment's own attributes."""
+    """Return what a program reads from an environment, writes into it, and gets from its method."""
     env.reset(seed=4)
     painted = env.get_wrapper_attr("paint")("blue")
     after_painting = env.step(0)[4]
@@ -276,7 +282,7 @@ def seen_from_outside(env):
 
 
 def test_attributes_and_methods_of_an_environment_are_reached_as_through_gymnasium_s_wrappers(make_players):
-    """A program for `gymnasium.make` must work with `make_env`."""
+    """A program that was written for `gymnasium.make` must work with `make_env`."""
     member = Seated(environment="Painted-v0")
     plain = gymnasium.make("Painted-v0", robot=member.robot, scene=member.scene)
 
@@ -288,7 +294,7 @@ def test_attributes_and_methods_of_an_environment_are_reached_as_through_gymnasi
 
 
 def test_a_standby_that_takes_over_has_the_attributes_that_were_set(make_players):
-    """Its environment is another object, which the wrapper shows from the next episode on."""
+    """The standby has another environment object, which the wrapper uses from the next episode on."""
     member = Seated(environment="Painted-v0")
     env = FaultTolerantEnv(make_players(member))
     env.reset()
@@ -304,12 +310,12 @@ def test_a_standby_that_takes_over_has_the_attributes_that_were_set(make_players
 @pytest.mark.filterwarnings("ignore:.*different from the unwrapped version")
 @pytest.mark.parametrize("check", [check_env, check_env_for_sb3], ids=["gymnasium", "sb3"])
 def test_the_checkers_of_other_projects_have_nothing_to_object_to(make_players, check):
-    """They test seeds, spaces, types and determinism; every warning is an error in these tests."""
+    """The checkers test seeds, spaces, types and determinism; each warning is an error here."""
     check(FaultTolerantEnv(make_players(Seated())), skip_render_check=True)
 
 
 def test_common_wrappers_can_be_put_around_it(make_players):
-    """They read spaces and metadata, and pass on a fault."""
+    """The wrappers read spaces and metadata, and pass a fault on."""
     env = gymnasium.wrappers.RecordEpisodeStatistics(
         gymnasium.wrappers.TimeLimit(FaultTolerantEnv(make_players(Seated(deaths=[4]))), 10)
     )

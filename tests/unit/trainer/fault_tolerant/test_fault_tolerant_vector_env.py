@@ -1,4 +1,4 @@
-"""Several simulators as vector environments of gymnasium and Stable-Baselines3, without invalid rows."""
+"""Several simulators as a vector environment for gymnasium and Stable-Baselines3, without invalid rows."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ RIGHT, LEFT = 1, 0
 
 @pytest.fixture
 def make_env(make_players, make_member):
-    """Make a vector of members; each breaks as its dictionary says."""
+    """Return a function that makes a vector environment; each dictionary sets the faults of a simulator."""
 
     def make(*faults, kind=FaultTolerantVectorEnv, restarts=10):
         members = [make_member(f"collect-{index}", **given) for index, given in enumerate(faults)]
@@ -34,12 +34,12 @@ def make_env(make_players, make_member):
 
 
 def walk(env, steps, action=RIGHT):
-    """Return the results of some equal steps."""
+    """Return the results of some steps with the same action."""
     return [env.step(np.full(env.num_envs, action)) for _ in range(steps)]
 
 
 def test_a_vector_is_gymnasium_s_own_in_everything_but_faults(make_env, make_member):
-    """Values, types, shapes and masks are equal; gymnasium's vector also resets in the same step."""
+    """Values, types, shapes and masks are equal; gymnasium's vector is set to reset in the same step too."""
     ours, *_ = make_env({}, {})
     theirs = SyncVectorEnv(
         [lambda: make_member("a").env, lambda: make_member("b").env], autoreset_mode=AutoresetMode.SAME_STEP
@@ -62,7 +62,10 @@ def test_a_vector_is_gymnasium_s_own_in_everything_but_faults(make_env, make_mem
 
 
 def test_the_step_of_a_fault_waits_and_begins_the_next_episode(make_env):
-    """The row is the next episode's first; the last observation is where loops look for it."""
+    """The row has the first observation of the next episode.
+
+    The last one is in the info, where loops look for it.
+    """
     env, members, _ = make_env({"steps": [2], "held": True}, {})
     env.reset(seed=[1, 2])
     walk(env, 1)
@@ -80,7 +83,7 @@ def test_the_step_of_a_fault_waits_and_begins_the_next_episode(make_env):
 
 
 def test_several_simulators_that_break_in_one_step_are_mended_at_once(make_env):
-    """Each has a thread of its own."""
+    """Each simulator is restarted by its own thread."""
     env, members, _ = make_env({"steps": [2]}, {"steps": [2], "resets": [2]}, {})
     env.reset(seed=1)
 
@@ -92,7 +95,7 @@ def test_several_simulators_that_break_in_one_step_are_mended_at_once(make_env):
 
 
 def test_no_row_of_many_steps_with_faults_is_invalid(make_env):
-    """Loops learn only from values that a simulator sent and that are in the observation space."""
+    """All values come from a simulator and are inside the observation space."""
     env, members, _ = make_env(
         {"steps": range(5, 100, 7), "resets": [3]}, {"steps": range(3, 100, 11)}, restarts=40
     )
@@ -109,7 +112,7 @@ def test_no_row_of_many_steps_with_faults_is_invalid(make_env):
 
 
 def test_episodes_have_the_seeds_of_their_member(make_env):
-    """The seed is one number for all, or one for each, which may be NumPy's."""
+    """A program passes one seed for all simulators or one for each; NumPy integers are accepted."""
     env, members, _ = make_env({}, {})
 
     env.reset(seed=np.int64(5))
@@ -125,7 +128,7 @@ def test_episodes_have_the_seeds_of_their_member(make_env):
 
 
 def test_options_reach_every_environment(make_env):
-    """Examples are `start` and `target`."""
+    """`start` and `target` are such options."""
     env, members, _ = make_env({}, {})
 
     env.reset(options={"easy": True})
@@ -134,7 +137,7 @@ def test_options_reach_every_environment(make_env):
 
 
 def test_a_member_that_breaks_too_often_ends_the_loop_with_a_typed_error(make_env):
-    """Lock-step cannot continue without one of the simulators."""
+    """A vector cannot step without one of its simulators."""
     env, *_ = make_env({"resets": range(1, 20)}, {}, restarts=1)
 
     with pytest.raises(FaultBudgetSpent, match="collect-0"):
@@ -142,7 +145,7 @@ def test_a_member_that_breaks_too_often_ends_the_loop_with_a_typed_error(make_en
 
 
 def test_gymnasium_s_wrappers_for_vectors_can_be_put_around_it(make_env):
-    """CleanRL's scripts use these wrappers."""
+    """The scripts of CleanRL use these wrappers."""
     env, *_ = make_env({"steps": [2]}, {})
     wrapped = gymnasium.wrappers.vector.RecordEpisodeStatistics(env)
     wrapped.reset(seed=1)
@@ -154,7 +157,7 @@ def test_gymnasium_s_wrappers_for_vectors_can_be_put_around_it(make_env):
 
 
 def test_closing_a_vector_releases_its_simulators(make_env):
-    """Each is released once."""
+    """Each simulator is released exactly once."""
     env, _, players = make_env({}, {})
 
     env.close()
@@ -164,7 +167,7 @@ def test_closing_a_vector_releases_its_simulators(make_env):
 
 
 def test_stable_baselines3_gets_the_row_that_it_expects(make_env):
-    """It resets in the same step, and puts everything else into the info."""
+    """Stable-Baselines3 expects a reset in the same step, and the other values in the info."""
     env, *_ = make_env({}, {}, kind=FaultTolerantVecEnv)
     env.seed(3)
     first = env.reset()
@@ -182,7 +185,10 @@ def test_stable_baselines3_gets_the_row_that_it_expects(make_env):
 
 
 def test_stable_baselines3_counts_no_episode_that_a_fault_cut(make_env):
-    """Its return says nothing about the policy; the value of the rest is bootstrapped."""
+    """The return of a cut episode does not measure the policy.
+
+    The value of its last observation is bootstrapped.
+    """
     env, *_ = make_env({"steps": [2]}, {}, kind=FaultTolerantVecEnv)
     env.reset()
 
@@ -195,7 +201,7 @@ def test_stable_baselines3_counts_no_episode_that_a_fault_cut(make_env):
 
 
 def test_stable_baselines3_learns_in_it(make_env):
-    """The test uses its own wrappers, seeds and attributes."""
+    """Stable-Baselines3 uses wrappers, seeds and attributes of the vector."""
     env, members, _ = make_env({"steps": [7]}, {"steps": [11]}, kind=FaultTolerantVecEnv)
 
     model = PPO("MlpPolicy", VecMonitor(env), n_steps=16, batch_size=8, seed=1).learn(64)
@@ -208,7 +214,7 @@ def test_stable_baselines3_learns_in_it(make_env):
 
 @pytest.fixture
 def make_masked(make_players, make_member):
-    """Make a vector of two tasks that forbid actions; the first one breaks in its fourth step."""
+    """Return a vector of two tasks with masks; the first one breaks in its fourth step."""
 
     def make(kind):
         members = [make_member(f"collect-{index}") for index in range(2)]
@@ -230,7 +236,7 @@ def test_sb3_contrib_asks_for_masks_by_its_own_names(make_masked):
 
 
 def test_a_loop_of_gymnasium_asks_for_masks_of_all(make_masked):
-    """It uses `call`, as with gymnasium's own vectors."""
+    """As with gymnasium's own vectors, the loop uses `call`."""
     env = make_masked(FaultTolerantVectorEnv)
     env.reset(seed=[1, 2])
 

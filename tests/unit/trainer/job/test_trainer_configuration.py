@@ -1,4 +1,4 @@
-"""The fields of a training.yaml, and the errors for mistakes in it."""
+"""The fields of training.yaml, and the messages about mistakes in it."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ MINIMAL = {
 
 
 def test_every_field_of_the_contract_is_read(tmp_path):
-    """The operator writes this file, so the trainer must know all of its fields."""
+    """The operator writes these fields, so the trainer must read each of them."""
     path = tmp_path / "training.yaml"
     path.write_text(COMPLETE)
 
@@ -60,14 +60,14 @@ def test_every_field_of_the_contract_is_read(tmp_path):
 
 
 def test_what_is_dumped_is_read_back_as_the_same():
-    """A run directory has the file, so that the run can be evaluated later."""
+    """The run directory has the dumped file, with which the run is evaluated later."""
     configuration = parse(yaml.safe_load(COMPLETE))
 
     assert parse(yaml.safe_load(dump(configuration))) == configuration
 
 
 def test_all_mistakes_are_reported_at_once():
-    """Each attempt to correct a mistake costs a new pod."""
+    """A person would need a new pod for each mistake if they were reported one by one."""
     wrong = MINIMAL | {"steps": 0, "evaluation": {"episodes": 0}, "seed": -1}
 
     with pytest.raises(ConfigurationError) as caught:
@@ -81,7 +81,7 @@ def test_all_mistakes_are_reported_at_once():
 
 
 def test_a_mistake_in_a_list_names_its_place():
-    """There may be thirty simulators."""
+    """A job may have thirty simulators, so the message has the index."""
     wrong = MINIMAL | {"simulators": [MINIMAL["simulators"][0] | {"role": "Colect"}]}
 
     with pytest.raises(ConfigurationError, match=r"simulators\[0\].role: 'Colect' is refused"):
@@ -89,9 +89,9 @@ def test_a_mistake_in_a_list_names_its_place():
 
 
 def test_an_unknown_field_is_logged_with_its_place_and_ignored():
-    """An operator that is newer than the job's trainer image may write it.
+    """The operator may be newer than the trainer's image.
 
-    The run continues as far as it can.
+    The run continues without the field.
     """
     newer = MINIMAL | {"simulators": [MINIMAL["simulators"][0] | {"roll": 1}], "ofTomorrow": {"a": [1]}}
 
@@ -104,7 +104,7 @@ def test_an_unknown_field_is_logged_with_its_place_and_ignored():
 
 
 def test_an_unknown_field_hides_no_mistake_of_another():
-    """Other mistakes are still refused, including those that involve several fields."""
+    """A mistake that involves several fields is still reported."""
     with pytest.raises(ConfigurationError, match="none has role Collect"):
         parse(MINIMAL | {"ofTomorrow": 1, "simulators": [MINIMAL["simulators"][0] | {"role": "Evaluate"}]})
 
@@ -118,13 +118,13 @@ def test_an_unknown_field_hides_no_mistake_of_another():
     ],
 )
 def test_simulators_that_do_not_fit_together_are_refused(simulators, fact):
-    """Each is valid on its own; only the combination is wrong."""
+    """Each simulator is valid on its own, but not together with the others."""
     with pytest.raises(ConfigurationError, match=fact):
         parse(MINIMAL | {"simulators": simulators})
 
 
 def test_the_error_for_a_missing_file_has_the_variable_that_names_it(tmp_path, monkeypatch):
-    """A person who started the program by hand sees only the message."""
+    """A person who started the program by hand has only this message."""
     monkeypatch.setenv("PALAESTRA_CONFIG", str(tmp_path / "none.yaml"))
 
     with pytest.raises(ConfigurationError, match=r"none.yaml: cannot be read .* PALAESTRA_CONFIG"):
@@ -132,7 +132,7 @@ def test_the_error_for_a_missing_file_has_the_variable_that_names_it(tmp_path, m
 
 
 def test_a_folder_that_is_not_a_run_directory_is_named(tmp_path):
-    """A person who evaluates or compares has typed a folder, and no variable."""
+    """For an evaluation or a comparison, a person types a folder and sets no variable."""
     with pytest.raises(ConfigurationError, match=r"has no training.yaml; give a run directory") as caught:
         load_run(tmp_path)
 
@@ -140,7 +140,7 @@ def test_a_folder_that_is_not_a_run_directory_is_named(tmp_path):
 
 
 def test_without_the_variable_the_remedy_names_it(monkeypatch):
-    """The variable is not set on a laptop."""
+    """On a laptop, the variable is usually not set."""
     monkeypatch.delenv("PALAESTRA_CONFIG", raising=False)
 
     with pytest.raises(ConfigurationError, match="PALAESTRA_CONFIG: is not set"):
@@ -148,7 +148,7 @@ def test_without_the_variable_the_remedy_names_it(monkeypatch):
 
 
 def test_a_file_that_is_not_yaml_is_refused(tmp_path):
-    """The parser's own message has the position."""
+    """The message of the YAML parser has the position of the mistake."""
     path = tmp_path / "training.yaml"
     path.write_text("job: [")
 
@@ -162,6 +162,6 @@ def test_a_file_that_is_not_yaml_is_refused(tmp_path):
     )
 )
 def test_whatever_the_document_is_only_configuration_errors_come_out(content):
-    """A traceback would not help the author of a file."""
+    """A traceback would not help the author of the file."""
     with pytest.raises(ConfigurationError):
         parse(content)

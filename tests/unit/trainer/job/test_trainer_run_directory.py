@@ -1,4 +1,4 @@
-"""The files of a run directory: each is either the old or the new one, never a half."""
+"""The files of a run directory: after a crash, each is the old or the new file as a whole."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def test_attempts_are_counted(directory):
 
 
 def test_a_line_that_a_crash_tore_is_left_out(tmp_path):
-    """The lines before and after it are complete."""
+    """The lines before and after the torn line are complete."""
     path = tmp_path / "lines.jsonl"
     append_line(path, {"step": 1})
     with path.open("a") as file:
@@ -39,7 +39,7 @@ def test_a_line_that_a_crash_tore_is_left_out(tmp_path):
 
 
 def test_a_file_that_is_not_there_has_no_lines(tmp_path):
-    """Nothing was evaluated yet."""
+    """At the start of a run, nothing has been evaluated."""
     assert list(read_lines(tmp_path / "none")) == []
 
 
@@ -59,7 +59,7 @@ def test_a_file_is_replaced_as_a_whole_or_not_at_all(tmp_path):
 
 
 def test_a_summary_makes_a_run_finished(directory, make_configuration):
-    """This holds until a user prolongs it."""
+    """With more steps in its job, the same run is not finished."""
     before = finished(directory, make_configuration(steps=100))
     write_summary(directory, summarise(directory, Progress(100, [])))
 
@@ -70,7 +70,7 @@ def test_a_summary_makes_a_run_finished(directory, make_configuration):
 
 @pytest.mark.parametrize("text", ["", "[]", json.dumps({"steps": 3})])
 def test_a_summary_that_says_nothing_finishes_nothing(directory, make_configuration, text):
-    """Another program has written it."""
+    """Another program may have written such a file."""
     directory.summary.write_text(text)
 
     assert finished(directory, make_configuration()) is None

@@ -1,4 +1,4 @@
-"""Everything that a job names as module:Class is imported in the same way, with the same errors."""
+"""Code of the job's author, named as module:Class, is imported in one way with one form of error."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ BROKEN = {
 
 @pytest.fixture
 def written(tmp_path, monkeypatch):
-    """`written(source)` returns the name of a new module with this source, which can be imported."""
+    """`written(source)` returns the name of a new importable module with this source."""
     monkeypatch.syspath_prepend(tmp_path)
 
     def write(source):
@@ -56,7 +56,10 @@ def written(tmp_path, monkeypatch):
 @pytest.mark.parametrize("source", BROKEN)
 @pytest.mark.parametrize("field", FIELDS)
 def test_a_module_that_cannot_be_imported_is_a_mistake_of_the_job(written, tmp_path, field, source):
-    """Any exception gives exit code 2 with field, fact, line and remedy, not a retry or a silent end."""
+    """For any exception, the exit code is 2.
+
+    The message has the field, the mistake, the line and the remedy.
+    """
     module = written(source)
 
     with pytest.raises(ConfigurationError) as refusal:
@@ -68,7 +71,7 @@ def test_a_module_that_cannot_be_imported_is_a_mistake_of_the_job(written, tmp_p
 
 
 def test_an_entry_point_that_cannot_be_imported_is_a_mistake_of_the_job(written):
-    """It is imported later than the module that registers the environment."""
+    """The entry point is imported later than the module that registers the environment."""
     part = written("raise RuntimeError('no display')")
     module = written(f"import gymnasium\ngymnasium.register(id='Late-v0', entry_point='{part}:Late')\n")
 
@@ -81,7 +84,7 @@ def test_an_entry_point_that_cannot_be_imported_is_a_mistake_of_the_job(written)
 
 
 def test_a_name_that_the_module_lacks_is_to_be_corrected(written):
-    """The module itself exists, so nothing is to be installed."""
+    """The module exists, so the remedy is to correct the name and not to install a package."""
     module = written("")
 
     with pytest.raises(ConfigurationError, match=r"has no attribute 'Own'\); correct the name$"):
@@ -89,7 +92,7 @@ def test_a_name_that_the_module_lacks_is_to_be_corrected(written):
 
 
 def test_an_argument_may_be_given_by_name_if_python_takes_it_by_name():
-    """The options of environments and callbacks are then checked like hyperparameters."""
+    """Options of environments and callbacks are checked against these names, as hyperparameters are."""
 
     def made(first, /, second, *others, third=3, **rest):
         del first, second, others, third, rest

@@ -1,4 +1,4 @@
-"""The command that writes reports."""
+"""The command `palaestra-report`, which writes reports and films."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ DRIVE = {
 
 @pytest.fixture
 def run(tmp_path):
-    """Make a run directory with one recorded episode."""
+    """Return a run directory with one recorded episode."""
     folder = tmp_path / "run"
     folder.mkdir()
     (folder / "training.yaml").write_text("job: arena\n")
@@ -33,7 +33,7 @@ def run(tmp_path):
 
 
 def test_one_run_is_reported_in_its_directory_and_several_where_the_person_says(tmp_path, capsys):
-    """The path is printed, so that a script can open it."""
+    """The command prints the path, so a script can open the report."""
     for name in ("0", "1"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "training.yaml").write_text("job: arena\n")
@@ -50,7 +50,7 @@ def test_one_run_is_reported_in_its_directory_and_several_where_the_person_says(
 
 
 def test_a_folder_that_is_not_a_run_is_named(tmp_path, capsys):
-    """Nothing is written, not even for the right ones."""
+    """If one folder is wrong, no report is written for the others either."""
     (tmp_path / "training.yaml").write_text("job: arena\n")
 
     code = main([str(tmp_path), str(tmp_path / "none")])
@@ -61,7 +61,7 @@ def test_a_folder_that_is_not_a_run_is_named(tmp_path, capsys):
 
 
 def test_a_place_that_cannot_be_written_is_named(tmp_path, capsys):
-    """The message has the remedy."""
+    """The message asks for another file with `--out`."""
     (tmp_path / "training.yaml").write_text("job: arena\n")
 
     code = main([str(tmp_path), "--out", str(tmp_path / "none" / "report.html")])
@@ -71,7 +71,7 @@ def test_a_place_that_cannot_be_written_is_named(tmp_path, capsys):
 
 
 def test_the_best_episode_is_written_as_an_animated_gif(run, tmp_path, capsys):
-    """Such a picture can be pasted into a message or a page."""
+    """A person can paste a GIF into a message or a web page."""
     code = main([str(run), "--film", str(tmp_path / "best.gif")])
 
     assert (code, capsys.readouterr().out) == (0, f"{tmp_path / 'best.gif'}\n")
@@ -79,12 +79,12 @@ def test_the_best_episode_is_written_as_an_animated_gif(run, tmp_path, capsys):
         assert (film.n_frames, film.size) == (20, (360, 276))
         assert film.info["duration"] == 150
         film.seek(19)
-        assert film.convert("RGB").getpixel((246, 106)) == (31, 95, 191)  # the robot
+        assert film.convert("RGB").getpixel((246, 106)) == (31, 95, 191)  # a pixel of the robot
     assert not (run / "report.html").exists()
 
 
 def test_the_best_episode_is_written_as_a_video_that_plays_as_fast_as_it_was(run, tmp_path):
-    """Each pose is a picture."""
+    """Each recorded pose is one frame of the video."""
     assert main([str(run), "--film", str(tmp_path / "best.mp4")]) == 0
 
     with av.open(str(tmp_path / "best.mp4")) as film:
@@ -93,7 +93,7 @@ def test_the_best_episode_is_written_as_a_video_that_plays_as_fast_as_it_was(run
 
 
 def test_a_run_without_recorded_episodes_has_no_film(run, tmp_path, capsys):
-    """An old film stays as it is."""
+    """The command must not overwrite or delete an older film."""
     (run / "replays.json").unlink()
     (tmp_path / "best.gif").write_text("old")
 
@@ -113,19 +113,19 @@ def test_a_run_without_recorded_episodes_has_no_film(run, tmp_path, capsys):
     ],
 )
 def test_a_film_that_cannot_be_written_is_named(run, tmp_path, capsys, name, code, problem):
-    """The message has the remedy."""
+    """The message asks for another file with `--film`, or for a name that ends in .gif or .mp4."""
     assert main([str(run), "--film", str(tmp_path / name)]) == code
     assert problem in capsys.readouterr().err
 
 
 def test_a_film_shows_one_run(run, tmp_path, capsys):
-    """Two films would need two names."""
+    """A film of a second run would need a second file name."""
     assert main([str(run), str(run), "--film", str(tmp_path / "best.gif")]) == 2
     assert "a film shows one run; give one run directory" in capsys.readouterr().err
 
 
 def test_an_mp4_without_pyav_says_what_to_install(run, tmp_path, capsys, monkeypatch):
-    """PyAV has 36 MB, and a GIF needs none of it."""
+    """PyAV has 36 MB and is needed only for MP4 files, so it is optional."""
     monkeypatch.setitem(sys.modules, "av", None)
 
     assert main([str(run), "--film", str(tmp_path / "best.mp4")]) == 2

@@ -1,4 +1,4 @@
-"""TensorBoard's event files, read without TensorBoard."""
+"""Reading TensorBoard's event files without TensorBoard."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from palaestra_trainer.run.logger import hide_points
 
 
 def read(folder):
-    """Return the scalars of all event files in a folder."""
+    """Return the scalars in all event files of a folder."""
     found = {}
     for path in sorted(folder.iterdir(), key=lambda path: (path.stat().st_mtime_ns, path.name)):
         add_scalars(path.read_bytes(), found)
@@ -20,21 +20,21 @@ def read(folder):
 
 
 def write(folder, *points):
-    """Write scalars as a run does."""
+    """Write scalars to an event file, as a run does."""
     with SummaryWriter(str(folder)) as writer:
         for name, value, step in points:
             writer.add_scalar(name, value, step)
 
 
 def test_scalars_are_read_as_tensorboard_wrote_them(tmp_path):
-    """The curves of a report are those of TensorBoard."""
+    """The report shows the same curves as TensorBoard."""
     write(tmp_path, ("train/loss", 0.5, 100), ("train/loss", 0.25, 200), ("rollout/ep_rew_mean", -1.0, 100))
 
     assert read(tmp_path) == {"train/loss": {100: 0.5, 200: 0.25}, "rollout/ep_rew_mean": {100: -1.0}}
 
 
 def test_points_that_a_resume_hides_are_left_out(tmp_path):
-    """A run that resumed at step 100 plays the later steps again."""
+    """A run that resumed at step 100 repeats the later steps and writes their points again."""
     write(tmp_path, ("train/loss", 0.5, 100), ("train/loss", 0.25, 200))
     hide_points(tmp_path, after=100)
 
@@ -43,7 +43,7 @@ def test_points_that_a_resume_hides_are_left_out(tmp_path):
 
 @pytest.mark.parametrize("cut", [1, 5, 17])
 def test_a_record_that_a_kill_cut_short_is_left_out(tmp_path, cut):
-    """The report of a killed run is the one that is needed most."""
+    """A person needs the report of a killed run most."""
     write(tmp_path, ("train/loss", 0.5, 100), ("train/loss", 0.25, 200))
     [path] = tmp_path.iterdir()
     found = {}
@@ -55,6 +55,6 @@ def test_a_record_that_a_kill_cut_short_is_left_out(tmp_path, cut):
 
 @given(st.binary(max_size=200))
 def test_any_bytes_are_read_without_an_error(content):
-    """A damaged file must not keep the rest of a report from being made."""
+    """The other parts of a report must be written even if an event file is damaged."""
     add_scalars(content, {})
     add_scalars(len(content).to_bytes(8, "little") + bytes(4) + content + bytes(4), {})

@@ -1,4 +1,4 @@
-"""A report is one page that anyone can open: bounded, and safe whatever a run is called."""
+"""A report is a single page of bounded size, which is safe to open whatever texts the run contains."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ shares = st.floats(0, 1)
 
 @st.composite
 def replays(draw):
-    """Draw a recorded episode."""
+    """Draw the recording of an episode."""
     pose = st.tuples(numbers, numbers, numbers)
     corner = st.none() | st.tuples(numbers, numbers)
     return Replay(
@@ -49,7 +49,7 @@ def replays(draw):
 
 @st.composite
 def runs(draw):
-    """Draw a run of which every text may be any text, and every number any that a reader lets through."""
+    """Draw a run whose texts may be anything, and whose numbers may be any that the reader accepts."""
     named = st.dictionaries(texts, texts, max_size=3)
     evaluated = st.builds(
         Evaluated,
@@ -93,7 +93,7 @@ def runs(draw):
 
 
 class Elements(HTMLParser):
-    """The names of the elements of a page, and their attributes."""
+    """A parser that collects the element names and the attributes of a page."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -101,7 +101,7 @@ class Elements(HTMLParser):
         self.attributes: list[str] = []
 
     def handle_starttag(self, tag, attrs):
-        """Remember an element."""
+        """Record the element and its attributes."""
         self.names.append(tag)
         self.attributes += [name for name, _ in attrs]
 
@@ -115,7 +115,7 @@ def elements_of(text):
 
 @cache
 def large_parts():
-    """Return more of everything than a page shows."""
+    """Return a run that has more of each part than a page shows."""
     long = "a message with characters that take more bytes escaped: <&>\"' " * 20
     evaluated = tuple(
         Evaluated(step=step, success_rate=0.5, low=0.4, high=0.6, returns=(0.1, 0.2), mean_length=30.0)
@@ -142,7 +142,7 @@ def large_parts():
 
 
 def large_run(number):
-    """Return a large run with a name and a seed of its own."""
+    """Return a large run with a number in its name and its fields."""
     parts = large_parts()
     asked = {name: f"{number} {value}" for name, value in parts.asked.items()}
     return replace(parts, name=f"{number} {parts.name}", asked=asked)
@@ -150,9 +150,9 @@ def large_run(number):
 
 @given(st.lists(runs(), min_size=1, max_size=2))
 def test_no_text_of_a_run_becomes_an_element_or_a_reference(drawn):
-    """A report is opened from a mail: the name of a job, or the message of a fault, must not run as code.
+    """A person opens a report from a mail, so a job's name or a fault's message must not run as code.
 
-    It must not tell anyone either that it was opened.
+    The page must not load anything either, which would report to a server that it was opened.
     """
     text = page(drawn)
 
@@ -162,11 +162,11 @@ def test_no_text_of_a_run_becomes_an_element_or_a_reference(drawn):
     assert found.names.count("style") == 1
     assert not {"src", "href", "srcset", "action", "poster", "data"} & {*found.attributes}
     assert not [name for name in found.attributes if name.startswith("on")]
-    text.encode()  # no surrogate is left
+    text.encode()  # fails if a surrogate is left in the text
 
 
 def test_style_and_script_refer_to_nothing_outside_the_page():
-    """Their text is not escaped, so the test above does not see it."""
+    """Style and script are not escaped, so the test above does not cover them."""
     text = page([RunData(name="empty")])
 
     assert "http:" not in text
@@ -177,7 +177,7 @@ def test_style_and_script_refer_to_nothing_outside_the_page():
 
 @pytest.mark.parametrize("number", [1, 3, 200])
 def test_a_page_is_bounded_however_large_the_runs_are(number):
-    """It is mailed; details are left out before the page grows too large."""
+    """People send reports by mail, so details are left out of a page that would be too large."""
     text = page([large_run(index) for index in range(number)])
 
     assert len(text.encode()) <= MOST_BYTES
@@ -185,7 +185,7 @@ def test_a_page_is_bounded_however_large_the_runs_are(number):
 
 
 def test_details_are_left_out_in_the_order_of_their_size():
-    """The comparison of runs is what a page of many is for, so it is always there."""
+    """Two runs have their details. A page of many runs is for their comparison, which is always complete."""
     few, many = page([large_run(1), large_run(2)]), page([large_run(index) for index in range(100)])
 
     assert few.count('<details class="run">') == 2
@@ -195,20 +195,20 @@ def test_details_are_left_out_in_the_order_of_their_size():
 
 
 def test_a_page_that_cannot_be_small_enough_is_refused():
-    """A caller may ask for any size."""
+    """A caller may ask for any size, so the smallest page may still be too large."""
     with pytest.raises(ValueError, match="give fewer runs"):
         page([RunData(name="one"), RunData(name="two")], most_bytes=100)
 
 
 def test_only_so_many_runs_are_shown():
-    """A table of thousands of columns is of no use."""
+    """Nobody can read a table of a thousand columns."""
     text = page([RunData(name=f"run {index}") for index in range(pages.MOST_RUNS + 1)])
 
     assert f"The first {pages.MOST_RUNS} are shown." in text
 
 
 def test_everything_about_a_run_is_on_its_page():
-    """A part that is missing by mistake would be noticed only by a person."""
+    """Only a person would notice if a part were missing from the page."""
     run = RunData(
         name="arena / 0",
         ended="failed",
@@ -241,7 +241,7 @@ def test_everything_about_a_run_is_on_its_page():
 
 
 def test_text_is_escaped_where_an_element_is_made():
-    """No other module can forget it."""
+    """Escaping is in one function, so no other module can forget it."""
     assert element("p", "<b>", title='"') == '<p title="&quot;">&lt;b&gt;</p>'
     with pytest.raises(ValueError, match="would end it"):
         own_code("script", "'</script>'")
@@ -249,7 +249,7 @@ def test_text_is_escaped_where_an_element_is_made():
 
 @given(numbers, numbers)
 def test_ticks_are_few_and_inside_their_axis(first, second):
-    """Labels that overlap cannot be read."""
+    """Too many labels on an axis would overlap."""
     low, high = sorted((first, second))
 
     found = ticks(low, high)

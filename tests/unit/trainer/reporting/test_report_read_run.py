@@ -1,4 +1,4 @@
-"""A run directory becomes a report as far as its files can be read."""
+"""Reading a run directory for a report, as far as its files are readable."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ json_values = st.recursive(
 
 
 def test_the_report_of_a_complete_run_has_all_of_its_parts(play, job, directory):
-    """It is made by the trainer itself, because in a cluster no other program sees the volume."""
+    """The trainer writes the report itself, because in a cluster no other program has the volume."""
     code, _ = play(job())
 
     text, run = directory.report.read_text(encoding="utf-8"), read_run(directory)
@@ -48,7 +48,7 @@ def test_the_report_of_a_complete_run_has_all_of_its_parts(play, job, directory)
 
 
 def test_the_report_of_a_failed_run_has_its_reason_and_its_faults(play, job, directory):
-    """This report is the one that somebody mails to ask for help."""
+    """A person mails this report to ask for help."""
     code, _ = play(job(), faults={"collect-0": {"steps": range(20, 1000)}}.items())
 
     run, text = read_run(directory), directory.report.read_text(encoding="utf-8")
@@ -63,7 +63,7 @@ def test_the_report_of_a_failed_run_has_its_reason_and_its_faults(play, job, dir
 
 
 def test_the_report_of_an_interrupted_run_says_so(play, job, directory):
-    """The same command continues the run, so it is not a failure."""
+    """The same command continues the run, so the report must not call it failed."""
     calls = iter(range(1000))
 
     code, _ = play(job(), on_step=lambda: next(calls) == 60 and signal.raise_signal(signal.SIGTERM))
@@ -74,7 +74,7 @@ def test_the_report_of_an_interrupted_run_says_so(play, job, directory):
 
 
 def test_a_resumed_run_is_reported_as_what_it_is_now(play, job, directory):
-    """The end of the attempt before is not the end of the run."""
+    """The end of the previous attempt is not the end of the run."""
     calls = iter(range(1000))
     play(job(), on_step=lambda: next(calls) == 60 and signal.raise_signal(signal.SIGTERM))
 
@@ -86,7 +86,7 @@ def test_a_resumed_run_is_reported_as_what_it_is_now(play, job, directory):
 
 
 def test_a_run_that_was_never_recorded_leaves_no_report(play, job, directory):
-    """Its folder may be the run of another job."""
+    """The run directory may belong to another job, so nothing is written to it."""
     code, _ = play(job(algorithm={"name": "None"}))
 
     assert code == 2
@@ -94,7 +94,7 @@ def test_a_run_that_was_never_recorded_leaves_no_report(play, job, directory):
 
 
 def test_a_killed_run_is_reported_by_what_it_left(play, job, directory):
-    """Neither its summary nor its end was written."""
+    """A killed run has neither a summary nor a recorded end."""
     play(job())
     for file in (directory.summary, directory.end):
         file.unlink()
@@ -108,7 +108,7 @@ def test_a_killed_run_is_reported_by_what_it_left(play, job, directory):
 
 @given(st.sampled_from(FILES), json_values)
 def test_files_of_any_content_are_read_without_an_error(tmp_path_factory, name, content):
-    """Another release, or another program, may have written them."""
+    """Another release or another program may have written the file."""
     directory = RunDirectory(tmp_path_factory.mktemp("run") / "0")
     directory.path.mkdir()
     text = json.dumps(content)
@@ -121,7 +121,7 @@ def test_files_of_any_content_are_read_without_an_error(tmp_path_factory, name, 
 
 @pytest.mark.parametrize("name", FILES)
 def test_damaged_files_leave_their_part_out(tmp_path, name):
-    """A crash of the machine may leave any bytes."""
+    """After a crash of the machine, a file may contain any bytes."""
     directory = RunDirectory(tmp_path)
     (tmp_path / name).write_bytes(b'\xff\x00{"step": [')
 
@@ -129,7 +129,7 @@ def test_damaged_files_leave_their_part_out(tmp_path, name):
 
 
 def test_variables_and_passwords_of_a_job_are_left_out(tmp_path):
-    """A report is mailed to people who may not know them."""
+    """A report is mailed to people who must not see the values of variables."""
     env = [{"name": "TOKEN", "value": "hunter2"}]
     job = {"spec": {"trainer": {"env": env, "image": "oci://user:hunter3@registry/image"}}}
     (tmp_path / "job.yaml").write_text(yaml.safe_dump(job))
@@ -142,7 +142,7 @@ def test_variables_and_passwords_of_a_job_are_left_out(tmp_path):
 
 
 def test_only_numbers_that_a_chart_can_show_are_numbers():
-    """A chart of NaN, or of 1e300, would have no axis."""
+    """A chart with NaN or 1e300 could not have an axis."""
     assert [number(value) for value in (1, 2.5, True, "3", None, float("nan"), 1e300, 10**400)] == [
         *(1.0, 2.5),
         *[None] * 6,
@@ -152,7 +152,7 @@ def test_only_numbers_that_a_chart_can_show_are_numbers():
 
 
 def test_several_runs_make_one_report(play, job, directory, tmp_path):
-    """Seeds, sweeps and simulators are compared side by side."""
+    """A person compares seeds, sweeps or simulators in one report."""
     play(job())
 
     write_report([directory, directory], tmp_path / "both.html")
@@ -161,7 +161,7 @@ def test_several_runs_make_one_report(play, job, directory, tmp_path):
 
 
 def test_a_report_that_cannot_be_written_changes_no_end(tmp_path):
-    """A full disk is no reason to call a trained policy a failure."""
+    """The run directory cannot be written, but the trained policy is still a success."""
     directory = RunDirectory(tmp_path / "missing")
 
     report_end(directory, lambda: {"exit_code": 0})
@@ -170,7 +170,7 @@ def test_a_report_that_cannot_be_written_changes_no_end(tmp_path):
 
 
 def test_a_fault_that_a_restart_ends_has_its_seconds(tmp_path):
-    """Two faults in a row, as when a restart fails, end together."""
+    """If a restart fails, two faults end with the same restart."""
     directory = RunDirectory(tmp_path)
     fault = {
         "time": "noon",

@@ -1,4 +1,4 @@
-"""The tree of parameters; the answers themselves are compared with rosmaster's in tests/contract."""
+"""The tree of parameters. tests/contract compares the responses with those of rosmaster."""
 
 import copy
 
@@ -26,7 +26,7 @@ def made(settings):
 
 @given(SET, NAMES, VALUES)
 def test_a_parameter_has_the_value_that_was_set_and_is_gone_once_deleted(settings, name, value):
-    """The previous values do not matter, even a value where it needs a namespace."""
+    """Earlier values have no effect, even a plain value where the new name needs a namespace."""
     parameters = made(settings)
 
     parameters.set(name, value)
@@ -39,7 +39,7 @@ def test_a_parameter_has_the_value_that_was_set_and_is_gone_once_deleted(setting
 
 @given(SET, SET)
 def test_a_tree_that_was_returned_never_changes(before, after):
-    """It may be on its way to a node while another program sets parameters."""
+    """A response with the tree may still be on its way while another program sets parameters."""
     parameters = made(before)
     returned = parameters.get("/")
     kept = copy.deepcopy(returned)
@@ -53,7 +53,7 @@ def test_a_tree_that_was_returned_never_changes(before, after):
 
 @given(SET)
 def test_every_name_is_that_of_a_value(settings):
-    """A namespace is not a parameter."""
+    """`names` returns parameters only, not their namespaces."""
     parameters = made(settings)
 
     names = parameters.names()
@@ -63,7 +63,7 @@ def test_every_name_is_that_of_a_value(settings):
 
 
 def test_a_search_goes_up_to_the_root_and_only_looks_for_the_first_part():
-    """The rest may be set later, as ROS has it."""
+    """As in ROS, only the first part of the name must exist. The rest may be set later."""
     parameters = made([("/robot/base/width", 1), ("/base", 2)])
 
     assert parameters.search("base/none", "/robot/arm/hand") == "/robot/base/none"
@@ -74,13 +74,13 @@ def test_a_search_goes_up_to_the_root_and_only_looks_for_the_first_part():
 
 
 def test_a_root_that_is_no_dictionary_is_refused():
-    """The root has to hold all namespaces."""
+    """The root must contain all namespaces."""
     with pytest.raises(TypeError, match="must be a dictionary"):
         Parameters().set("/", 5)
 
 
 def test_a_change_reaches_subscribers_above_below_and_of_the_name_itself():
-    """A namespace that is replaced deletes what it does not name."""
+    """A replaced namespace deletes the parameters that its new value lacks."""
     found = {
         it.subscribed: it[1:] for it in changes("/r", {"x": 1}, ["/", "/r/", "/r/x/", "/r/y/", "/other/"])
     }

@@ -1,4 +1,4 @@
-"""The registrations of nodes; the responses themselves are compared with rosmaster's in tests/contract."""
+"""The registrations of nodes. tests/contract compares the responses with those of rosmaster."""
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -13,7 +13,7 @@ REGISTERED = st.lists(
 
 @given(REGISTERED)
 def test_a_node_is_known_exactly_while_it_has_a_registration(registered):
-    """A name that a killed simulator leaves behind must not keep its successor from starting."""
+    """If a killed simulator's node remained known, the next simulator could not start."""
     nodes = Registrations()
     for kind, name, node in registered:
         nodes.register(kind, name, node, f"http://h{node}")
@@ -29,7 +29,7 @@ def test_a_node_is_known_exactly_while_it_has_a_registration(registered):
 
 @given(REGISTERED)
 def test_a_node_with_another_address_replaces_the_old_one_of_its_name(registered):
-    """All that the old one was registered for leads nowhere any more."""
+    """Topics and services of the old node lead to an address where no program listens."""
     nodes = Registrations()
     for kind, name, node in registered:
         nodes.register(kind, name, node, "http://old")
@@ -42,7 +42,7 @@ def test_a_node_with_another_address_replaces_the_old_one_of_its_name(registered
 
 
 def test_a_service_has_the_address_of_the_node_that_registered_last():
-    """A restarted simulator serves the same names."""
+    """A restarted simulator registers the same service names."""
     nodes = Registrations()
     nodes.register_service("/s", "/a", "http://a", "rosrpc://a")
     nodes.register_service("/s", "/b", "http://b", "rosrpc://b")
@@ -54,7 +54,7 @@ def test_a_service_has_the_address_of_the_node_that_registered_last():
 
 
 def test_a_registration_with_another_address_is_not_removed():
-    """The registration is that of a newer node."""
+    """The registration belongs to a newer node with the same name."""
     nodes = Registrations()
     nodes.register(Kind.PUBLISHER, "/t", "/a", "http://new")
 
@@ -63,7 +63,7 @@ def test_a_registration_with_another_address_is_not_removed():
 
 
 def test_a_topic_has_the_type_of_its_newest_publisher():
-    """A subscriber to any type, such as a recorder, must not hide it."""
+    """A recorder subscribes to any type, `*`, which must not hide the publisher's type."""
     nodes = Registrations()
     declared = []
     for type_name, published in (("*", False), ("a/First", False), ("a/Second", True), ("*", True)):

@@ -1,4 +1,4 @@
-"""Updates on their way to nodes, over real sockets."""
+"""Sending updates to nodes over real sockets."""
 
 import threading
 import time
@@ -14,7 +14,7 @@ PATIENCE_S = 30.0
 
 
 class Slave:
-    """A node that records its updates, and answers each only while `free` is set."""
+    """A node that records its updates, and responds only while `free` is set."""
 
     def __init__(self, code=1):
         self.got = []
@@ -31,13 +31,13 @@ class Slave:
         return [self._code, "", 0]
 
     def publishers(self, topic, *uris):
-        """Return an update about a topic."""
+        """Return an update with the publishers of a topic."""
         return Update(self.uri, "publisherUpdate", topic, list(uris))
 
 
 @pytest.fixture
 def slave():
-    """Make nodes, and close them."""
+    """Yield a function that makes nodes, which are closed at the end."""
     made = []
 
     def make(**options):
@@ -51,12 +51,12 @@ def slave():
 
 
 def refused(update):
-    """Fail: no update is refused."""
+    """Fail, because no node in this test rejects an update."""
     raise AssertionError(update)
 
 
 def test_updates_of_one_node_arrive_in_order_and_only_the_newest_of_a_subject(slave):
-    """A node that is slow would be behind forever, and its last list of publishers decides."""
+    """A slow node would never catch up otherwise; only the newest list of publishers matters."""
     node, updates = slave(), Updates(refused)
     node.free.clear()
     updates.add([node.publishers("/first", "http://a")])
@@ -90,7 +90,7 @@ def test_nodes_that_hang_or_are_gone_delay_no_other(slave):
 
 
 def test_an_update_to_a_node_that_hangs_ends_at_its_deadline(slave):
-    """The next one is tried, because the node may only have been busy."""
+    """The next update is tried, because the node may only have been busy."""
     node = slave()
     node.free.clear()
     updates = Updates(refused, deadline_s=0.1)
@@ -101,7 +101,7 @@ def test_an_update_to_a_node_that_hangs_ends_at_its_deadline(slave):
 
 
 def test_an_invalid_address_is_dropped(slave):
-    """Any program may register one."""
+    """Any program may register an invalid address."""
     node, updates = slave(), Updates(refused)
 
     updates.add([Update(uri, "shutdown", "/n", "") for uri in ("http://", "rosrpc://h:1", "http://h:x")])
@@ -111,7 +111,7 @@ def test_an_invalid_address_is_dropped(slave):
 
 
 def test_a_node_that_refuses_a_parameter_is_reported(slave):
-    """The master unsubscribes it."""
+    """The master then unsubscribes the node from the parameter."""
     node, reported = slave(code=-1), []
     update = Update(node.uri, "paramUpdate", "/x/", 5, "/n")
 

@@ -1,4 +1,4 @@
-"""Several attempts of a run, on corridors."""
+"""Complete runs on corridors: steps, evaluations, faults and ends."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from palaestra_trainer.run.evaluate import measure
 
 @pytest.mark.parametrize(("name", "collectors", "steps"), [("DQN", 1, 100), ("PPO", 2, 128), ("A2C", 1, 100)])
 def test_a_run_ends_with_its_steps_a_model_and_a_summary(play, job, directory, name, collectors, steps):
-    """DQN and A2C end at the target, PPO at the end of its rollout."""
+    """DQN and A2C stop at the wanted step, PPO at the end of its rollout."""
     code, _ = play(job(name, collectors=collectors))
 
     summary = json.loads(directory.summary.read_text())
@@ -32,7 +32,7 @@ def test_a_run_ends_with_its_steps_a_model_and_a_summary(play, job, directory, n
 
 
 def test_evaluations_are_lines_of_equal_episodes(play, job, directory):
-    """Each policy is evaluated on the same seeds, at a fixed interval and at the end."""
+    """Each evaluation plays the same seeds, at fixed intervals and at the end."""
     _, members = play(job())
 
     lines = list(read_lines(directory.evaluations))
@@ -43,7 +43,7 @@ def test_evaluations_are_lines_of_equal_episodes(play, job, directory):
 
 
 def test_simulators_rest_while_nobody_needs_them(play, job):
-    """Evaluators run only in evaluations and the confirmation, collectors at all other times."""
+    """Evaluators run only in evaluations and in the confirmation, collectors at all other times."""
     _, members = play(job())
 
     assert members["evaluate-0"].log == ["start", "pause", *(["run", "pause"] * 4), "stop"]
@@ -51,7 +51,7 @@ def test_simulators_rest_while_nobody_needs_them(play, job):
 
 
 def test_model_zip_is_the_best_by_evaluation(play, job, directory):
-    """On the seeds of the evaluations, its result equals that of the best line."""
+    """Measured again on the same seeds, the policy in model.zip has the result of the best evaluation."""
     configuration = job("REINFORCE", steps=600, evaluation={"everySteps": 50, "episodes": 4})
     _, members = play(configuration)
     best = max(read_lines(directory.evaluations), key=lambda it: (it["success_rate"], it["mean_return"]))
@@ -64,7 +64,7 @@ def test_model_zip_is_the_best_by_evaluation(play, job, directory):
 
 
 def test_training_ends_early_at_the_wanted_success_rate(play, job, directory):
-    """The corridor is learned long before 5,000 steps."""
+    """The policy learns the corridor long before 5,000 steps."""
     wanted = {"everySteps": 50, "episodes": 4, "stopAtSuccessRate": 1.0}
     code, _ = play(job("REINFORCE", steps=5000, evaluation=wanted))
 
@@ -76,7 +76,7 @@ def test_training_ends_early_at_the_wanted_success_rate(play, job, directory):
 
 @pytest.mark.parametrize("evaluation", [{"everySteps": 0}, {"everySteps": 10}])
 def test_without_evaluations_the_last_model_is_kept(play, job, directory, evaluation):
-    """Without evaluations no model is the best."""
+    """Without evaluations, no model is known to be better than the last one."""
     code, _ = play(job(evaluation=evaluation, evaluators=0))
 
     assert code == 0
@@ -86,7 +86,7 @@ def test_without_evaluations_the_last_model_is_kept(play, job, directory, evalua
 
 @pytest.mark.parametrize("name", ["DQN", "PPO", "A2C", "REINFORCE"])
 def test_faults_are_survived_and_counted(play, job, directory, name):
-    """Both collectors and evaluators break; the number of steps is the same as without faults."""
+    """A collector and an evaluator break, and the run still takes all its steps."""
     faults = {"collect-0": {"steps": [5, 30]}, "evaluate-0": {"steps": [6]}}
     code, members = play(job(name), faults)
 
@@ -98,7 +98,7 @@ def test_faults_are_survived_and_counted(play, job, directory, name):
 
 
 def test_simulators_are_recycled_without_a_fault(play, job, directory):
-    """Between episodes, simulators report that they are due."""
+    """A simulator reports between two episodes that it is due for recycling."""
     code, members = play(job(), {name: {"recycle_after": 5} for name in ("collect-0", "evaluate-0")})
 
     summary = json.loads(directory.summary.read_text())
@@ -108,7 +108,7 @@ def test_simulators_are_recycled_without_a_fault(play, job, directory):
 
 
 def test_evaluating_simulators_are_recycled_while_the_others_collect(play, job, directory, tmp_path):
-    """An evaluation must not wait for such a restart, and its result stays the same."""
+    """The restart happens in the background, and the results are those of a run without recycling."""
     recycled, undisturbed = directory, RunDirectory(tmp_path / "undisturbed")
     evaluation = {"everySteps": 20, "episodes": 4, "confirmEpisodes": 0}
 
@@ -121,7 +121,7 @@ def test_evaluating_simulators_are_recycled_while_the_others_collect(play, job, 
 
 
 def test_a_spent_budget_ends_the_run_with_80_and_a_checkpoint(play, job, directory, last_word):
-    """The job is not retried, but a person may repair the cause and resume."""
+    """Kubernetes does not retry the job, but a person may remove the cause and resume."""
     code, _ = play(job(), {"collect-0": {"steps": range(30, 100)}})
 
     assert code == 80
@@ -130,14 +130,14 @@ def test_a_spent_budget_ends_the_run_with_80_and_a_checkpoint(play, job, directo
 
 
 def test_a_simulator_that_does_not_start_is_a_fault_too(play, job):
-    """This holds until its budget is spent."""
+    """The start is tried again until the budget is spent."""
     code, _ = play(job(), {"collect-0": {"starts": [1, 2]}})
 
     assert code == 0
 
 
 def test_a_lost_master_ends_the_run_with_75(play, job, directory, last_word):
-    """The simulators do not register again, but a new pod has a new master."""
+    """The simulators would not register with a new master, but a new pod starts new simulators."""
     code, _ = play(job(), {"collect-0": {"steps": {33: MasterLost("no ROS master")}}})
 
     assert code == 75
@@ -161,7 +161,7 @@ def test_a_mistake_is_reported_before_a_simulator_is_made(play, job, last_word, 
 
 
 def test_missing_members_are_reported(job, directory, last_word):
-    """The function that makes them left one out."""
+    """The function that makes the simulators has left one out."""
     code = attempt.run(job(), directory, lambda _: [])
 
     assert code == 2
@@ -178,7 +178,7 @@ def test_missing_members_are_reported(job, directory, last_word):
     ids=["type", "value", "space"],
 )
 def test_an_algorithm_that_does_not_fit_is_refused_before_a_simulator_starts(play, job, algorithm):
-    """The signature shows it, or the algorithm's own checks."""
+    """The signature of the algorithm shows the mistake, or the algorithm's own check."""
     code, members = play(job(algorithm=algorithm))
 
     assert code == 2
@@ -187,7 +187,7 @@ def test_an_algorithm_that_does_not_fit_is_refused_before_a_simulator_starts(pla
 
 @pytest.mark.parametrize("name", ["DQN", "PPO"])
 def test_a_run_that_diverges_ends_with_81_and_saves_nothing_of_it(play, job, directory, last_word, name):
-    """Otherwise every attempt would start with NaN."""
+    """If a checkpoint contained NaN, every later attempt would start with it."""
     code, _ = play(job(name, steps=2000), step_reward=float("nan"))
 
     assert code == 81
@@ -200,7 +200,7 @@ def test_a_run_that_diverges_ends_with_81_and_saves_nothing_of_it(play, job, dir
 
 @pytest.mark.parametrize(("name", "step"), [("DQN", 64), ("PPO", 5), ("A2C", 5)])
 def test_weights_that_diverge_end_the_run_at_that_update(play, job, directory, last_word, name, step):
-    """The checkpoint before it is kept, and no later one has these weights."""
+    """The checkpoint from before the update is kept, and none is written after it."""
     given = {
         "DQN": {"learning_starts": 60, "batch_size": 8, "train_freq": 4},
         "PPO": {"n_steps": 5, "batch_size": 5},
@@ -218,7 +218,7 @@ def test_weights_that_diverge_end_the_run_at_that_update(play, job, directory, l
 
 
 def test_a_last_word_has_the_last_faults(play, job, last_word):
-    """A pod's log is deleted with it."""
+    """The log of a pod is deleted together with the pod."""
     play(job(), {"collect-0": {"steps": [5, 30]}})
 
     faults = last_word().faults
@@ -230,7 +230,7 @@ def test_a_last_word_has_the_last_faults(play, job, last_word):
 
 
 def test_a_summary_says_what_the_wall_clock_went_into(play, job, directory):
-    """The times add up to the whole, and show the share of training."""
+    """The times add up to the duration, and give the share of it that trained."""
     play(job("PPO"), {"collect-0": {"steps": [50]}})
 
     summary = json.loads(directory.summary.read_text())
@@ -242,7 +242,7 @@ def test_a_summary_says_what_the_wall_clock_went_into(play, job, directory):
 
 
 def test_an_unexpected_error_ends_with_1_and_stops_every_simulator(play, job, last_word):
-    """A bug must leave no processes behind, and its line must be visible without the log."""
+    """The message has the line of the error, because a person may have no access to the log."""
     bug = {"collect-0": {"steps": {20: ZeroDivisionError("a bug")}}}
     code, members = play(job(), bug)
 
@@ -252,7 +252,7 @@ def test_an_unexpected_error_ends_with_1_and_stops_every_simulator(play, job, la
 
 
 def test_tensorboard_has_the_tags_that_people_look_for(play, job, directory):
-    """The tags are those of Stable-Baselines3, and one for each reward term, with its name."""
+    """The tags are those of Stable-Baselines3, and one with the name of each reward term."""
     play(job("A2C", steps=600))
 
     events = EventAccumulator(str(directory.tensorboard))
@@ -272,7 +272,7 @@ def test_tensorboard_has_the_tags_that_people_look_for(play, job, directory):
 
 
 def in_order(folder):
-    """Return TensorBoard's points of a folder, even if all of its files were written in the same second."""
+    """Return TensorBoard's points of a folder in order, even if its files are of the same second."""
     files = sorted(folder.iterdir(), key=lambda it: (int(it.name.split(".")[3]), int(it.suffix[1:])))
     whole = folder.with_name("events.out.tfevents")
     whole.write_bytes(b"".join(file.read_bytes() for file in files))
@@ -283,7 +283,7 @@ def in_order(folder):
 
 @pytest.mark.parametrize("killed_at", [30, 75], ids=["before the first checkpoint", "after it"])
 def test_tensorboard_shows_no_step_twice_when_a_run_was_resumed(play, job, directory, killed_at):
-    """The steps after the checkpoint are repeated, and the first points would overlap the second ones."""
+    """After a resume the steps since the checkpoint are repeated, so their first points must be hidden."""
     noisy = job("A2C", checkpoint={"everySteps": 50, "keep": 2}, evaluation={"everySteps": 10, "episodes": 1})
     kill = {"collect-0": {"steps": {killed_at: ZeroDivisionError("as good as a kill")}}}
 
@@ -298,13 +298,13 @@ def test_tensorboard_shows_no_step_twice_when_a_run_was_resumed(play, job, direc
 
 
 def test_measuring_needs_a_model(job, directory):
-    """The message has the remedy."""
+    """A person may evaluate a run before it has a model; the message asks to train first."""
     with pytest.raises(ConfigurationError, match=r"model.zip: does not exist; train first"):
         measure(job(), directory.model, lambda _: [], episodes=1, stream="B")
 
 
 def test_a_policy_is_measured_where_it_collected_if_nobody_evaluates(play, job, directory, make_member):
-    """The end of a run prints the command, even for a job without role Evaluate, and names its world."""
+    """The end of a run prints the command for this, and not every job has a group with role Evaluate."""
     play(job(evaluators=0))
     reported = []
 
@@ -323,7 +323,7 @@ def test_a_policy_is_measured_where_it_collected_if_nobody_evaluates(play, job, 
 
 
 def test_a_restored_policy_is_the_policy_that_was_saved(play, job, directory, make_member):
-    """The zip is read without unpickling, with the configuration of the run."""
+    """The zip file is read without unpickling, with the configuration of the run."""
     play(job())
 
     result = measure(

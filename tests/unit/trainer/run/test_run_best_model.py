@@ -1,4 +1,4 @@
-"""The best policy of a run and its success rate are decided on separate episodes."""
+"""The best policy of a run is chosen by evaluations, and its success rate is measured on other episodes."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ GOAL = {"everySteps": 40, "episodes": 4, "stopAtSuccessRate": 0.9}
 
 
 def lucky(seed, _reached):
-    """Report success in the episodes by which policies are chosen, and in no other."""
+    """Report success in the episodes of evaluations, and failure in all others."""
     return {"is_success": seed in EVALUATED}
 
 
@@ -41,7 +41,7 @@ def test_a_goal_that_was_reached_by_luck_does_not_end_training(play, job, direct
 
 
 def test_each_confirmation_plays_episodes_of_its_own(play, job, directory):
-    """Otherwise the policies would in the end be chosen on these episodes."""
+    """If confirmations repeated their episodes, the policy would in the end be chosen by these too."""
     _, members = play(job(evaluation=GOAL | {"confirmEpisodes": 10}), report=lucky)
 
     confirmed = list(read_lines(directory.confirmations))
@@ -53,10 +53,10 @@ def test_each_confirmation_plays_episodes_of_its_own(play, job, directory):
 
 
 def test_a_goal_that_is_confirmed_ends_training_with_the_policy_that_reached_it(play, job, directory):
-    """An earlier policy with a better evaluation was not confirmed."""
+    """An earlier policy had a better evaluation, but its confirmation failed."""
     configuration = job(steps=400, evaluation=GOAL | {"stopAtSuccessRate": 0.5, "confirmEpisodes": 10})
     confirming = [*episode_seeds(1, CONFIRM, 20)]
-    good = {*EVALUATED, *confirming[10:]}  # the second confirmation
+    good = {*EVALUATED, *confirming[10:]}  # the episodes of the second confirmation
 
     play(configuration, report=lambda seed, _: {"is_success": seed in good})
 
@@ -67,7 +67,7 @@ def test_a_goal_that_is_confirmed_ends_training_with_the_policy_that_reached_it(
 
 
 def test_without_confirmations_an_evaluation_alone_ends_training(play, job, directory):
-    """With confirmEpisodes 0 there is no confirmation."""
+    """With `confirmEpisodes: 0` the run ends at the first evaluation that reaches the goal."""
     play(job(evaluation=GOAL | {"confirmEpisodes": 0}), report=lucky)
 
     result = summary(directory)
@@ -77,7 +77,7 @@ def test_without_confirmations_an_evaluation_alone_ends_training(play, job, dire
 
 
 def test_the_best_policy_is_confirmed_at_the_end_and_the_last_one_is_kept(play, job, directory):
-    """model.zip is confirmed, and the checkpoint continues with the newest policy."""
+    """model.zip has the confirmed policy, while the newest checkpoint has the last policy."""
     play(job("REINFORCE", steps=600, evaluation={"everySteps": 50, "episodes": 4, "confirmEpisodes": 7}))
 
     [line] = read_lines(directory.confirmations)
@@ -93,7 +93,7 @@ def test_the_best_policy_is_confirmed_at_the_end_and_the_last_one_is_kept(play, 
 
 
 def test_an_evaluation_keeps_its_episodes(play, job, directory):
-    """A user who doubts a rate can look at its episodes and repeat one by its seed."""
+    """A person who doubts a success rate can look at its episodes, and repeat one by its seed."""
     play(job(), report=lambda seed, reached: {"is_success": reached, "outcome": f"of-{seed}"})
 
     line = next(read_lines(directory.evaluations))
@@ -105,7 +105,7 @@ def test_an_evaluation_keeps_its_episodes(play, job, directory):
 
 
 def test_success_that_is_never_reported_is_absent_and_not_zero(play, job, directory, last_word):
-    """A user's environment may not report success; the best policy then has the best return."""
+    """A user's environment may report no success. The best policy is then the one with the best return."""
     code, _ = play(job(), report=lambda *_: {})
 
     result = summary(directory)
@@ -117,7 +117,7 @@ def test_success_that_is_never_reported_is_absent_and_not_zero(play, job, direct
 
 
 def test_a_goal_without_reported_success_ends_the_run_at_its_first_evaluation(play, job, last_word):
-    """The goal could never be reached, and a retry cannot help."""
+    """The run could never reach its goal, and a retry cannot help."""
     code, _ = play(job(evaluation=GOAL), report=lambda *_: {})
 
     assert code == 2
@@ -126,16 +126,16 @@ def test_a_goal_without_reported_success_ends_the_run_at_its_first_evaluation(pl
 
 
 def test_success_that_is_reported_and_failure_that_is_not_is_a_rate(play, job, directory):
-    """Some environments set is_success only if it is true."""
+    """Some environments set `is_success` only when it is true."""
     play(job(), report=lambda seed, _: {"is_success": True} if seed == min(EVALUATED) else {})
 
     assert next(read_lines(directory.evaluations))["success_rate"] == 0.25
 
 
 def test_a_confirmation_that_was_cut_is_made_up_for(play, job, directory):
-    """A signal must not turn a goal that was reached into one that was missed."""
+    """A goal that was reached must count even if a signal interrupts its confirmation."""
     steps = iter(range(1, 100_000))
-    in_confirmation = 4 * 8 + 3  # the corridor's episodes have eight steps at most
+    in_confirmation = 4 * 8 + 3  # an episode of the corridor has eight steps at most
 
     def cut():
         if next(steps) == in_confirmation:
@@ -152,12 +152,12 @@ def test_a_confirmation_that_was_cut_is_made_up_for(play, job, directory):
 
 
 def test_the_summary_is_that_of_model_zip_also_after_a_resume(play, job, directory):
-    """The best model was evaluated after the checkpoint from which the run resumed."""
+    """The best model was evaluated later than the checkpoint from which the run resumed."""
     configuration = job(evaluation={"everySteps": 40, "episodes": 4, "confirmEpisodes": 0})
     play(configuration, report=lambda *_: {"is_success": True})
     before = best_of(directory)
     directory.summary.unlink()
-    drop_lines(directory.evaluations, lambda _: True)  # a resume before its step does so
+    drop_lines(directory.evaluations, lambda _: True)  # a resume from an earlier step drops these lines
 
     play(configuration, report=lambda *_: {"is_success": False})
 

@@ -1,4 +1,4 @@
-"""The callbacks of a job's author run together with the training loop's own."""
+"""Callbacks of a job's author, which run together with those of the training loop."""
 
 from __future__ import annotations
 
@@ -75,13 +75,16 @@ def module(tmp_path, monkeypatch):
 
 @pytest.fixture
 def seen(module):
-    """Return the notes of the module's callbacks."""
+    """Return the notes that the callbacks of the module have made."""
     return __import__(module).SEEN
 
 
 @pytest.fixture
 def with_callbacks(job, module):
-    """Make the configuration of a short run whose callbacks have these options."""
+    """Return a function that makes the configuration of a short run.
+
+    Each set of options is for one callback.
+    """
 
     def make(*options, name="DQN", **changes):
         configuration = job(name, **changes)
@@ -93,12 +96,15 @@ def with_callbacks(job, module):
 
 
 def events(seen, word, event):
-    """Return the step of each event of a callback."""
+    """Return the steps at which a callback had an event."""
     return [entry[2] for entry in seen if entry[:2] == (word, event)]
 
 
 def test_callbacks_are_called_in_their_order_and_end_last(play, with_callbacks, seen):
-    """They run at the start of an attempt, at each step, and after the last evaluation and checkpoint."""
+    """Callbacks are called at the start of an attempt and at each step.
+
+    Their end comes after the last evaluation and the last checkpoint.
+    """
     code, _ = play(with_callbacks({"word": "first"}, {"word": "second"}))
 
     assert code == 0
@@ -110,7 +116,10 @@ def test_callbacks_are_called_in_their_order_and_end_last(play, with_callbacks, 
 
 
 def test_a_callback_sees_which_rows_a_fault_spoiled(play, with_callbacks, seen):
-    """The infos have these rows; until the end of the step they also count as its steps."""
+    """The infos mark the invalid rows.
+
+    Until the end of the step, these rows count as steps for the callback.
+    """
     play(with_callbacks({}, name="PPO"), {"collect-0": {"steps": [5]}})
 
     valid = [entry[3] for entry in seen if entry[1] == "step"]
@@ -119,7 +128,7 @@ def test_a_callback_sees_which_rows_a_fault_spoiled(play, with_callbacks, seen):
 
 
 def test_a_run_with_callbacks_learns_the_same(play, job, with_callbacks, directory, tmp_path):
-    """Callbacks only observe."""
+    """A callback only observes the training, so the evaluations must be the same."""
     without = RunDirectory(tmp_path / "without")
     play(with_callbacks({}))
     play(job(), into=without)
@@ -131,7 +140,7 @@ def test_a_run_with_callbacks_learns_the_same(play, job, with_callbacks, directo
 def test_a_callback_that_returns_false_ends_training_ordinarily(
     play, with_callbacks, directory, seen, name, kept
 ):
-    """The run is evaluated, confirmed and saved as of the boundary before the cut rollout."""
+    """The run ends at the last rollout boundary: the state of that step is evaluated, confirmed and saved."""
     code, _ = play(with_callbacks({"stop_at": 55}, name=name))
 
     assert code == 0
@@ -142,7 +151,7 @@ def test_a_callback_that_returns_false_ends_training_ordinarily(
 
 
 def test_a_run_that_a_callback_ended_does_not_say_that_all_steps_are_done(play, with_callbacks, last_word):
-    """Many people read its result and its status, but not the log."""
+    """Many people read the result and the status of a run, but not its log."""
     play(with_callbacks({"stop_at": 55}))
 
     assert last_word().reason == "Completed: the training is complete"
@@ -151,7 +160,7 @@ def test_a_run_that_a_callback_ended_does_not_say_that_all_steps_are_done(play, 
 def test_a_run_that_a_callback_ended_is_prolonged_as_if_it_had_not(
     play, job, with_callbacks, directory, tmp_path
 ):
-    """The cut rollout leaves nothing behind, so the rest of the run is the same."""
+    """The cut rollout is dropped, so the longer run continues as if the callback had not been there."""
     without, longer = RunDirectory(tmp_path / "without"), RunDirectory(tmp_path / "longer")
     play(job("DQN", evaluation={"everySteps": 0}), into=without)
     play(with_callbacks({"stop_at": 55}, evaluation={"everySteps": 0}))
@@ -168,7 +177,7 @@ def test_a_run_that_a_callback_ended_is_prolonged_as_if_it_had_not(
 def test_an_error_of_a_callback_ends_the_run_with_its_name_its_line_and_a_checkpoint(
     play, with_callbacks, directory, last_word, module, seen
 ):
-    """A retry may help, for example if a server was down; the line shows the author the place."""
+    """A retry may help, for example after the failure of a server. The line leads the author to the error."""
     code, members = play(with_callbacks({"fail_at": 55}))
 
     assert code == 1
@@ -181,7 +190,7 @@ def test_an_error_of_a_callback_ends_the_run_with_its_name_its_line_and_a_checkp
 
 
 def test_an_error_at_the_end_is_reported_too(play, with_callbacks, last_word, seen):
-    """It is reported after the other callbacks have ended."""
+    """The other callbacks are ended first, and then the run fails."""
     code, _ = play(with_callbacks({"fail_at_end": True}, {"word": "second"}))
 
     assert code == 1
@@ -192,7 +201,7 @@ def test_an_error_at_the_end_is_reported_too(play, with_callbacks, last_word, se
 def test_a_fault_at_the_end_of_a_callback_neither_skips_the_others_nor_hides_the_first_error(
     play, with_callbacks, last_word, seen
 ):
-    """A callback that uses a simulator at its end may meet a fault. The first error is the cause."""
+    """A callback may use a simulator when training ends. The first error is the cause of the run's end."""
     ends = ({"fail_at_end": "fault"}, {"word": "second", "fail_at_end": True}, {"word": "third"})
 
     play(with_callbacks(*ends))
@@ -206,14 +215,14 @@ def test_a_fault_at_the_end_of_a_callback_neither_skips_the_others_nor_hides_the
 
 
 def test_every_error_at_the_end_is_in_the_log(play, with_callbacks, capsys):
-    """The reason of the run has only the first error."""
+    """The reason in the run's status has only the first error."""
     play(with_callbacks({"fail_at_end": "fault"}, {"word": "second", "fail_at_end": True}))
 
     assert "raised RuntimeError: no such file" in capsys.readouterr().out
 
 
 def test_a_callback_begins_anew_when_a_run_resumes(play, with_callbacks, last_word, seen):
-    """The callback also gets the end of the interrupted attempt, whose reason stays the signal."""
+    """The callback was also ended in the interrupted attempt. The reason of that end is still the signal."""
     configuration = with_callbacks({"fail_at_end": True})
     steps = iter(range(1, 1000))
 
@@ -227,7 +236,7 @@ def test_a_callback_begins_anew_when_a_run_resumes(play, with_callbacks, last_wo
 
 
 def test_a_run_may_resume_with_other_callbacks(play, job, with_callbacks):
-    """Callbacks are not part of the model."""
+    """A callback is no part of the model, so a resume does not compare it."""
     steps = iter(range(1, 1000))
     play(with_callbacks({}), on_step=lambda: next(steps) == 42 and os.kill(os.getpid(), signal.SIGTERM))
 
@@ -263,7 +272,7 @@ def test_a_run_may_resume_with_other_callbacks(play, job, with_callbacks):
     ],
 )
 def test_a_wrong_callback_is_refused_with_field_fact_and_remedy(module, name, options, fact):
-    """All that can be known without a simulator is checked before one starts."""
+    """Each mistake that shows without a simulator is reported before one starts."""
     wanted = Callback(name=name.format(module=module), options=options)
 
     with pytest.raises(ConfigurationError) as caught:

@@ -1,4 +1,4 @@
-"""The code in docs/howto/callbacks.md is run unchanged."""
+"""The code in docs/howto/callbacks.md is executed without changes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ PAGE = (Path(__file__).parents[4] / "docs/howto/callbacks.md").read_text()
 
 @pytest.fixture
 def job_of_the_page():
-    """Return the algorithm of a job on the page as the trainer reads it."""
+    """Return the algorithm in the page's job as the trainer reads it."""
 
     def read(kind):
         job = identified(load(blocks(PAGE, f"yaml {kind}")[0]), "uid")
@@ -29,7 +29,7 @@ def job_of_the_page():
 
 
 def test_the_callback_of_the_page_ends_training(play, job, directory, job_of_the_page, tmp_path, monkeypatch):
-    """The return of the corridor cannot rise for ever."""
+    """In the corridor the return cannot rise for ever, so the callback must end the training."""
     (tmp_path / "bored.py").write_text(blocks(PAGE, "python bored")[0])
     monkeypatch.syspath_prepend(str(tmp_path))
     short = job("PPO", steps=5000, evaluation={"everySteps": 0})

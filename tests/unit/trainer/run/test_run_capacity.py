@@ -1,4 +1,4 @@
-"""Replay buffers that do not fit are refused before a simulator starts."""
+"""A replay buffer that exceeds memory or disk is rejected before a simulator starts."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ KEPT = Checkpoint(every_steps=5000, keep=3)
 
 @pytest.fixture
 def machine(tmp_path):
-    """Return a function that writes the kernel's files, and returns the folders for `capacity_now`."""
+    """Return a function that writes the kernel's files; it returns the arguments for `capacity_now`."""
 
     def write(files, cgroup="0::/pod/container"):
         (tmp_path / "proc" / "self").mkdir(parents=True)
@@ -50,7 +50,10 @@ def begun(directory):
 
 
 def test_the_limit_of_a_container_counts_without_the_cache_of_files(machine, begun):
-    """The kernel frees this cache first; otherwise a checkpoint of some GB would look like used memory."""
+    """The kernel frees this cache first.
+
+    After a checkpoint of some GB, the cache would look like used memory.
+    """
     files = {
         "pod/container/memory.max": "2000000000",
         "pod/container/memory.current": "900000000",
@@ -76,15 +79,15 @@ def test_the_limit_of_a_container_counts_without_the_cache_of_files(machine, beg
     ids=["of a parent", "of version 1", "in a namespace"],
 )  # fmt: skip
 def test_every_kind_of_limit_counts(machine, begun, cgroup, files):
-    """A pod may have a limit, and some nodes have cgroup version 1.
+    """The pod may have a limit above the container, and a node may have cgroup version 1.
 
-    A container sees its own group as the root.
+    Inside a container, its own group may appear as the root.
     """
     assert capacity_now(begun, **machine(files, cgroup)).memory_bytes == 1_500_000_000 - RESERVE_BYTES
 
 
 def test_without_a_limit_the_available_memory_of_the_machine_counts(machine, begun):
-    """This is so on a laptop, or in a pod without `limits`."""
+    """A laptop has no limit, and neither has a pod without `limits`."""
     found = capacity_now(begun, **machine({}))
 
     assert found.memory_bytes == 8_000_000 * 1024 - RESERVE_BYTES
@@ -92,7 +95,7 @@ def test_without_a_limit_the_available_memory_of_the_machine_counts(machine, beg
 
 
 def test_where_the_kernel_reports_nothing_nothing_is_refused_for_memory(tmp_path, begun):
-    """An unknown number is better than a wrong one."""
+    """Without a known limit, a buffer must not be rejected by a guess."""
     found = capacity_now(begun, groups=tmp_path / "none", processes=tmp_path / "none")
 
     assert found.memory_bytes is None
@@ -100,7 +103,7 @@ def test_where_the_kernel_reports_nothing_nothing_is_refused_for_memory(tmp_path
 
 
 def test_checkpoints_that_are_there_are_room_for_those_to_come(begun, monkeypatch):
-    """Checkpoints are replaced one by one, and chunks that several share count once."""
+    """Each new checkpoint replaces an old one. A chunk that several checkpoints share counts once."""
     chunk = begun.checkpoints / "100" / "experience" / "00000.npy"
     chunk.parent.mkdir(parents=True)
     chunk.write_bytes(bytes(1 << 20))
@@ -130,7 +133,7 @@ def test_checkpoints_that_are_there_are_room_for_those_to_come(begun, monkeypatc
     ],
 )  # fmt: skip
 def test_a_buffer_that_does_not_fit_is_refused_with_the_largest_that_does(memory, limit, disk, lines):
-    """With both numbers the reader can decide which to change."""
+    """The message has both numbers, so a person can change either the job or the limit."""
     room = Capacity(memory_bytes=memory, memory_limit=limit, disk_bytes=disk)
     refused = ""
 
@@ -148,7 +151,7 @@ def test_a_buffer_that_does_not_fit_is_refused_with_the_largest_that_does(memory
 def test_a_run_whose_buffer_does_not_fit_ends_with_2_before_a_simulator_starts(
     play, job, last_word, monkeypatch, tmp_path
 ):
-    """The largest size in the message is then accepted."""
+    """A second run with the size from the message is accepted."""
     room = Capacity(memory_bytes=3000, memory_limit=True, disk_bytes=GB)
     monkeypatch.setattr(attempt, "capacity_now", lambda _: room)
 

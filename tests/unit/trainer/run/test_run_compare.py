@@ -1,4 +1,4 @@
-"""The policies of two runs on the same fresh episodes."""
+"""The comparison of two runs' policies on the same fresh episodes."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ SHORT = {"steps": 300, "evaluation": {"everySteps": 0}}
 
 @pytest.fixture
 def reaching(play, job, directory):
-    """Return the run of a policy that walks to the goal."""
+    """Return the run directory of a policy that walks to the goal."""
     play(job("REINFORCE", **SHORT))
     return directory.path
 
 
 @pytest.fixture
 def staying(play, job, tmp_path):
-    """Return the run of a policy that stays away from the goal, because each step was rewarded."""
+    """Return the run directory of a policy that stays away from the goal, because each step was rewarded."""
     directory = RunDirectory(tmp_path / "staying")
     play(job("REINFORCE", **SHORT), step_reward=1.0, into=directory)
     return directory.path
@@ -43,7 +43,7 @@ def staying(play, job, tmp_path):
 
 @pytest.fixture
 def written(make_configuration, tmp_path):
-    """Return a function that writes a run directory with a configuration and a file as policy."""
+    """Return a function that writes a run directory with a configuration and an empty model."""
 
     def write(name, **fields):
         run = tmp_path / name
@@ -57,7 +57,7 @@ def written(make_configuration, tmp_path):
 
 @pytest.fixture
 def compared(make_member):
-    """Return a function that compares two runs and returns the result, every report and the members."""
+    """Return a function that compares two runs; it returns the result, the reports and the simulators."""
 
     def run(a, b, rules=RULES, **options):
         members, reports = options.get("members", []), []
@@ -76,9 +76,10 @@ def compared(make_member):
 
 
 def test_the_better_policy_is_known_after_one_batch_of_fresh_episodes(reaching, staying, compared):
-    """One always succeeds and the other never.
+    """One policy always succeeds and the other never.
 
-    Both play the same seeds, which no run has: one of them might have learned there, or been chosen there.
+    Both play the same seeds. No run uses these, since a policy may have been trained or chosen on a run's
+    seeds.
     """
     result, reports, (ours, theirs) = compared(reaching, staying)
 
@@ -91,7 +92,7 @@ def test_the_better_policy_is_known_after_one_batch_of_fresh_episodes(reaching, 
 
 
 def test_a_policy_is_like_itself_as_soon_as_the_bounds_allow(reaching, compared):
-    """The other order would be to play all episodes for nothing."""
+    """Playing all the other episodes would be a waste of time."""
     result, reports, _ = compared(reaching, reaching)
 
     assert (result.verdict, result.pairs) == (Verdict.ALIKE, Pairs(both=100))
@@ -99,7 +100,7 @@ def test_a_policy_is_like_itself_as_soon_as_the_bounds_allow(reaching, compared)
 
 
 def test_a_comparison_ends_undecided_after_its_episodes(reaching, compared):
-    """The last batch is as long as what is left."""
+    """The last batch has the number of episodes that are left."""
     result, reports, _ = compared(reaching, reaching, Rules(episodes=30))
 
     assert (result.verdict, result.ended) == (Verdict.UNDECIDED, True)
@@ -107,7 +108,7 @@ def test_a_comparison_ends_undecided_after_its_episodes(reaching, compared):
 
 
 def test_an_interrupted_comparison_stops_its_simulators(reaching, compared):
-    """Ctrl-C leaves nothing behind."""
+    """After Ctrl-C, no simulator must keep running."""
     looks = itertools.count()
     members = []
 
@@ -128,7 +129,7 @@ def test_without_reports_of_success_no_policy_is_better(reaching, compared):
 
 
 def test_policies_of_different_tasks_are_refused_before_anything_starts(written):
-    """Success would not mean the same; every reason is told at once."""
+    """Success would not mean the same in both tasks. The error lists all differences at once."""
     a, b = written("a"), written("b", environment={"id": "Other-v0"}, robot="EPuck")
 
     with pytest.raises(ConfigurationError) as refused:
@@ -151,7 +152,7 @@ def test_a_run_without_a_policy_is_named(written):
 
 
 def test_both_simulators_are_those_of_a_with_names_of_their_own(written):
-    """Two simulators with one ROS name would end each other."""
+    """With equal ROS names, each simulator would unregister the other one from the master."""
     first, second = contestants(written("a", uid="1"), written("b", uid="2"), "mujoco")
 
     (ours,), (theirs,) = first.simulators, second.simulators
@@ -163,7 +164,7 @@ def test_both_simulators_are_those_of_a_with_names_of_their_own(written):
 
 
 def test_options_that_differ_are_told(written):
-    """A person may want to compare just these options, such as movements, so they are not refused."""
+    """A person may want to compare just these options, so they are printed and not rejected."""
     other = written("b", environment={"id": "Corridor-v0", "options": {"max_steps": 5}})
 
     assert list(notes(written("a"), other)) == [
@@ -193,14 +194,14 @@ def test_options_that_differ_are_told(written):
     ],
 )
 def test_each_verdict_is_a_sentence(pairs, verdict, sentence):
-    """A person reads this line alone."""
+    """Many people read only this line."""
     comparison = Comparison(pairs=pairs, verdict=Verdict(verdict), faults=0, ended=True)
 
     assert sentence_of(comparison, Rules()) == sentence
 
 
 def test_a_batch_is_a_line_and_the_end_an_object():
-    """The bounds of both are those of the same interval."""
+    """The line and the JSON object have the bounds of the same interval."""
     pairs = Pairs(both=14, only_a=4, only_b=1, neither=1)
     comparison = Comparison(pairs=pairs, verdict=Verdict.UNDECIDED, faults=2, ended=True)
 

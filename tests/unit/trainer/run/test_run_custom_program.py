@@ -1,4 +1,4 @@
-"""Users' own programs report their progress; each test runs one in a process."""
+"""Programs of users report their progress; each test runs one as a process."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ for line in sys.stdin:
 
 @pytest.fixture
 def address():
-    """A free address."""
+    """Return a free address."""
     with socket.socket() as listener:
         listener.bind(("127.0.0.1", 0))
         return f"127.0.0.1:{listener.getsockname()[1]}"
@@ -41,7 +41,10 @@ def address():
 
 @pytest.fixture
 def program(tmp_path, address):
-    """Start a program with a target of 1000 steps; each call returns when it has reported."""
+    """Yield a function that lets a program report and waits for the report.
+
+    The program has a target of 1000 steps.
+    """
     job = {
         "job": "own",
         "environment": {"id": "Task-v0"},
@@ -73,7 +76,7 @@ def program(tmp_path, address):
 
 
 def answer(address, path):
-    """Return the program's response."""
+    """Return the program's response to a request."""
     with urlopen(f"http://{address}{path}", timeout=LONG_S) as response:
         return response.read().decode()
 
@@ -92,7 +95,7 @@ def test_a_program_that_reports_answers_as_the_built_in_loop_does(program, addre
 
 
 def test_what_a_program_spends_its_time_on_is_not_known(program, address):
-    """A second with a wrong cause is worse than an unknown one."""
+    """A second with a wrong cause would mislead more than an unknown one."""
     program(step=10)
 
     assert json.loads(answer(address, "/status"))["goodput"] == {}
@@ -100,7 +103,7 @@ def test_what_a_program_spends_its_time_on_is_not_known(program, address):
 
 
 def test_a_program_that_reaches_its_steps_has_said_its_last_word(program, tmp_path):
-    """The program may end before the next poll."""
+    """The program may end before the operator polls it again."""
     program(step=999)
     before = (tmp_path / "word").exists()
 
@@ -119,7 +122,7 @@ def test_a_program_that_reaches_its_steps_has_said_its_last_word(program, tmp_pa
     ],
 )
 def test_a_report_of_what_cannot_be_is_refused(arguments, mistake):
-    """A value in percent would pass for a very good policy."""
+    """A rate in percent would look like a very good policy."""
     with pytest.raises(ValueError, match=mistake):
         report(**arguments)
 
@@ -132,7 +135,7 @@ def test_a_report_outside_of_a_job_does_nothing(monkeypatch):
 
 
 def test_steps_of_tolerant_environments_count_until_the_program_reports():
-    """After its report only the program's number counts, because it includes earlier attempts."""
+    """After its first report, only the program's own number counts, because it includes earlier attempts."""
     progress = ProgramReport(100, [])
 
     progress.played(Role.COLLECT, [{}, {"episode": {"r": 1.0, "l": 5}}, {"palaestra": {"sim_fault": {}}}])
@@ -145,7 +148,7 @@ def test_steps_of_tolerant_environments_count_until_the_program_reports():
 
 
 def test_steps_of_an_evaluating_environment_are_none_of_training(clock):
-    """The operator must not take an evaluation for a stalled training, either."""
+    """The operator must neither count these steps nor take an evaluation for a stalled training."""
     progress = ProgramReport(100, [], clock)
     progress.played(Role.COLLECT, [{}])
 
@@ -153,13 +156,13 @@ def test_steps_of_an_evaluating_environment_are_none_of_training(clock):
 
     assert (progress.status().step, progress.phase) == (1, "evaluating")
     clock.now += 61.0
-    assert progress.phase == "training"  # so that one that hangs is found too
+    assert progress.phase == "training"  # a minute without a step may be a hung training
     progress.played(Role.COLLECT, [{}])
     assert (progress.status().step, progress.phase) == (2, "training")
 
 
 def test_a_worker_process_has_a_progress_that_is_not_served(make_configuration, monkeypatch):
-    """Only the program may use the address; its workers would conflict."""
+    """The main process serves the address, so a worker must not."""
     monkeypatch.setattr(multiprocessing, "parent_process", multiprocessing.current_process)
     configuration = make_configuration()
 
@@ -168,7 +171,7 @@ def test_a_worker_process_has_a_progress_that_is_not_served(make_configuration, 
 
 
 def test_faults_and_restarts_of_a_program_s_simulators_are_in_its_status():
-    """The built-in loop has them there, too."""
+    """The built-in training loop shows them in the same fields."""
     progress = ProgramReport(100, [])
     progress.add("collect-0", Role.COLLECT)
     progress.add("collect-0", Role.COLLECT)

@@ -1,4 +1,4 @@
-"""A damaged run directory ends a run with one message before anything starts or is deleted."""
+"""A damaged run directory ends an attempt with one message, before anything starts or is deleted."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from tests.unit.trainer.run.test_run_resume import signal_after
 
 @pytest.fixture(scope="module")
 def begun_once(tmp_path_factory):
-    """The run directory of `begun`, which is made once for all tests."""
+    """Return a run directory that the fixture `begun` fills once for all tests."""
     return RunDirectory(tmp_path_factory.mktemp("begun") / "run")
 
 
 @pytest.fixture
 def begun(begun_once, play, job, directory):
-    """The directory of a run that was interrupted after its first checkpoints and evaluations."""
+    """Return a copy of a run that was interrupted after its first checkpoints and evaluations."""
     if not begun_once.path.exists():
         play(job("PPO"), on_step=signal_after(60), into=begun_once)
     shutil.copytree(begun_once.path, directory.path)
@@ -31,12 +31,12 @@ def begun(begun_once, play, job, directory):
 
 
 def written(name, content):
-    """Return a function that overwrites a file."""
+    """Return a function that overwrites a file of a run."""
     return lambda run: (run.path / name).write_bytes(content)
 
 
 def appended(name, content):
-    """Return a function that appends to a file."""
+    """Return a function that appends to a file of a run."""
 
     def damage(run):
         with (run.path / name).open("ab") as file:
@@ -46,12 +46,12 @@ def appended(name, content):
 
 
 def halved(name):
-    """Return a function that cuts off the end of a file."""
+    """Return a function that cuts 1000 bytes off the end of a file."""
     return lambda run: (run.path / name).write_bytes((run.path / name).read_bytes()[:-1000])
 
 
 def another_kind(name):
-    """Return a function that replaces a file by a folder, or a folder by a file."""
+    """Return a function that puts a folder in place of a file, or a file in place of a folder."""
 
     def damage(run):
         path = run.path / name
@@ -66,7 +66,7 @@ def another_kind(name):
 
 
 def with_member(run):
-    """Damage the evaluation in model.zip."""
+    """Put a wrong evaluation into model.zip."""
     members = {}
     with zipfile.ZipFile(run.model) as archive:
         members = {name: archive.read(name) for name in archive.namelist()}
@@ -76,7 +76,7 @@ def with_member(run):
 
 
 def in_each_checkpoint(name, content):
-    """Return a function that overwrites a file in each checkpoint, or removes it if the content is None."""
+    """Return a function that overwrites a file in each checkpoint, or deletes it if the content is None."""
 
     def damage(run):
         for folder in run.checkpoints.iterdir():
@@ -123,7 +123,7 @@ DAMAGES = (
 
 
 def content_of(folder: Path):
-    """Return each file below a folder with its bytes."""
+    """Return the bytes of each file below a folder."""
     return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
@@ -131,7 +131,7 @@ def content_of(folder: Path):
 def test_a_damage_ends_the_attempt_before_anything_starts_or_is_deleted(
     begun, play, job, last_word, name, damage
 ):
-    """Before, there was a traceback, a new run over the old files, or an end hours later."""
+    """Before, there was a traceback, a new run over the old files, or a failure hours later."""
     damage(begun)
     before = content_of(begun.path)
 
@@ -158,7 +158,7 @@ HARMLESS = {
 
 @pytest.mark.parametrize("damage", HARMLESS.values(), ids=HARMLESS)
 def test_what_a_crash_may_leave_is_no_damage(begun, play, job, damage):
-    """The run resumes from its checkpoint."""
+    """A crash of the machine may truncate such files, and the run still resumes from its checkpoint."""
     damage(begun)
 
     code, _ = play(job("PPO"), must_resume=True)
@@ -167,7 +167,10 @@ def test_what_a_crash_may_leave_is_no_damage(begun, play, job, damage):
 
 
 def test_no_checkpoint_and_none_that_can_be_read_are_two_answers(begun):
-    """Without checkpoints a run begins; over damaged ones it would begin again and replace them."""
+    """With no checkpoint a new run begins.
+
+    Over damaged checkpoints it must not, because it would replace them.
+    """
     in_each_checkpoint("model.zip", b"PK")(begun)
 
     assert checkpoint.newest(begun.path / "none") is None
@@ -176,7 +179,7 @@ def test_no_checkpoint_and_none_that_can_be_read_are_two_answers(begun):
 
 
 def test_appending_a_line_reads_no_more_of_a_longer_file(tmp_path, monkeypatch):
-    """Two thousand evaluations read 11 GiB before."""
+    """Before, two thousand evaluations read 11 GiB in total."""
     path = tmp_path / "evaluations.jsonl"
     monkeypatch.setattr(Path, "read_bytes", None)
     monkeypatch.setattr(Path, "read_text", None)

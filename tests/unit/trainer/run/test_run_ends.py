@@ -1,4 +1,4 @@
-"""The end of a run: exit codes, last words, signals and the watchdog."""
+"""The end of a run: exit codes, the termination message, signals and the watchdog."""
 
 from __future__ import annotations
 
@@ -44,14 +44,14 @@ from palaestra_trainer.run.watchdog import Watchdog, stalled
     ],
 )
 def test_every_end_has_its_code(error, code, reason):
-    """The operator decides about a retry by the code."""
+    """The operator decides by the exit code whether to retry."""
     end = end_of(error)
 
     assert (end.code, end.reason) == (code, reason)
 
 
 def test_the_last_word_goes_where_it_is_wanted(tmp_path):
-    """On a laptop it goes to a file of the run, in a pod to Kubernetes' own."""
+    """On a laptop, the message goes to a file of the run; in a pod, to the path that Kubernetes reads."""
     path, default = tmp_path / "word", tmp_path / "termination-log"
     word = Termination(step=5, reason="Completed")
     default.touch()
@@ -64,14 +64,14 @@ def test_the_last_word_goes_where_it_is_wanted(tmp_path):
 
 
 def test_a_last_word_nobody_wants_is_not_written(tmp_path):
-    """A trainer on a laptop leaves no file in /dev."""
+    """On a laptop, a trainer must not write a file into /dev."""
     write_last_word(Termination(step=5, reason="Completed"), {}, tmp_path / "none")
 
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_last_word_that_cannot_be_written_is_no_error(tmp_path):
-    """The run has ended, and its exit code must not change."""
+    """The run has ended already, so its exit code must not change."""
     missing = {"PALAESTRA_TERMINATION_LOG": str(tmp_path / "none" / "word")}
 
     write_last_word(Termination(step=5, reason="Completed"), missing)
@@ -80,7 +80,7 @@ def test_a_last_word_that_cannot_be_written_is_no_error(tmp_path):
 
 
 def test_a_signal_is_noted_and_raised_at_the_next_check():
-    """A model in the middle of a rollout is not consistent."""
+    """In the middle of a rollout, the state of a model is inconsistent."""
     with Interruption() as interruption:
         interruption.check()
         os.kill(os.getpid(), signal.SIGTERM)
@@ -91,7 +91,7 @@ def test_a_signal_is_noted_and_raised_at_the_next_check():
 
 
 def test_the_handler_that_was_set_before_is_set_again():
-    """Pytest, for example, installs a handler."""
+    """The process may have a handler of its own; pytest, for example, installs one."""
     before = signal.getsignal(signal.SIGINT)
 
     with Interruption():
@@ -101,7 +101,7 @@ def test_the_handler_that_was_set_before_is_set_again():
 
 
 def test_a_sigint_that_was_ignored_at_the_start_stays_ignored():
-    """Scripts ignore it for background programs."""
+    """A shell script ignores SIGINT for the programs that it starts in the background."""
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         with Interruption() as interruption:
@@ -114,7 +114,7 @@ def test_a_sigint_that_was_ignored_at_the_start_stays_ignored():
 
 
 def test_a_stall_is_reported_and_ends_the_process():
-    """It ends after the deadline and not before, with its own exit code."""
+    """The process ends with its own exit code, after the deadline and not before."""
     left, words = threading.Event(), []
     codes = []
 
@@ -129,7 +129,7 @@ def test_a_stall_is_reported_and_ends_the_process():
 
 
 def test_a_run_that_moves_is_left_alone():
-    """The watchdog keeps checking its idle time."""
+    """The watchdog checks the idle time again and again."""
     asked = threading.Semaphore(0)
 
     def idle_s():
@@ -141,7 +141,7 @@ def test_a_run_that_moves_is_left_alone():
 
 
 def test_a_stalled_process_shows_its_stacks_and_exits_with_82():
-    """Only the stacks show the cause."""
+    """Only the stacks show where the process hangs."""
     program = (
         "import threading; from palaestra_trainer.run.watchdog import Watchdog\n"
         "def hang(): threading.Event().wait(60)\n"
@@ -157,7 +157,7 @@ def test_a_stalled_process_shows_its_stacks_and_exits_with_82():
 
 
 def test_a_full_disk_is_reported_also_when_the_system_names_no_file():
-    """A failed write knows only its file descriptor."""
+    """The error of a failed write has only a file descriptor, and no path."""
     end = end_of(OSError(errno.ENOSPC, "full"))
 
     assert end.message == "the run directory: disk full; free some space"
@@ -165,7 +165,7 @@ def test_a_full_disk_is_reported_also_when_the_system_names_no_file():
 
 @pytest.fixture
 def progress():
-    """Return the progress of a run with started simulators that has not stepped for 90 s."""
+    """Return the progress of a run with started simulators, 90 s after its last step."""
     now = [0.0]
     made = Progress(100, [("collect-0", "Collect"), ("evaluate-0", "Evaluate")], lambda: now[0])
     made.started("collect-0")
@@ -175,7 +175,7 @@ def progress():
 
 
 def test_a_stall_while_a_simulator_is_down_is_that_simulator_s(progress):
-    """The message names it, so that a person reads its log and not the trainer's."""
+    """The message names the simulator, so a person reads the simulator's log and not the trainer's."""
     progress.fault("collect-0", SimulatorHung("collect-0", "no answer"), steps_lost=0)
 
     end = stalled(progress)
@@ -185,7 +185,7 @@ def test_a_stall_while_a_simulator_is_down_is_that_simulator_s(progress):
 
 
 def test_a_stall_amid_a_step_is_a_simulator_s_as_well(progress):
-    """During a step it is not yet known which simulator hangs."""
+    """During a step, it is not known which of the simulators hangs."""
     with progress.spending(Cause.TRANSPORT):
         end = stalled(progress)
 
@@ -195,7 +195,7 @@ def test_a_stall_amid_a_step_is_a_simulator_s_as_well(progress):
 
 @pytest.mark.parametrize(("cause", "phase"), [(Cause.LEARNING, "training"), (Cause.CHECKPOINTING, "saving")])
 def test_a_stall_while_nobody_waits_for_simulators_is_the_trainer_s(progress, cause, phase):
-    """The disk may hang, or an update may be endless; a restart of a simulator would not help."""
+    """The disk may hang or an update may never end, so a restart of a simulator would not help."""
     with progress.spending(cause):
         end = stalled(progress)
 
@@ -205,14 +205,14 @@ def test_a_stall_while_nobody_waits_for_simulators_is_the_trainer_s(progress, ca
 
 @pytest.fixture
 def log(capsys):
-    """Return a logger with a trainer's configuration."""
+    """Return a logger with the configuration of a trainer."""
     configure_logs()
     yield structlog.get_logger("tests")
     capsys.readouterr()
 
 
 def test_the_last_ten_lines_of_the_log_are_kept(log, capsys):
-    """The order is that of the log, with the newest line last."""
+    """The lines are in the order of the log, with the newest last."""
     for number in range(12):
         log.info("line", number=number)
 
@@ -222,7 +222,7 @@ def test_the_last_ten_lines_of_the_log_are_kept(log, capsys):
 
 
 def test_of_an_error_the_end_of_its_traceback_is_kept(log):
-    """The cause is at the end."""
+    """The last lines of a traceback have the cause."""
 
     def fail():
         raise ZeroDivisionError("a bug")

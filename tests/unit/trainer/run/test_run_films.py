@@ -1,4 +1,4 @@
-"""TensorBoard shows recorded episodes of the best policy from above."""
+"""Films of the best policy's episodes in TensorBoard, seen from above."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def shown(directory):
     """Return the films that TensorBoard reads, by name and step."""
     [path] = directory.tensorboard.iterdir()
     return {
-        (value.tag, event.step): value.tensor.string_val[2]  # after width and height
+        (value.tag, event.step): value.tensor.string_val[2]  # the first two strings are width and height
         for event in EventFileLoader(str(path)).Load()
         for value in event.summary.value
         if value.metadata.plugin_data.plugin_name == "images"
@@ -31,7 +31,7 @@ def shown(directory):
 
 @pytest.fixture
 def located(make_member):
-    """Make members whose robots drive on a floor."""
+    """Return a function that makes simulators whose robots drive on a floor."""
 
     def make(*arguments, **options):
         member = make_member(*arguments, **options)
@@ -49,17 +49,17 @@ def located(make_member):
 
 
 class TestRobotsOnAFloor:
-    """Members tell where their robots are."""
+    """Runs whose simulators report the poses of their robots."""
 
     @pytest.fixture
     def make_member(self, located):
-        """Replace the members of `play`."""
+        """Return the function that replaces the fixture in `play`."""
         return located
 
     def test_each_new_best_policy_is_shown_at_its_step(self, play, job, directory):
-        """A person sees what the robot has learned since, without another program.
+        """A person sees in TensorBoard what the robot has learned since the last film.
 
-        The last pictures are those of the confirmation.
+        The last films are those of the confirmation.
         """
         play(job(evaluation=EVALUATION))
 
@@ -71,7 +71,7 @@ class TestRobotsOnAFloor:
         assert ("episodes/best", 100) in films
 
     def test_a_film_is_a_small_gif_that_moves(self, play, job, directory):
-        """A browser shows a GIF as it is; TensorBoard loads ten of each name."""
+        """A browser shows a GIF without a plugin. TensorBoard loads ten films of each name."""
         play(job(evaluation=EVALUATION))
 
         films = shown(directory)
@@ -83,7 +83,7 @@ class TestRobotsOnAFloor:
 
 
 def test_a_run_without_recordings_shows_no_film(play, job, directory):
-    """Robots that stand on no floor have no picture from above."""
+    """A robot that stands on no floor has no picture from above."""
     play(job(evaluation=EVALUATION))
 
     assert shown(directory) == {}

@@ -1,4 +1,4 @@
-"""At the end of a run, and when the code of a job's author ends it, the first cause decides."""
+"""The first cause decides how a run ends, also if code of the job's author fails or ends the program."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ AT_STEP = 5
 
 
 class Task(gymnasium.Env):
-    """A task that calls a function at one step, and another when it is closed."""
+    """A task that calls a function at one step, and another function when it is closed."""
 
     observation_space = spaces.Box(-1, 1, (1,), np.float32)
     action_space = spaces.Discrete(2)
@@ -38,7 +38,7 @@ class Task(gymnasium.Env):
         return np.zeros(1, np.float32), {}
 
     def step(self, action):
-        """Take a step."""
+        """Take a step; at step `AT_STEP`, call the function first."""
         del action
         self.taken += 1
         numbers = np.zeros(1, np.float32)
@@ -47,46 +47,46 @@ class Task(gymnasium.Env):
         return numbers, 0.0, self.taken % 4 == 0, False, {}
 
     def close(self):
-        """Close the task."""
+        """Record that the task is closed, and call the function."""
         self.closed = True
         self.at_close()
 
 
 class Leaves(BaseCallback):
-    """A callback that ends the program."""
+    """A callback that ends the program with exit code 0."""
 
     def _on_step(self):
         sys.exit(0)
 
 
 def fails():
-    """Raise an error."""
+    """Raise an error, as an environment's `close` may."""
     raise RuntimeError("my close failed")
 
 
 def leaves():
-    """End the program."""
+    """End the program with exit code 0."""
     sys.exit(0)
 
 
 def diverges():
-    """Return a number that is not finite."""
+    """Return an observation with NaN."""
     return np.full(1, np.nan, np.float32)
 
 
 def breaks():
-    """Raise an error."""
+    """Raise an error, as an environment's `step` may."""
     raise RuntimeError("my first cause")
 
 
 def is_asked_to_end():
-    """Send a signal to this process."""
+    """Send SIGTERM to this process."""
     os.kill(os.getpid(), signal.SIGTERM)
 
 
 @pytest.fixture
 def play(make_member, make_configuration, tmp_path, monkeypatch):
-    """Train in two simulators of such a task, and return exit code, last word and the tasks."""
+    """Return a function that trains in two such tasks; it returns the exit code, the reason and the tasks."""
     word = tmp_path / "word"
     monkeypatch.setenv("PALAESTRA_TERMINATION_LOG", str(word))
 
@@ -127,7 +127,7 @@ def play(make_member, make_configuration, tmp_path, monkeypatch):
     ],
 )
 def test_an_environment_that_fails_to_close_changes_no_end(play, amid, at_close, code, reason):
-    """The other environments are closed, too."""
+    """The other environments are still closed."""
     found, word, tasks = play(amid, at_close)
 
     assert found == code
@@ -136,7 +136,7 @@ def test_an_environment_that_fails_to_close_changes_no_end(play, amid, at_close,
 
 
 def test_an_environment_cannot_end_the_program_as_if_the_run_were_complete(play):
-    """Otherwise a library's exit code 0 would mark a run without a model as complete."""
+    """A library that exits with code 0 would mark a run without a model as complete."""
     code, word, _ = play(leaves)
 
     assert code == 1
@@ -145,7 +145,7 @@ def test_an_environment_cannot_end_the_program_as_if_the_run_were_complete(play)
 
 
 def test_a_callback_cannot_end_the_program_as_if_the_run_were_complete(play):
-    """A callback must return False to stop training, or raise an error."""
+    """A callback ends a training by returning False, or by raising an error."""
     code, word, _ = play(callbacks=[Leaves])
 
     assert code == 1
@@ -154,7 +154,7 @@ def test_a_callback_cannot_end_the_program_as_if_the_run_were_complete(play):
 
 
 def test_an_environment_that_hangs_when_it_is_closed_does_not_keep_the_run():
-    """The end that was already decided stays."""
+    """The exit code that was decided before `close` is used."""
     left = []
 
     leave_after(0.05, 75, lambda: left.append("word"), left.append).join(20)
@@ -163,12 +163,12 @@ def test_an_environment_that_hangs_when_it_is_closed_does_not_keep_the_run():
 
 
 def test_nobody_watches_for_steps_while_everything_is_stopped(play):
-    """Before, a `close` that took longer than `stallDeadlineSeconds` turned a complete run into a stall."""
+    """Before, a `close` that took longer than `stallDeadlineSeconds` made a complete run a stalled one."""
     watching = []
 
     def close():
         for thread in [each for each in threading.enumerate() if each.name == "watchdog"]:
-            thread.join(20)  # it ends at once if it was stopped
+            thread.join(20)  # a watchdog that was stopped ends at once
             watching.append(thread.is_alive())
 
     code, _, _ = play(at_close=close)
@@ -196,9 +196,9 @@ sys.exit(code)
 
 @pytest.mark.parametrize("name", ["train", "evaluate", "export"])
 def test_a_thread_that_lives_on_does_not_keep_the_program(name):
-    """The program ends soon, with its code and the name of the thread.
+    """The program ends soon with its own exit code, and the log has the name of the thread.
 
-    The trainer does so despite signals.
+    This is so even if signals arrive meanwhile.
     """
     with subprocess.Popen(
         [sys.executable, "-c", LIVES_ON, name], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True

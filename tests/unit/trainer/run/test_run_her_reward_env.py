@@ -1,4 +1,4 @@
-"""The environment that computes rewards of goals for hindsight experience replay needs no simulator."""
+"""The environment that computes rewards for hindsight experience replay; it needs no simulator."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from palaestra_trainer.webots.facade import open_facades
 
 
 class Reach(gymnasium.Env):
-    """A task with goals whose robot has a scanner."""
+    """A task with goals whose robot needs a scanner."""
 
     needs = (Scanner,)
     observation_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
@@ -26,14 +26,14 @@ class Reach(gymnasium.Env):
         robot.use_scanner()
 
     def compute_reward(self, achieved, desired, info):
-        """Return 1 for each goal that was reached."""
+        """Return 1 for each goal that was reached, otherwise 0."""
         del info
         return np.all(achieved == desired, axis=-1).astype(np.float32)
 
 
 @pytest.fixture
 def job():
-    """`job(task, robot)` returns the configuration of a run; the task is registered for the test."""
+    """`job(task, robot)` registers the task for the test, and returns the configuration of a run."""
 
     def write(task, robot=None, **more):
         gymnasium.register(id="Reach-v0", entry_point=task)
@@ -46,7 +46,7 @@ def job():
 
 
 def test_the_judge_has_the_robot_of_the_job(job):
-    """A task for two wheels and a scanner must learn from goals, too."""
+    """A task for two wheels and a scanner must be able to learn from goals too."""
     judge = make_judge(job(Reach, "TurtleBot3Burger"))
 
     goals = np.array([[0.0, 1.0], [0.0, 2.0]])
@@ -55,7 +55,7 @@ def test_the_judge_has_the_robot_of_the_job(job):
 
 
 def test_a_wrapper_that_changes_rewards_is_refused_and_another_is_not(job):
-    """A batch would mix rewards with the wrapper and rewards of other goals without it."""
+    """A batch would mix rewards with the wrapper and, for other goals, rewards without it."""
     limit = {"name": "gymnasium.wrappers:TimeLimit", "options": {"max_episode_steps": 5}}
     clip = {"name": "gymnasium.wrappers:ClipReward", "options": {"max_reward": 1}}
     limited = job(Reach, wrappers=[limit])
@@ -70,7 +70,7 @@ def test_a_wrapper_that_changes_rewards_is_refused_and_another_is_not(job):
 
 
 def test_without_a_robot_in_the_job_the_judge_has_a_robotino(job):
-    """A Robotino is then the robot of the simulators, with all its capabilities."""
+    """A Robotino has all capabilities, and is the default robot of the simulators."""
 
     class Grasp(Reach):
         needs = (Gripper, Scanner)
@@ -79,7 +79,7 @@ def test_without_a_robot_in_the_job_the_judge_has_a_robotino(job):
 
 
 def test_a_robot_that_does_not_fit_the_task_is_refused_by_its_own_name(job):
-    """The error comes before a simulator starts."""
+    """The robot is checked before a simulator starts, so a person waits only seconds for the error."""
     with pytest.raises(
         MissingCapability, match=r"trainer\.robot: EPuck has no Scanner, which Reach-v0 needs"
     ):
@@ -87,7 +87,7 @@ def test_a_robot_that_does_not_fit_the_task_is_refused_by_its_own_name(job):
 
 
 def test_a_task_that_computes_no_rewards_of_goals_is_refused(job):
-    """Otherwise hindsight experience replay would fail at its first sample."""
+    """Hindsight experience replay would fail at its first sample."""
 
     class Blind(Reach):
         compute_reward = None
@@ -97,7 +97,7 @@ def test_a_task_that_computes_no_rewards_of_goals_is_refused(job):
 
 
 def test_the_judge_s_simulator_is_offered_to_no_environment(job):
-    """No simulator runs behind it."""
+    """There is no simulator behind this facade, so no environment of a user may get it."""
     make_judge(job(Reach))
 
     assert open_facades.offered() is None

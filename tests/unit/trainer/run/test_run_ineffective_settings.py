@@ -1,4 +1,4 @@
-"""A run with settings by which nothing is learned reports them at its start and at its end."""
+"""Settings by which a run learns nothing, or too little, are reported at its start and at its end."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SMALL = {"policy_kwargs": {"net_arch": [4]}}
 
 @pytest.fixture
 def play(make_member, make_configuration, tmp_path, monkeypatch):
-    """Train, and return exit code, last word and the warnings in the log."""
+    """Return a function that trains; it returns the exit code, the reason and the warnings in the log."""
     word = tmp_path / "word"
     monkeypatch.setenv("PALAESTRA_TERMINATION_LOG", str(word))
 
@@ -52,7 +52,7 @@ def test_learning_that_starts_after_the_end_is_told(play):
 
 
 def test_a_rollout_of_more_steps_than_the_run_is_told(play):
-    """Stable-Baselines3 takes all of its steps."""
+    """Stable-Baselines3 completes its rollout, so the run takes more steps than the job asks for."""
     code, word, warned = play("PPO", n_steps=64, batch_size=8)
 
     assert code == 0
@@ -69,7 +69,7 @@ def test_a_rollout_of_more_steps_than_the_run_is_told(play):
     ],
 )
 def test_updates_that_are_rarer_than_the_steps_are_told(play, name, given, line):
-    """In a run of two minutes the policy was updated once, and no line reported it."""
+    """A policy was once updated a single time in a run of two minutes, and no line reported it."""
     off_policy = {"learning_starts": 4, "buffer_size": 100, "batch_size": 4} if name == "DQN" else {}
 
     code, _, warned = play(name, **off_policy, **given)
@@ -79,7 +79,7 @@ def test_updates_that_are_rarer_than_the_steps_are_told(play, name, given, line)
 
 
 def test_a_run_that_learns_says_nothing_of_it(play):
-    """This is the control."""
+    """Without this control, a warning in every run would pass the tests above."""
     assert play("DQN", learning_starts=10, buffer_size=100, batch_size=4) == (
         0,
         "Completed: the training is complete",
@@ -89,7 +89,7 @@ def test_a_run_that_learns_says_nothing_of_it(play):
 
 @pytest.mark.parametrize("wrapper", [NormalizeObservation, NormalizeReward])
 def test_a_wrapper_with_statistics_of_its_own_is_refused(play, wrapper):
-    """The statistics would be lost at a resume, and the evaluating simulators would have others."""
+    """A resume would lose the statistics, and the evaluating simulator would have other ones."""
     code, word, _ = play("PPO", lambda env: gymnasium.wrappers.TimeLimit(wrapper(env), 9), n_steps=16)
 
     assert code == 2

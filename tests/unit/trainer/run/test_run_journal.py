@@ -1,4 +1,4 @@
-"""The journal keeps the times and faults of an attempt that is killed."""
+"""The journal keeps times and faults of an attempt that is killed."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def journal(tmp_path, clock):
 
 
 def test_what_came_after_the_checkpoint_is_not_forgotten(journal, progress, clock):
-    """Time and faults after the checkpoint count, but steps and episodes after it are repeated."""
+    """The time and the faults since the checkpoint count. The steps and episodes since then are repeated."""
     progress.counters = Counters(episodes=3, goodput={"learning": 10.0})
     saved = progress.counted()
     with progress.spending(Cause.LEARNING):
@@ -42,7 +42,7 @@ def test_what_came_after_the_checkpoint_is_not_forgotten(journal, progress, cloc
 
 
 def test_a_checkpoint_that_is_newer_counts(journal, progress, clock):
-    """Everything before it was saved with it."""
+    """A checkpoint has all counters up to its own time."""
     clock.now = 6.0
     journal.keep(progress)
     clock.now = 7.0
@@ -52,7 +52,7 @@ def test_a_checkpoint_that_is_newer_counts(journal, progress, clock):
 
 
 def test_a_journal_is_written_now_and_then(journal, progress, clock, tmp_path):
-    """A write at every step would cost more than it is worth."""
+    """A write at each step would take too much time."""
     written = []
     for now in (1.0, 5.0, 9.0, 10.0):
         clock.now = now
@@ -65,7 +65,7 @@ def test_a_journal_is_written_now_and_then(journal, progress, clock, tmp_path):
 
 @pytest.mark.parametrize("text", [None, "", "[]", "{}", '{"step": "x"}', '{"step": 3, "counters": 5}'])
 def test_without_a_readable_journal_the_checkpoint_counts(journal, tmp_path, text):
-    """A machine that died may have left half of the file."""
+    """After a crash of the machine, the journal may be truncated."""
     if text is not None:
         (tmp_path / "journal.json").write_text(text)
     saved = Counters(episodes=3)
@@ -74,7 +74,7 @@ def test_without_a_readable_journal_the_checkpoint_counts(journal, tmp_path, tex
 
 
 def test_a_journal_that_cannot_be_written_ends_no_run(progress, clock, tmp_path):
-    """A run does not need it."""
+    """The journal is only for statistics, so its failure must not end a run."""
     journal = Journal(tmp_path / "none" / "journal.json", clock)
     clock.now = 6.0
 
@@ -87,7 +87,7 @@ def test_a_journal_that_cannot_be_written_ends_no_run(progress, clock, tmp_path)
 def test_a_killed_attempt_s_faults_and_steps_are_in_the_next_one_s_counters(
     play, job, directory, monkeypatch, step
 ):
-    """Otherwise a run would look better the more often it is killed."""
+    """A run that is often killed must not seem to have had fewer faults."""
     monkeypatch.setattr("palaestra_trainer.run.journal.EVERY_S", 0.0)
     play(job(), {"collect-0": {"steps": {20: SimulatorDead("collect-0", "gone"), step: KILLED}}})
     found = checkpoint.newest(directory.checkpoints)

@@ -27,7 +27,7 @@ def signal_after(steps, number=signal.SIGTERM):
 @pytest.mark.parametrize("name", ["DQN", "PPO", "REINFORCE"])
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_a_signal_ends_a_run_with_a_checkpoint_and_75(play, job, directory, last_word, name, number):
-    """The checkpoint is that of a rollout boundary, and an incomplete rollout is repeated."""
+    """The checkpoint has the state of the last rollout boundary, so an incomplete rollout is repeated."""
     code, members = play(job(name), on_step=signal_after(42, number))
 
     saved = checkpoint.newest(directory.checkpoints).manifest
@@ -40,7 +40,7 @@ def test_a_signal_ends_a_run_with_a_checkpoint_and_75(play, job, directory, last
 
 @pytest.mark.parametrize("name", ["DQN", "PPO"])
 def test_a_long_rollout_does_not_wait_for_its_end_once_a_signal_has_come(play, job, directory, name):
-    """The rollout is dropped, so at most one is repeated."""
+    """The rollout is dropped and repeated after the resume."""
     long = {"DQN": {"train_freq": 3000, "buffer_size": 50}, "PPO": {"n_steps": 4000, "batch_size": 50}}
     configuration = job(
         name,
@@ -63,7 +63,10 @@ def test_a_long_rollout_does_not_wait_for_its_end_once_a_signal_has_come(play, j
 
 @pytest.mark.parametrize("name", ["DQN", "PPO"])
 def test_an_interrupted_run_goes_on_where_it_was(play, job, directory, name):
-    """It ends at the same total, repeats the incomplete rollout, and keeps the earlier counts."""
+    """The run ends at the same total and keeps its earlier counts.
+
+    It repeats at most the incomplete rollout.
+    """
     configuration = job(name)
     _, before = play(configuration, {"collect-0": {"steps": [5]}}, signal_after(42))
     saved = checkpoint.newest(directory.checkpoints).manifest
@@ -73,7 +76,7 @@ def test_an_interrupted_run_goes_on_where_it_was(play, job, directory, name):
     summary = json.loads(directory.summary.read_text())
     seeds_before, seeds_after = (set(it["collect-0"].env.seeds) for it in (before, after))
     assert code == 0
-    assert summary["steps"] == (100 if name == "DQN" else 110)  # 14 valid rows, then 16 a rollout
+    assert summary["steps"] == (100 if name == "DQN" else 110)  # 14 valid rows, then 16 per rollout
     assert (summary["attempts"], summary["faults"]) == (2, 1)
     assert len(seeds_before & seeds_after) <= (1 if name == "DQN" else 4)
     reasons = [line["reason"] for line in read_lines(directory.attempts)]
@@ -81,7 +84,7 @@ def test_an_interrupted_run_goes_on_where_it_was(play, job, directory, name):
 
 
 def test_a_run_is_prolonged_by_another_job(play, job, directory, tmp_path):
-    """It starts from the other's last checkpoint, runs to its own total, and leaves those files unchanged."""
+    """The new run starts from the last checkpoint of the other run, whose files stay unchanged."""
     play(job())
     found = files_of(directory.path)
     longer = RunDirectory(tmp_path / "longer")
@@ -98,7 +101,7 @@ def test_a_run_is_prolonged_by_another_job(play, job, directory, tmp_path):
 def test_a_run_that_prolongs_another_goes_on_from_its_own_checkpoint_once_it_has_one(
     play, job, directory, tmp_path
 ):
-    """The steps since the other's checkpoint are not repeated."""
+    """The second attempt must not start from the other run's checkpoint again."""
     play(job())
     longer = RunDirectory(tmp_path / "longer")
     prolonging = job(steps=250, resume_from=str(directory.path))
@@ -114,7 +117,7 @@ def test_a_run_that_prolongs_another_goes_on_from_its_own_checkpoint_once_it_has
 
 
 def test_a_run_that_is_to_prolong_nothing_is_refused(play, job, directory, tmp_path, last_word):
-    """Otherwise it would begin at step 0, which nobody would notice for a long time; nothing was started."""
+    """Without the error, the run would begin at step 0, and a person would learn that much later."""
     code, members = play(job(resume_from=str(tmp_path / "empty")))
 
     assert code == 2
@@ -125,14 +128,14 @@ def test_a_run_that_is_to_prolong_nothing_is_refused(play, job, directory, tmp_p
 
 
 def files_of(folder):
-    """Return every file of a folder with its content."""
+    """Return the bytes of each file in a folder."""
     return {path: path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
 
 
 def test_the_last_word_has_the_number_of_the_attempt_and_its_restarts(play, job, last_word):
-    """The number is from the run directory, which outlives every pod.
+    """The number comes from the run directory, which outlives the pods.
 
-    The restarts are those of this attempt.
+    The restarts are those of this attempt alone.
     """
     play(job("DQN"), {"collect-0": {"steps": [5]}}, signal_after(42))
     first = last_word()
@@ -144,7 +147,7 @@ def test_the_last_word_has_the_number_of_the_attempt_and_its_restarts(play, job,
 
 
 def test_an_attempt_whose_simulators_never_start_is_on_record(play, job, directory, last_word):
-    """The attempt had a pod, so the next attempt is the second."""
+    """A pod has run this attempt, so the next one is the second."""
     code, _ = play(job("DQN"), {"collect-0": {"starts": range(1, 20)}})
 
     assert code == 80
@@ -152,7 +155,7 @@ def test_an_attempt_whose_simulators_never_start_is_on_record(play, job, directo
 
 
 def test_a_finished_run_is_reported_and_not_repeated(play, job, directory, last_word):
-    """A pod that is started again must cost nothing."""
+    """A restarted pod must not train a finished run again."""
     play(job())
 
     code, members = play(job())
@@ -171,7 +174,7 @@ def test_a_finished_run_that_is_prolonged_is_the_run_that_was_that_long(
 ):
     """Steps 96 and 192 are rollout boundaries of both algorithms.
 
-    A finished run therefore ends in a state that the longer run would also have had.
+    So a run that ends at step 96 has the state that a longer run has there.
     """
     algorithm = {"name": name, "hyperparameters": job(name).algorithm.hyperparameters | constant}
     at_once = RunDirectory(tmp_path / "at-once")
@@ -187,7 +190,7 @@ def test_a_finished_run_that_is_prolonged_is_the_run_that_was_that_long(
 
 
 def parameters(directory):
-    """Return every parameter of the policy in the newest checkpoint."""
+    """Return the parameters of the policy in the newest checkpoint."""
     _, found, _ = load_from_zip_file(
         checkpoint.newest(directory.checkpoints).path / "model.zip", device="cpu", load_data=False
     )
@@ -195,7 +198,7 @@ def parameters(directory):
 
 
 def test_a_prolonged_run_is_not_finished_until_it_ends(play, job, directory):
-    """Otherwise the summary of its first end would be reported as the result of the second."""
+    """The summary of the first end must not pass for the result of the longer run."""
     play(job())
 
     code, _ = play(job(steps=150), on_step=signal_after(20))
@@ -205,7 +208,7 @@ def test_a_prolonged_run_is_not_finished_until_it_ends(play, job, directory):
 
 
 def test_a_directory_of_another_run_is_refused(play, job, last_word):
-    """The error comes before anything is overwritten."""
+    """The error comes before any file is overwritten."""
     play(job("DQN"))
 
     code, _ = play(job("PPO", steps=200))
@@ -215,7 +218,7 @@ def test_a_directory_of_another_run_is_refused(play, job, last_word):
 
 
 def test_resuming_nothing_is_refused_if_it_was_asked_for(play, job):
-    """A person who types --resume expects a run to be there."""
+    """A person who types --resume expects a run in this directory."""
     code, _ = play(job(), must_resume=True)
 
     assert code == 2
@@ -223,7 +226,7 @@ def test_resuming_nothing_is_refused_if_it_was_asked_for(play, job):
 
 @pytest.mark.parametrize(("every", "steps"), [(40, [40, 80, 100]), (1000, [100])], ids=["amid", "final"])
 def test_an_evaluation_that_was_cut_is_made_up_for(play, job, directory, every, steps):
-    """The best policy may be the one whose evaluation was interrupted."""
+    """The policy whose evaluation was interrupted may be the best one."""
     configuration = job(evaluation={"everySteps": every, "episodes": 4})
     code, _ = play(configuration, on_step=signal_after(1), of="evaluate-0")
     cut = list(read_lines(directory.evaluations))
@@ -235,7 +238,7 @@ def test_an_evaluation_that_was_cut_is_made_up_for(play, job, directory, every, 
 
 
 def test_no_evaluation_is_made_twice(play, job, directory):
-    """The evaluations of the previous attempt are recorded."""
+    """The evaluations of the first attempt are in the run directory."""
     play(job(), on_step=signal_after(70))
 
     play(job())
@@ -244,7 +247,7 @@ def test_no_evaluation_is_made_twice(play, job, directory):
 
 
 def test_the_time_of_an_attempt_that_was_killed_is_kept(play, job, directory):
-    """Like its steps, its time counts up to the last checkpoint; otherwise a killed run would look faster."""
+    """Without this time, a run that was killed would seem to be faster."""
     play(job(), {"collect-0": {"steps": {70: ZeroDivisionError("as good as a kill")}}})
     saved = checkpoint.newest(directory.checkpoints).manifest
 
@@ -259,7 +262,7 @@ def test_the_time_of_an_attempt_that_was_killed_is_kept(play, job, directory):
 def test_a_new_run_begins_with_the_policy_of_another_and_resumes_from_its_own(
     play, job, directory, tmp_path, capsys
 ):
-    """Its steps count from 0, and a resumed run has learned since."""
+    """A new run counts its steps from 0. A resumed run keeps what it has learned since."""
     play(job())
     tuned = RunDirectory(tmp_path / "tuned")
     tuning = job(initial_policy=str(directory.model))

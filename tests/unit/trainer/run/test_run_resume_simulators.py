@@ -1,4 +1,4 @@
-"""Simulators are restored to their state at a checkpoint."""
+"""At a resume, each simulator plays its saved episode again up to the checkpoint."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ TINY = {"name": "A2C", "hyperparameters": {"n_steps": 5, "policy_kwargs": {"net_
 
 @pytest.fixture
 def make_env(make_member):
-    """Make a vector environment of corridors; faults are given by row."""
+    """Return a function that makes a VecEnv of corridors; faults are given by row."""
 
     def make(members=2, faults=()):
         return SimulatorsVecEnv(
@@ -33,7 +33,7 @@ def make_env(make_member):
 
 @pytest.fixture
 def saved(make_env, make_configuration):
-    """Return the state of a model in training, with incomplete episodes of two members."""
+    """Return the state of a model in training, while two simulators are in the middle of an episode."""
     env = make_env()
     model = make_model(make_configuration(algorithm=TINY).algorithm, env, seed=1)
     model.learn(10)
@@ -43,14 +43,14 @@ def saved(make_env, make_configuration):
 
 
 def rejoined(env, saved):
-    """Return the state, and the warnings about simulators that do not repeat themselves."""
+    """Return the state after a resume, and the warnings about simulators that do not repeat themselves."""
     with structlog.testing.capture_logs() as logs:
         state = rejoin(env, saved)
     return state, [line["event"] for line in logs if "do not repeat" in line["event"]]
 
 
 def test_simulators_that_repeat_themselves_are_where_they_were(make_env, saved):
-    """The resumed run is then exact, and there is no warning."""
+    """The resume is then exact, and there is no warning."""
     state, warnings = rejoined(make_env(), saved)
 
     assert state is saved
@@ -58,7 +58,10 @@ def test_simulators_that_repeat_themselves_are_where_they_were(make_env, saved):
 
 
 def test_training_warns_of_a_simulator_that_does_not_repeat_itself_and_goes_on(make_env, saved):
-    """Most physics engines do not; the policy must get the current state, not the old one."""
+    """Most physics engines are not deterministic.
+
+    The policy must get the present observation, not the saved one.
+    """
     env = make_env()
     env.seed(2)
 
@@ -70,7 +73,7 @@ def test_training_warns_of_a_simulator_that_does_not_repeat_itself_and_goes_on(m
 
 
 def test_a_simulator_that_breaks_meanwhile_begins_its_next_episode(make_env, saved):
-    """The rewards of its episode are dropped, and nothing is bootstrapped; the other member continues."""
+    """Rewards of the cut episode are dropped, and nothing is bootstrapped. The other simulator continues."""
     state, warnings = rejoined(make_env(faults={0: {"steps": [1]}}), saved)
 
     assert warnings == []
@@ -81,7 +84,7 @@ def test_a_simulator_that_breaks_meanwhile_begins_its_next_episode(make_env, sav
 
 
 def test_a_simulator_that_was_broken_begins_the_episode_it_was_about_to(make_env, saved):
-    """That episode had no step yet."""
+    """That episode had no step yet, so the simulator begins it now."""
     broken = [EpisodeState(saved.members[0].episode + 1, None), saved.members[1]]
 
     state, warnings = rejoined(make_env(), checkpoint.TrainingState(**fields(saved) | {"members": broken}))
@@ -93,7 +96,7 @@ def test_a_simulator_that_was_broken_begins_the_episode_it_was_about_to(make_env
 
 @pytest.mark.parametrize("members", [1, 3])
 def test_a_run_may_go_on_with_another_number_of_simulators(make_env, saved, members):
-    """A new simulator begins its first episode, and the episodes of removed ones are dropped."""
+    """A new simulator begins its first episode, and the episodes of removed simulators are dropped."""
     state, _ = rejoined(make_env(members), saved)
 
     assert len(state.members) == len(state.episode_starts) == len(state.observation) == members
@@ -103,7 +106,7 @@ def test_a_run_may_go_on_with_another_number_of_simulators(make_env, saved, memb
 @pytest.mark.parametrize("name", ["DQN", "PPO", "REINFORCE"])
 @pytest.mark.parametrize("collectors", [(1, 3), (3, 1)])
 def test_a_run_with_another_number_of_simulators_ends(play, job, directory, name, collectors):
-    """This also holds with a replay buffer, which keeps a row for each of them."""
+    """A run with a replay buffer is tested too, because its buffer keeps a row for each simulator."""
     before, after = collectors
     play(job(name, collectors=before))
 
@@ -119,7 +122,7 @@ def fields(state):
 
 
 def test_an_episode_that_begins_anew_owes_no_reward_to_the_one_before(make_env, make_configuration):
-    """Rewards are normalized by the discounted return of the episode so far."""
+    """Rewards are normalized by the discounted return of the episode, which is 0 in a new one."""
     env = make_env()
     model = make_model(make_configuration(algorithm=TINY | {"normalize": {}}).algorithm, env, seed=1)
     model.learn(10)

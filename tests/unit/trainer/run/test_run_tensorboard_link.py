@@ -1,4 +1,4 @@
-"""A run on a claim gets a link under the name of its job, and trains on where links are not possible."""
+"""A run on a claim gets a link with the name of its job; where links are impossible, it still trains."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ OTHER = "9b8c7d6e-7c2b-4d68-9a40-c3b2a1908f7e"
 
 @pytest.fixture
 def volume(tmp_path):
-    """Return an empty claim."""
+    """Return the folder of an empty claim."""
     path = tmp_path / "volume"
     path.mkdir()
     return path
@@ -26,7 +26,7 @@ def volume(tmp_path):
 
 @pytest.fixture
 def start(volume, make_configuration):
-    """Return a function that starts a replica on the claim and returns its log lines."""
+    """Return a function that starts a replica on the claim, and returns its log lines."""
 
     def begin(uid=UID, replica=0):
         directory = RunDirectory(volume / uid / str(replica))
@@ -39,13 +39,13 @@ def start(volume, make_configuration):
 
 
 def shown(volume):
-    """Return every link that TensorBoard finds, with its target folder."""
+    """Return the links that TensorBoard finds, with their target folders."""
     links = (path for path in (volume / "tensorboard").rglob("*") if path.is_symlink())
     return {str(link.relative_to(volume / "tensorboard")): link.resolve() for link in links}
 
 
 def test_a_run_on_a_claim_is_linked_under_the_name_of_its_job(play, job, volume):
-    """On the claim the folder is named by a UID, which means nothing to a reader."""
+    """The run's folder has the UID of the job as its name, which means nothing to a person."""
     directory = RunDirectory(volume / UID / "0")
 
     assert play(job(uid=UID), into=directory)[0] == 0
@@ -55,7 +55,7 @@ def test_a_run_on_a_claim_is_linked_under_the_name_of_its_job(play, job, volume)
 
 
 def test_the_link_holds_wherever_the_claim_is_mounted(start, volume):
-    """TensorBoard mounts it at /runs, the trainer at /var/lib/palaestra."""
+    """TensorBoard mounts the claim at /runs, and the trainer mounts it at /var/lib/palaestra."""
     start()
     elsewhere = volume.rename(volume.with_name("runs"))
 
@@ -71,7 +71,7 @@ def test_jobs_of_one_name_and_their_replicas_are_distinguished(start, volume):
 
 
 def test_replicas_that_start_at_once_are_all_linked(start, volume):
-    """Each may be the first that needs the folder."""
+    """Each of these replicas may be the first that needs the folder."""
     with ThreadPoolExecutor(8) as threads:
         list(threads.map(start, [UID] * 8, range(8)))
 
@@ -79,7 +79,7 @@ def test_replicas_that_start_at_once_are_all_linked(start, volume):
 
 
 def test_a_restart_leaves_the_link_as_it_is(start, volume):
-    """Each start makes the link again, in case it was deleted."""
+    """Each start makes the link again if it was deleted."""
     start()
     made = os.lstat(volume / "tensorboard/corridor-0d1f3e5a/0")
 
@@ -88,7 +88,7 @@ def test_a_restart_leaves_the_link_as_it_is(start, volume):
 
 
 def test_a_link_that_leads_elsewhere_is_replaced(start, volume):
-    """The job's name and UID determine the target."""
+    """The name and the UID of the job determine the target."""
     (volume / "tensorboard/corridor-0d1f3e5a").mkdir(parents=True)
     (volume / "tensorboard/corridor-0d1f3e5a/0").symlink_to("../../gone")
 
@@ -98,7 +98,7 @@ def test_a_link_that_leads_elsewhere_is_replaced(start, volume):
 
 @pytest.mark.parametrize("make", ["write_text", "mkdir"])
 def test_what_is_no_link_stays(start, volume, make):
-    """A person put it there."""
+    """A person may have put a file or a folder there."""
     place = volume / "tensorboard/corridor-0d1f3e5a/0"
     place.parent.mkdir(parents=True)
     {"write_text": lambda: place.write_text("mine"), "mkdir": place.mkdir}[make]()
@@ -110,7 +110,7 @@ def test_what_is_no_link_stays(start, volume, make):
 
 @pytest.mark.parametrize("replaced", ["tensorboard", "tensorboard/corridor-0d1f3e5a"])
 def test_a_folder_that_another_job_replaced_by_a_link_is_not_followed(start, volume, tmp_path, replaced):
-    """Otherwise that job would choose where this trainer writes."""
+    """If the link were followed, the other job would decide where this trainer writes."""
     outside = tmp_path / "outside"
     outside.mkdir()
     (volume / replaced).parent.mkdir(exist_ok=True)
@@ -122,7 +122,7 @@ def test_a_folder_that_another_job_replaced_by_a_link_is_not_followed(start, vol
 
 @pytest.mark.parametrize("number", [errno.EPERM, errno.ENOSYS, errno.EROFS, errno.EOPNOTSUPP])
 def test_a_file_system_without_links_costs_one_warning(play, job, volume, monkeypatch, number):
-    """SMB has no links, unless it is mounted with mfsymlinks."""
+    """SMB has no links, unless it is mounted with the option mfsymlinks."""
 
     def refuse(*_, **__):
         raise OSError(number, os.strerror(number))
@@ -139,7 +139,7 @@ def test_a_file_system_without_links_costs_one_warning(play, job, volume, monkey
 
 
 def test_a_local_run_has_no_link(tmp_path, make_configuration):
-    """It is at <dir>/<job>/<replica>, so the job's name is already in the path."""
+    """A local run is at <dir>/<job>/<replica>, so the job's name is already in its path."""
     for uid in (UID, ""):
         directory = RunDirectory(tmp_path / "corridor" / "0")
         link_curves(directory, make_configuration(uid=uid))

@@ -1,4 +1,4 @@
-"""Each simulator has one environment in one process, which PALAESTRA_CONFIG assigns."""
+"""Each simulator of PALAESTRA_CONFIG is allocated to one environment in one process."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ LONG_S = 60
 
 
 def make_configuration(*roles):
-    """Return a configuration whose simulators s-0, s-1, … have these roles."""
+    """Return a configuration whose simulators s-0, s-1 and so on have these roles."""
     simulators = [
         {"name": f"s-{index}", "group": "s", "index": index, "role": role, "control": f"127.0.0.1:710{index}"}
         for index, role in enumerate(roles)
@@ -31,14 +31,14 @@ def make_configuration(*roles):
 
 @pytest.fixture(autouse=True)
 def scratch(tmp_path, monkeypatch):
-    """Set the container's scratch folder to the test's folder."""
+    """Let the scratch folder of the container be the test's folder."""
     monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path))
     return tmp_path
 
 
 @pytest.fixture
 def take():
-    """Allocate simulators and return their names; all are released at the end of the test."""
+    """Yield a function that allocates a simulator and returns its name; all are released at the end."""
     allocated = []
 
     def next_name(configuration, role="Collect"):
@@ -51,14 +51,14 @@ def take():
 
 
 def test_each_environment_has_a_simulator_of_its_own(take):
-    """Two environments in one simulator would drive the same robot, with plausible numbers."""
+    """Two environments in one simulator would drive the same robot, with plausible results."""
     configuration = make_configuration("Collect", "Collect")
 
     assert [take(configuration), take(configuration)] == ["s-0", "s-1"]
 
 
 def test_a_collecting_environment_never_takes_an_evaluating_simulator(take):
-    """An evaluation must not depend on training in its simulator."""
+    """Training in the same simulator would change the results of an evaluation."""
     configuration = make_configuration("Evaluate", "Collect")
 
     assert take(configuration) == "s-1"
@@ -81,7 +81,7 @@ def test_a_released_simulator_can_be_allocated_again():
 
 
 def _allocate_and_name(configuration, folder=None):
-    if folder is not None:  # a server that starts workers has the variables of an earlier test
+    if folder is not None:  # a server process that starts workers has the variables of an earlier test
         os.environ["ROS_LOG_DIR"] = str(folder)
     try:
         return allocate(configuration, "Collect").simulator.name
@@ -97,7 +97,7 @@ def _allocate_and_die(configuration):
 @pytest.mark.parametrize("method", ["fork", "forkserver", "spawn"])
 @pytest.mark.filterwarnings("ignore:.*multi-threaded.*fork:DeprecationWarning")
 def test_worker_processes_have_simulators_of_their_own(take, method, scratch):
-    """This is tested for each start method of libraries; a forked worker must not share its parent's lock."""
+    """Each start method of a process is tested. A forked worker must not share the lock of its parent."""
     configuration = make_configuration("Collect", "Collect")
     mine = take(configuration)
 
@@ -110,7 +110,7 @@ def test_worker_processes_have_simulators_of_their_own(take, method, scratch):
 
 @pytest.mark.filterwarnings("ignore:.*multi-threaded.*fork:DeprecationWarning")
 def test_a_forked_worker_does_not_release_its_parents_simulator():
-    """It inherits the parent's environment objects, and may close them when it ends."""
+    """A forked worker inherits the environments of its parent, and may close them when it ends."""
     configuration = make_configuration("Collect")
     mine = allocate(configuration, "Collect")
 
@@ -123,7 +123,7 @@ def test_a_forked_worker_does_not_release_its_parents_simulator():
 
 
 def test_a_killed_process_leaves_no_lock(take):
-    """The kernel releases the lock, so a later attempt finds every simulator."""
+    """The kernel releases the lock, so a later attempt can use every simulator."""
     configuration = make_configuration("Collect")
     killed = multiprocessing.get_context("spawn").Process(target=_allocate_and_die, args=(configuration,))
     killed.start()
@@ -135,7 +135,7 @@ def test_a_killed_process_leaves_no_lock(take):
 
 @pytest.mark.parametrize("number", [errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP])
 def test_a_scratch_folder_without_locks_is_named(monkeypatch, scratch, number):
-    """Two environments could otherwise share a simulator.
+    """Without locks, two environments could use the same simulator.
 
     NFS without its lock service and Lustre without `flock` have no locks.
     """

@@ -1,4 +1,4 @@
-"""The number of tolerated faults, and the time that a step may take."""
+"""The number of faults that a run tolerates, and the duration above which a step is slow."""
 
 from __future__ import annotations
 
@@ -17,7 +17,10 @@ DEAD, HUNG = SimulatorDead("robotino", "closed the connection"), SimulatorHung("
 
 
 def test_the_message_tells_flapping_from_an_accident():
-    """The message has kinds of faults, window and remedy, because a person reads it hours later."""
+    """A person reads the message hours later.
+
+    So it has the types of faults, the time window and the remedy.
+    """
     budget = RestartBudget("collect-0", RestartLimit(restarts=10), clock=lambda: 0.0)
     for fault in [DEAD] * 9 + [HUNG]:
         budget.spend(fault)
@@ -33,7 +36,7 @@ def test_the_message_tells_flapping_from_an_accident():
 
 
 def test_a_budget_of_nothing_bears_nothing():
-    """With restart.limit 0 the first fault ends the run."""
+    """With `restart.limit: 0` the first fault ends the run."""
     budget = RestartBudget("collect-0", RestartLimit(restarts=0))
 
     with pytest.raises(FaultBudgetSpent, match=r"^collect-0: 0 restarts within 600 s .* \(last: robotino: "):
@@ -41,7 +44,7 @@ def test_a_budget_of_nothing_bears_nothing():
 
 
 def test_three_restarts_in_a_short_time_are_flapping():
-    """Two may be chance, and old ones do not count."""
+    """Two restarts may be chance. Restarts outside the time window do not count."""
     times = iter([0.0, 50.0, 99.0, 100.0, 199.0])
     budget = RestartBudget("collect-0", RestartLimit(within_s=100.0), clock=lambda: next(times))
     flapping = []
@@ -54,7 +57,7 @@ def test_three_restarts_in_a_short_time_are_flapping():
 
 @pytest.mark.parametrize(("left", "least", "losses"), [(4, 2, 2), (4, None, 0), (1, 1, 0), (2, 5, 0)])
 def test_a_group_loses_as_many_as_it_can_do_without(left, least, losses):
-    """By default every simulator is needed."""
+    """By default each simulator of a group is needed."""
     group = Group(left, least)
 
     assert [group.lose_one() for _ in range(left)] == [True] * losses + [False] * (left - losses)
@@ -65,7 +68,7 @@ def test_a_group_loses_as_many_as_it_can_do_without(left, least, losses):
     [(0.004, 0.051, True), (0.004, 0.049, False), (0.010, 0.099, False), (0.010, 0.101, True)],
 )
 def test_slow_is_a_step_of_ten_times_the_median_and_fifty_milliseconds(usual, seconds, slow):
-    """The first limit ignores normal jitter, and the second ignores delays that nobody would notice."""
+    """Ten times the median ignores normal jitter, and 50 ms ignores delays that no person would notice."""
     pace = Pace()
     assert not any(pace.slow(usual) for _ in range(10))
 
@@ -73,14 +76,14 @@ def test_slow_is_a_step_of_ten_times_the_median_and_fifty_milliseconds(usual, se
 
 
 def test_the_first_steps_are_never_slow():
-    """They have no earlier steps for comparison, and connecting takes time."""
+    """There are no earlier steps to compare with, and connecting takes time."""
     pace = Pace()
 
     assert not any(pace.slow(1.0 + number) for number in range(10))
 
 
 def test_a_simulator_that_has_become_slower_is_not_reported_for_ever():
-    """After fifty steps the new speed counts as normal."""
+    """After fifty steps the new duration counts as normal."""
     pace = Pace()
     for _ in range(200):
         pace.slow(0.004)
@@ -89,7 +92,7 @@ def test_a_simulator_that_has_become_slower_is_not_reported_for_ever():
 
 
 def test_who_waits_for_a_slow_simulator_is_not_slow(make_member):
-    """One thread takes turns between steps; each is measured by its own part of the time."""
+    """Simulators take turns in one thread, so each is measured only by its own part of the time."""
     told = []
     watcher = NullWatcher()
     watcher.slow = lambda name, seconds: told.append((name, seconds > 0.05))
@@ -106,7 +109,7 @@ def test_who_waits_for_a_slow_simulator_is_not_slow(make_member):
 
 
 def compute_for_a_while():
-    """Compute for a tenth of a second."""
+    """Use the processor for a tenth of a second."""
     until = time.perf_counter() + 0.1
     while time.perf_counter() < until:
         pass

@@ -1,4 +1,4 @@
-"""A simulator drives one robot of its world, by the robot's class."""
+"""The class of a job's robot decides which robot of the world it drives."""
 
 from palaestra_protocol.control import RobotName
 from palaestra_trainer.simulators.simulator import driven_robot
@@ -10,17 +10,17 @@ REFEREE = RobotName(robot="referee", ros_name="referee", supervisor=True, defini
 
 
 def test_a_class_drives_the_robot_that_it_names():
-    """The devices of two equal robots have equal names, so only the name distinguishes them."""
+    """Two equal robots have devices with equal names, so only the robot's name distinguishes them."""
     assert driven_robot([GATE, FIRST, SECOND, REFEREE], "ROVER_2") is SECOND
 
 
 def test_a_class_may_name_the_supervisor():
-    """The robot that learns is often its own supervisor, next to robots without that right."""
+    """The robot that learns is often its own supervisor, in a world with other robots."""
     assert driven_robot([GATE, REFEREE], "REFEREE") is REFEREE
 
 
 def test_a_class_without_a_name_drives_the_first_robot_that_is_no_supervisor():
-    """So does one whose name only a PROTO has."""
+    """A class whose name no robot has drives this robot too, because the name may be only in a PROTO."""
     assert driven_robot([REFEREE, GATE, FIRST], "") is GATE
     assert driven_robot([REFEREE, GATE, FIRST], "ROVER_9") is GATE
     assert driven_robot([REFEREE], "") is None

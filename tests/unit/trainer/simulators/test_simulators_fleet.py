@@ -1,4 +1,4 @@
-"""The fleet of all simulators of a run."""
+"""The fleet: all simulators of a run, their start, their faults and their end."""
 
 from __future__ import annotations
 
@@ -32,28 +32,28 @@ DEADLINE_S = 5.0
 
 
 class Told(NullWatcher):
-    """A watcher that records its calls."""
+    """A watcher that records which of its methods were called."""
 
     def __init__(self):
         self.told = []
 
     def restarted(self, simulator, *, recycled):
-        """Record the call."""
+        """Record the restart."""
         assert not recycled
         self.told.append(f"restarted {simulator}")
 
     def flapping(self, simulator):
-        """Record the call."""
+        """Record that the simulator is flapping."""
         self.told.append(f"flapping {simulator}")
 
     def given_up(self, simulator):
-        """Record the call."""
+        """Record that the simulator was given up."""
         self.told.append(f"given up {simulator}")
 
 
 @pytest.fixture
 def make_fleet(make_configuration, make_member):
-    """Make a fleet of two members; the arguments are for the first one."""
+    """Return a function that makes a fleet of two simulators; the keywords set the first one's faults."""
 
     def make(first=None, **faults):
         members = [first or make_member("collect-0", **faults), make_member("evaluate-0")]
@@ -63,7 +63,7 @@ def make_fleet(make_configuration, make_member):
 
 
 def test_all_are_started_and_stopped(make_fleet):
-    """The test has collecting and evaluating simulators."""
+    """The fleet has a collecting and an evaluating simulator."""
     fleet, members = make_fleet()
 
     fleet.start()
@@ -73,7 +73,7 @@ def test_all_are_started_and_stopped(make_fleet):
 
 
 def test_one_that_does_not_come_up_ends_the_start(make_fleet):
-    """Its budget limits the number of attempts."""
+    """The budget limits the number of tries."""
     fleet, members = make_fleet(starts=range(1, 100))
 
     with pytest.raises(FaultBudgetSpent, match="collect-0: flapping: 10 restarts"):
@@ -83,12 +83,12 @@ def test_one_that_does_not_come_up_ends_the_start(make_fleet):
 
 
 def misfit_starts(*numbers):
-    """Return starts at which the world lacks a required node."""
+    """Return starts at which the world lacks a node that the environment needs."""
     return {number: WorldMisfit("collect-0", "the world has no node DEF TARGET") for number in numbers}
 
 
 def test_two_processes_in_a_row_that_lack_what_is_needed_are_a_wrong_configuration(make_fleet):
-    """A retry cannot help, because the world is the same each time."""
+    """The world is the same each time, so a retry cannot help."""
     fleet, members = make_fleet(starts=misfit_starts(1, 2))
 
     with pytest.raises(ConfigurationError, match="collect-0: collect-0: the world has no node DEF TARGET"):
@@ -103,7 +103,7 @@ def test_two_processes_in_a_row_that_lack_what_is_needed_are_a_wrong_configurati
     ids=["one", "two with another fault between"],
 )
 def test_a_misfit_that_the_next_process_does_not_repeat_is_mended(make_fleet, starts):
-    """A process may respond before its world is loaded completely."""
+    """A process may answer before it has loaded its world completely."""
     fleet, members = make_fleet(starts=starts)
 
     fleet.start()
@@ -112,7 +112,7 @@ def test_a_misfit_that_the_next_process_does_not_repeat_is_mended(make_fleet, st
 
 
 def test_a_run_that_has_stepped_before_mends_misfits_like_other_faults(make_fleet):
-    """The run has stepped, so its worlds are valid."""
+    """The run has stepped before, so its worlds have all nodes."""
     fleet, members = make_fleet(starts=misfit_starts(1, 2, 3))
 
     fleet.start(stepped=True)
@@ -121,7 +121,7 @@ def test_a_run_that_has_stepped_before_mends_misfits_like_other_faults(make_flee
 
 
 def refusals(*numbers, fact="refused a step of 50 ms; use a multiple of the world's basicTimeStep"):
-    """Return starts, resets or steps at which the simulator refuses a request."""
+    """Return starts, resets or steps at which the simulator rejects a request."""
     return {number: WrongData("collect-0", fact) for number in numbers}
 
 
@@ -136,7 +136,7 @@ def test_what_two_processes_refuse_in_the_same_words_is_a_mistake(play, make_con
 
 
 def test_a_simulator_that_refuses_its_variables_twice_is_a_mistake(play, make_configuration, last_word):
-    """It ends with exit code 2 each time, and ten restarts would not correct PALAESTRA_STUB_FAULTS."""
+    """The simulator exits with code 2 each time, and a restart cannot correct PALAESTRA_STUB_FAULTS."""
     said = "the simulator ended with code 2; its last line: 'exit@step=45' is not a fault"
     starts = {number: SimulatorRefused("collect-0", said) for number in (1, 2, 3)}
 
@@ -157,14 +157,14 @@ def test_a_simulator_that_refuses_its_variables_twice_is_a_mistake(play, make_co
     ids=["after a step", "in other words", "then something else"],
 )
 def test_what_one_process_refuses_is_mended(play, make_configuration, faults):
-    """A simulator that worked before is broken, but the configuration is right."""
+    """If the next process accepts the same request, the configuration is right."""
     code, _ = play(make_configuration(), faults={"collect-0": faults})
 
     assert code == ExitCode.DONE
 
 
 def test_simulators_that_take_long_to_come_up_are_named(make_fleet, make_member, monkeypatch):
-    """The log names the late simulator before its deadline turns it into a fault."""
+    """A person sees in the log which simulator is late, before the deadline makes it a fault."""
     monkeypatch.setattr("palaestra_trainer.simulators.fleet.LONG_S", 0.0)
     released = threading.Event()
     member = make_member("collect-0")
@@ -181,7 +181,7 @@ def test_simulators_that_take_long_to_come_up_are_named(make_fleet, make_member,
 
 
 def test_a_signal_does_not_wait_for_simulators_that_start(make_fleet, make_member):
-    """Eleven attempts of a minute each are long after Ctrl-C."""
+    """Eleven tries of a minute each would be a long wait after Ctrl-C."""
     released = threading.Event()
     member = make_member("collect-0")
 
@@ -205,7 +205,7 @@ def test_a_signal_does_not_wait_for_simulators_that_start(make_fleet, make_membe
 
 
 def with_fewer(configuration, least):
-    """Return the configuration with `minSimulators` for each group."""
+    """Return the configuration with this `minSimulators` in each group."""
     content = configuration.model_dump(by_alias=True)
     for simulator in content["simulators"]:
         simulator["minSimulators"] = least
@@ -213,7 +213,7 @@ def with_fewer(configuration, least):
 
 
 def test_training_begins_when_enough_of_each_group_are_up(make_configuration, make_member):
-    """The missing one is restarted while the others learn."""
+    """The missing simulator is restarted while the others collect."""
     members = [make_member("collect-0", starts=[1], held=True), make_member("collect-1")]
     watcher = Told()
     fleet = Fleet(with_fewer(make_configuration(collectors=2, evaluators=0), 1), members, watcher)
@@ -229,7 +229,7 @@ def test_training_begins_when_enough_of_each_group_are_up(make_configuration, ma
 
 
 def test_one_that_fails_after_the_others_are_up_is_not_waited_for(make_configuration, make_member):
-    """From then on it is restarted in the background, like any other."""
+    """Like a simulator that breaks later, it is restarted in the background."""
     up = threading.Event()
     late = make_member("collect-0", held=True)
 
@@ -249,7 +249,7 @@ def test_one_that_fails_after_the_others_are_up_is_not_waited_for(make_configura
 
 
 def test_training_does_not_begin_before_every_one_was_tried(make_configuration, make_member):
-    """Usually all start, and the first steps should include all of them."""
+    """Usually all simulators start, so the first steps should have all of them."""
     released = threading.Event()
     slow = make_member("collect-0")
     slow.start = lambda: released.wait(DEADLINE_S)
@@ -273,7 +273,7 @@ def test_training_does_not_begin_before_every_one_was_tried(make_configuration, 
 
 
 def test_a_simulator_that_never_comes_up_is_given_up_if_enough_are_left(make_configuration, make_member):
-    """One broken machine in a pool must not keep the others from learning."""
+    """One broken machine in a pool must not keep the others from training."""
     members = [make_member("collect-0", starts=range(1, 100)), make_member("collect-1")]
     watcher = Told()
     fleet = Fleet(with_fewer(make_configuration(collectors=2, evaluators=0), 1), members, watcher)
@@ -287,7 +287,7 @@ def test_a_simulator_that_never_comes_up_is_given_up_if_enough_are_left(make_con
 
 
 def test_stopping_ends_a_mending_that_is_under_way(make_fleet):
-    """No thread may use a simulator that its owner has stopped."""
+    """After the end of the fleet, no thread may use a simulator."""
     fleet, members = make_fleet(held=True)
     fleet.start()
     (restarter,) = fleet.collecting
@@ -300,7 +300,7 @@ def test_stopping_ends_a_mending_that_is_under_way(make_fleet):
 
 
 def test_a_member_that_is_mended_neither_rests_nor_runs(make_fleet):
-    """Only the restarting thread may use it."""
+    """During a restart, only the restarter's thread may use the simulator."""
     fleet, members = make_fleet(held=True)
     fleet.start()
     fleet.collecting[0].begin_restart(SimulatorHung("collect-0", "slow"))
@@ -313,7 +313,10 @@ def test_a_member_that_is_mended_neither_rests_nor_runs(make_fleet):
 
 
 def test_a_resting_member_is_recycled_in_the_background_and_awaited_before_it_runs(make_member):
-    """The others collect meanwhile; a member that is paused in between would step while paused."""
+    """The other simulators collect meanwhile.
+
+    If it were paused during the restart, it would step while paused.
+    """
     member = make_member(recycle_after=1, held=True)
     restarter = Restarter(member)
     restarter.reset(seed=1)
@@ -327,7 +330,7 @@ def test_a_resting_member_is_recycled_in_the_background_and_awaited_before_it_ru
 
 
 def test_a_resting_member_that_is_not_due_stays_as_it_is(make_member):
-    """Its next evaluation ends before its limit is reached."""
+    """The simulator's next evaluation ends before the limit is reached."""
     member = make_member(recycle_after=24)
     restarter = Restarter(member)
     restarter.reset(seed=1)
@@ -339,7 +342,7 @@ def test_a_resting_member_that_is_not_due_stays_as_it_is(make_member):
 
 
 def test_a_recycling_at_rest_that_fails_is_mended_when_the_member_is_to_run(make_member):
-    """It is again restarted in the background, because another simulator may take its episodes."""
+    """The second restart is in the background too, because another simulator may take over the episodes."""
     member = make_member(recycle_after=1, starts=[1])
     restarter = Restarter(member)
     restarter.reset(seed=1)
@@ -353,7 +356,7 @@ def test_a_recycling_at_rest_that_fails_is_mended_when_the_member_is_to_run(make
 
 
 def test_stopping_ends_a_recycling_at_rest_and_reports_no_fault(make_fleet, make_member):
-    """A signal may come while the simulators are healthy, and their end is then not a fault."""
+    """The simulators are healthy when a signal ends the run, so their end is not a fault."""
     member = make_member("collect-0", recycle_after=1, held=True)
     fleet, _ = make_fleet(member)
     fleet.start()
@@ -369,7 +372,7 @@ def test_stopping_ends_a_recycling_at_rest_and_reports_no_fault(make_fleet, make
 
 
 def test_fifty_faults_leave_nothing_behind(make_member):
-    """Neither threads nor descriptors: a week of training has many more."""
+    """A week of training has many more faults, so each must free its threads and descriptors."""
     restarter = Restarter(make_member(), RestartLimit(restarts=50))
     threads, descriptors = threading.active_count(), len(list(Path("/proc/self/fd").iterdir()))
 

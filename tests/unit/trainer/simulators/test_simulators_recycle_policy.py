@@ -1,4 +1,4 @@
-"""A healthy simulator is restarted after some resets, at an age, or at a memory size."""
+"""A healthy simulator is restarted after some resets, at an age, or above a memory size."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ MIB = 2**20
 
 
 class Clock:
-    """A clock that a test moves."""
+    """A clock that a test sets forward."""
 
     def __init__(self):
         self.now_s = 100.0
@@ -22,7 +22,7 @@ class Clock:
 
 
 class Memory:
-    """A sidecar's report of its memory, and the number of requests for it."""
+    """A sidecar's report of memory, which counts how often it was requested."""
 
     def __init__(self, used=None):
         self.used = used
@@ -41,7 +41,7 @@ def clock():
 
 
 def test_without_limits_nothing_is_ever_due(clock):
-    """A job sets this with `recycle: {afterResets: 0}`."""
+    """A job with `recycle: {afterResets: 0}` sets no limit."""
     wear = RecyclePolicy(None, Memory(10**12), clock)
     clock.now_s += 1e9
 
@@ -50,9 +50,9 @@ def test_without_limits_nothing_is_ever_due(clock):
 
 @pytest.mark.parametrize(("resets", "due"), [(23, None), (24, "24 resets"), (25, "25 resets")])
 def test_due_by_resets(clock, resets, due):
-    """The paper's simulator died at the 25th reset.
+    """The simulator of the paper died at its 25th reset.
 
-    After 24 resets, the next one is the new simulator's first.
+    After 24 resets, the next reset is the first of a new simulator.
     """
     wear = RecyclePolicy(Recycle(after_resets=24), Memory(), clock)
 
@@ -72,14 +72,14 @@ def test_due_by_resets(clock, resets, due):
     ],
 )
 def test_due_before_several_episodes_where_that_saves_a_restart_amid_them(clock, resets, episodes, due):
-    """Fifty episodes contain two restarts in any case, also in a simulator that was restarted before."""
+    """Fifty episodes need two restarts in any case, even in a simulator that was just restarted."""
     wear = RecyclePolicy(Recycle(after_resets=24), Memory(), clock)
 
     assert wear.due(resets, episodes) == due
 
 
 def test_due_by_age_since_it_came_into_use(clock):
-    """An hour as a standby is not an hour of work; it would otherwise be recycled when it takes over."""
+    """An hour as a standby is not an hour of work, so a standby is not recycled when it takes over."""
     wear = RecyclePolicy(Recycle(after_minutes=1.5), Memory(), clock)
     clock.now_s += 89.0
     before = wear.due(0)
@@ -92,7 +92,7 @@ def test_due_by_age_since_it_came_into_use(clock):
 
 @pytest.mark.parametrize(("used", "due"), [(400 * MIB, None), (401 * MIB, "401 MiB of memory"), (None, None)])
 def test_due_by_memory(clock, used, due):
-    """It is due above the limit, not at it, and not if the memory is unknown."""
+    """The simulator is due above the limit but not at it, and not while its memory is unknown."""
     wear = RecyclePolicy(Recycle(above_memory_bytes=400 * MIB), Memory(used), clock)
     clock.now_s += ASK_MEMORY_EVERY_S
 
@@ -100,7 +100,7 @@ def test_due_by_memory(clock, used, due):
 
 
 def test_memory_is_asked_for_once_a_second_at_most(clock):
-    """Episodes may be short, and a sidecar reads every process for the response."""
+    """Episodes may be short, and the sidecar reads each process of the simulator for a response."""
     memory = Memory(0)
     wear = RecyclePolicy(Recycle(above_memory_bytes=MIB), memory, clock)
 
@@ -112,7 +112,7 @@ def test_memory_is_asked_for_once_a_second_at_most(clock):
 
 
 def test_memory_is_not_asked_for_where_it_has_no_limit(clock):
-    """No program needs the response."""
+    """A request would cost time, although no limit uses the response."""
     memory = Memory(0)
     wear = RecyclePolicy(Recycle(after_resets=1), memory, clock)
     clock.now_s += 60.0
@@ -123,7 +123,7 @@ def test_memory_is_not_asked_for_where_it_has_no_limit(clock):
 
 
 def test_the_first_limit_that_is_reached_is_the_reason(clock):
-    """The log has it, so that a user can raise the right limit."""
+    """The log has the reason, so that a user raises the right limit."""
     limits = Recycle(after_resets=24, after_minutes=1, above_memory_bytes=MIB)
     wear = RecyclePolicy(limits, Memory(2 * MIB), clock)
     clock.now_s += 60.0

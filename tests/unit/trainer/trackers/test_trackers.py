@@ -1,4 +1,4 @@
-"""The common part of all trackers, tested with one that keeps everything in memory."""
+"""The common part of all trackers, tested with a tracker that keeps all data in memory."""
 
 from __future__ import annotations
 
@@ -22,31 +22,31 @@ from palaestra_trainer.trackers.tracker import Tracker, known_run, remember_run,
 
 
 class Memory(Tracker):
-    """A tracker that keeps its data for all attempts together."""
+    """A tracker that keeps the data of all attempts in its class."""
 
     begun: ClassVar[list[Any]] = []
     points: ClassVar[list[Any]] = []
     ended: ClassVar[list[int]] = []
 
     def begin(self, directory, configuration):
-        """Continue the known run, or begin the first."""
+        """Continue the run that is known from an earlier attempt, or begin a new one."""
         run = known_run(directory, "memory")
         if run is None:
             remember_run(directory, "memory", "the-run")
         self.begun.append((run, configuration))
 
     def log_scalars(self, step, scalars):
-        """Keep the scalars."""
+        """Keep the scalars of a step."""
         self.points.append((step, scalars))
 
     def end(self):
-        """Record the end."""
+        """Record how many points the tracker had at the end."""
         self.ended.append(len(self.points))
 
 
 @pytest.fixture
 def memory(monkeypatch):
-    """Return the empty tracker, as the class of every callback."""
+    """Return the tracker without data, which replaces the class of each callback."""
     for name in ("begun", "points", "ended"):
         monkeypatch.setattr(Memory, name, [])
     monkeypatch.setattr(callbacks, "_class", lambda *_: Memory)
@@ -55,7 +55,7 @@ def memory(monkeypatch):
 
 @pytest.fixture
 def tracked(job):
-    """Make the configuration of a short run with the tracker."""
+    """Return a function that makes the configuration of a short run with the tracker."""
 
     def make(name="DQN", **changes):
         configuration = job(name, **changes)
@@ -66,7 +66,10 @@ def tracked(job):
 
 
 def test_a_tracker_gets_every_scalar_of_tensorboard_at_the_same_step(play, tracked, memory, directory):
-    """This includes the last evaluation and the confirmation, after the end of learning."""
+    """The last evaluation and the confirmation come after the end of learning.
+
+    The tracker must get them too.
+    """
     play(tracked("PPO"))
 
     points = {(name, step): value for step, scalars in memory.points for name, value in scalars.items()}
@@ -81,7 +84,7 @@ def test_a_tracker_gets_every_scalar_of_tensorboard_at_the_same_step(play, track
 
 
 def test_a_tracker_gets_the_configuration_with_every_hyperparameter(play, tracked, memory):
-    """Defaults are included, because a later release may have others."""
+    """The configuration includes defaults, because a later release may have other ones."""
     play(tracked())
 
     run, configuration = memory.begun[0]
@@ -92,7 +95,7 @@ def test_a_tracker_gets_the_configuration_with_every_hyperparameter(play, tracke
 
 
 def test_every_attempt_continues_the_same_run_of_the_tracker(play, tracked, memory):
-    """The tracker's run id is in the run directory, which outlives an attempt."""
+    """The id of the tracker's run is in the run directory, which outlives an attempt."""
     steps = iter(range(1, 1000))
     play(tracked(), on_step=lambda: next(steps) == 42 and os.kill(os.getpid(), signal.SIGTERM))
     play(tracked())
@@ -104,7 +107,7 @@ def test_every_attempt_continues_the_same_run_of_the_tracker(play, tracked, memo
 
 @pytest.mark.parametrize("tracker", ["wandb:Wandb", "mlflow:MLflow"])
 def test_a_tracker_whose_library_is_missing_is_refused_by_name(tracker):
-    """The error comes before a simulator starts."""
+    """The library is checked before a simulator starts, so a person waits only seconds for the error."""
     library, _, _ = tracker.partition(":")
     if importlib.util.find_spec(library):
         pytest.skip(f"{library} is installed")
@@ -114,20 +117,23 @@ def test_a_tracker_whose_library_is_missing_is_refused_by_name(tracker):
 
 
 class UnreachableService(types.ModuleType):
-    """The library of W&B, which is not installed, with a service that is unreachable at the end."""
+    """A fake of the library of W&B, whose service cannot be reached at the end."""
 
     Settings = staticmethod(dict)
 
     def init(self, settings, **_):
-        """Return the run, which is this module."""
+        """Return this module as the run."""
         self.settings = settings
         return self
 
     def define_metric(self, *_, **__):
-        """Do nothing."""
+        """Do nothing, because no metric is shown."""
 
     def finish(self):
-        """Raise a timeout, as the library does with a deadline; without one it would not return."""
+        """Raise the timeout that the library raises if it has a deadline.
+
+        Without one it would wait for ever.
+        """
         assert self.settings["finish_timeout"] > 0
         assert self.settings["finish_timeout_raises"]
         raise TimeoutError("Timed out finishing run.")
@@ -135,7 +141,7 @@ class UnreachableService(types.ModuleType):
 
 @pytest.fixture
 def wandb_away(monkeypatch):
-    """Return the tracker's class with that library; both modules are removed after the test."""
+    """Return the tracker's class with the fake library, for the time of the test."""
     name = "palaestra_trainer.trackers.wandb"
     monkeypatch.setitem(sys.modules, "wandb", UnreachableService("wandb"))
     monkeypatch.setitem(sys.modules, name, None)
@@ -144,7 +150,10 @@ def wandb_away(monkeypatch):
 
 
 def test_wandb_that_cannot_upload_in_time_ends_with_a_warning_and_the_remedy(wandb_away, directory):
-    """The grace period of a pod is shorter than the library's timeout; its files are in the run directory."""
+    """A pod must end before the library's own timeout.
+
+    Its files are in the run directory, for a later upload.
+    """
     tracker = wandb_away(mode="online")
     directory.path.mkdir(exist_ok=True)
     tracker.begin(directory, {"job": "corridor", "replica": 0})

@@ -1,4 +1,4 @@
-"""Several functions at the same time."""
+"""Several functions that run at the same time, each in its own thread."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ PATIENCE_S = 20.0
 
 
 def test_the_results_are_in_the_order_of_the_works():
-    """Neither can end alone, so they ran at the same time."""
+    """Each function waits for the other, so they must have run at the same time."""
     together = threading.Barrier(2, timeout=PATIENCE_S)
 
     def work(name):
@@ -29,7 +29,7 @@ def test_the_results_are_in_the_order_of_the_works():
 
 
 def test_an_error_of_one_ends_the_others():
-    """Otherwise the other episodes would continue for a result that no caller gets."""
+    """Nobody would read the results of the other functions, so they must not continue."""
 
     def broken(check):
         del check
@@ -44,7 +44,7 @@ def test_an_error_of_one_ends_the_others():
 
 
 def test_the_callers_check_ends_all():
-    """A signal is noticed in the main thread only."""
+    """Only the main thread notices a signal."""
 
     def endless(check):
         while True:

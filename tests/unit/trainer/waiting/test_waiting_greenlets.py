@@ -1,4 +1,4 @@
-"""Several tasks take turns in one thread: each continues while the others wait."""
+"""Several tasks take turns in one thread: while one waits, another continues."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from palaestra_trainer.waiting.wait_time import waited_s
 
 @pytest.fixture
 def connections():
-    """Two connections, each with a requesting and a responding end."""
+    """Yield two connections, each as a pair of a requesting and a responding end."""
     with ExitStack() as stack:
         yield [[stack.enter_context(end) for end in socket.socketpair()] for _ in range(2)]
 
 
 @given(st.lists(st.integers(0, 4), max_size=5))
 def test_results_come_in_the_order_of_the_works(pauses):
-    """The order does not depend on how often each task lets the others run."""
+    """The order does not depend on how often a task lets the others run."""
 
     def work(place):
         for _ in range(pauses[place]):
@@ -56,12 +56,12 @@ def test_everyone_has_a_first_turn_before_anyone_has_a_second(pauses):
 
 
 def test_alone_there_is_nobody_to_let():
-    """A notebook steps one environment and does not use turns."""
+    """A notebook with one environment has no other task to run."""
     assert let_others() is None
 
 
 def test_turns_may_be_taken_within_a_turn():
-    """A task with several simulators of its own is still one task."""
+    """A task with several simulators of its own still counts as one task."""
 
     def pair(name):
         return take_turns([lambda: [name, let_others()][0], name.upper])
@@ -70,7 +70,7 @@ def test_turns_may_be_taken_within_a_turn():
 
 
 def test_an_error_waits_for_the_others():
-    """No simulator may be left between a request and its response."""
+    """If the error came at once, a simulator would be left between a request and its response."""
     done = []
 
     def fail():
@@ -88,7 +88,7 @@ def test_an_error_waits_for_the_others():
 
 
 def test_an_interruption_ends_the_others_where_they_stand():
-    """After Ctrl-C each task can close its connection, and none continues."""
+    """After Ctrl-C, no task continues. Each runs its `finally` blocks, for example to close a connection."""
     told = []
 
     def wait():
@@ -107,7 +107,7 @@ def test_an_interruption_ends_the_others_where_they_stand():
 
 
 def test_a_work_with_an_answer_goes_before_those_without(connections):
-    """A slow simulator delays only itself."""
+    """A slow simulator must delay only its own task."""
     (slow, answers_slowly), (quick, answers_quickly) = connections
     told = []
 
@@ -127,7 +127,7 @@ def test_a_work_with_an_answer_goes_before_those_without(connections):
 
 
 def test_of_several_answers_the_first_that_was_asked_for_is_read_first(connections):
-    """If there is a choice, the order must not depend on chance."""
+    """With several responses to read, the order must not depend on chance."""
     told = []
 
     def work(place):
@@ -142,7 +142,7 @@ def test_of_several_answers_the_first_that_was_asked_for_is_read_first(connectio
 
 
 def test_an_answer_that_stays_away_is_left_to_the_work_that_asked_first(connections):
-    """Only that task has the deadline and can interpret a missing response."""
+    """Only this task has the deadline, and knows what a missing response means."""
     told = []
 
     def work(place):
@@ -156,7 +156,7 @@ def test_an_answer_that_stays_away_is_left_to_the_work_that_asked_first(connecti
 
 
 def test_a_wait_of_all_is_nobody_s_turn(connections):
-    """The time counts as waiting for simulators, and as a part of each step that waits."""
+    """The time counts as a wait for simulators, and as a part of each waiting task's step."""
     began, waited = time.perf_counter(), waited_s()
     found = []
 
@@ -173,7 +173,7 @@ def test_a_wait_of_all_is_nobody_s_turn(connections):
 
 
 def test_the_slow_wait_beside_each_other_too(connections):
-    """A step of fifty milliseconds takes that long, in any order of requests."""
+    """In any order of requests, a step of 50 ms takes that long for each task."""
     began, waited = time.perf_counter(), waited_s()
     found = []
 
@@ -192,7 +192,7 @@ def test_the_slow_wait_beside_each_other_too(connections):
 
 
 def test_when_patience_is_over_nobody_is_waited_for(connections):
-    """Sixteen simulators may hang when a run must end."""
+    """At the end of a run, sixteen simulators that hang must not each be waited for."""
     waited = waited_s()
     shutdown_deadline.end(after_s=-1.0)
     try:
@@ -204,7 +204,7 @@ def test_when_patience_is_over_nobody_is_waited_for(connections):
 
 
 def test_of_several_errors_the_first_work_s_is_raised(connections):
-    """A repeated run must fail in the same way, whichever simulator responded first."""
+    """A repeated run must fail with the same error, whichever simulator responds first."""
 
     def fail(place):
         if place == 0:
@@ -216,7 +216,7 @@ def test_of_several_errors_the_first_work_s_is_raised(connections):
 
 
 def test_nothing_of_a_work_outlives_it():
-    """Greenlets are reused. If they kept observations or tracebacks, the memory would fill."""
+    """Greenlets are reused. If they kept observations or tracebacks, the memory would fill up."""
 
     class Result:
         pass
@@ -228,7 +228,7 @@ def test_nothing_of_a_work_outlives_it():
 
 
 def test_turns_can_be_taken_again_after_any_end():
-    """The next step must not depend on one that failed or was interrupted."""
+    """A step that failed or was interrupted must not affect the next one."""
 
     def interrupt():
         let_others()
@@ -245,7 +245,7 @@ def test_turns_can_be_taken_again_after_any_end():
 
 
 def test_each_thread_takes_turns_of_its_own():
-    """A greenlet belongs to the thread that made it; a script may step its environments in another thread."""
+    """A greenlet runs only in the thread that made it. A script may step environments in another thread."""
     take_turns([let_others, let_others])
     found = []
 

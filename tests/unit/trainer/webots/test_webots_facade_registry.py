@@ -1,4 +1,4 @@
-"""The facade that a new environment uses."""
+"""The registry decides which facade a new environment uses."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from palaestra_trainer.webots.facade import open_facades
 
 
 class Facade:
-    """Any object that a program may create."""
+    """An object in place of a facade; any class will do."""
 
 
 @pytest.fixture
 def make():
-    """Make facades that are offered, and withdraw them at the end of the test."""
+    """Yield a function that makes facades and offers them; they are withdrawn at the end."""
     made = []
 
     def one():
@@ -30,7 +30,7 @@ def make():
 
 
 def test_the_newest_facade_is_offered(make):
-    """In a notebook, the cell above created it."""
+    """In a notebook, this is the facade that the previous cell created."""
     make()
     newest = make()
 
@@ -48,7 +48,7 @@ def test_a_facade_has_one_environment_at_a_time(make):
 
 
 def test_a_facade_that_was_closed_is_offered_no_more(make):
-    """This holds even if its environment gives it back later."""
+    """An environment may give the facade back later, which must not offer it again."""
     facade = make()
     open_facades.take(facade)
     open_facades.withdraw(facade)
@@ -58,7 +58,7 @@ def test_a_facade_that_was_closed_is_offered_no_more(make):
 
 
 def test_a_facade_that_nobody_has_is_forgotten():
-    """The list must not keep a simulator's connections open."""
+    """The registry must not keep the connections to a simulator open."""
     facade = Facade()
     open_facades.offer(facade)
     del facade
@@ -69,7 +69,7 @@ def test_a_facade_that_nobody_has_is_forgotten():
 
 @pytest.mark.filterwarnings("ignore:.*multi-threaded.*fork:DeprecationWarning")
 def test_a_forked_process_is_offered_none_of_its_parent(make):
-    """Both processes would read from the same connections."""
+    """Parent and child would read from the same connections."""
     facade = make()
 
     child = os.fork()

@@ -1,4 +1,4 @@
-"""Arrays from the messages of cameras and lidars, and refused messages."""
+"""Decoding messages of cameras and lidars into arrays, and rejecting damaged ones."""
 
 import math
 import struct
@@ -15,7 +15,7 @@ POINTS = np.array([[1.0, 2.0, 3.0], [math.inf, math.inf, math.inf]], np.float32)
 
 
 def image(data, kind, pixel_bytes, frame_id="robotino/camera", **changes):
-    """Return an array as the bytes of a sensor_msgs/Image; `changes` replace its fields."""
+    """Return an array as the bytes of a sensor_msgs/Image; `changes` replaces fields of the message."""
     height, width = data.shape[:2]
     fields = {
         "header": {"seq": 3, "frame_id": frame_id},
@@ -29,7 +29,7 @@ def image(data, kind, pixel_bytes, frame_id="robotino/camera", **changes):
 
 
 def color(**changes):
-    """Return a message of a camera."""
+    """Return a message of a color camera."""
     return image(PIXELS, "bgra8", 4, **changes)
 
 
@@ -39,7 +39,7 @@ def depth(data=METERS, **changes):
 
 
 def cloud(names=("x", "y", "z", "layer", "time"), **changes):
-    """Return a message of a lidar's point cloud, as the `ros` controller packs it."""
+    """Return a message with a lidar's point cloud, packed as by the `ros` controller."""
     packed = b"".join(struct.pack("<fffif", *point, 0, 0.0) for point in POINTS)
     fields = {
         "header": {"frame_id": "robotino/lidar"},
@@ -65,13 +65,13 @@ KINDS = {
 
 @pytest.fixture(params=KINDS)
 def kind(request):
-    """Return a reader for a device's messages, a function that makes one, and its array."""
+    """Return a reader for the messages of a device, a function that makes a message, and its array."""
     make_reading, make_message, array = KINDS[request.param]
     return make_reading(), make_message, array
 
 
 def test_the_array_has_shape_and_type_of_the_sensor(kind):
-    """The result is the same for the first message and for later ones, whose head is known."""
+    """The first message is parsed completely; later messages reuse its layout."""
     read, make_message, array = kind
 
     for _ in range(2):
@@ -82,7 +82,7 @@ def test_the_array_has_shape_and_type_of_the_sensor(kind):
 
 
 def test_no_pixel_is_copied(kind):
-    """The array uses the memory of the message and is read-only."""
+    """The array is a read-only view of the message's memory."""
     read, make_message, _ = kind
     message = make_message()
 
@@ -93,7 +93,7 @@ def test_no_pixel_is_copied(kind):
 
 
 def test_a_camera_may_change_its_size():
-    """The size changes if the world was loaded again."""
+    """The size may change when another world is loaded."""
     read = ImageReading("camera")
     read(color())
 
@@ -104,7 +104,7 @@ def test_a_camera_may_change_its_size():
 
 @pytest.mark.parametrize("known", [False, True], ids=["first", "later"])
 def test_a_message_cut_short_anywhere_is_refused(kind, known):
-    """Otherwise pixels of the previous image would be read."""
+    """A reader that accepted the message would return pixels of the previous image."""
     read, make_message, _ = kind
     sound = make_message()
     if known:
@@ -116,7 +116,7 @@ def test_a_message_cut_short_anywhere_is_refused(kind, known):
 
 
 def test_a_message_that_is_too_long_is_refused(kind):
-    """Such a message is of another type than the topic's."""
+    """A message with more bytes than its type needs was sent to the wrong topic."""
     read, make_message, _ = kind
     sound = make_message()
 
@@ -165,6 +165,6 @@ REFUSED = {
 
 @pytest.mark.parametrize(("read", "message", "fact"), REFUSED.values(), ids=REFUSED.keys())
 def test_a_message_of_another_format_is_refused(read, message, fact):
-    """A policy would learn from noise."""
+    """With a wrong format, a policy would learn from noise."""
     with pytest.raises(ValueError, match=fact):
         read(message)

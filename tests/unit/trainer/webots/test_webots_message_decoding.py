@@ -1,4 +1,4 @@
-"""Values from a sensor's messages, and refused messages."""
+"""Decoding the values in messages of sensors, and rejecting damaged messages."""
 
 import math
 import struct
@@ -30,7 +30,7 @@ def kind(request):
 
 @pytest.fixture
 def read(kind):
-    """Return a reader for the messages of one device that has sent none yet."""
+    """Return a reader for one device, which has read no message yet."""
     return NumberReading("ir1", KINDS[kind][0])
 
 
@@ -41,14 +41,14 @@ def message(kind, value, frame_id="robotino/ir1"):
 
 
 def test_the_reading_is_the_last_number(kind, read):
-    """Messages are read one after another, as genpy would read them."""
+    """For each of several messages, the reader returns the value that genpy would return."""
     _, _, value = KINDS[kind]
 
     assert [read(message(kind, it)) for it in (value, type(value)(0), value)] == [value, 0, value]
 
 
 def test_a_frame_id_of_another_length_is_read_too(kind, read):
-    """The frame_id may be another robot's, or empty."""
+    """The frame_id may be empty, or that of another robot."""
     _, _, value = KINDS[kind]
 
     assert [read(message(kind, value, name)) for name in ("robotino/ir1", "", "r")] == [value] * 3
@@ -56,7 +56,7 @@ def test_a_frame_id_of_another_length_is_read_too(kind, read):
 
 @pytest.mark.parametrize("known", [False, True], ids=["first", "later"])
 def test_a_message_cut_short_anywhere_is_refused(kind, read, known):
-    """Otherwise text of its header would be read as a number."""
+    """A reader that accepted the message would take text of the header for a number."""
     sound = message(kind, KINDS[kind][2])
     if known:
         read(sound)
@@ -67,7 +67,7 @@ def test_a_message_cut_short_anywhere_is_refused(kind, read, known):
 
 
 def test_a_message_that_is_too_long_is_refused(kind, read):
-    """Such a message is of another type than the topic's."""
+    """A message with more bytes than its type needs was sent to the wrong topic."""
     sound = message(kind, KINDS[kind][2])
 
     with pytest.raises(ValueError, match=f"a message of {len(sound) + 1} bytes, not {len(sound)}"):
@@ -75,7 +75,7 @@ def test_a_message_that_is_too_long_is_refused(kind, read):
 
 
 def test_a_message_whose_frame_id_claims_another_length_is_refused(kind, read):
-    """The message is as long as before, but the reading is not at its end."""
+    """The message has the usual length, but its reading is not at the end."""
     _, _, value = KINDS[kind]
     sound = message(kind, value)
     read(sound)
@@ -89,13 +89,13 @@ def test_a_message_whose_frame_id_claims_another_length_is_refused(kind, read):
 @pytest.mark.parametrize("wrong", [float("nan"), float("inf"), float("-inf")])
 @pytest.mark.parametrize("kind", ["sensor_msgs/Range", "webots_ros/Float64Stamped"], indirect=True)
 def test_what_is_no_finite_number_is_refused_with_the_device(kind, read, wrong):
-    """One NaN in an observation is in every weight after one update."""
+    """A single NaN in an observation spreads to every weight at the next update."""
     with pytest.raises(ValueError, match=f"{wrong} from ir1"):
         read(message(kind, wrong))
 
 
 def test_a_reading_of_several_numbers_is_a_tuple():
-    """The order is that of the message."""
+    """The numbers are in the order of the message."""
     point = message_type("geometry_msgs/PointStamped").codec.encode({"point": {"x": 1.0, "y": 2.0, "z": 3.0}})
 
     assert VectorReading("gps", POINT)(point) == (1.0, 2.0, 3.0)
@@ -103,7 +103,7 @@ def test_a_reading_of_several_numbers_is_a_tuple():
 
 @pytest.mark.parametrize("axis", ["x", "y", "z"])
 def test_each_number_of_a_tuple_has_to_be_finite(axis):
-    """A single NaN reaches a loss as well."""
+    """A single NaN in the tuple would reach the loss."""
     point = message_type("geometry_msgs/PointStamped").codec.encode({"point": {axis: math.nan}})
 
     with pytest.raises(ValueError, match=r"nan.* from gps"):

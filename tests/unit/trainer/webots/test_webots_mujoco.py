@@ -1,4 +1,4 @@
-"""Facades of MuJoCo's sensors and actuators for which Webots has no device."""
+"""Facades of MuJoCo's sensors and actuators that have no equivalent among Webots' devices."""
 
 import math
 
@@ -18,7 +18,7 @@ def message(*numbers):
 
 
 def test_numbers_are_an_array_of_all():
-    """The order is that of MuJoCo."""
+    """The numbers are in the order of MuJoCo."""
     numbers = read_numbers(message(1.0, -2.5, 0.0))
 
     assert numbers.dtype == np.float64
@@ -27,13 +27,13 @@ def test_numbers_are_an_array_of_all():
 
 @pytest.mark.parametrize("number", [math.nan, math.inf])
 def test_a_number_that_is_not_finite_is_refused(number):
-    """A policy would learn from it."""
+    """A policy must not learn from NaN or infinity."""
     with pytest.raises(ValueError, match=str(number)):
         read_numbers(message(1.0, number))
 
 
 def test_a_message_cut_short_anywhere_is_refused():
-    """Otherwise a length would be read as a number."""
+    """A reader that accepted the message would take the length of the list for a number."""
     sound = message(1.0, 2.0)
 
     for length in range(len(sound)):
@@ -42,7 +42,7 @@ def test_a_message_cut_short_anywhere_is_refused():
 
 
 def test_devices_have_their_names_below_mujoco():
-    """A robot's list of devices has these names."""
+    """The device list of a robot has these names."""
     assert MujocoSensor("walker", "hip force").device == "mujoco/hip force"
     actuator = MujocoActuator("walker", "left biceps")
     assert actuator.device == "mujoco/left biceps"

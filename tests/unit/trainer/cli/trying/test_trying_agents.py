@@ -1,4 +1,4 @@
-"""What acts in an environment that is tried."""
+"""The agents that act in an environment that a person tries."""
 
 from __future__ import annotations
 
@@ -32,19 +32,19 @@ SPACES = (
 
 @pytest.mark.parametrize("space", SPACES, ids=str)
 def test_zero_and_random_actions_are_in_every_space(space):
-    """An environment that refuses them would be blamed for our mistake."""
+    """An action outside the space would be our mistake, but the environment would be blamed."""
     assert space.contains(Zero(space).act(None))
     assert space.contains(Random(space, 1).act(None))
 
 
 def test_zero_is_the_nearest_point_where_the_bounds_exclude_it():
-    """A gripper may open from 0.5 to 1."""
+    """A gripper, for example, may open from 0.5 to 1."""
     assert zero_of(SPACES[4]).tolist() == [0.5]
 
 
 @pytest.mark.parametrize("space", MASKED, ids=str)
 def test_random_actions_obey_a_mask(space):
-    """An environment with masks may raise for an action that it forbids."""
+    """An environment may raise an error for an action that its mask forbids."""
     agent, generator = Random(space, 1), np.random.default_rng(1)
     for _ in range(50):
         mask = all_allowed(space)
@@ -57,14 +57,14 @@ def test_random_actions_obey_a_mask(space):
 
 
 def test_the_same_seed_chooses_the_same_actions():
-    """A person looks at a problem again."""
+    """A person can then repeat an episode with a problem."""
     ours, theirs = Random(SPACES[0], 7), Random(SPACES[0], 7)
 
     assert [ours.act(None) for _ in range(20)] == [theirs.act(None) for _ in range(20)]
 
 
 def test_arrows_are_the_movements_that_an_environment_names():
-    """A person at the keyboard does not count the movements of a task."""
+    """A person at the keyboard does not know the numbers of the movements."""
     env = gymnasium.Env()
     env.options = SimpleNamespace(movements=(Movement.STOP, Movement.FORWARD, Movement.TURN_LEFT))
     names = names_of_actions(env)
@@ -77,7 +77,7 @@ def test_arrows_are_the_movements_that_an_environment_names():
 
 
 def test_without_names_arrows_are_the_first_actions():
-    """Every small Discrete space can be driven."""
+    """A person can then try any small Discrete space."""
     keys = keys_of(spaces.Discrete(3, start=5))
 
     assert [int(keys[key]) for key in (UP, LEFT, RIGHT)] == [5, 6, 7]
@@ -85,7 +85,7 @@ def test_without_names_arrows_are_the_first_actions():
 
 
 def test_arrows_are_the_bounds_of_the_first_two_numbers():
-    """A velocity ahead and a turn, as in most environments of robots that drive."""
+    """In most environments of driving robots, these numbers are the velocity ahead and the turn."""
     space = spaces.Box(np.float32([-1, -2]), np.float32([3, 4]))
 
     keys = keys_of(space)
@@ -111,7 +111,7 @@ def test_arrows_are_the_bounds_of_the_first_two_numbers():
     ids=str,
 )
 def test_actions_for_which_a_person_has_too_few_keys_are_refused(space):
-    """The sentence has the remedy."""
+    """The message proposes `--agent random` instead."""
     with pytest.raises(ConfigurationError, match=r"--agent keyboard: the actions are .*use --agent random"):
         keys_of(space)
 
@@ -129,13 +129,13 @@ def test_actions_for_which_a_person_has_too_few_keys_are_refused(space):
     ],
 )
 def test_the_bytes_of_a_terminal_are_keys(typed, keys, rest):
-    """An arrow may arrive in two reads."""
+    """The bytes of an arrow key may arrive in two reads."""
     assert decode(typed) == (keys, rest)
 
 
 @pytest.fixture
 def typing():
-    """Return a keyboard, the end of a pipe to type into, and the lines that it shows."""
+    """Yield a keyboard, the end of the pipe for typing, and the list of lines that it shows."""
     reader, writer = os.pipe()
     shown: list[str] = []
     with os.fdopen(reader, "rb", buffering=0), os.fdopen(writer, "wb", buffering=0) as typed:
@@ -143,7 +143,7 @@ def typing():
 
 
 def test_each_key_is_an_action_and_others_have_no_effect(typing):
-    """A person may rest a hand on the keyboard."""
+    """A person may touch other keys by accident."""
     keyboard, typed, shown = typing
     typed.write(b"x\x1b[A ")
 
@@ -154,7 +154,7 @@ def test_each_key_is_an_action_and_others_have_no_effect(typing):
 
 @pytest.mark.parametrize(("key", "end"), [(b"n", EndEpisode), (b"q", EndTry)])
 def test_a_key_ends_the_episode_or_all(typing, key, end):
-    """Both work amid an episode."""
+    """Both keys work in the middle of an episode."""
     keyboard, typed, _ = typing
     typed.write(key)
 
@@ -163,7 +163,7 @@ def test_a_key_ends_the_episode_or_all(typing, key, end):
 
 
 def test_a_terminal_that_is_closed_ends_all(typing):
-    """The wait would have no end."""
+    """No key can arrive any more, so the program would wait for ever."""
     keyboard, typed, _ = typing
     typed.close()
 
@@ -172,7 +172,7 @@ def test_a_terminal_that_is_closed_ends_all(typing):
 
 
 def test_a_signal_ends_the_wait_for_a_key(typing):
-    """Ctrl-C must not wait for another key."""
+    """After Ctrl-C, a person must not have to press another key."""
     keyboard, _, _ = typing
 
     def interrupted():

@@ -1,4 +1,4 @@
-"""The episodes of a try, and what they find."""
+"""The episodes in which a person tries an environment, and the problems that they find."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from palaestra_trainer.waiting.check import go_on
 
 
 class Task(gymnasium.Env):
-    """Counts to three; a test replaces what is wrong."""
+    """A task that counts to three; a test replaces the method that should be wrong."""
 
     observation_space = spaces.Box(0.0, 1.0, (1,), np.float32)
     action_space = spaces.Discrete(2)
@@ -33,7 +33,7 @@ class Task(gymnasium.Env):
         return self.seen(), {}
 
     def step(self, action):
-        """Count."""
+        """Count one step."""
         del action
         self.steps += 1
         return self.seen(), self.reward(), self.steps == 3, False, self.info()
@@ -53,7 +53,7 @@ class Task(gymnasium.Env):
 
 @pytest.fixture
 def tried(make_member):
-    """Return a function that plays two episodes of a task with changes, and what was found."""
+    """Return a function that plays two episodes of a task with changes, and returns the findings."""
 
     def play(agent=None, seeds=(1, 2), check=go_on, **changes):
         member = make_member()
@@ -66,7 +66,7 @@ def tried(make_member):
 
 
 def test_a_right_environment_has_figures_and_no_problem(tried):
-    """Each episode has a return of 3 in three steps."""
+    """Each episode has three steps and a return of 3."""
     found = tried()
 
     lines = summary(found)
@@ -107,14 +107,14 @@ def test_a_right_environment_has_figures_and_no_problem(tried):
     ids=["nan", "inf", "dtype", "outside", "still", "zero", "no success", "raises", "seed", "scale"],
 )
 def test_each_problem_is_a_sentence_with_a_remedy(tried, changes, words):
-    """A training would end, or learn nothing, after minutes."""
+    """A training would end minutes later, or learn nothing."""
     lines = summary(tried(**changes))
 
     assert any(words in line for line in lines), lines
 
 
 def test_an_episode_that_does_not_end_is_a_problem(tried, monkeypatch):
-    """An evaluation would wait for it."""
+    """An evaluation would wait for the end of such an episode."""
     monkeypatch.setattr(episodes, "MOST_STEPS", 50)
 
     lines = summary(tried(step=lambda it, _: (it.seen(), 1.0, False, False, {}), steps=0))
@@ -123,7 +123,7 @@ def test_an_episode_that_does_not_end_is_a_problem(tried, monkeypatch):
 
 
 def test_the_same_problem_is_told_once_with_its_number():
-    """Ten episodes would fill the terminal."""
+    """Ten episodes with a line per step would fill the terminal."""
     problems = Problems()
     for _ in range(3):
         problems.add("the reward is nan; fix it")
@@ -132,7 +132,7 @@ def test_the_same_problem_is_told_once_with_its_number():
 
 
 def test_a_fault_of_the_simulator_is_a_problem_and_the_next_episode_is_played(make_member):
-    """A simulator that crashes is what a person wants to know before a night of training."""
+    """A person wants to know of a crash before a night of training."""
     member = make_member(steps=[30])
     restarter = Restarter(member)
     reported = []
@@ -147,7 +147,7 @@ def test_a_fault_of_the_simulator_is_a_problem_and_the_next_episode_is_played(ma
 
 
 def test_a_spent_budget_ends_a_try(make_member):
-    """As it ends a training."""
+    """Training ends in the same way, instead of restarting the simulator endlessly."""
     member = make_member(steps=range(1, 1000))
     restarter = Restarter(member, RestartLimit(restarts=2))
 
@@ -156,7 +156,7 @@ def test_a_spent_budget_ends_a_try(make_member):
 
 
 def test_a_signal_ends_a_try_and_is_no_problem_of_the_environment(tried):
-    """The program then stops the simulator."""
+    """The program must stop the simulator after the signal."""
 
     def interrupted():
         raise Interrupted("SIGTERM received")
@@ -166,15 +166,15 @@ def test_a_signal_ends_a_try_and_is_no_problem_of_the_environment(tried):
 
 
 def test_an_episode_that_a_person_ends_is_not_counted(tried):
-    """Its return would be that of half an episode."""
+    """The return of half an episode would change the mean."""
 
     class Impatient(Zero):
-        """Ends the first episode after one step."""
+        """An agent that ends the first episode after one step."""
 
         acts = 0
 
         def act(self, mask):
-            """Choose an action."""
+            """Choose an action, or end the episode."""
             self.acts += 1
             if self.acts == 2:
                 raise EndEpisode
@@ -184,7 +184,7 @@ def test_an_episode_that_a_person_ends_is_not_counted(tried):
 
 
 def test_the_time_of_a_step_is_divided_among_its_parts():
-    """Time in which the thread did not wait, and which the simulation did not use, is the environment's."""
+    """The environment's own time is what remains after the waits for the simulator and for the transport."""
     clock, waited, transported = iter([0.0, 10.0]), iter([0.0, 6.0]), iter([0.0, 1.0])
     times = StepTimes()
 

@@ -1,4 +1,4 @@
-"""The state from which a run can resume is saved and found."""
+"""Checkpoints: saving the state of a run, finding the newest one, and resuming from it."""
 
 from __future__ import annotations
 
@@ -39,7 +39,10 @@ CHUNK_ROWS = 16
 
 @pytest.fixture(autouse=True)
 def _small_chunks(monkeypatch):
-    """Make a few dozen rows several chunks: a row of the corridor has 36 bytes."""
+    """Make chunks of a few dozen rows, so that a small buffer has several.
+
+    A row of the corridor has 36 bytes.
+    """
     monkeypatch.setattr(buffers, "CHUNK_BYTES", 36 * CHUNK_ROWS)
 
 
@@ -54,7 +57,7 @@ class Trained:
         self.saver = checkpoint.Saver(folder, keep=3)
 
     def learn(self, steps):
-        """Continue the training."""
+        """Continue the training for some steps."""
         self.model.learn(steps, reset_num_timesteps=False)
         return self
 
@@ -67,7 +70,7 @@ class Trained:
         )
 
     def resume(self):
-        """Restore the model from the newest checkpoint, and return its state."""
+        """Restore the model from the newest checkpoint, and return the restored state."""
         found = checkpoint.newest(self.folder)
         state = checkpoint.restore(found, self.model)
         self._env.resume(state.members)
@@ -80,7 +83,7 @@ class Trained:
         return self.folder / str(step)
 
     def experience(self, step):
-        """Return the files with a checkpoint's experience by name."""
+        """Return the experience files of a checkpoint, by name."""
         return {file.name: file for file in sorted((self.path(step) / "experience").iterdir())}
 
 
@@ -99,7 +102,7 @@ def trained(make_member, make_configuration, tmp_path):
 
 
 def rows(model):
-    """Return the experience of a model, oldest first."""
+    """Return the experience of a model by column."""
     return {name: column[: model.replay_buffer.size()] for name, column in model.replay_buffer.rows().items()}
 
 
@@ -110,7 +113,7 @@ def equal(one, other):
 
 @pytest.mark.parametrize("name", ["DQN", "PPO"])
 def test_what_is_saved_is_restored(trained, name):
-    """The test compares networks, optimizer, counts, statistics and random generators."""
+    """Networks, optimizer, counts, statistics and the state of the episode are compared."""
     before, after = trained(name), trained(name, steps=0)
     before.save()
 
@@ -131,7 +134,7 @@ def test_what_is_saved_is_restored(trained, name):
 
 @pytest.mark.parametrize("name", ["DQN", "PPO"])
 def test_random_numbers_go_on_where_they_were(trained, name):
-    """Otherwise exploration by NumPy, PyTorch or the action space would differ, or be repeated."""
+    """With other generators, exploration after a resume would differ from that of an uninterrupted run."""
     before = trained(name)
     before.save()
 
@@ -147,7 +150,7 @@ def test_random_numbers_go_on_where_they_were(trained, name):
 
 @pytest.mark.parametrize("steps", [40, 230], ids=["half full", "gone round"])
 def test_the_replay_buffer_is_restored(trained, steps):
-    """Each row is at the same position, because samples are drawn by position."""
+    """Samples are drawn by position, so each row must have the same position."""
     before, after = trained(steps=steps), trained(steps=0)
     before.save()
 
@@ -158,7 +161,7 @@ def test_the_replay_buffer_is_restored(trained, steps):
 
 
 def test_a_checkpoint_whose_size_cannot_be_looked_at_is_one_all_the_same(trained):
-    """The checkpoint is written, and a value for a dashboard must not end a run."""
+    """The size is a value for a dashboard, which must not end a run."""
     it = trained()
     it.save()
     before = it.saver.size_bytes()
@@ -169,7 +172,10 @@ def test_a_checkpoint_whose_size_cannot_be_looked_at_is_one_all_the_same(trained
 
 
 def test_only_chunks_that_changed_are_written_again(trained):
-    """The other files are those of the previous checkpoint; a million rows would take too long."""
+    """Files of unchanged chunks are hard links to those of the last checkpoint.
+
+    Writing a million rows each time would take too long.
+    """
     model = trained(steps=100)
     model.save()
     model.learn(20).save()
@@ -181,7 +187,7 @@ def test_only_chunks_that_changed_are_written_again(trained):
 
 
 def test_a_resumed_run_shares_chunks_too(trained):
-    """The saver knows the files that it has read."""
+    """After a resume, the saver also links the files from which it has read."""
     trained(steps=100).save()
     model = trained(steps=0)
     model.resume()
@@ -195,7 +201,7 @@ def test_a_resumed_run_shares_chunks_too(trained):
 
 
 def test_a_row_that_ends_as_truncated_afterwards_is_written_again(trained):
-    """A fault changes the row before it, which may be in a saved chunk."""
+    """A fault marks the row before it as truncated, and that row may be in a saved chunk."""
     model = trained(steps=32)
     model.save()
     buffer = model.model.replay_buffer
@@ -225,7 +231,7 @@ def test_chunks_are_copied_where_the_volume_has_no_links(trained, monkeypatch):
 
 
 def test_a_chunk_whose_file_is_gone_is_written_again(trained):
-    """A user may have deleted it."""
+    """A user may have deleted the file of the last checkpoint."""
     model = trained(steps=100)
     model.save()
     model.experience(100)["00000.npy"].unlink()
@@ -236,7 +242,7 @@ def test_a_chunk_whose_file_is_gone_is_written_again(trained):
 
 
 def test_the_newest_checkpoints_are_kept(trained):
-    """Newest means the largest step, not the last name: 100 is after 20."""
+    """The newest checkpoint is the one with the most steps: by name, 100 would come before 20."""
     model = trained(steps=0).learn(1)
     for step in (3, 20, 30, 100):
         model.save(step)
@@ -246,7 +252,10 @@ def test_the_newest_checkpoints_are_kept(trained):
 
 
 def test_checkpoints_beyond_the_step_are_removed(trained):
-    """They are damaged, otherwise the run would have resumed from them, and must not displace good ones."""
+    """The run did not resume from these checkpoints, so they are damaged.
+
+    They must not displace good ones.
+    """
     model = trained()
     for step in (10, 20, 30):
         model.save(step)
@@ -259,7 +268,7 @@ def test_checkpoints_beyond_the_step_are_removed(trained):
 
 
 def test_a_step_is_saved_again(trained):
-    """This happens in a run that is interrupted right after a checkpoint."""
+    """A run that is interrupted right after a checkpoint saves the same step twice."""
     model = trained()
 
     assert model.save()
@@ -270,19 +279,19 @@ def test_a_step_is_saved_again(trained):
 
 
 def flip(path):
-    """Change one bit in the middle, as a faulty disk does."""
+    """Flip one bit in the middle of a file, as a faulty disk does."""
     content = bytearray(path.read_bytes())
     content[len(content) // 2] ^= 1
     replace(path, bytes(content))
 
 
 def truncate(path):
-    """Truncate the file, as a crash of the machine does."""
+    """Cut off the end of a file, as a crash of the machine does."""
     replace(path, path.read_bytes()[:-10])
 
 
 def replace(path, content):
-    """Damage only this file, and not the ones that share its content."""
+    """Replace this file without changing other files that are hard links to the same content."""
     path.unlink()
     path.write_bytes(content)
 
@@ -300,7 +309,7 @@ FILES = [
 @pytest.mark.parametrize("damage", [truncate, flip, os.remove])
 @pytest.mark.parametrize("file", FILES)
 def test_a_checkpoint_with_a_damaged_file_is_skipped(trained, file, damage):
-    """A warning is logged; the run resumes from the previous checkpoint, which is complete."""
+    """The log has a warning, and the run resumes from the previous checkpoint."""
     model = trained()
     for step in (10, 20):
         model.save(step)
@@ -318,7 +327,7 @@ def test_a_checkpoint_with_a_damaged_file_is_skipped(trained, file, damage):
 
 @pytest.mark.parametrize("content", ["[]", "{}", '{"format": 1}', "null", '{"format": 99}'])
 def test_a_manifest_that_is_none_is_damage(trained, content):
-    """Its content does not matter, because its digest is missing."""
+    """Without a digest in the manifest, no content is accepted."""
     model = trained()
     for step in (10, 20):
         model.save(step)
@@ -328,7 +337,7 @@ def test_a_manifest_that_is_none_is_damage(trained, content):
 
 
 def test_every_bit_of_a_manifest_counts(trained):
-    """The manifest has the step from which the run resumes, and no other file has its digest."""
+    """The manifest has the step from which a run resumes, and contains its own digest."""
     model = trained()
     model.save()
     path = model.path(40) / "manifest.json"
@@ -344,7 +353,7 @@ def test_every_bit_of_a_manifest_counts(trained):
 
 
 def test_damage_to_shared_experience_does_not_end_a_run(trained):
-    """The bad file may be in every checkpoint, but the rows of the other chunks are good."""
+    """Several checkpoints may share the damaged file, but the rows of their other chunks are intact."""
     model = trained(steps=100)
     model.save()
     model.learn(20).save()
@@ -365,7 +374,7 @@ def test_damage_to_shared_experience_does_not_end_a_run(trained):
 
 
 def test_what_is_left_of_a_buffer_that_has_gone_round_is_in_order(trained):
-    """The oldest row comes first, so it is the first to be overwritten."""
+    """The buffer overwrites its oldest row first, so the remaining rows must be in order."""
     model = trained(steps=230)
     model.save()
     (model.path(230) / "experience/00000.npy").unlink()
@@ -378,7 +387,10 @@ def test_what_is_left_of_a_buffer_that_has_gone_round_is_in_order(trained):
 
 
 def test_a_checkpoint_of_another_format_is_refused(trained):
-    """A new run would waste the steps of this one; the release that wrote the checkpoint can read it."""
+    """A new run would throw away the steps of this one.
+
+    The release that wrote the checkpoint can still read it.
+    """
     model = trained()
     model.save(10)
     model.save(20)
@@ -390,12 +402,12 @@ def test_a_checkpoint_of_another_format_is_refused(trained):
 
 
 def test_without_a_checkpoint_there_is_none(tmp_path):
-    """A new run has no checkpoint."""
+    """The run directory of a new run has no checkpoints."""
     assert checkpoint.newest(tmp_path / "none") is None
 
 
 def fail(number):
-    """Return a function that raises an error of the operating system."""
+    """Return a function that raises an error of the operating system, with this number."""
 
     def write(*_args, **_options):
         raise OSError(number, os.strerror(number))
@@ -406,7 +418,7 @@ def fail(number):
 @pytest.mark.parametrize("number", [errno.ENOSPC, errno.EDQUOT])
 @pytest.mark.parametrize("where", ["model.save", "np.savez", "np.save"])
 def test_a_full_disk_leaves_what_was_there(trained, monkeypatch, where, number):
-    """Training continues; the next checkpoint may fit again, and must be complete."""
+    """The training continues without a new checkpoint, and the next checkpoint must be complete again."""
     model = trained(steps=100)
     model.save()
     model.learn(20)
@@ -426,7 +438,7 @@ def test_a_full_disk_leaves_what_was_there(trained, monkeypatch, where, number):
 
 
 def test_another_failure_to_write_is_not_hidden(trained, monkeypatch):
-    """A read-only volume does not become writable."""
+    """A read-only volume will not become writable, so the run must end."""
     model = trained()
     monkeypatch.setattr(model.model, "save", fail(errno.EROFS))
 
@@ -436,7 +448,7 @@ def test_another_failure_to_write_is_not_hidden(trained, monkeypatch):
 
 @pytest.mark.parametrize("number", [errno.EINVAL, errno.ENOTSUP])
 def test_a_file_system_without_fsync_of_folders_keeps_checkpoints(trained, monkeypatch, number):
-    """gcsfuse, s3fs, SMB and some NFS servers lack it; files are still synced."""
+    """gcsfuse, s3fs, SMB and some NFS servers cannot sync folders; files are still synced."""
     sync, synced = os.fsync, []
 
     def fsync(descriptor):
@@ -456,9 +468,9 @@ def test_a_file_system_without_fsync_of_folders_keeps_checkpoints(trained, monke
 
 @pytest.mark.parametrize("number", [errno.EPERM, errno.ENOTSUP])
 def test_a_file_system_that_renames_no_folders_is_refused_in_a_sentence(trained, monkeypatch, number):
-    """Object stores are an example.
+    """Some object stores cannot rename a folder.
 
-    Otherwise a traceback at the first checkpoint would be retried again and again.
+    The error must forbid a retry, because each attempt would fail at its first checkpoint.
     """
     rename = Path.rename
 
@@ -476,7 +488,7 @@ def test_a_file_system_that_renames_no_folders_is_refused_in_a_sentence(trained,
 
 
 def test_a_draft_is_never_taken_for_a_checkpoint(trained):
-    """A trainer was killed after it had written everything except the final name."""
+    """The trainer was killed after it had written all files, but before it renamed the folder."""
     model = trained()
     model.save(10)
     model.save(20)
@@ -490,7 +502,7 @@ def test_a_draft_is_never_taken_for_a_checkpoint(trained):
 
 @pytest.mark.parametrize("there", [False, True])
 def test_a_kill_while_a_step_is_saved_again_loses_nothing(trained, there):
-    """The kill comes between the renames of the old and the new folder, or right after them."""
+    """The kill comes between the renames of the old and the new folder, or after both."""
     model = trained()
     model.save()
     shutil.copytree(model.path(40), model.folder / ".40.replaced")
@@ -512,7 +524,7 @@ def test_a_kill_while_a_step_is_saved_again_loses_nothing(trained, there):
     ],
 )
 def test_another_run_is_not_continued(trained, make_configuration, changes, field):
-    """The networks of another run may fit, but have another meaning."""
+    """The networks of another run may have the same shape, but were trained for another task."""
     model = trained()
     model.save()
     other = make_configuration(**({"algorithm": model.configuration.algorithm.model_dump()} | changes))
@@ -522,7 +534,7 @@ def test_another_run_is_not_continued(trained, make_configuration, changes, fiel
 
 
 def test_a_checkpoint_is_of_the_same_run_where_only_a_default_is_new(trained, make_configuration):
-    """After an upgrade between two attempts, the saved configuration lacks the new field."""
+    """An upgrade between two attempts may add a field, which the saved configuration lacks."""
     model = trained()
     model.save()
     newest = checkpoint.newest(model.folder)
@@ -539,7 +551,7 @@ def test_a_checkpoint_is_of_the_same_run_where_only_a_default_is_new(trained, ma
 
 
 def test_tensors_of_another_shape_are_a_configuration_error(trained, make_member, tmp_path):
-    """The file is complete, but does not match the configuration."""
+    """The file is intact, but it belongs to another configuration."""
     trained(steps=0).model.save(tmp_path / "model.zip")
     wide = Algorithm(
         name="DQN", hyperparameters=HYPERPARAMETERS["DQN"] | {"policy_kwargs": {"net_arch": [9]}}
@@ -551,15 +563,15 @@ def test_tensors_of_another_shape_are_a_configuration_error(trained, make_member
 
 
 class Bomb:
-    """An object that would run a command if it were unpickled."""
+    """An object that runs code when it is unpickled."""
 
     def __reduce__(self):
-        """Return the command as instructions to rebuild the object."""
+        """Return a call that fails the test as the way to rebuild the object."""
         return (pytest.fail, ("unpickled",))
 
 
 def test_nothing_in_a_model_is_unpickled(trained, tmp_path):
-    """Write access to a volume must not allow code execution in the trainer."""
+    """A person who can write to a volume must not be able to run code in the trainer."""
     model = trained(steps=0).model
     model.save(tmp_path / "model.zip")
     with zipfile.ZipFile(tmp_path / "model.zip", "a") as archive:
@@ -572,7 +584,7 @@ def test_nothing_in_a_model_is_unpickled(trained, tmp_path):
 
 @pytest.mark.parametrize("file", ["state.npz", "experience/00000.npy"])
 def test_arrays_of_objects_are_refused(trained, file):
-    """They are pickled."""
+    """NumPy stores arrays of objects as pickles, which can contain code."""
     model = trained()
     model.save()
     found = checkpoint.newest(model.folder)

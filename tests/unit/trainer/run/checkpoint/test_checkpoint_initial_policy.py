@@ -1,4 +1,4 @@
-"""A new run begins with the policy of another: with its tensors and statistics, but without running code."""
+"""A new run starts with tensors and statistics of another run's policy; no code in the file is run."""
 
 import io
 import os
@@ -23,7 +23,7 @@ SMALL = {"n_steps": 8, "batch_size": 8, "policy_kwargs": {"net_arch": [8]}}
 
 
 class Numbers(gymnasium.Env):
-    """An environment with observations of a given length."""
+    """An environment whose observations have a given length."""
 
     action_space = spaces.Discrete(2)
 
@@ -45,19 +45,19 @@ class Numbers(gymnasium.Env):
 
 
 def model_of(seed=0, length=4, name="PPO", normalize=None, **changes):
-    """Return a new model; the arguments are what matters to a test."""
+    """Return a new model; the arguments set what differs from the default."""
     algorithm = Algorithm(name=name, hyperparameters=SMALL | changes, normalize=normalize)
     return make_model(algorithm, DummyVecEnv([lambda: Numbers(length)]), seed)
 
 
 def saved(model, path):
-    """Save a model, and return the path of the zip."""
+    """Save a model, and return the path of its zip file."""
     save_tensors(path, model)
     return path
 
 
 def test_all_tensors_of_the_policy_are_the_files(tmp_path):
-    """Nothing else is restored: steps and optimizer are new."""
+    """Only the policy is loaded: the number of steps is 0 and the optimizer is new."""
     trained = model_of(seed=1)
     trained.learn(16)
     model = model_of(seed=2)
@@ -71,7 +71,7 @@ def test_all_tensors_of_the_policy_are_the_files(tmp_path):
 
 
 def test_a_model_of_plain_stable_baselines3_will_do(tmp_path):
-    """A person may have trained it without Palaestra."""
+    """A person may have trained the policy without Palaestra."""
     plain = PPO("MlpPolicy", Numbers(), **SMALL)
     plain.save(tmp_path / "plain.zip")
     model = model_of()
@@ -82,7 +82,7 @@ def test_a_model_of_plain_stable_baselines3_will_do(tmp_path):
 
 
 def test_statistics_come_along_where_both_normalize(tmp_path):
-    """Without the scale of its observations, a policy cannot use them."""
+    """A policy needs the mean and the deviation of the observations with which it was trained."""
     trained = model_of(normalize=Normalize())
     trained.learn(16)
     model = model_of(normalize=Normalize(rewards=False, clip_observations=5.0))
@@ -97,7 +97,7 @@ def test_statistics_come_along_where_both_normalize(tmp_path):
 
 @pytest.mark.parametrize(("before", "now"), [(None, Normalize()), (Normalize(), None)])
 def test_a_normalizer_on_one_side_only_is_logged(tmp_path, before, now):
-    """The difference may be intended, so it is not an error."""
+    """The difference may be intended, so it is a warning and not an error."""
     path = saved(model_of(normalize=before), tmp_path / "model.zip")
 
     with structlog.testing.capture_logs() as logs:
@@ -126,7 +126,7 @@ def test_a_normalizer_on_one_side_only_is_logged(tmp_path, before, now):
     ids=["another shape", "more layers", "fewer layers"],
 )
 def test_a_mismatch_names_the_tensor_with_both_shapes(tmp_path, changes, message):
-    """The model stays unchanged."""
+    """After the error, the model has its own tensors as before."""
     path = saved(model_of(), tmp_path / "model.zip")
     model = model_of(**changes)
     before = [tensor.clone() for tensor in model.policy.state_dict().values()]
@@ -138,7 +138,7 @@ def test_a_mismatch_names_the_tensor_with_both_shapes(tmp_path, changes, message
 
 
 class Bomb:
-    """An object that would write a file if it were unpickled."""
+    """An object that makes a folder when it is unpickled."""
 
     def __init__(self, path):
         self.path = path
@@ -149,7 +149,7 @@ class Bomb:
 
 @pytest.mark.parametrize("member", ["policy.pth", "data"])
 def test_nothing_is_unpickled(tmp_path, member):
-    """This holds in place of the tensors, and where Stable-Baselines3 keeps its settings."""
+    """The object is in place of the tensors, or among the settings of Stable-Baselines3."""
     model, path, content = model_of(), tmp_path / "model.zip", io.BytesIO()
     torch.save(Bomb(tmp_path / "exploded"), content)
     with zipfile.ZipFile(saved(model, path)) as archive:
@@ -172,7 +172,7 @@ def test_nothing_is_unpickled(tmp_path, member):
 
 @pytest.mark.parametrize("content", [None, b"", b"no zip"])
 def test_a_file_that_is_no_model_is_refused(tmp_path, content):
-    """The file is missing, empty, or of another kind."""
+    """The file is missing, empty, or not a zip file."""
     path = tmp_path / "model.zip"
     if content is not None:
         path.write_bytes(content)
@@ -184,7 +184,7 @@ def test_a_file_that_is_no_model_is_refused(tmp_path, content):
 
 
 def changed(model, path, change):
-    """Return the path of a zip of the model with a changed first weight."""
+    """Save the model with a changed first weight, and return the path of its zip file."""
     saved(model, path)
     state = model.policy.state_dict()
     name = next(name for name in state if name.endswith("weight"))
@@ -209,7 +209,7 @@ def changed(model, path, change):
     ids=["nan", "infinite", "complex", "sparse"],
 )
 def test_weights_that_are_no_plain_numbers_are_refused(tmp_path, change, fact):
-    """Before, NaN stayed NaN, the imaginary part was dropped, and a sparse tensor raised an error."""
+    """Before, NaN was loaded, an imaginary part was dropped, and a sparse tensor caused a traceback."""
     path = changed(model_of(seed=1), tmp_path / "model.zip", change)
 
     with pytest.raises(ConfigurationError, match=fact):
@@ -218,7 +218,7 @@ def test_weights_that_are_no_plain_numbers_are_refused(tmp_path, change, fact):
 
 @pytest.mark.parametrize("inner", [False, True], ids=["in the zip", "in PyTorch's own zip"])
 def test_a_file_that_unpacks_to_gigabytes_is_refused_before_it_does(tmp_path, inner):
-    """Before, two megabytes became four gigabytes of memory."""
+    """Before this check, a file of two megabytes took four gigabytes of memory."""
     bomb = io.BytesIO()
     with zipfile.ZipFile(bomb, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("archive/data/0", bytes(64 << 20))

@@ -1,4 +1,4 @@
-"""The faults of a run are written when they happen, with the seconds that they took."""
+"""The file of a run's faults: each fault is written at once, and its duration when it ends."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from palaestra_trainer.run.telemetry.progress import Progress
 
 @pytest.fixture
 def progress(tmp_path, clock):
-    """Return the progress of a run that writes its faults."""
+    """Return the progress of a run with a file of faults."""
     progress = Progress(100, [("collect-0", Role.COLLECT), ("collect-1", Role.COLLECT)], clock)
     progress.fault_log = FaultLog(tmp_path / "faults.jsonl", 2, clock)
     return progress
 
 
 def died(progress, simulator):
-    """Report a fault."""
+    """Report that a simulator died."""
     progress.fault(simulator, SimulatorDead(simulator, "died"), 7)
 
 
 def test_a_fault_is_written_at_once_and_its_end_when_the_simulator_is_up(progress, tmp_path, clock):
-    """A run that is killed before the restart has ended knows its fault."""
+    """A run may be killed before the restart has ended; its report still has the fault."""
     progress.step = 50
     died(progress, "collect-0")
     [line] = read_lines(tmp_path / "faults.jsonl")
@@ -51,14 +51,14 @@ def test_a_fault_is_written_at_once_and_its_end_when_the_simulator_is_up(progres
 
 
 def test_a_recycled_simulator_had_no_fault(progress, tmp_path):
-    """Its restart is planned."""
+    """The restart of a recycled simulator is planned."""
     progress.restarted("collect-1", recycled=True)
 
     assert [*read_lines(tmp_path / "faults.jsonl")] == []
 
 
 def test_the_file_is_bounded(progress, tmp_path, monkeypatch):
-    """A simulator that fails every second for a week must not fill the volume."""
+    """A simulator that fails each second for a week must not fill the volume."""
     monkeypatch.setattr(fault_log, "MOST_BYTES", 500)
 
     for _ in range(20):
@@ -69,7 +69,7 @@ def test_the_file_is_bounded(progress, tmp_path, monkeypatch):
 
 
 def test_a_file_that_cannot_be_written_ends_nothing(progress, tmp_path):
-    """A full disk is reported by the next checkpoint; here the simulator must be restarted."""
+    """The next checkpoint reports a full disk; here only the simulator must be restarted."""
     (tmp_path / "faults.jsonl").mkdir()
 
     died(progress, "collect-0")

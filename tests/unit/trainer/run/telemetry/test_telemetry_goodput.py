@@ -1,4 +1,4 @@
-"""The goodput ledger divides the wall clock by cause."""
+"""The goodput ledger divides the duration of a run by causes."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from palaestra_trainer.waiting.wait_time import count_wait, waited_s
 
 
 class Clock:
-    """A clock that a test sets, and a thread whose wait for simulators a test sets."""
+    """A clock, and the time for which the thread has waited for simulators; a test sets both."""
 
     def __init__(self):
         self.now = 1000
         self.waited = 50
 
     def pass_(self, seconds, waiting=0):
-        """Let seconds pass; during the last `waiting` of them the thread waits for simulators."""
+        """Let seconds pass, of which the thread waits `waiting` for simulators."""
         self.now += seconds
         self.waited += waiting
 
     def ledger(self):
-        """Return a new ledger."""
+        """Return a new ledger with this clock."""
         return GoodputLedger(lambda: self.now, lambda: self.waited)
 
 
@@ -43,12 +43,12 @@ def clock():
 
 @pytest.fixture
 def goodput(clock):
-    """Return a new ledger."""
+    """Return a new ledger with the clock."""
     return clock.ledger()
 
 
 def spent(goodput):
-    """Return the causes of a ledger with time, in seconds."""
+    """Return the seconds of a ledger by cause, without causes of 0 seconds."""
     return {cause: seconds for cause, seconds in goodput.seconds().items() if seconds}
 
 
@@ -60,7 +60,7 @@ def test_a_run_starts_until_something_else_is_said(goodput, clock):
 
 
 def test_of_two_causes_the_inner_one_counts(goodput, clock):
-    """An evaluation within training does not train."""
+    """During an evaluation inside the training, nothing is learned."""
     with goodput.spending(Cause.LEARNING):
         clock.pass_(1)
         with goodput.spending(Cause.EVALUATING):
@@ -72,7 +72,7 @@ def test_of_two_causes_the_inner_one_counts(goodput, clock):
 
 
 def test_an_error_ends_a_cause_as_anything_does(goodput, clock):
-    """A checkpoint follows an interrupted evaluation."""
+    """After an interrupted evaluation, the time of the checkpoint must have its own cause."""
     with suppress(KeyError), goodput.spending(Cause.EVALUATING):
         clock.pass_(5)
         raise KeyError
@@ -82,7 +82,7 @@ def test_an_error_ends_a_cause_as_anything_does(goodput, clock):
 
 
 def test_what_a_step_waited_for_simulators_is_stepping_and_its_rest_transport(goodput, clock):
-    """The first depends on the simulator, the second on Palaestra."""
+    """Stepping is the time of the simulator, and transport that of Palaestra."""
     clock.pass_(7, waiting=6)
     with goodput.spending(Cause.TRANSPORT):
         clock.pass_(5, waiting=3)
@@ -91,7 +91,7 @@ def test_what_a_step_waited_for_simulators_is_stepping_and_its_rest_transport(go
 
 
 def test_a_wait_is_never_longer_than_its_step(goodput, clock):
-    """Two clocks may differ in their last digits."""
+    """The two clocks may differ by rounding."""
     with goodput.spending(Cause.TRANSPORT):
         clock.pass_(5, waiting=6)
 
@@ -99,7 +99,7 @@ def test_a_wait_is_never_longer_than_its_step(goodput, clock):
 
 
 def test_what_a_step_waited_for_a_simulator_that_hangs_is_no_step(goodput, clock):
-    """The simulator simulated nothing in that time."""
+    """A simulator that hangs simulates nothing in this time."""
     with goodput.spending(Cause.TRANSPORT):
         clock.pass_(6, waiting=5)
         goodput.in_vain()
@@ -110,7 +110,7 @@ def test_what_a_step_waited_for_a_simulator_that_hangs_is_no_step(goodput, clock
 
 
 def test_a_fault_that_is_noticed_beside_the_run_costs_it_nothing(goodput, clock):
-    """A restart fails in its own thread."""
+    """The failed restart is in its own thread, while the run continues to step."""
     with goodput.spending(Cause.TRANSPORT):
         thread = threading.Thread(target=goodput.in_vain)
         thread.start()
@@ -121,7 +121,7 @@ def test_a_fault_that_is_noticed_beside_the_run_costs_it_nothing(goodput, clock)
 
 
 def test_another_thread_spends_nothing(goodput, clock):
-    """A simulator is restarted while the run continues."""
+    """A simulator is restarted in its own thread while the run learns."""
 
     def mend():
         with goodput.spending(Cause.RECOVERING):
@@ -136,7 +136,7 @@ def test_another_thread_spends_nothing(goodput, clock):
 
 
 def test_every_thread_may_ask(goodput, clock):
-    """A scrape may come at any time."""
+    """A scrape of the metrics may come at any time, in another thread."""
     answers = []
     with goodput.spending(Cause.CHECKPOINTING):
         clock.pass_(5)
@@ -155,7 +155,7 @@ moves = st.recursive(
 
 
 def play(goodput, clock, move):
-    """Let time pass, or spend inner moves on a cause, perhaps with an error at the end."""
+    """Let time pass, or play inner moves with a cause, which may end by an error."""
     if move[0] == "pass":
         clock.pass_(move[1], move[2])
         return
@@ -169,7 +169,7 @@ def play(goodput, clock, move):
 
 @given(st.lists(moves, max_size=6))
 def test_every_second_belongs_to_exactly_one_cause(course):
-    """However causes are nested and left, they add up to the wall clock, to the last digit."""
+    """However causes are nested, their seconds add up exactly to the duration."""
     clock = Clock()
     goodput, began = clock.ledger(), clock.now
     for move in course:
@@ -180,7 +180,10 @@ def test_every_second_belongs_to_exactly_one_cause(course):
 
 @given(st.lists(moves, max_size=6), st.lists(st.sampled_from(Cause), min_size=6, max_size=6))
 def test_no_cause_shrinks_for_a_reader_amid_a_cause(course, causes):
-    """Prometheus takes a decreasing counter for a restart; only the current step is missing."""
+    """Prometheus takes a decreasing counter for a restart.
+
+    Only the time of the current step may be missing.
+    """
     clock = Clock()
     goodput, began = clock.ledger(), clock.now
     before = goodput.seconds()
@@ -198,20 +201,20 @@ def test_no_cause_shrinks_for_a_reader_amid_a_cause(course, causes):
 
 
 def test_the_share_that_trained_is_that_of_steps_and_learning():
-    """This is the share that a run without faults, evaluations and checkpoints would also have."""
+    """Evaluations, checkpoints and faults do not train."""
     seconds = {"stepping": 30.0, "transport": 10.0, "learning": 20.0, "evaluating": 15.0, "starting": 5.0}
 
     assert trained_share(seconds) == 0.75
 
 
 def test_of_no_time_no_share_trained():
-    """The share is then unknown, which is neither 0 nor 1."""
+    """Without any time the share is unknown, which is neither 0 nor 1."""
     assert trained_share({}) is None
     assert trained_share({"learning": 0.0}) is None
 
 
 def test_each_thread_has_waited_for_itself():
-    """Evaluations wait in their own threads."""
+    """Evaluations wait for their simulators in threads of their own."""
     before, others = waited_s(), []
     count_wait(1.5)
     thread = threading.Thread(target=lambda: others.append(waited_s()))
@@ -223,7 +226,10 @@ def test_each_thread_has_waited_for_itself():
 
 @pytest.fixture
 def steps(clock, make_member):
-    """Step a held member three times, and return the time by cause. It is released after five seconds."""
+    """Return a function that steps a held simulator three times and returns the seconds by cause.
+
+    The simulator is released after five seconds.
+    """
 
     def run(**breaks):
         member = make_member(held=True, **breaks)
@@ -246,15 +252,15 @@ def steps(clock, make_member):
 
 
 def test_a_vector_step_is_transport_where_no_wire_is_waited_for(steps):
-    """An example is an environment that computes everything itself."""
+    """Such an environment computes everything in the trainer's own process."""
     assert steps() == {"transport": 3}
 
 
 def test_waiting_for_the_only_simulator_to_come_back_is_recovering(steps):
-    """The first step broke, the second had only invalid rows, and the third was taken."""
+    """The first step breaks, the second has only invalid rows, and the third succeeds."""
     assert steps(steps=[1]) == {"transport": 2, "recovering": 5}
 
 
 def test_waiting_for_a_simulator_that_is_recycled_is_recycling_and_not_recovering(steps):
-    """The wait is within a step, between two episodes; a run without faults must not seem to have any."""
+    """The wait is within a step, between two episodes. A run without faults must not seem to have had one."""
     assert steps(recycle_after=1) == {"transport": 3, "recycling": 5}

@@ -1,4 +1,4 @@
-"""The metrics of a trainer and the sources of their values."""
+"""The metrics of a trainer, and where their values come from."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ def progress(clock):
 
 
 def scrape(progress, known=None):
-    """Return the families that Prometheus parses, by name."""
+    """Return the metric families that Prometheus would parse, by name."""
     text = generate_latest(metrics.registry(progress, known or {})).decode()
     return {family.name: family for family in text_string_to_metric_families(text)}
 
 
 def values(progress, name, *labels):
-    """Return the values of a metric by some labels, in the given order; an unknown metric has no values."""
+    """Return the values of a metric, by the values of these labels; an unknown metric has none."""
     return {
         tuple(sample.labels[label] for label in labels): sample.value
         for family in scrape(progress).values()
@@ -47,13 +47,13 @@ def values(progress, name, *labels):
 
 
 def episode(number, *, success=None):
-    """Return the info of the last step of an episode with a return of `number`."""
+    """Return the info at the end of an episode with this return."""
     end = {} if success is None else {"is_success": success}
     return {"episode": {"r": float(number), "l": 10 * number}} | end
 
 
 def test_every_family_is_there_before_anything_happened(progress):
-    """A dashboard is made before the run, and an unknown value is not zero."""
+    """A person may make a dashboard before the run, and an unknown value must not be exported as zero."""
     found = scrape(progress)
 
     assert {name for name in found if name.startswith("palaestra_")} == {
@@ -64,7 +64,7 @@ def test_every_family_is_there_before_anything_happened(progress):
 
 
 def test_episodes_fall_into_the_buckets_of_their_returns_and_lengths(progress):
-    """The quantiles of the last hundred are exact."""
+    """The quantiles are those of the last hundred episodes."""
     progress.collected(7, [episode(number) for number in range(1, 6)])
 
     returns = values(progress, "palaestra_trainer_episode_return_bucket", "le")
@@ -78,7 +78,7 @@ def test_episodes_fall_into_the_buckets_of_their_returns_and_lengths(progress):
 
 
 def test_success_in_training_is_that_of_the_last_hundred_episodes(progress):
-    """An environment that does not report success has no such metric."""
+    """Without reports of success from the environment, the metric has no value."""
     progress.collected(1, [episode(1)])
     silent = values(progress, "palaestra_trainer_episode_success_ratio")
     progress.collected(2, [episode(1, success=False)] * 100)
@@ -89,7 +89,7 @@ def test_success_in_training_is_that_of_the_last_hundred_episodes(progress):
 
 
 def test_the_metrics_of_an_evaluation_stay_until_the_next(progress):
-    """The number of evaluations is also exported."""
+    """The number of evaluations is a metric too, so a new evaluation with equal values is visible."""
     for success in (True, False):
         played = Episode(seed=1, total_reward=2.0, length=3, success=success)
         progress.evaluated(EvaluationResult(episodes=(played,), faults=0, seconds=0.1))
@@ -106,7 +106,7 @@ def test_the_metrics_of_an_evaluation_stay_until_the_next(progress):
 
 
 def test_figures_for_tensorboard_are_metrics_too(progress):
-    """Losses, exploration and learning rate are exported, but undeclared names are not."""
+    """Losses, exploration and learning rate have metrics; a name of the user's own has none."""
     logged = Logged(progress.figures)
     logged.write({"train/loss": 0.5, "train/n_updates": 4, "rollout/exploration_rate": 0.3}, {}, 7)
     logged.write({"train/learning_rate": 0.001, "train/my_own_loss": 1.0, "train/loss": 0.25}, {}, 8)
@@ -117,7 +117,7 @@ def test_figures_for_tensorboard_are_metrics_too(progress):
 
 
 def test_faults_and_restarts_are_counted_by_simulator_and_cause(progress):
-    """A restart has the cause of the fault before it; recycling is not a fault."""
+    """A restart has the type of the last fault as its cause; a recycling is not a fault."""
     progress.fault("collect-0", SimulatorDead("collect-0", "gone"), steps_lost=0)
     progress.fault("collect-0", SimulatorHung("collect-0", "silent"), steps_lost=0)
     progress.restarted("collect-0", recycled=False)
@@ -136,7 +136,7 @@ def test_faults_and_restarts_are_counted_by_simulator_and_cause(progress):
 
 
 def test_simulators_are_counted_by_how_they_stand(progress):
-    """A simulator that was given up differs from one that is restarting."""
+    """The state of a simulator that was given up differs from that of one that restarts."""
     progress.started("evaluate-0")
     progress.given_up("collect-0")
 
@@ -147,7 +147,10 @@ def test_simulators_are_counted_by_how_they_stand(progress):
 
 
 def test_each_simulator_has_metrics_of_its_steps_and_episodes(progress, make_member, clock):
-    """Steps with their time, episodes, and the remaining restarts; simulated time if it is known."""
+    """Metrics count steps with their duration, episodes and remaining restarts.
+
+    Simulated time is exported if it is known.
+    """
     restarter = Restarter(make_member(), RestartLimit(restarts=4), progress, clock)
     progress.figures.meters = {"collect-0": restarter.meter}
     restarter.reset(1)
@@ -165,7 +168,7 @@ def test_each_simulator_has_metrics_of_its_steps_and_episodes(progress, make_mem
 
 
 def test_a_budget_is_whole_again_when_its_time_has_passed(make_member, clock):
-    """By the same window by which the simulator is given up."""
+    """The time window is the one by which the simulator would be given up."""
     restarter = Restarter(make_member(), RestartLimit(restarts=2, within_s=60.0), clock=clock)
     restarter.begin_restart(SimulatorDead("collect-0", "gone"))
     await_one([restarter])
@@ -176,7 +179,7 @@ def test_a_budget_is_whole_again_when_its_time_has_passed(make_member, clock):
 
 
 def test_a_member_that_knows_its_simulated_time_is_asked(progress, make_member):
-    """The rate of the simulated time is the real-time factor."""
+    """Prometheus computes the real-time factor from the simulated time."""
     member = make_member()
     member.simulated_s = 1.92
     progress.figures.meters = {"collect-0": Restarter(member).meter}
@@ -188,7 +191,7 @@ def test_a_member_that_knows_its_simulated_time_is_asked(progress, make_member):
 
 @pytest.fixture
 def train(job, directory, make_member):
-    """Train a short run of DQN to its end, and return its progress."""
+    """Return a function that trains with DQN to the end, and returns the progress."""
 
     def run():
         configuration = job("DQN")
@@ -205,7 +208,7 @@ def train(job, directory, make_member):
 
 
 def test_a_run_tells_of_its_checkpoints_and_losses(train):
-    """After the run, the metrics have time, duration and size of its checkpoints, and its losses."""
+    """The metrics are the time, the duration and the size of checkpoints, and the losses."""
     progress = train()
 
     size = values(progress, "palaestra_trainer_checkpoint_size_bytes")[()]
@@ -220,7 +223,10 @@ def test_a_run_tells_of_its_checkpoints_and_losses(train):
 
 
 def test_a_resumed_run_exports_nothing_before_its_step_is_known(job, directory, train):
-    """Prometheus takes a jump from 0 for growth. Here the port is in use, so nothing is served."""
+    """Prometheus would take a jump from 0 for growth.
+
+    Here the port is in use, so nothing is served, and the test reads the progress itself.
+    """
     saved = train().step
     with socket.create_server(("127.0.0.1", 0)) as taken:
         configuration = job("DQN", statusAddress=f"127.0.0.1:{taken.getsockname()[1]}")
@@ -234,7 +240,7 @@ def test_a_resumed_run_exports_nothing_before_its_step_is_known(job, directory, 
 
 
 def test_a_checkpoint_that_a_full_disk_refuses_is_counted(train, monkeypatch):
-    """The run continues without the checkpoint, but somebody should notice."""
+    """The run continues without the checkpoint, but a person should get an alert."""
 
     def no_space(*_args, **_options):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
@@ -248,7 +254,7 @@ def test_a_checkpoint_that_a_full_disk_refuses_is_counted(train, monkeypatch):
 
 
 def test_the_limits_of_a_run_are_metrics_too(progress, job):
-    """Alerts compare with them: no checkpoint for three intervals, or idle for most of the deadline."""
+    """Alerts compare with these limits, for example three checkpoint intervals without a checkpoint."""
     configuration = job(checkpoint={"everySteps": 50}, stallDeadlineSeconds=90)
 
     found = scrape(progress, metrics.constants(configuration))
@@ -258,7 +264,7 @@ def test_the_limits_of_a_run_are_metrics_too(progress, job):
 
 
 def test_a_member_with_a_spare_has_simulated_what_both_have():
-    """A restart swaps their roles, but a counter must not decrease."""
+    """A restart swaps simulator and standby, but the counter must not decrease."""
     first, second = (SimpleNamespace(name="collect-0", simulated_s=seconds) for seconds in (1.5, 0.25))
 
     assert Standby(first, second).simulated_s == 1.75

@@ -1,4 +1,4 @@
-"""The progress of a run and its status."""
+"""The progress of a run, and the status that it reports."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ def progress(clock):
 
 
 def get(server, path):
-    """Return the server's response."""
+    """Return the response of the server to a request."""
     with urllib.request.urlopen(f"http://{server.address}{path}", timeout=5) as answer:
         return answer.read().decode()
 
 
 def evaluation(*, success):
-    """Return an evaluation of one episode."""
+    """Return an evaluation with one episode."""
     episode = Episode(seed=1, total_reward=1.0, length=3, success=success)
     return EvaluationResult(episodes=(episode,), faults=1, seconds=0.1)
 
 
 def test_at_the_start_nothing_is_known(progress):
-    """An absent value differs from zero."""
+    """An absent value differs from a value of zero."""
     status = progress.status()
 
     assert (status.step, status.target, status.phase) == (0, 100, "starting")
@@ -48,7 +48,7 @@ def test_at_the_start_nothing_is_known(progress):
 
 
 def test_steps_and_episodes_are_counted(progress):
-    """An invalid row belongs to no episode."""
+    """An invalid row belongs to no episode, so it is not counted."""
     progress.collected(
         7, [{"episode": {"r": 2.0, "l": 3}, "palaestra": {"extra_steps": 1}}, {"palaestra": {"valid": False}}]
     )
@@ -60,7 +60,7 @@ def test_steps_and_episodes_are_counted(progress):
 
 
 def test_speed_is_that_of_the_last_half_minute(progress, clock):
-    """A slow hour yesterday does not affect the current speed."""
+    """A slow hour yesterday must not change the speed that a person sees now."""
     for second in range(100):
         clock.now = float(second)
         progress.collected(second * (1 if second < 50 else 10), [])
@@ -69,7 +69,7 @@ def test_speed_is_that_of_the_last_half_minute(progress, clock):
 
 
 def test_what_simulators_leave_out_is_reported_once_for_their_group():
-    """All simulators of a group have the same world, but their reports may have different line numbers."""
+    """The simulators of a group have the same world, even if their reports have different line numbers."""
     names = ["big-hall-0", "big-hall-1", "evaluate-0"]
     progress = Progress(100, [(name, "Collect") for name in names])
     for number, name in enumerate(names[:2]):
@@ -87,7 +87,7 @@ def test_what_simulators_leave_out_is_reported_once_for_their_group():
 
 
 def test_a_fault_is_reported_for_its_simulator(progress):
-    """The status has the simulator, its state and the fault."""
+    """A person sees which simulator broke, its state, and its last fault."""
     progress.started("collect-0")
     progress.fault("collect-0", SimulatorDead("collect-0", "gone"), steps_lost=0)
     broken = progress.status().simulators[0]
@@ -100,7 +100,7 @@ def test_a_fault_is_reported_for_its_simulator(progress):
 
 
 def test_recycling_is_no_restart(progress):
-    """No fault occurred."""
+    """Recycling is planned, so it must not look like a fault."""
     progress.restarted("collect-0", recycled=True)
 
     assert progress.status().simulators[0].restarts == 0
@@ -108,7 +108,7 @@ def test_recycling_is_no_restart(progress):
 
 
 def test_a_simulator_is_ready_when_it_is_up_and_not_when_all_are(progress):
-    """The status must show which simulator is late."""
+    """A person must see which simulator is late."""
     progress.started("collect-0")
 
     states = {each.name: each.state for each in progress.status().simulators}
@@ -116,7 +116,7 @@ def test_a_simulator_is_ready_when_it_is_up_and_not_when_all_are(progress):
 
 
 def test_a_run_that_goes_on_never_says_step_0(progress):
-    """This holds from the time when its checkpoint is found, before any simulator has started."""
+    """The step is known as soon as the checkpoint is found, before any simulator has started."""
     progress.resumed(40, Counters(episodes=3))
 
     status = progress.status()
@@ -124,7 +124,10 @@ def test_a_run_that_goes_on_never_says_step_0(progress):
 
 
 def test_restarts_of_this_attempt_are_those_of_all_simulators(progress):
-    """Recycling does not count; the counters also include earlier attempts."""
+    """The counters include earlier attempts, while this number is for one attempt.
+
+    Recycling does not count.
+    """
     progress.counters.restarts = 7
     progress.restarted("collect-0", recycled=False)
     progress.restarted("evaluate-0", recycled=False)
@@ -134,7 +137,7 @@ def test_restarts_of_this_attempt_are_those_of_all_simulators(progress):
 
 
 def test_idleness_ends_with_a_step_of_any_simulator(progress, clock):
-    """An evaluation is not a stall."""
+    """An evaluation steps only its own simulator, and must not look like a stall."""
     clock.now = 50.0
     before = progress.idle_s()
     progress.stepped(1)
@@ -143,7 +146,7 @@ def test_idleness_ends_with_a_step_of_any_simulator(progress, clock):
 
 
 def test_the_age_of_progress_is_by_a_clock_that_nobody_sets(progress, clock, monkeypatch):
-    """A node's time of day may jump by an hour, but the time since the last step must not."""
+    """The time of day of a node may jump by an hour, which must not look like a stall."""
     clock.now = 50.0
     progress.stepped(1)
     monkeypatch.setattr("time.time", lambda: 0.0)
@@ -153,7 +156,7 @@ def test_the_age_of_progress_is_by_a_clock_that_nobody_sets(progress, clock, mon
 
 
 def test_a_step_ends_the_age_of_progress(progress, clock):
-    """Also one of an evaluation: the restarter of any simulator reports it."""
+    """A step of an evaluation counts too, because each simulator's restarter reports its steps."""
     progress.stepped(1)
     clock.now = 60.0
     before = progress.status().last_progress_age_s
@@ -163,7 +166,7 @@ def test_a_step_ends_the_age_of_progress(progress, clock):
 
 
 def test_counters_go_into_a_checkpoint_and_come_back(progress, clock):
-    """The faults of a run are those of all its attempts."""
+    """A run's faults are those of all its attempts."""
     progress.fault("collect-0", SimulatorHung("collect-0", "slow"), steps_lost=0)
     clock.now = 1.5
 
@@ -175,12 +178,12 @@ def test_counters_go_into_a_checkpoint_and_come_back(progress, clock):
 
 
 def test_a_checkpoint_of_an_older_release_has_fewer_counters():
-    """A value that it lacks is unknown, and counts from now on."""
+    """A counter that the checkpoint lacks starts at zero."""
     assert Counters.from_json({"episodes": 7, "seconds": 3.0}) == Counters(episodes=7)
 
 
 def test_time_goes_on_where_the_attempt_before_ended(progress, clock):
-    """It continues by cause, and each second counts once, however often it is read."""
+    """Each cause continues with the seconds of the last attempt, and reading the time does not change it."""
     with progress.spending(Cause.LEARNING):
         clock.now = 5.0
     before = progress.counted()
@@ -195,7 +198,7 @@ def test_time_goes_on_where_the_attempt_before_ended(progress, clock):
 
 
 def test_time_of_a_checkpoint_that_lacks_a_cause_stays_where_it_was(progress, clock):
-    """A release may add a cause; the cause under which the previous release counted it is unknown."""
+    """An older release counted the time of a new cause under another one, which is unknown."""
     saved = Counters.from_json({"goodput": {"stepping": 3.0, "recovering": 2.0}})
     progress.resumed(40, saved)
     with progress.spending(Cause.RECYCLING):
@@ -207,7 +210,7 @@ def test_time_of_a_checkpoint_that_lacks_a_cause_stays_where_it_was(progress, cl
 
 
 def test_a_phase_is_what_time_is_spent_on(progress):
-    """The phase is one word that shows a person what the run does."""
+    """A person sees in one word what the run does."""
     phases = [progress.phase]
     for cause in Cause:
         with progress.spending(cause):
@@ -220,7 +223,7 @@ def test_a_phase_is_what_time_is_spent_on(progress):
 
 
 def test_slowness_is_counted_and_breaks_nothing(progress):
-    """A simulator that needs more time is not restarted."""
+    """A slow simulator is not restarted."""
     progress.started("collect-0")
     progress.slow("collect-0", 0.4)
     progress.fault("evaluate-0", SimulatorDead("evaluate-0", "gone"), steps_lost=0)
@@ -232,7 +235,7 @@ def test_slowness_is_counted_and_breaks_nothing(progress):
 
 
 def test_a_simulator_that_breaks_again_and_again_is_flapping_until_it_is_steady(progress, clock):
-    """One crash in a night is an accident, but three in ten minutes are not."""
+    """One crash in a night is an accident, but three in ten minutes are a problem."""
     progress.restarted("collect-0", recycled=False)
     once = progress.status().simulators[0].flapping
     progress.flapping("collect-0")
@@ -244,7 +247,7 @@ def test_a_simulator_that_breaks_again_and_again_is_flapping_until_it_is_steady(
 
 
 def test_a_simulator_that_was_given_up_is_reported_and_no_longer_missed(progress):
-    """The run continues without it."""
+    """The run continues without this simulator, so nobody waits for it."""
     progress.started("evaluate-0")
     progress.given_up("collect-0")
 
@@ -255,7 +258,7 @@ def test_a_simulator_that_was_given_up_is_reported_and_no_longer_missed(progress
 
 
 def test_the_status_has_the_current_state_of_a_spare(progress):
-    """Without a spare the field is absent."""
+    """A simulator without a standby has no such field."""
     spare = ["starting"]
     progress.has_standby("collect-0", lambda: spare[0])
     first = progress.status().simulators
@@ -266,7 +269,7 @@ def test_the_status_has_the_current_state_of_a_spare(progress):
 
 
 def test_the_last_ten_faults_are_remembered(progress):
-    """Each has what is needed to find the cause: time, simulator, fault and step."""
+    """A person needs time, simulator, fault and step of each to find the cause."""
     for number in range(12):
         progress.collected(number, [])
         progress.fault("collect-0", SimulatorDead("collect-0", f"gone {number}"), steps_lost=0)
@@ -280,14 +283,14 @@ def test_the_last_ten_faults_are_remembered(progress):
 
 
 def test_the_steps_of_an_episode_that_a_fault_cut_are_lost(progress):
-    """Training steps were learned from for nothing; evaluation steps took as long."""
+    """In training, nothing was learned from these steps; in an evaluation, they took time in vain."""
     progress.fault("collect-0", SimulatorDead("collect-0", "gone"), steps_lost=5)
 
     assert progress.status().steps_lost == 5
 
 
 def test_the_steps_after_the_checkpoint_that_a_run_goes_on_from_are_lost(progress):
-    """The checkpoint stores this for the next attempt; a run that continues has lost no steps."""
+    """The checkpoint keeps this number for the next attempt. A run that is not interrupted loses no steps."""
     progress.collected(47, [])
 
     assert progress.counted(40).steps_lost == 7
@@ -296,7 +299,7 @@ def test_the_steps_after_the_checkpoint_that_a_run_goes_on_from_are_lost(progres
 
 
 def test_time_and_faults_are_drawn_over_the_steps(progress, clock):
-    """TensorBoard shows the time by activity, and the faults by kind."""
+    """TensorBoard shows the time by cause, and the faults by type."""
     clock.now = 2.0
     progress.fault("collect-0", SimulatorDead("collect-0", "gone"), steps_lost=0)
     progress.slow("collect-0", 0.4)
@@ -309,14 +312,14 @@ def test_time_and_faults_are_drawn_over_the_steps(progress, clock):
 
 
 def test_what_the_docstring_promises_is_there(progress):
-    """Everything else that is public is described too."""
+    """The docstring describes all public attributes, and no others."""
     promised = set(re.findall(r"^ {4}(\w+): ", inspect.getdoc(Progress), re.MULTILINE))
 
     assert promised == {name for name in vars(progress) if not name.startswith("_")}
 
 
 def test_the_success_rate_is_that_of_the_last_evaluation(progress):
-    """A policy may get worse, and the user must see that."""
+    """A policy may get worse, and a person must see that."""
     progress.evaluated(evaluation(success=True))
     progress.evaluated(evaluation(success=False))
 
@@ -324,7 +327,7 @@ def test_the_success_rate_is_that_of_the_last_evaluation(progress):
 
 
 def test_status_is_the_protocol_s(progress):
-    """The operator parses it with the same code."""
+    """The operator parses the status with the same code."""
     progress.saved(50)
     with status_server("127.0.0.1:0", progress) as server:
         answer = json.loads(get(server, "/status"))
@@ -334,7 +337,7 @@ def test_status_is_the_protocol_s(progress):
 
 
 def test_metrics_are_the_same_numbers(progress):
-    """Unknown values are absent."""
+    """Values that are unknown are absent from the metrics."""
     progress.collected(7, [{"episode": {"r": 2.0, "l": 3}}])
     progress.fault("collect-0", SimulatorDead("collect-0", "gone"), steps_lost=0)
     with status_server("127.0.0.1:0", progress) as server:
@@ -350,7 +353,7 @@ def test_metrics_are_the_same_numbers(progress):
 
 
 def test_probes_are_answered(progress):
-    """Kubernetes sends them every few seconds."""
+    """Kubernetes sends a probe every few seconds."""
     with status_server("127.0.0.1:0", progress) as server:
         assert get(server, "/healthz") == "ok\n"
         with pytest.raises(urllib.error.HTTPError, match="404"):
@@ -368,6 +371,6 @@ def test_a_port_in_use_is_reported_as_such(progress):
 
 @pytest.mark.parametrize("address", ["203.0.113.1:9090", "127.0.0.1:99999", "no.such.host.invalid:1"])
 def test_an_address_that_is_not_ours_is_reported_as_such(progress, address):
-    """The message has the operating system's error."""
+    """The message has the error of the operating system."""
     with pytest.raises(ConfigurationError, match="cannot be listened on"):
         status_server(address, progress)

@@ -1,4 +1,4 @@
-"""The log lines about a run's progress."""
+"""The log lines with the progress of a run."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def test_a_line_has_the_figures_as_fields():
 
 
 def test_it_is_due_at_once_and_then_at_intervals():
-    """Every step checks whether a line is due, and most of them must get False."""
+    """The training loop checks at each step whether a line is due."""
     progress = ProgressLog(every_s=60.0)
     first = progress.due
     progress.write(STATUS)
