@@ -37,7 +37,7 @@ from palaestra_protocol.control import SidecarState
 
 
 class LifecycleEvent(StrEnum):
-    """The events: a request of the trainer, an exit of the process, a deadline, a shutdown of the container."""
+    """An event: a request of the trainer, an exit of the process, a deadline, a shutdown of the container."""
 
     START = "start"
     READY = "ready"

@@ -21,7 +21,7 @@ _PROJECT = "project"
 
 
 def located(world: str) -> Path:
-    """Return the path of a world: the file `world`, or if it does not exist the shipped world of that name."""
+    """Return the path of a world: the file `world`, or the shipped world of that name if it is missing."""
     path = Path(world)
     shipped = builtin_path(world) if path.name == world and not path.exists() else None
     return shipped or path
