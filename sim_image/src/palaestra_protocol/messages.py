@@ -205,7 +205,7 @@ class ChoiceText(ValueKind):
 
 @dataclass(frozen=True, slots=True)
 class Part(ValueKind):
-    """A message within this one."""
+    """A nested message."""
 
     message: type[JsonMessage]
 
@@ -220,7 +220,7 @@ class Part(ValueKind):
 
 @dataclass(frozen=True, slots=True)
 class PartList(ValueKind):
-    """A list of messages: the first `most` are written."""
+    """A list of messages; the writer writes only the first `most`."""
 
     message: type[JsonMessage]
     most: int
@@ -235,7 +235,7 @@ class PartList(ValueKind):
 
 
 class NewestPartList(PartList):
-    """A list of messages, the newest last: the last `most` are written."""
+    """A list of messages, the newest last; the writer writes only the last `most`."""
 
     __slots__ = ()
 
@@ -264,7 +264,7 @@ class Lines(ValueKind):
 
 
 class NewestLines(Lines):
-    """A list of texts, the newest last: the last `most_entries` are written."""
+    """A list of texts, the newest last; the writer writes only the last `most_entries`."""
 
     __slots__ = ()
 
@@ -284,7 +284,7 @@ class Table(ValueKind):
     kind: ValueKind
 
     def read(self, fields: Fields, name: str) -> dict[str, Any]:
-        """Return the values of the names that the message has."""
+        """Return the values by name; a name that the message lacks is left out."""
         table = fields.part(name, Fields)
         return {row.value: self.kind.read(table, row.value) for row in self.rows if table.has(row.value)}
 

@@ -138,8 +138,8 @@ def _hidden(folder: str, others: list[str]) -> list[tuple[str, str, str]]:
         mine, other = _spec(name, [folder]), _spec(name, others)
         if not (mine and mine.origin):  # a folder without `__init__.py` does not shadow a module
             continue
-        # The standard library recognizes the system by imports that fail elsewhere, such as msvcrt. So a
-        # user's module with such a name also shadows.
+        # Some modules of the standard library, such as msvcrt, exist only on other systems. The library tries
+        # to import them to recognize the system. So a user's module with such a name shadows too.
         if name in sys.stdlib_module_names if other is None else not _same(mine.origin, other.origin):
             found.append((name, mine.origin, folder))
     return found

@@ -1,4 +1,4 @@
-"""Select the signals that a program handles, and set an event when one arrives.
+"""Select the signals that a program handles, and set an event when such a signal arrives.
 
 All programs of Palaestra use these rules.
 """

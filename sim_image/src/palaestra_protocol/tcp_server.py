@@ -84,7 +84,7 @@ class TcpServer(socketserver.ThreadingTCPServer):
             return
         try:
             super().process_request(request, client_address)
-        except RuntimeError:  # the system refuses another thread
+        except RuntimeError:  # the system cannot start another thread
             self.slots.leave(request)
             raise
 

@@ -186,7 +186,7 @@ class _Process:
             self._nodes[name].unregister()
 
     def _start(self) -> None:
-        # Comes first, because a sidecar reads this file as soon as the simulator is ready.
+        # The report comes first, because a sidecar reads the file as soon as the simulator is ready.
         self._report_left_out()
         self._simulator.start()
         silent = silent_devices(self._simulator.simulation.robots)

@@ -52,7 +52,7 @@ MOST_FAULTS = 10  # in a termination message; older faults are dropped
 MOST_LINES = 10  # of the trainer's log, in a termination message; older lines are dropped
 MOST_LINE = 200  # characters of such a log line, and of `FaultRecord.fact`
 MOST_REASON = 2000
-MOST_TERMINATION_BYTES = 4096  # Source: Kubernetes cuts a container's termination message there
+MOST_TERMINATION_BYTES = 4096  # Kubernetes cuts a container's termination message at this length
 
 _LONGEST_ESCAPE = 12  # bytes of one character in JSON: two \uXXXX
 
@@ -117,7 +117,7 @@ class TrainerStatus(JsonMessage):
         mean_return: the mean return of recent training episodes; None before the first episode has ended.
         success_rate: the success rate of the last evaluation or confirmation, 0 to 1; None before the first
             evaluation, or if the environment does not report success.
-        success_interval: the confidence interval of `success_rate`; None if that is None.
+        success_interval: the confidence interval of `success_rate`; None if `success_rate` is None.
         steps_per_second: the recent speed; None if unknown.
         simulators: the status of each simulator.
         last_checkpoint: the newest checkpoint; None if there is no checkpoint yet.
@@ -183,7 +183,7 @@ class Termination(JsonMessage):
         reason: the reason for which the trainer ended, in a sentence.
         success_rate: the success rate of the last evaluation or confirmation, 0 to 1; None without an
             evaluation, or if the environment does not report success.
-        success_interval: the confidence interval of `success_rate`; None if that is None.
+        success_interval: the confidence interval of `success_rate`; None if `success_rate` is None.
         last_checkpoint: the newest checkpoint; None if there is no checkpoint.
         attempt: number of this attempt in the run directory's record, from 1; None if not recorded.
         restarts: number of restarts of simulators after faults in this attempt; None if not reported.

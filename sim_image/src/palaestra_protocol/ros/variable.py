@@ -145,7 +145,7 @@ class _Octets:
 
     def write(self, value: Any, pieces: list[Piece]) -> None:
         if not isinstance(value, bytes | bytearray | memoryview | list | tuple):
-            raise TypeError(f"{type(value).__name__} where bytes are needed")
+            raise TypeError(f"{type(value).__name__} is not a type of bytes")
         octets = bytes(value) if isinstance(value, list | tuple) else memoryview(value).cast("B")
         pieces += LENGTH.pack(len(octets)), octets
 

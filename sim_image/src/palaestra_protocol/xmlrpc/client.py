@@ -94,4 +94,4 @@ def _body(stream: _Stream) -> bytes:
             raise UnreadableDocument(f"the response has the HTTP status {response.status}, not 200")
         return response.read()
     except http.client.HTTPException as error:
-        raise UnreadableDocument(f"the response is not one of HTTP: {error!r}") from error
+        raise UnreadableDocument(f"the response is not HTTP: {error!r}") from error

@@ -90,7 +90,7 @@ def _read(data: bytes) -> xmlrpc.client.Unmarshaller:
     parser.EndElementHandler = end
     parser.CharacterDataHandler = reader.data
     parser.StartDoctypeDeclHandler = _refuse_document_type
-    reader.xml("", None)  # without an encoding, because expat decodes
+    reader.xml("", None)  # no encoding, because expat decodes the text
     try:
         parser.Parse(data, True)
     except UnreadableDocument:

@@ -89,7 +89,7 @@ def damaged_answer(response: Codec, data: bytes, damages: Sequence[Damage]) -> b
 
 
 def _with_floats(part: Any, value: float) -> Any:
-    """Return a decoded message, or a part of one, with `value` in place of each float."""
+    """Return a decoded message, or a part of a message, with `value` in place of each float."""
     if isinstance(part, float):
         return value
     if isinstance(part, list | tuple):

@@ -51,7 +51,7 @@ UNHARMED = Ruling()
 
 
 class FaultState:
-    """Counts the events of this life, and decides from the counts and the schedule."""
+    """Counts the events of this life; decides from the counts and the schedule which faults occur."""
 
     def __init__(self, schedule: FaultSchedule) -> None:
         self._schedule = schedule

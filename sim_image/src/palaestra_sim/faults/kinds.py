@@ -14,7 +14,9 @@ RESET_PATHS = frozenset(
 
 
 class FaultEvent(StrEnum):
-    """The events that trigger faults; each life of a stub counts them from 1.
+    """The events that trigger faults.
+
+    A life is one run of the stub's process. In each life, the events of each kind are counted from 1.
 
     - step: a `time_step` request of one robot, the first that sent such a request. So a world with several
       robots also has one event for each step.

@@ -163,7 +163,7 @@ class _Listener:
         """Do nothing: this node has no clients."""
 
     def later(self, delay_s: float, callback: Callable[[], None]) -> None:
-        """Never call `callback`: only steps need delays, and this node runs none."""
+        """Do nothing: only steps use delays, and no step runs here."""
 
     def close(self) -> None:
         """Do nothing: this node has no sockets."""

@@ -27,7 +27,7 @@ class Endings(Protocol):
     """The methods of the program that end it, or that affect all of its nodes."""
 
     def end(self, status: int) -> None:
-        """Close everything and exit with that code."""
+        """Close all connections and exit with the code `status`."""
         ...
 
     def lose_master(self) -> None:

@@ -19,11 +19,11 @@ _DRAWS = float(256**_DRAW_BYTES)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Life:
-    """The inputs of the random numbers that are constant in one life.
+    """The inputs of the random numbers; they are constant in one life.
 
     Attributes:
         seed: the seed that a user chose.
-        simulator: the name of the simulator; simulators with equal seeds have different names.
+        simulator: the name of the simulator; with it, two simulators with the same seed have other numbers.
         number: the number of the life; the program that starts the simulator counts lives from 1.
     """
 

@@ -4,8 +4,8 @@ Two details make the package work next to an installed webots_ros and on a plain
 
 - `src/webots_ros` has no `__init__.py`. Python uses such a folder only if no entry of `sys.path` has a
   regular package of the same name. So if another webots_ros is installed, Python imports that one.
-- The manifest is a `manifest.xml` and names no dependencies. roslib adds the folder `src` to the path of
-  ROS's tools only for a package with a `manifest.xml`, and only if each dependency has a manifest too. Debian
+- The manifest is a `manifest.xml`, because roslib adds `src` to the path of ROS's tools only for such a
+  package. The manifest names no dependencies, because roslib requires a manifest of each dependency. Debian
   installs the manifests of std_msgs, geometry_msgs and sensor_msgs only with their C++ packages.
 
 Only this module imports genpy and genmsg. They are available wherever the generated modules are useful,

@@ -66,7 +66,7 @@ class MujocoBody:
         return sum(1 << index for index, shape in enumerate(parts) if shape in outline)
 
     def place(self, x: float, y: float, heading_rad: float) -> None:
-        """Set the position and heading of the robot; its motion continues."""
+        """Set the position and heading of the robot; the robot keeps its velocity."""
         self._stand(x, y, heading_rad)
         if self._joints is not None:
             self._joints[:] = x, y, heading_rad

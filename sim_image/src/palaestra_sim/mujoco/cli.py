@@ -12,8 +12,8 @@ from palaestra_sim.scene.mode import Mode
 from palaestra_sim.scene.physics import Physics
 from palaestra_sim.scene.validation import LeaveOut
 
-# These functions import MuJoCo, not the module. So `--help` works without MuJoCo, and the program can report
-# a missing MuJoCo as an error with a remedy.
+# The functions import MuJoCo, because an import at the top of this module would fail without MuJoCo. So
+# `--help` always works, and the program can report a missing MuJoCo as an error with a remedy.
 
 
 def _physics() -> Physics:

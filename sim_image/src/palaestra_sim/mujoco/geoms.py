@@ -153,9 +153,10 @@ def put(position: Any, quaternion: Any, pose: Pose) -> None:
 
 
 def _inertia(matter: MassProperties) -> tuple[float, ...]:
-    """Return the inertia of a mass that the user did not give an inertia.
+    """Return a default inertia for a mass, if the user did not set one.
 
-    The mass fills the bounding boxes of its shapes. Without shapes, it is a ball with the density of water.
+    The mass fills the bounding boxes of its shapes. If it has no shapes, it is a ball with the density of
+    water.
     """
     if not matter.shapes:
         radius_m = (matter.mass_kg / 1000.0 * 0.239) ** (1.0 / 3.0)

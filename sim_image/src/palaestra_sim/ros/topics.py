@@ -103,7 +103,7 @@ class Publisher:
         self.topic.send(self.topic.type.codec.frame({**self._template, **fields}))
 
     def send_value(self, value: Any, stamp_ns: int | None = None) -> None:
-        """Send the template with `value` in its last field, a time stamp and a sequence number.
+        """Send the template with `value` in its last field; its header gets a time stamp and a number.
 
         If the topic has no subscriber, this method does nothing; the sequence number does not increase.
 

@@ -49,7 +49,7 @@ class MotionBackend(Protocol):
         ...
 
     def add_torque(self, node: SceneNode, torque: Vector, *, relative: bool) -> None:
-        """Apply a torque in the next basic step; `relative` is as in `add_force`."""
+        """Apply a torque in the next basic step; see `add_force` for `relative`."""
         ...
 
 

@@ -217,7 +217,7 @@ class RosController:
     def _loop_hears(self) -> bool:
         """Return whether the main loop will notice the new step, and so will send its messages.
 
-        With `lost_wakeup`, it does not notice a step while it is busy with the messages of the previous one.
+        With `lost_wakeup`, the main loop does not notice a step while it sends the messages of the last step.
         """
         if not self._options.lost_wakeup:
             self.publish()

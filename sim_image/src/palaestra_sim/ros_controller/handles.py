@@ -14,7 +14,7 @@ from palaestra_sim.ros_controller.backend import Backend
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.tree.fields import NodeField
 
-_FIRST_ADDRESS: Final = 0x5580_0000_0000  # Linux places the heap of a position-independent program there
+_FIRST_ADDRESS: Final = 0x5580_0000_0000  # Linux places the heap of a program near this address
 _LOAD_SPACING: Final = 0x0001_0000_0000
 _SPACING: Final = 0x90
 

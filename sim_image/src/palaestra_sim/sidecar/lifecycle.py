@@ -24,7 +24,8 @@ Rules:
    even with code 0, because a simulator does not exit by itself.
 4. After a stop request, the trainer's supervisor robot ends the simulation. If the process still runs at the
    deadline, the sidecar kills it. A second stop request can only make the deadline earlier.
-5. At a shutdown, the sidecar itself ends the simulator: it sends SIGTERM, and kills the process later.
+5. At a shutdown, the sidecar itself ends the simulator: it sends SIGTERM, and after a deadline it kills the
+   process.
 6. An event that is not in the table is refused, and the state does not change.
 
 This file has all decisions about states. The module `simulator` runs the actions.

@@ -2,8 +2,8 @@
 
 No other module of the sidecar starts processes. The sidecar and a reaper exchange messages through two pipes.
 Threads wait for these messages, so no method of this module blocks. The sidecar may be process 1 of its
-container, which inherits all orphans. So `reap` collects the exit status of every child that has ended: of
-reapers and of orphans.
+container, and process 1 inherits all orphans. So `reap` collects the exit status of every child that has
+ended: of reapers and of orphans.
 """
 
 import contextlib
@@ -168,7 +168,7 @@ def _spawn(command: CommandLine, descriptors: Mapping[int, int]) -> int:
 
     Args:
         command: the command line of the simulator.
-        descriptors: the descriptors of the reaper, with the descriptor of this process for each.
+        descriptors: for each descriptor of the reaper, the descriptor of this process that becomes it.
     """
     with _reapers_lock:
         pid = os.posix_spawn(

@@ -44,7 +44,8 @@ def lay_out(world: Path, project: Path, root: Path, *, linked: bool) -> Path:
     Args:
         world: the absolute path of the source world.
         project: the absolute path of the project to make.
-        root: the absolute path of the folder up to which the source folders are copied as folders of links.
+        root: the absolute path of the outermost source folder. For each folder from `root` to that of
+            `world`, the project gets a folder.
         linked: whether to link everything next to `world`, and next to each folder from it up to `root`, at
             the same relative path. Links of an earlier start are renewed.
 
@@ -128,7 +129,7 @@ def _links(folders: Mapping[Path, Path]) -> Iterator[tuple[Path, Path]]:
 def _inside(source: Path, folder: Path) -> Iterator[Path]:
     """Yield the entries of `source`, without system folders and without the entry that contains `folder`.
 
-    A link to the latter would make a loop.
+    A link to that entry would make a loop.
     """
     for path in source.iterdir():
         of_the_system = source == source.parent and path.name in _OF_THE_SYSTEM

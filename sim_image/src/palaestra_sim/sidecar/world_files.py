@@ -95,7 +95,7 @@ def root_of(world: Path, given: Path | None) -> Path:
 
 
 def root_of_model(world: Path, given: Path | None) -> Path | None:
-    """Return `root_of` for an MJCF model; None for any other world, because its simulators need no root.
+    """Return `root_of` for an MJCF model; None for any other world, which is loaded without a root.
 
     Raises:
         WorldError, SidecarError: see `named`.

@@ -116,7 +116,7 @@ class StubBody(Disc):
             disc.scan(frame, rays, reach)
 
     def place(self, x: float, y: float, heading_rad: float) -> None:
-        """Set the position and heading of the robot; its motion continues."""
+        """Set the position and heading of the robot; the robot keeps its velocity."""
         self.x = x
         self.y = y
         self.heading_rad = heading_rad

@@ -170,7 +170,7 @@ class Block:
         return dx * self.c + dy * self.s, dy * self.c - dx * self.s
 
     def _way_out(self, x: float, y: float, radius: float) -> Contact:
-        """Return the contact of a robot whose center is inside the block: the nearest face is its way out."""
+        """Return the contact of a robot whose center is inside the block; it leaves by the nearest face."""
         out_x = self.half_x - abs(x)
         out_y = self.half_y - abs(y)
         if out_x < out_y:

@@ -97,7 +97,7 @@ class Met(Protocol):
 
 
 class SlopedBeams:
-    """The beams of one robot that need not be horizontal; they are cast one by one.
+    """The beams of one robot, which may be inclined; they are cast one by one.
 
     Floors are obstacles too; a floor extends to infinity.
     """

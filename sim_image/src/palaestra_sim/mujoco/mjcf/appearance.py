@@ -44,7 +44,8 @@ _KINDS: Final = {
 }
 _ROUND: Final = frozenset((_CAPSULE, int(_GEOM.mjGEOM_CYLINDER)))
 _VISIBLE_GROUPS: Final = 3
-_UNPAINTED: Final = (0.5, 0.5, 0.5, 1.0)  # a geom with this rgba has its material's. Source: XML reference
+# If a geom has this rgba, MuJoCo uses the color of the geom's material. Source: XML reference, geom/rgba
+_UNPAINTED: Final = (0.5, 0.5, 0.5, 1.0)
 
 
 class ModelAppearance:

@@ -62,7 +62,7 @@ class ModelCamera:
     def depths(self, nearest_m: float, resolution_m: float) -> memoryview:
         """Raise an error: a model has no RangeFinder."""
         del nearest_m, resolution_m
-        raise UnsimulatedError("a camera of a model measures no distances; add <rangefinder> sensors")
+        raise UnsimulatedError("a camera of a model does not measure distances; add <rangefinder> sensors")
 
     def patches(self, owner: Callable[[SceneNode], SceneNode | None]) -> dict[SceneNode, Corners]:
         """Return an empty mapping: a camera of a model has no Recognition node."""

@@ -12,7 +12,7 @@ from palaestra_sim.scene.geometry import Pose
 HINGE: Final = int(mujoco.mjtJoint.mjJNT_HINGE)
 SLIDE: Final = int(mujoco.mjtJoint.mjJNT_SLIDE)
 FREE: Final = int(mujoco.mjtJoint.mjJNT_FREE)
-# How many positions and speeds a joint has; other types of joints have one of each.
+# The numbers of positions and of speeds of a joint; joints of other types have one of each.
 _POSITIONS: Final = {FREE: 7, int(mujoco.mjtJoint.mjJNT_BALL): 4}
 _SPEEDS: Final = {FREE: 6, int(mujoco.mjtJoint.mjJNT_BALL): 3}
 
@@ -21,7 +21,7 @@ class Model:
     """One model and its current state.
 
     MuJoCo computes poses and sensors at the beginning of a step, for the state before the step. `settle`
-    computes them for the state after the last step. It does not affect the next step.
+    computes them for the state after the last step, and does not affect the next step.
 
     Args:
         model: MuJoCo's model.

@@ -36,7 +36,7 @@ class Feed:
         constants: the other constant fields; their values are read when the topic begins.
         source: the object that has the current value; None if the topic never has messages.
         reading: the field with the value; "" means the last field.
-        many: whether the value is a sequence; each of its items is sent in a message of its own.
+        many: whether the value is a sequence; each of its items is sent in a separate message.
         whole: whether the value is a mapping of all fields.
         stamped: whether the messages have a header.
         publishers: the publishers, by period in ms.
