@@ -106,4 +106,4 @@ def _always(fields: Fields) -> Handler:
 
 
 def _no_urdf(_request: Any) -> Fields:
-    raise ServiceFailed("this simulator cannot write a URDF; use driver webots")
+    raise ServiceFailed("no URDF is written here; use driver webots")
