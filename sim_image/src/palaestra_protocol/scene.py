@@ -85,7 +85,7 @@ class Triangles:
         flat = _numbers(fields, "points", 3 * MOST_POINTS)
         corners = fields.parts("triangles", _index, 3 * MOST_TRIANGLES)
         if len(flat) % 3 or len(corners) % 3:
-            raise ProtocolError(f"{path or 'body'}: the length of points or triangles is not a multiple of 3")
+            raise ProtocolError(f"{path or 'body'}: points or triangles are not in threes")
         if corners and max(corners) >= len(flat) // 3:
             raise fields.error("triangles", "names a point that is missing")
         return cls(
