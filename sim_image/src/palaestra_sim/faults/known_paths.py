@@ -157,7 +157,7 @@ class _Listener:
         return _Silent()
 
     def withdraw(self, publisher: Any) -> None:
-        """Keep the topic in the record."""
+        """Do nothing: the topic stays in the record."""
 
     def answer(self, call: Any, fields: Fields) -> None:
         """Do nothing: this node has no clients."""

@@ -24,7 +24,7 @@ log = logging.getLogger(__name__)
 
 
 class Endings(Protocol):
-    """The methods of the program that end it, or that affect all of its nodes."""
+    """The methods of the program that end the process, or that affect all ROS nodes of the process."""
 
     def end(self, status: int) -> None:
         """Close all connections and exit with the code `status`."""

@@ -23,7 +23,7 @@ class Life:
 
     Attributes:
         seed: the seed that a user chose.
-        simulator: the name of the simulator; with it, two simulators with the same seed have other numbers.
+        simulator: the name of the simulator, so that simulators with the same seed get different numbers.
         number: the number of the life; the program that starts the simulator counts lives from 1.
     """
 

@@ -36,7 +36,7 @@ LONGEST_STEP_S: Final = 0.004  # maximum duration of MuJoCo's step; with longer 
 
 
 class MujocoPhysics:
-    """The motion of one world; see `Physics`."""
+    """Computes the motion, the sensor rays and the images of one world; see `Physics`."""
 
     abilities = Abilities(name="MuJoCo", loose=True, leaning=True, forces=True, joints=True)
 

@@ -66,7 +66,7 @@ class Loop:
             self._epoll.unregister(number)
 
     def later(self, delay_s: float, callback: Callback) -> None:
-        """Call `callback` once, `delay_s` seconds from now; 0 means after the callbacks that are ready."""
+        """Call `callback` once after `delay_s` seconds; 0 means after the callbacks that are ready now."""
         heapq.heappush(self._timers, (time.monotonic() + delay_s, next(self._order), callback))
 
     def post(self, callback: Callback) -> None:

@@ -29,7 +29,7 @@ class Driver(StrEnum):
     COMMAND = "command"
 
 
-SHOWN = (Driver.STUB, Driver.MUJOCO)  # these describe their world to viewers
+SHOWN = (Driver.STUB, Driver.MUJOCO)  # these simulators describe their world to viewers
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

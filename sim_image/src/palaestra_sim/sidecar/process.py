@@ -133,7 +133,8 @@ class SimulatorProcess:
             below |= found
         ticks = sum(_ticks(pid, _OWN_TIME) + _ticks(pid, _ENDED_TIME) for pid in below)
         cpu_s = (ticks + _ticks(self.reaper, _ENDED_TIME)) / os.sysconf("SC_CLK_TCK")
-        # A process that ends while it is counted may be missing in both sums, so the total could fall.
+        # A process that ends during the count may be missing both as a running and as an ended process. Then
+        # the sum falls, but a counter must not fall.
         self._cpu_s = max(self._cpu_s, cpu_s)
         pages = sum(_resident_pages(pid) for pid in below)
         return Usage(rss_bytes=pages * os.sysconf("SC_PAGE_SIZE"), cpu_s=self._cpu_s)

@@ -138,7 +138,7 @@ def _inside(source: Path, folder: Path) -> Iterator[Path]:
 
 
 def _is_ours(link: Path, sources: Collection[Path]) -> bool:
-    """Return whether an earlier start of this container made this link, to an entry of one of `sources`."""
+    """Return whether `link` leads to an entry of `sources`; an earlier start made such links."""
     if not link.is_symlink():
         return False
     target = link.readlink()

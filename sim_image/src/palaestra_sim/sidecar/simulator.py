@@ -33,7 +33,7 @@ class NoAnswer(TimeoutError):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CommandResult:
-    """Whether a request was allowed, and the state after it."""
+    """The result of a request: whether it was allowed, and the state after it."""
 
     allowed: bool
     state: SimulatorState

@@ -55,7 +55,7 @@ class Viewing:
 
     @classmethod
     def without(cls, reason: str) -> Self:
-        """Return an object whose methods raise NothingToSee with this sentence."""
+        """Return an object whose methods raise NothingToSee with the text `reason`."""
         nothing = cls(Path())
         nothing._reason = reason
         return nothing
@@ -119,7 +119,7 @@ class _Link:
         self._socket: socket.socket | None = None
 
     def ask(self, request: bytes, most_bytes: int) -> bytes:
-        """Return the response to a request.
+        """Send a request to the simulator and return the response.
 
         Raises:
             SimulatorSilent: the simulator does not run, or does not respond in time.

@@ -20,7 +20,8 @@ from palaestra_sim.stub.obstacles import Block, Disc, Hull
 
 _Z: Final = 2
 _ALONG_Z: Final = frozenset(("cylinder", "capsule"))
-_MOST_DISCS: Final = 16  # per box; if a box is over eight times as long as wide, there are gaps between discs
+# Maximum number of discs for one box. If a box is over eight times as long as wide, its discs have gaps.
+_MOST_DISCS: Final = 16
 
 
 class RoundPart(NamedTuple):

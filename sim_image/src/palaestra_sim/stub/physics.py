@@ -55,7 +55,7 @@ class _Level(NamedTuple):
 
 
 class StubPhysics:
-    """The motion of one world, without masses and forces; see `Physics`."""
+    """Computes the motion and the sensor rays of one world, without masses and forces; see `Physics`."""
 
     abilities = Abilities(name="the stub")
 

@@ -122,7 +122,13 @@ class SlopedBeams:
         floors_m: Sequence[float] = (0.0,),
         rounded: Sequence[Met] = (),
     ) -> None:
-        """Set the obstacles of the beams: upright obstacles, the heights of floors, and other obstacles."""
+        """Set the obstacles of the beams.
+
+        Args:
+            solids: the upright obstacles.
+            floors_m: the heights of the floors.
+            rounded: all other obstacles.
+        """
         self._rounded = tuple(rounded)
         self._solids = tuple(solids)
         self._floors = tuple(floors_m)

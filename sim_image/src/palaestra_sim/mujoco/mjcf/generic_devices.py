@@ -68,7 +68,7 @@ class MujocoActuator:
         return float(self.controls[self.number]) if self._wanted is None else self._wanted
 
     def set_control(self, value: float) -> bool:
-        """Set the control for the following basic steps, cut to its limits.
+        """Set the control for the following basic steps; a value outside the limits is cut to the limit.
 
         Return False, and change nothing, if `value` is not finite.
         """
