@@ -107,8 +107,8 @@ class SimulatorState(JsonMessage):
 
     Attributes:
         state: the state of the simulator.
-        driver: stub, webots or command.
-        world: the path of its world.
+        driver: stub, mujoco, webots or command.
+        world: the path of the simulator's world.
         robots: the robots of that world that have a ROS node.
         pid: the process ID of the simulator's first process; None while the simulator does not run.
         starts: number of starts of the simulator since the sidecar started.
