@@ -1,14 +1,14 @@
 #!/bin/sh
-# Make a folder that holds the sidecar and everything it needs but a shell: Python, its libraries, the C library.
-# It runs where it is copied to, in any Linux image of this machine's processor, whatever that image holds.
-# Run inside the stub's image, when the packages are installed.
-# Arguments: the folder; where the packages are installed, if elsewhere.
+# Make a folder with the sidecar and all that it needs except a shell: Python, Python's libraries, the C library.
+# Users copy the folder into their own simulator images. It works in every Linux image for the same processor type.
+# Run this script inside the stub's image, after the packages are installed.
+# Arguments: the folder; optionally the folder in which the packages are installed.
 set -eu
 target=$1
 python=$(readlink -f /usr/bin/python3)
 name=$(basename "$python")
 installed=${2:-/usr/local/lib/$name/dist-packages}
-own=$target/lib/python3/dist-packages # where Debian's Python looks below its own prefix
+own=$target/lib/python3/dist-packages # Debian's Python searches this folder below its prefix
 
 mkdir -p "$target/bin" "$own"
 cp "$python" "$target/lib/$name.program"
@@ -27,8 +27,8 @@ done | grep -o '/[^ ]*' | sort -u | while read -r library; do
 done
 loader=$(basename "$(ldd "$target/lib/$name.program" | grep -o '/[^ ]*/ld-linux[^ ]*')")
 
-# The loader is named by its path, since the image's own may be older, or not be there. Nothing of this goes
-# into the environment: the simulator inherits that.
+# The script starts the copied dynamic loader by its path, because that of the image may be older or missing.
+# It sets no environment variables, because the simulator would inherit them.
 cat >"$target/bin/python3" <<SCRIPT
 #!/bin/sh
 root=\$(cd "\${0%/*}/.." && pwd)

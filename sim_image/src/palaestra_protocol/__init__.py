@@ -1,26 +1,26 @@
 """Messages, metrics, HTTP server and small rules that operator, trainer, sidecar and simulator share.
 
-- `control`: between trainer and sidecar: the requests, and the state of a simulator
-- `pod`: between trainer and operator: `/status`, the termination message, exit codes
-- `ros`: between trainer and simulator: connections, types and values of ROS 1
-- `scene`: what a world looks like, and where its parts are, for viewers and replays
+- `control`: the requests of a trainer to a sidecar, and the sidecar's reports about a simulator
+- `pod`: the reports of a trainer to the operator: `/status`, the termination message, exit codes
+- `ros`: ROS 1 between trainer and simulator: connections, types and values
+- `scene`: the visible shapes of a world and their poses, for viewers and replays
 - `camera_picture`: the newest picture of a robot's camera, for viewers
-- `foreign_words`: words of other projects, and their places in a TrainingJob
-- `messages`: messages whose readers and writers follow from their declarations
-- `fields`: checks of received JSON, because its sender is not trusted
-- `metrics`: families of metrics, as data
-- `numbers`: numbers of command-line options
-- `linux`: refusing a system other than Linux
-- `imports`: faster imports for programs
-- `masking`: text in which the passwords of addresses are masked
-- `shadowing`: a user's modules that shadow those of Python and of dependencies
-- `signals`: the signals that a program handles
+- `foreign_words`: options of other projects, and the TrainingJob fields that replace them
+- `messages`: derives the reader and the writer of a JSON message from its declaration
+- `fields`: checks received JSON, because its sender is not trusted
+- `metrics`: declares metrics as data: names, help texts, labels and buckets
+- `numbers`: parses the numbers of command-line options
+- `linux`: ends a program that runs on a system other than Linux
+- `imports`: makes the imports of a program faster
+- `masking`: masks the passwords in the addresses of a text
+- `shadowing`: finds a user's modules that shadow modules of Python or of a dependency
+- `signals`: selects the signals that a program handles
 - `http`: the HTTP server of operator, trainer and sidecar, with limits for time and size
 - `xmlrpc`: XML-RPC as ROS uses it, with limits for time and size
-- `tcp_server`: the base of both servers: one port, with a thread for each connection
-- `connection_limits`: the connections that these servers keep
+- `tcp_server`: the base class of the HTTP and XML-RPC servers: one port, a thread for each connection
+- `connection_limits`: limits the number of connections of these servers
 
-This package imports none of the others. All modules except `connection_limits`, `http`, `imports`,
-`linux`, `shadowing`, `signals`, `tcp_server`, `ros.sockets` and the server and client of `xmlrpc` are pure:
-values and bytes.
+This package imports no other package of Palaestra. These modules use sockets, threads or the interpreter's
+state: `connection_limits`, `http`, `imports`, `linux`, `shadowing`, `signals`, `tcp_server`, `ros.sockets`,
+and the server and client of `xmlrpc`. All other modules are pure: they compute values from values.
 """

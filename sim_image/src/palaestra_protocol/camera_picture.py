@@ -1,4 +1,8 @@
-"""The newest picture of a robot's camera, as JSON data for viewers: an API server passes on texts."""
+"""The newest picture of a robot's camera, as JSON data for viewers.
+
+A viewer may read it through the proxy of a Kubernetes API server. Our client for that server returns text, so
+the pixels are base64.
+"""
 
 from __future__ import annotations
 
@@ -22,10 +26,10 @@ class CameraPicture:
     """One picture.
 
     Attributes:
-        name: of the camera.
-        width: in pixels, at most MOST_SIDE.
-        height: in pixels, at most MOST_SIDE.
-        pixels: red, green and blue of each, one byte each, row by row from the top left.
+        name: the name of the camera.
+        width: the number of pixels in a row, at most MOST_SIDE.
+        height: the number of rows, at most MOST_SIDE.
+        pixels: three bytes for each pixel (red, green, blue), row by row from the top left.
     """
 
     name: str
@@ -34,7 +38,7 @@ class CameraPicture:
     pixels: bytes
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as JSON data; the pixels are compressed."""
+        """Return the picture as JSON data; the pixels are compressed."""
         return {
             "name": clipped(self.name, MOST_NAME),
             "width": self.width,

@@ -1,9 +1,12 @@
-"""The connection slots of a server: limited in total and for each peer; new connections come first.
+"""The connection slots of a server: their number is limited, in total and for each peer.
 
-A kubelet's probe sends its request as soon as it is connected. So an idle connection, one whose request is
-not yet complete, loses its slot to a new one. If the peer of the new connection has reached its limit, that
-peer's oldest idle connection is closed, so a peer with many connections starves only itself. A connection
-whose request is complete keeps its slot until the response is ready.
+A connection is idle while its request is not complete. If no slot is free, a new connection takes the slot of
+the oldest idle one. So clients that connect and send nothing cannot block a kubelet's probe, which sends its
+request as soon as it is connected.
+
+If the peer of the new connection has reached its own limit, an idle connection of the same peer is closed. So
+a peer with many connections cannot take the slots of other peers. A connection with a complete request keeps
+its slot until the response is ready.
 """
 
 import contextlib
@@ -38,7 +41,11 @@ class ConnectionSlots:
         self._taken: dict[socket.socket, _Slot] = {}  # the oldest first
 
     def take(self, connection: socket.socket, peer: str) -> bool:
-        """Return whether a new connection got a slot; if all are taken, close the oldest idle connection."""
+        """Give a new connection a slot, and return True; return False if the server is busy.
+
+        If all slots are taken, the oldest idle connection is closed. If no connection is idle, the server is
+        busy.
+        """
         with self._lock:
             if (crowd := self._crowd(peer)) is not None:
                 idle = next((one for one in crowd if not self._taken[one].answering), None)
@@ -55,7 +62,7 @@ class ConnectionSlots:
                 slot.answering = now
 
     def leave(self, connection: socket.socket) -> None:
-        """Free the slot of a connection, if it still has one."""
+        """Free the slot of a connection, if the connection still has a slot."""
         with self._lock:
             self._taken.pop(connection, None)
 
@@ -66,7 +73,7 @@ class ConnectionSlots:
                 self._drop(connection)
 
     def _crowd(self, peer: str) -> list[socket.socket] | None:
-        """Return the connections from which one must be closed for `peer`; None if a slot is free."""
+        """Return the connections of which one must close to free a slot for `peer`; None if one is free."""
         of_peer = [one for one, slot in self._taken.items() if slot.peer == peer]
         if len(of_peer) >= self._most_of_peer:
             return of_peer
@@ -75,5 +82,5 @@ class ConnectionSlots:
     def _drop(self, connection: socket.socket) -> None:
         """Close a connection; the thread that reads from it ends."""
         del self._taken[connection]
-        with contextlib.suppress(OSError):  # the peer may have closed it already
+        with contextlib.suppress(OSError):  # the peer may have closed the connection already
             connection.shutdown(socket.SHUT_RDWR)

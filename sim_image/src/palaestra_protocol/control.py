@@ -1,20 +1,21 @@
 """The requests of a trainer to a sidecar, and the sidecar's reports about its simulator.
 
-    POST /start   {}                    start it; the response does not wait for it
-    POST /ready   {}                    it has completed a real round trip
-    POST /stop    {"deadline_s": 5.0}   it will end; it is killed after that many seconds
-    GET  /state
+    POST /start   {}                    start the simulator; the response does not wait for the start
+    POST /ready   {}                    the trainer has completed a real round trip with the simulator
+    POST /stop    {"deadline_s": 5.0}   the simulator will end; the sidecar kills it after that many seconds
+    GET  /state                         return the simulator's state
 
 A sidecar with a standby has the same requests for its second simulator at /standby/start, /standby/ready,
-/standby/stop and /standby/state. The trainer decides which of the two it uses.
+/standby/stop and /standby/state. The trainer decides which of the two simulators it uses.
 
-The response is a `SimulatorState` with status 200, or 409 if the state does not allow the request. If the
-body is wrong, the status is 400 and the body is {"error": "<field>: <fact>"}.
+The response is a `SimulatorState`. Its status is 200, or 409 if the simulator's state does not allow the
+request. If the body of the request is wrong, the status is 400 and the response is
+{"error": "<field>: <fact>"}.
 
-A simulator may leave out nodes of its world that it cannot simulate, if its user allowed that. Before it
-becomes ready, it then writes the whole file that the environment variable `LEFT_OUT_FILE` names: UTF-8, with
-one line for each kind of node. Example: "the stub simulates no Drone: 1 node left out (collect-0.wbt, line
-12)".
+If the user allowed it, a simulator leaves out nodes of its world that it cannot simulate. Before such a
+simulator becomes ready, it writes a report. The environment variable `LEFT_OUT_FILE` names the file. The
+report is UTF-8 text with one line for each kind of node. Example: "the stub simulates no Drone: 1 node left
+out (collect-0.wbt, line 12)".
 """
 
 from __future__ import annotations
@@ -74,8 +75,11 @@ class SidecarState(StrEnum):
 class RobotName(JsonMessage):
     """The names of a robot in the world.
 
-    `robot` is its Robot.name, `ros_name` the name of its ROS node, `supervisor` whether it may change
-    the scene. `definition` is its DEF name; "": it has none.
+    Attributes:
+        robot: the field `name` of the robot.
+        ros_name: the name of the robot's ROS node.
+        supervisor: whether the robot may change the scene.
+        definition: the DEF name of the robot; "" if the world gives it no DEF name.
     """
 
     robot: Annotated[str, Text(MOST_NAME)]
@@ -86,10 +90,10 @@ class RobotName(JsonMessage):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LastExit(JsonMessage):
-    """The last end of the simulator: its exit code, or its signal such as "SIGBUS".
+    """The last end of the simulator: its exit code, or the signal that ended it, such as "SIGBUS".
 
-    If neither is set, it could not be started, or its end was not observed. `expected` is true if the end was
-    announced; otherwise it was a fault.
+    If neither is set, the simulator could not be started, or the sidecar did not observe its end. `expected`
+    is true if a stop request announced the end. Any other end is a fault.
     """
 
     code: Annotated[int | None, Maybe(Whole(0, 255))] = None
@@ -103,15 +107,16 @@ class SimulatorState(JsonMessage):
 
     Attributes:
         state: the state of the simulator.
-        driver: stub, webots or command.
-        world: the path of its world.
+        driver: stub, mujoco, webots or command.
+        world: the path of the simulator's world.
         robots: the robots of that world that have a ROS node.
-        pid: the process ID of the simulator's first process; None while it does not run.
-        starts: number of starts since the sidecar started.
-        faults: number of ends without an announcement.
-        last_exit: its last end; None if it has not ended yet.
-        detail: the reason for this state, in a sentence for people; "" if there is nothing to add.
-        rss_bytes: the memory of its processes, in responses to GET while it is ready; else None.
+        pid: the process ID of the simulator's first process; None while the simulator does not run.
+        starts: number of starts of the simulator since the sidecar started.
+        faults: number of times that the simulator ended without a stop request.
+        last_exit: the simulator's last end; None if it has not ended yet.
+        detail: the reason for this state, in a sentence for people; "" if the state needs no explanation.
+        rss_bytes: the memory of the simulator's processes. It is set only in responses to GET while the
+            simulator is ready; otherwise None.
         left_out: the nodes that the simulator left out of its world at its last start, in lines for people.
     """
 
@@ -130,11 +135,11 @@ class SimulatorState(JsonMessage):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StopRequest(JsonRequest):
-    """An announcement that the simulator will end, within `deadline_s` seconds (0: kill it now)."""
+    """Announces that the simulator will end within `deadline_s` seconds; 0 means that it is killed now."""
 
     deadline_s: Annotated[float, Number(0.0, MOST_DEADLINE_S)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlainRequest(JsonRequest):
-    """A request without parameters: start, ready."""
+    """A request without parameters: `/start` or `/ready`."""

@@ -1,12 +1,12 @@
 """Read JSON from an untrusted process.
 
-A pod runs programs that its author chose, so its response may have a wrong type, be endless, or contain
-characters that cannot be encoded. Each value is read by a method that checks its type and its bounds; any
-other value raises `ProtocolError`. Unknown fields are ignored in responses, because a newer release may add
-some. In requests they are refused, because there they are mistakes.
+A pod may run a program of a user. Its response may have a value of a wrong type, be endless, or contain
+characters that cannot be encoded. So each method of `Fields` checks the type and the bounds of a value, and
+raises `ProtocolError` if the check fails. Readers of responses ignore unknown fields, because a newer release
+may add fields. Readers of requests refuse an unknown field, because it is probably a misspelling.
 
-Writers keep the same bounds with `clipped`, `enumerated` and `known`. `palaestra_protocol.messages` does both
-for messages whose fields declare their bounds.
+Writers keep the same bounds with `clipped`, `enumerated` and `known`. For messages whose fields declare their
+bounds, `palaestra_protocol.messages` provides reader and writer.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from palaestra_protocol.masking import masked
 T = TypeVar("T")
 Choice = TypeVar("Choice", bound=StrEnum)
 
-MOST_BYTES = 2**19  # size of one response; all fields fit at maximum length, with the longest escapes
-MOST_COUNT = 2**53  # every JSON reader keeps integers up to this one exactly
+MOST_BYTES = 2**19  # maximum size of a response: enough for the longest texts, if each character is escaped
+MOST_COUNT = 2**53  # JSON readers that use floats represent integers exactly up to this number
 MOST_NAME = 255
 MOST_TEXT = 500
 
@@ -35,14 +35,14 @@ _TYPES = {dict: "an object", list: "a list", str: "text", bool: "true or false",
 
 
 class ProtocolError(ValueError):
-    """A message does not follow the protocol; the text names the field and the fact."""
+    """A message does not follow the protocol; the error text names the field and the mistake."""
 
 
 def decoded(data: bytes, most_bytes: int = MOST_BYTES) -> object:
     """Return the JSON value of `data`.
 
     Raises:
-        ProtocolError: it is longer than `most_bytes`, or is not JSON.
+        ProtocolError: `data` is longer than `most_bytes`, or is not JSON.
     """
     if len(data) > most_bytes:
         raise ProtocolError(f"body: {len(data)} bytes are more than {most_bytes}")
@@ -61,7 +61,10 @@ def clipped(text: str, most: int = MOST_TEXT) -> str:
 
 
 def enumerated(texts: Sequence[str], most: int, most_entries: int) -> list[str]:
-    """Return at most `most_entries` texts, each `clipped`; the last one counts those that were dropped."""
+    """Return at most `most_entries` texts, each `clipped`.
+
+    If there are more texts, the last entry is "and N more", where N is the number of dropped texts.
+    """
     kept = [clipped(text, most) for text in texts[:most_entries]]
     if missing := len(texts) - len(kept):
         kept[-1] = f"and {missing + 1} more"
@@ -69,12 +72,12 @@ def enumerated(texts: Sequence[str], most: int, most_entries: int) -> list[str]:
 
 
 def known(value: float | None) -> float | None:
-    """Return `value`; None for infinities and NaN, which JSON cannot express."""
+    """Return `value`, or None for infinities and NaN, because JSON has no text for them."""
     return value if value is not None and math.isfinite(value) else None
 
 
 class Fields:
-    """The fields of one JSON object, each read by its type.
+    """Reads the fields of one JSON object, with one method for each type of value.
 
     Every method raises ProtocolError if the field is missing or has another type or value.
 
@@ -100,7 +103,7 @@ class Fields:
         return self._content.get(name) is not None
 
     def text(self, name: str, most: int = MOST_TEXT, least: int = 0) -> str:
-        """Return text of `least` to `most` characters."""
+        """Return the field's text, which has `least` to `most` characters."""
         return _text(self._value(name), self._at(name), most, least)
 
     def texts(self, name: str, most: int, most_entries: int) -> tuple[str, ...]:
@@ -108,7 +111,7 @@ class Fields:
         return self.parts(name, lambda item, path: _text(item, path, most), most_entries)
 
     def choice(self, name: str, choices: type[Choice]) -> Choice:
-        """Return one of `choices`."""
+        """Return the member of `choices` that the field's text names."""
         value = self.text(name)
         try:
             return choices(value)
@@ -141,7 +144,7 @@ class Fields:
         return number
 
     def flag(self, name: str) -> bool:
-        """Return true or false."""
+        """Return the field's Boolean."""
         value = self._value(name)
         if not isinstance(value, bool):
             raise self.error(name, f"{_kind(value)} is not true or false")
@@ -182,7 +185,11 @@ class Fields:
 
 
 def _text(value: object, path: str, most: int, least: int = 0) -> str:
-    """Return the `value` at `path` if it is text of `least` to `most` characters."""
+    """Return `value` if it is text of `least` to `most` characters; errors name its `path`.
+
+    Raises:
+        ProtocolError: `value` is anything else, or has half of a surrogate pair.
+    """
     if not isinstance(value, str):
         raise ProtocolError(f"{path}: {_kind(value)} is not text")
     if not least <= len(value) <= most:
@@ -193,7 +200,7 @@ def _text(value: object, path: str, most: int, least: int = 0) -> str:
 
 
 def _kind(value: object) -> str:
-    """Return the type of a JSON value in words, without the value, which may be very long."""
+    """Return the type of a JSON value in words, for a message; the value itself may be too long for one."""
     return _TYPES.get(type(value), "a number")
 
 

@@ -1,6 +1,7 @@
-"""Words of other projects, and the TrainingJob fields that replace them.
+"""Option names of other projects, and the TrainingJob fields that replace them.
 
-Operator and trainer meet the same words: in a section of a job, and among its hyperparameters.
+A user may write such a name as a field of a job, which the operator checks, or as a hyperparameter, which the
+trainer checks. Both print the remedy from this table.
 """
 
 from __future__ import annotations
@@ -15,8 +16,9 @@ _COUNT = "write the count of a group of spec.simulators with role Collect"
 _STEPS = "write trainer.steps"
 _NORMALIZE = "write trainer.algorithm.normalize"
 
-# Words of RL-Baselines3-Zoo's files; arguments that a run itself passes to classes of Stable-Baselines3; and
-# words of `learn`, of callbacks and of other libraries for which a job has a field of its own.
+# The keys of RL-Baselines3-Zoo's files, the arguments that a run itself passes to classes of
+# Stable-Baselines3, and the arguments of `learn`, of callbacks and of other libraries that a field of a job
+# replaces. The values are the remedies.
 ELSEWHERE: Mapping[str, str] = MappingProxyType(
     {
         "_init_setup_model": "a run sets its model up itself; leave it out",
@@ -55,7 +57,7 @@ ELSEWHERE: Mapping[str, str] = MappingProxyType(
         "verbose": "the log of a run has every figure; leave it out",
     }
 )
-# The words of this table that only a file of RL-Baselines3-Zoo has.
+# The names in this table that occur only in files of RL-Baselines3-Zoo.
 OF_ZOO = frozenset(
     {
         "callback", "env_kwargs", "env_wrapper", "frame_stack", "monitor_kwargs", "n_envs", "n_timesteps",
@@ -67,7 +69,8 @@ FROM_ZOO = "`palaestra from-zoo FILE` writes a job from a whole file of RL-Basel
 _HINDSIGHT = (
     "HER is a replay buffer; use SAC, TD3, DDPG, TQC, DQN or QRDQN with replay_buffer_class: HerReplayBuffer"
 )
-# Algorithms of Stable-Baselines3 and sb3-contrib that a run does not support, by their names in lower case.
+# Algorithms of Stable-Baselines3 and sb3-contrib that a run does not support. Keys: names in lower case.
+# Values: the reason and the remedy.
 NO_ALGORITHM: Mapping[str, str] = MappingProxyType(
     {
         "ars": "ARS learns from whole returns, which rows of broken simulators would enter; use another one",

@@ -1,10 +1,12 @@
-"""The HTTP server of operator, trainer and sidecar: a table of routes, with limits for time, size and number.
+"""The HTTP server of operator, trainer and sidecar.
 
-Each connection carries one request, with a deadline and a maximum size; a slow or endless request is closed
-without a response. The number of connections is limited: a new one replaces an idle one, as
-`connection_limits` describes. Errors are JSON: {"error": "<field>: <fact>"}. The status is 404 for an unknown
-path, 405 for a wrong method, 411 for a POST without Content-Length and 413 for a body that is too long.
-Requests are not logged, because probes and scrapes come every few seconds.
+A table maps methods and paths to functions (`Routes`). Each connection carries one request. If a request is
+not complete at its deadline, or is too long, the server closes the connection without a response. The number
+of connections is limited, as `connection_limits` describes.
+
+Errors are JSON: {"error": "<field>: <fact>"}. The status is 404 for an unknown path, 405 for a wrong method,
+411 for a POST without Content-Length and 413 for a body that is too long. Requests are not logged, because
+probes and scrapes come every few seconds.
 """
 
 import io
@@ -22,23 +24,23 @@ from palaestra_protocol.connection_limits import MOST_CONNECTIONS, ConnectionSlo
 from palaestra_protocol.numbers import MOST_PORT
 from palaestra_protocol.tcp_server import TcpServer
 
-MOST_REQUEST_BYTES = 2**17  # enough to send 414 for a path of 64 KiB, the longest of http.server
+MOST_REQUEST_BYTES = 2**17  # the server can read a path of 64 KiB, the limit of http.server, and reply 414
 MOST_BODY_BYTES = 4096
 DEADLINE_S = 5.0
 
 
 class Address(NamedTuple):
-    """The address on which a server listens; port 0 stands for any free port."""
+    """The address on which a server listens; port 0 means that the system chooses a free port."""
 
     host: str
     port: int
 
     @classmethod
     def parse(cls, text: str) -> Self:
-        """Return the address of `127.0.0.1:7100` or `[::1]:7100`; a host is an IP address.
+        """Return the address in a text such as `127.0.0.1:7100` or `[::1]:7100`.
 
         Raises:
-            ValueError: it is not an IP address with a port from 0 to 65535.
+            ValueError: `text` is not an IP address with a port from 0 to 65535.
         """
         host, _, port = text.rpartition(":")
         bare = host.removeprefix("[").removesuffix("]")
@@ -56,7 +58,7 @@ class Address(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Response:
-    """A response: a status, and a body of some type."""
+    """A response: its status, its body, and the content type of the body."""
 
     status: HTTPStatus
     body: bytes
@@ -68,12 +70,12 @@ Routes = Mapping[tuple[str, str], Route]  # keys: the method, GET or POST, and t
 
 
 def json_response(status: HTTPStatus, content: Mapping[str, Any]) -> Response:
-    """Return JSON data."""
+    """Return a response with JSON content."""
     return Response(status=status, body=json.dumps(content).encode() + b"\n", content_type="application/json")
 
 
 def error_response(status: HTTPStatus, fact: str) -> Response:
-    """Return an error response, in the format of the server's own errors."""
+    """Return an error response in the format that the server itself uses."""
     return json_response(status, {"error": fact})
 
 
@@ -90,11 +92,11 @@ class Server(TcpServer):
     """A server on one port; see `TcpServer`.
 
     Args:
-        address: where to listen. `0.0.0.0` and `::` both mean every address of the machine, IPv6 and IPv4,
-            because the addresses of a pod are those of its cluster.
-        routes: its paths.
+        address: the address on which it listens. `0.0.0.0` and `::` both mean every address of the machine,
+            IPv4 and IPv6, because the cluster decides which of the two a pod has.
+        routes: the function for each method and path.
         name: the name of the program, for the header `Server` and the thread.
-        deadline_s: for reading a request, and again for writing the response.
+        deadline_s: time limit for reading a request; the same limit applies to writing the response.
 
     Raises:
         OSError: the address is in use, or does not belong to this machine.
@@ -114,18 +116,22 @@ class Server(TcpServer):
 
     @property
     def address(self) -> Address:
-        """The address on which it listens, with the actual port."""
+        """The address on which the server listens, with the port that the system chose."""
         return Address(*self.socket.getsockname()[:2])
 
     def server_bind(self) -> None:
-        """Bind the socket; a server for all addresses also accepts IPv4, whatever the system's default is."""
+        """Bind the socket.
+
+        A server for all addresses accepts IPv4 also on an IPv6 socket, even if the system's default forbids
+        that.
+        """
         if self._every and self.address_family == socket.AF_INET6:
             self.socket.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 0)
         super().server_bind()
 
 
 def _is_every(host: str) -> bool:
-    """Return whether a host is an IP address that stands for every address; a host name never does."""
+    """Return whether `host` is `0.0.0.0` or `::`, which stand for every address of the machine."""
     try:
         return ipaddress.ip_address(host).is_unspecified
     except ValueError:
@@ -133,12 +139,12 @@ def _is_every(host: str) -> bool:
 
 
 def _every_host() -> str:
-    """Return the host that stands for every address: IPv4 if IPv6 is disabled in the node's kernel."""
+    """Return the host that stands for every address: `::`, or `0.0.0.0` if the kernel has no IPv6."""
     return str(ipaddress.IPv6Address(0) if socket.has_dualstack_ipv6() else ipaddress.IPv4Address(0))
 
 
 class _Handler(BaseHTTPRequestHandler):
-    """Handles one request, by the routes of its server."""
+    """Handles one request: calls the function of its route, and sends the response."""
 
     def setup(self) -> None:
         super().setup()
@@ -181,7 +187,7 @@ class _Handler(BaseHTTPRequestHandler):
             self._send(error_response(HTTPStatus.NOT_FOUND, f"path: is not one of {known}"))
 
     def _called(self, route: Route, body: bytes) -> Response:
-        """Return the response of a route; until then the connection keeps its slot."""
+        """Call the function of a route and return its response; meanwhile the connection keeps its slot."""
         self._server.slots.answering(self.connection, now=True)
         try:
             return route(body)
@@ -198,7 +204,7 @@ class _Handler(BaseHTTPRequestHandler):
 
 
 class _Reader(io.RawIOBase):
-    """Reads a connection until its deadline, and no more than MOST_REQUEST_BYTES."""
+    """Reads at most MOST_REQUEST_BYTES from a connection; raises an error after the deadline."""
 
     def __init__(self, connection: socket.socket, deadline_s: float) -> None:
         self._connection = connection

@@ -1,4 +1,4 @@
-"""Faster imports: without an optional dependency, and without garbage collection."""
+"""Make imports faster: skip an optional dependency, and pause garbage collection."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ from importlib import import_module
 
 
 def import_without(dependency: str, module: str) -> None:
-    """Import a module as if its optional dependency were not installed; later imports find the dependency.
+    """Import `module` as if its optional `dependency` were not installed.
 
-    This has no effect if the module or the dependency is already imported.
+    Later imports find the dependency. If the module or the dependency is already imported, this function does
+    nothing.
     """
     if dependency not in sys.modules and module not in sys.modules:
         sys.modules[dependency] = None  # type: ignore[assignment]  # Python's way to forbid an import
@@ -24,11 +25,11 @@ def import_without(dependency: str, module: str) -> None:
 
 @contextmanager
 def without_collections() -> Iterator[None]:
-    """Collect no garbage while the block imports modules, and exclude these objects from later collections.
+    """Pause garbage collection while the block imports modules; later collections skip the new objects.
 
-    Imports create hundreds of thousands of permanent objects. If the collector scans them repeatedly, that
-    takes a sixth of the time to import PyTorch. If the block imports nothing new, later collections are as
-    before.
+    Imports create hundreds of thousands of permanent objects. Without the pause, the collector scans them
+    repeatedly, which takes a sixth of the time to import PyTorch. If the block imports no new module, later
+    collections still scan all objects.
     """
     imported = len(sys.modules)
     gc.disable()

@@ -1,7 +1,8 @@
-"""Refusing to start on a system other than Linux, in one sentence.
+"""End a program with a message if the system is not Linux.
 
-Programs that start, watch or are simulators need Linux: its `/proc`, subreapers, pidfds, epoll and signals.
-The rest of `palaestra`, such as `get` and `explain`, runs wherever Python does.
+Simulators, and the programs that start or watch simulators, need Linux: they use `/proc`, subreapers, pidfds,
+epoll and signals. Other commands of `palaestra`, such as `get` and `explain`, run on every system that has
+Python.
 """
 
 import sys
@@ -10,7 +11,7 @@ _WRONG_SYSTEM = 2
 
 
 def lack_of_linux() -> str | None:
-    """Return the fact and the remedy where this system is not Linux, otherwise None."""
+    """Return None on Linux; on another system, return the problem and the remedy."""
     system: str = sys.platform
     if system == "linux":
         return None
@@ -18,7 +19,7 @@ def lack_of_linux() -> str | None:
 
 
 def require_linux(program: str) -> None:
-    """Return on Linux; on another system, print one sentence and end this process.
+    """Do nothing on Linux; on another system, print the problem and exit.
 
     Raises:
         SystemExit: this system is not Linux.

@@ -1,20 +1,23 @@
-"""Messages of JSON, each declared once: a field's annotation is its writer and its reader.
+"""JSON messages: one declaration of a field defines how the field is written and read.
 
 A message is a dataclass. The annotation of a field has its type and a `ValueKind`, which has the bounds:
 
     phase: Annotated[str, Text(MOST_NAME, least=1)]
     mean_return: Annotated[float | None, Maybe(Number())] = None
 
-The writer keeps the bounds that the reader checks, so a long text of a trainer never hides its status.
-A reader ignores unknown fields, because a newer release may add some. `JsonRequest` refuses them, because
-there they are mistakes. Releases read each other's messages, so a field is one of three:
+The writer cuts a value to the bounds that the reader checks. So a long error text of a trainer does not make
+its status unreadable. A reader of responses ignores unknown fields, because a newer release may add fields.
+`JsonRequest` refuses unknown fields, because a misspelled field of a request must not be ignored.
 
-- a plain kind: the writer writes it always, and a reader refuses a message without it, even if the class has
-  a default for programs
-- `Maybe`: the writer writes it always, null if it is not known; a message of an older release may lack it
-- `AddedLater`: a field that 0.1.0 does not have: it is absent unless it is set
+Programs of different releases exchange messages, so each field is one of three:
 
-`palaestra_protocol.scene` reads its messages itself, because their parts must fit together.
+- a plain kind: the writer always writes the field, and the reader refuses a message without it; a default in
+  the class is only for programs that create messages
+- `Maybe`: the writer always writes the field, as null if the value is unknown; a message of an older release
+  may lack the field
+- `AddedLater`: release 0.1.0 does not have the field, so the writer leaves it out unless it is set
+
+`palaestra_protocol.scene` has its own reader, which also checks that the parts of a message fit together.
 """
 
 from __future__ import annotations
@@ -44,26 +47,26 @@ class ValueKind(ABC):
         """Return the value of the field `name`.
 
         Raises:
-            ProtocolError: it has another type, or exceeds a bound.
+            ProtocolError: the value has another type, or exceeds a bound.
         """
 
     def write(self, value: Any) -> Any:
-        """Return the value as JSON data within the bounds."""
+        """Return the value as JSON data, cut to the bounds."""
         return value
 
     def absent(self, value: Any) -> bool:
-        """Return whether a message with this value is written without the field."""
+        """Return whether the writer leaves the field out of a message with this value."""
         del value
         return False
 
 
 class JsonMessage:
-    """A message, or a part of one; its subclasses are dataclasses."""
+    """A message, or a part of a message; its subclasses are dataclasses."""
 
     __slots__ = ()
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as JSON data, with texts and lists cut to the lengths that a reader accepts."""
+        """Return the message as JSON data, with texts and lists cut to the lengths that a reader accepts."""
         values = ((name, kind, getattr(self, name)) for name, kind in _kinds(type(self)).items())
         return {name: kind.write(value) for name, kind, value in values if not kind.absent(value)}
 
@@ -99,11 +102,11 @@ class JsonRequest(JsonMessage):
         return super().from_json(content, path)
 
 
-_KINDS: dict[type[JsonMessage], Mapping[str, ValueKind]] = {}  # of messages written or read so far
+_KINDS: dict[type[JsonMessage], Mapping[str, ValueKind]] = {}  # a cache: filled when a class is first used
 
 
 def _kinds(message: type[JsonMessage]) -> Mapping[str, ValueKind]:
-    """Return the kinds of a message's fields, by name, in the order of their declaration."""
+    """Return the `ValueKind` of each field of a message, by name, in the order of their declaration."""
     if message not in _KINDS:
         hints = get_type_hints(message, include_extras=True)
         _KINDS[message] = {name: hint.__metadata__[0] for name, hint in hints.items()}
@@ -112,7 +115,7 @@ def _kinds(message: type[JsonMessage]) -> Mapping[str, ValueKind]:
 
 @dataclass(frozen=True, slots=True)
 class Text(ValueKind):
-    """Text of `least` to `most` characters, without the passwords of addresses; a longer one is cut."""
+    """Text of `least` to `most` characters; the writer cuts longer text and masks passwords in addresses."""
 
     most: int = MOST_TEXT
     least: int = 0
@@ -140,7 +143,7 @@ class Whole(ValueKind):
 
 @dataclass(frozen=True, slots=True)
 class Number(ValueKind):
-    """A finite number from `least` to `most`; one that is not finite is written as null: it is not known."""
+    """A finite number from `least` to `most`; the writer writes infinities and NaN as null, for unknown."""
 
     least: float = -math.inf
     most: float = math.inf
@@ -202,7 +205,7 @@ class ChoiceText(ValueKind):
 
 @dataclass(frozen=True, slots=True)
 class Part(ValueKind):
-    """A message within this one."""
+    """A nested message."""
 
     message: type[JsonMessage]
 
@@ -217,7 +220,7 @@ class Part(ValueKind):
 
 @dataclass(frozen=True, slots=True)
 class PartList(ValueKind):
-    """A list of messages: the first `most` are written."""
+    """A list of messages; the writer writes only the first `most`."""
 
     message: type[JsonMessage]
     most: int
@@ -232,7 +235,7 @@ class PartList(ValueKind):
 
 
 class NewestPartList(PartList):
-    """A list of messages, the newest last: the last `most` are written."""
+    """A list of messages, the newest last; the writer writes only the last `most`."""
 
     __slots__ = ()
 
@@ -243,7 +246,10 @@ class NewestPartList(PartList):
 
 @dataclass(frozen=True, slots=True)
 class Lines(ValueKind):
-    """A list of at most `most_entries` texts of at most `most` characters; the last one counts the rest."""
+    """A list of at most `most_entries` texts of at most `most` characters each.
+
+    If the writer drops texts, the last entry says how many.
+    """
 
     most: int
     most_entries: int
@@ -253,12 +259,12 @@ class Lines(ValueKind):
         return fields.texts(name, self.most, self.most_entries)
 
     def write(self, value: tuple[str, ...]) -> list[str]:
-        """Return the first texts; if some are dropped, the last one says how many."""
+        """Return the first texts; if texts are dropped, the last entry says how many."""
         return enumerated(value, self.most, self.most_entries)
 
 
 class NewestLines(Lines):
-    """A list of texts, the newest last: the last `most_entries` are written."""
+    """A list of texts, the newest last; the writer writes only the last `most_entries`."""
 
     __slots__ = ()
 
@@ -269,13 +275,16 @@ class NewestLines(Lines):
 
 @dataclass(frozen=True, slots=True)
 class Table(ValueKind):
-    """Values by the names in `rows`, all of one kind; a reader ignores names that a newer release added."""
+    """Values of one kind, by name; the reader ignores names that are not in `rows`.
+
+    A newer release may have added such a name.
+    """
 
     rows: Iterable[StrEnum]
     kind: ValueKind
 
     def read(self, fields: Fields, name: str) -> dict[str, Any]:
-        """Return the values of the names that the message has."""
+        """Return the values by name; a name that the message lacks is left out."""
         table = fields.part(name, Fields)
         return {row.value: self.kind.read(table, row.value) for row in self.rows if table.has(row.value)}
 
@@ -296,12 +305,12 @@ class Maybe(ValueKind):
         return self.kind.read(fields, name)
 
     def write(self, value: Any) -> Any:
-        """Return the value as JSON data; None if it is None."""
+        """Return the value as JSON data; None stays None."""
         return None if value is None else self.kind.write(value)
 
 
 class AddedLater(Maybe):
-    """A value that a later release added: its default is None, and the field is absent unless it is set."""
+    """A field that a release after 0.1.0 added; its default is None, and the writer leaves out None."""
 
     __slots__ = ()
 

@@ -1,12 +1,12 @@
-"""Families of metrics, as data.
+"""Declarations of metrics, as data.
 
-Each program declares its families in one table, from which its /metrics and docs/reference/metrics.md are
-generated. So the page always matches the exported metrics, and the number of a program's series can be
-computed.
+A family is a metric name with its type, help text and labels. Each program declares its families in one
+table. Its /metrics and docs/reference/metrics.md are generated from that table, so they always match. The
+table also gives the maximum number of series of the program.
 
-Frequent events, thousands a second, are counted in plain Python (`Tally`) and read at a scrape. Counting one
-takes a tenth of a microsecond. A histogram of `prometheus_client` takes half a microsecond, and over one to
-find the child of a label.
+Events that occur thousands of times a second are counted in plain Python (`Tally`) and exported at a scrape.
+`Tally.observe` takes a tenth of a microsecond. A histogram of `prometheus_client` takes half a microsecond,
+and more than one microsecond to find the child for a label value.
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ class MetricType(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Label:
-    """A label, and the limit of its values.
+    """A label, and the limit of its number of values.
 
     Attributes:
-        name: as in PromQL.
-        values: all possible ones; empty if they depend on the job or the cluster.
-        bound: if `values` is empty, the kind of object that has one value each, in words.
+        name: the name as in PromQL.
+        values: all possible values; empty if they depend on the job or the cluster.
+        bound: if `values` is empty, the kind of object for which each value stands, such as "release".
     """
 
     name: str
@@ -48,13 +48,14 @@ class Label:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Family:
-    """The metrics of one name.
+    """All metrics that have one name.
 
     Attributes:
-        name: as exported, with its unit.
+        name: the exported name, with its unit.
+        kind: counter, gauge or histogram.
         meaning: the help text.
-        labels: its labels; empty if the family has one value.
-        buckets: upper bounds of a histogram, ascending, without the last one, infinity.
+        labels: the labels; empty if the family has only one series.
+        buckets: the upper bounds of a histogram's buckets, ascending, without the infinite one.
     """
 
     name: str
@@ -69,11 +70,11 @@ class Family:
         return tuple(label.name for label in self.labels)
 
     def combinations(self) -> Iterator[tuple[str, ...]]:
-        """Yield every combination of label values; nothing if a label's values are not known in advance."""
+        """Yield every combination of label values; no combination if a label has no fixed values."""
         yield from product(*(label.values for label in self.labels))
 
     def series(self, sizes: Mapping[str, int]) -> int:
-        """Return the maximum number of series; `sizes` maps the bound of a label to its number of values."""
+        """Return the maximum number of series; `sizes` maps `Label.bound` to the number of such objects."""
         values = prod(sizes[label.bound] if label.bound else len(label.values) for label in self.labels)
         samples = sum(1 for _ in self.tally().samples()) if self.kind is MetricType.HISTOGRAM else 1
         return values * samples
@@ -83,7 +84,7 @@ class Family:
         return Tally(self.buckets)
 
     def metric(self, values: Values) -> Metric:
-        """Return the family with these values; unknown values are left out."""
+        """Return the family as a metric of `prometheus_client`; it has a series for each of `values`."""
         made = Metric(self.name.removesuffix("_total"), self.meaning, self.kind)
         for given, value in values.items():
             labels = dict(zip(self.label_names, given, strict=True))
@@ -94,25 +95,25 @@ class Family:
 
 
 def counter(name: str, meaning: str, *labels: Label) -> Family:
-    """Return a family whose values only rise."""
+    """Return a counter: a family whose values only rise."""
     return Family(name=name, kind=MetricType.COUNTER, meaning=meaning, labels=labels)
 
 
 def gauge(name: str, meaning: str, *labels: Label) -> Family:
-    """Return a family whose values rise and fall."""
+    """Return a gauge: a family whose values rise and fall."""
     return Family(name=name, kind=MetricType.GAUGE, meaning=meaning, labels=labels)
 
 
 def histogram(name: str, meaning: str, buckets: tuple[float, ...], *labels: Label) -> Family:
-    """Return a family that counts values by size."""
+    """Return a histogram: a family that counts observed values in buckets."""
     return Family(name=name, kind=MetricType.HISTOGRAM, meaning=meaning, labels=labels, buckets=buckets)
 
 
 class Tally:
-    """The count of observed values in each bucket; written by one thread, read by any.
+    """The number of observed values in each bucket; one thread may write while others read.
 
     Attributes:
-        total: sum of the values.
+        total: the sum of the observed values.
     """
 
     __slots__ = ("_bounds", "_counts", "total")
@@ -132,8 +133,9 @@ class Tally:
         counts = list(accumulate(self._counts))
         for bound, count in zip((*self._bounds, "+Inf"), counts, strict=True):
             yield "_bucket", {"le": str(bound)}, count
-        yield "_count", {}, counts[-1]  # without it, OpenTelemetry's Prometheus receiver drops the histogram
-        # A sum that falls looks like a restart to Prometheus' rate() and to OpenTelemetry's receiver.
+        yield "_count", {}, counts[-1]  # OpenTelemetry's Prometheus receiver drops a histogram without it
+        # Negative values could make the sum fall. Prometheus' rate() and OpenTelemetry's receiver would take
+        # that for a restart of the program.
         # Source: OpenMetrics 1.0, "Histogram"
         if self._bounds[0] >= 0:
             yield "_sum", {}, self.total

@@ -1,4 +1,4 @@
-"""Parsers for the numbers of command-line options; each raises an error for an invalid number."""
+"""Parsers for the numbers of command-line options; each raises `ArgumentTypeError` for an invalid number."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def whole(least: int = 0, most: int | None = None) -> Callable[[str], int]:
 
 
 def seconds(text: str) -> float:
-    """Return a time in seconds, for argparse's `type`: finite and above 0."""
+    """Return the number of seconds in `text`, finite and above 0; for argparse's `type`."""
     number = _finite(text)
     if number <= 0.0:
         raise ArgumentTypeError(f"{text} is refused; give more than 0")
@@ -34,7 +34,7 @@ def seconds(text: str) -> float:
 
 
 def milliseconds(text: str) -> float:
-    """Return a delay, for argparse's `type`: finite; 0 for no delay."""
+    """Return the number of milliseconds in `text`, finite and at least 0; for argparse's `type`."""
     number = _finite(text)
     if number < 0.0:
         raise ArgumentTypeError(f"{text} is refused; give 0 or more")

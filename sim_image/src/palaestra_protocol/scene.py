@@ -1,16 +1,16 @@
-"""What a simulated world looks like, and where its parts are now, as data for a viewer.
+"""The visible shapes of a simulated world and their poses, as data for a viewer.
 
-A `VisibleScene` has everything that stays: the parts of the world and their visible shapes. A `SceneState`
-has what a step changes. Both are plain JSON, so the simulator that writes them, the sidecar that passes them
-on, and the viewer or report that reads them need nothing in common but this module.
+A `VisibleScene` has the constant data: the nodes of the world and their visible shapes. A `SceneState` has
+the data that a step changes. Both are plain JSON. A simulator writes them, a sidecar forwards them, and a
+viewer or a report reads them; these programs share only this module.
 
-Lengths are in meters, angles in radians, times in seconds of the simulation. The frame of the world has its
-z axis up, also for a world file with y up. A pose is a tuple of seven numbers: x, y, z, and the unit
-quaternion w, x, y, z. The poses of all nodes are in the frame of the world, never in that of their parent; a
-shape's pose is in the frame of its node.
+Lengths are in meters, angles in radians, times in seconds of the simulation. The z axis of the world's frame
+points up, even if y points up in the world file. A pose is a tuple of seven numbers: x, y, z, and the unit
+quaternion w, x, y, z. A node's pose is in the frame of the world, not in the frame of its parent. A shape's
+pose is in the frame of its node.
 
-Readers accept a bounded number of nodes, shapes and points. A writer replaces a mesh that would exceed the
-bound by its box, and counts it in `simplified`.
+Readers accept a bounded number of nodes, shapes and points. If a mesh would exceed the bound, the writer
+replaces it by its bounding box and counts it in `simplified`.
 """
 
 from __future__ import annotations
@@ -31,22 +31,22 @@ MOST_STATE_BYTES: Final = 2**18
 MOST_NODES: Final = 1024
 MOST_SHAPES: Final = 8192
 MOST_MESHES: Final = 1024
-MOST_POINTS: Final = 2**16  # in all meshes together
+MOST_POINTS: Final = 2**16  # total of all meshes
 MOST_TRIANGLES: Final = 2**17
 MOST_JOINTS: Final = 1024
 MOST_TERMS: Final = 64
-LARGEST: Final = 1e9  # limits every number
+LARGEST: Final = 1e9  # largest absolute value of any number
 AT_ORIGIN: Final[PoseNumbers] = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
-WORLD: Final = "world"  # the name of the node that carries everything at rest
-TARGET_M: Final = 0.2  # radius of a target in pictures; the arena's tasks end within it
+WORLD: Final = "world"  # the name of the node that holds all shapes that do not move
+TARGET_M: Final = 0.2  # radius of a drawn target; tasks of the arena end when the robot is within this radius
 _DIGITS: Final = 5  # digits behind the decimal point: hundredths of a millimeter
 
 
 class ShapeKind(StrEnum):
-    """The kinds of visible shapes; all are centered at their pose.
+    """The kinds of visible shapes; each shape is centered at its pose.
 
-    A round shape stands along z. A capsule's height includes both caps. A plane lies in x and y, and its
-    upper side is visible; a size of 0 means that it has no end.
+    The axis of a cylinder or capsule is z. A capsule's height includes both caps. A plane lies in x and y,
+    and its upper side is visible; a size of 0 means that the plane is infinite.
     """
 
     BOX = "box"
@@ -59,13 +59,16 @@ class ShapeKind(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Triangles:
-    """A mesh: points in meters, and triangles of indices, counterclockwise as seen from outside."""
+    """A mesh: points in meters, and triangles.
+
+    A triangle has the indices of three points, counterclockwise as seen from outside.
+    """
 
     points: tuple[Numbers3, ...]
     triangles: tuple[tuple[int, int, int], ...]
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as JSON data: two flat lists."""
+        """Return the mesh as JSON data: two flat lists."""
         return {
             "points": [_short(number) for point in self.points for number in point],
             "triangles": [corner for three in self.triangles for corner in three],
@@ -76,7 +79,7 @@ class Triangles:
         """Return the object that `to_json` wrote.
 
         Raises:
-            ProtocolError: `content` is anything else, or a triangle has a corner that is not a point.
+            ProtocolError: `content` is anything else, or a triangle has the index of a missing point.
         """
         fields = Fields(content, path)
         flat = _numbers(fields, "points", 3 * MOST_POINTS)
@@ -96,11 +99,12 @@ class VisualShape:
     """One visible shape.
 
     Attributes:
-        kind: see ShapeKind.
-        size: x, y, z in meters; for round shapes 2 r, 2 r, height. A mesh is scaled by it.
-        pose: in the frame of the node.
-        color: of the whole shape.
-        mesh: for the kind MESH, the index in `VisibleScene.meshes`; else None.
+        kind: the kind of shape.
+        size: the extent along x, y and z in meters; for round shapes: diameter, diameter, height. For a mesh,
+            the factors by which its points are multiplied.
+        pose: the pose in the frame of the node.
+        color: the color of the whole shape.
+        mesh: for the kind MESH, the index of the mesh in `VisibleScene.meshes`; otherwise None.
     """
 
     kind: ShapeKind
@@ -110,7 +114,7 @@ class VisualShape:
     mesh: int | None = None
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as JSON data."""
+        """Return the shape as JSON data."""
         content: dict[str, Any] = {
             "kind": self.kind.value,
             "size": _list(self.size),
@@ -139,15 +143,15 @@ class VisualShape:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VisibleNode:
-    """A part of the world that moves as one: the frame of its shapes.
+    """A rigid part of the world, and the frame of its shapes.
 
     Attributes:
         name: unique in the scene.
-        parent: the name of the node around it; "" for a node at the top.
-        pose: in the frame of the world, when the scene was read.
-        moves: whether a state has its pose; a node that does not move keeps this one.
-        robot: whether it is a robot itself, not a part of one.
-        shapes: its visible shapes.
+        parent: the name of the parent node; "" for a node without parent.
+        pose: the pose in the frame of the world at the time when the scene was read.
+        moves: whether each `SceneState` has the node's current pose; otherwise `pose` stays valid.
+        robot: whether the node is a whole robot, not a part of a robot.
+        shapes: the visible shapes of the node.
     """
 
     name: str
@@ -158,7 +162,7 @@ class VisibleNode:
     shapes: tuple[VisualShape, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as JSON data."""
+        """Return the node as JSON data."""
         return {
             "name": clipped(self.name, MOST_NAME),
             "parent": clipped(self.parent, MOST_NAME),
@@ -188,16 +192,17 @@ class VisibleNode:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VisibleScene:
-    """The parts of one world and their looks.
+    """The nodes of one world and their visible shapes.
 
     Attributes:
         world: the name of the world, for people.
-        revision: changes when the looks or the parts of the world change; a state with another revision needs
-            another scene.
-        nodes: at most MOST_NODES, a parent before its children.
-        meshes: shared by the shapes.
+        revision: a number that changes when shapes, colors or nodes change. If a state has another revision,
+            the viewer needs a new scene.
+        nodes: at most MOST_NODES nodes; a parent comes before its children.
+        meshes: the meshes; several shapes may use the same mesh.
         sky: red, green and blue of the background, from 0 to 1.
-        simplified: the number of shapes that were too large, and were replaced by their box or left out.
+        simplified: the number of shapes that were too large; each was replaced by its bounding box, or left
+            out.
     """
 
     world: str
@@ -208,7 +213,7 @@ class VisibleScene:
     simplified: int = 0
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as JSON data."""
+        """Return the scene as JSON data."""
         return {
             "world": clipped(self.world, MOST_TEXT),
             "revision": self.revision,
@@ -238,7 +243,7 @@ class VisibleScene:
         return scene
 
     def _require_whole(self, path: str) -> None:
-        """Raise ProtocolError if the parts do not fit together, or are too many together."""
+        """Raise ProtocolError if names repeat, a mesh is missing, or there are too many shapes or points."""
         names = [node.name for node in self.nodes]
         shapes = [shape for node in self.nodes for shape in node.shapes]
         if len(set(names)) != len(names):
@@ -251,13 +256,13 @@ class VisibleScene:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TargetMarker:
-    """Where a robot shall go: a position in the frame of the world, and the radius of its mark."""
+    """The target position of a robot, in the frame of the world, and the radius of the drawn marker."""
 
     position: Numbers3
     radius_m: float = TARGET_M
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as JSON data."""
+        """Return the target as JSON data."""
         return {"position": _list(self.position), "radius_m": _short(self.radius_m)}
 
     @classmethod
@@ -278,16 +283,16 @@ class TargetMarker:
 class SceneState:
     """The state of a world after one step.
 
-    A simulator fills `time_s`, `revision`, `poses` and `joints`; a trainer adds the rest.
+    A simulator sets `time_s`, `revision`, `poses` and `joints`; a trainer sets the other fields.
 
     Attributes:
         time_s: simulated time since the last reset.
-        revision: of the scene to which the poses belong.
-        poses: of the nodes that move, by name, in the frame of the world.
-        joints: positions of motors and sensors of joints, in rad or m, by device name.
-        target: where the robot shall go; None if that is not known.
-        episode: the number of the episode, counted from 1; None if that is not known.
-        step: the number of the step in the episode; None if that is not known.
+        revision: the revision of the scene to which the poses belong.
+        poses: the poses of the nodes that move, by node name, in the frame of the world.
+        joints: the positions of motors and position sensors, in rad or m, by device name.
+        target: the target position of the robot; None if unknown.
+        episode: the number of the episode, counted from 1; None if unknown.
+        step: the number of the step in the episode; None if unknown.
         rewards: the newest value of each term of the reward, by name.
     """
 
@@ -301,7 +306,7 @@ class SceneState:
     rewards: Mapping[str, float] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as JSON data."""
+        """Return the state as JSON data."""
         return {
             "time_s": _short(self.time_s),
             "revision": self.revision,
@@ -335,7 +340,7 @@ class SceneState:
 
 
 def _short(number: float) -> float:
-    """Return a number with few digits; 0 for one that JSON cannot express."""
+    """Return a number rounded to `_DIGITS`; 0 for infinities and NaN, because JSON has no text for them."""
     return round(known(number) or 0.0, _DIGITS)
 
 
@@ -344,7 +349,7 @@ def _list(numbers: tuple[float, ...]) -> list[float]:
 
 
 def _known(values: Mapping[str, float]) -> dict[str, float]:
-    """Return the values that are finite, by their bounded names."""
+    """Return the finite values; names that are too long are cut."""
     return {
         clipped(name, MOST_NAME): _short(value) for name, value in values.items() if known(value) is not None
     }
@@ -365,7 +370,7 @@ def _numbers(fields: Fields, name: str, most: int) -> tuple[float, ...]:
 def _exactly(
     fields: Fields, name: str, count: int, least: float = -LARGEST, most: float = LARGEST
 ) -> tuple[float, ...]:
-    """Return exactly `count` numbers within bounds."""
+    """Return `count` numbers from `least` to `most`; any other list raises ProtocolError."""
     found = _numbers(fields, name, count)
     if len(found) != count or not all(least <= number <= most for number in found):
         raise fields.error(name, f"is not {count} numbers from {least:g} to {most:g}")
@@ -377,7 +382,7 @@ def _pose(fields: Fields, name: str) -> PoseNumbers:
 
 
 def _names(content: object, name: str, most: int) -> tuple[str, ...]:
-    """Return the names in an object that `Fields` has accepted."""
+    """Return the keys of the object in the field `name` of `content`, which `Fields` has accepted."""
     found = tuple(cast("Mapping[str, Mapping[str, object]]", content)[name])
     if len(found) > most or any(len(one) > MOST_NAME for one in found):
         raise ProtocolError(f"{name}: has more than {most} names, or one is longer than {MOST_NAME}")

@@ -1,13 +1,14 @@
-"""A user's modules, and the modules of Python and of Palaestra's dependencies that they shadow.
+"""Find modules of a user that shadow modules of Python or of Palaestra's dependencies.
 
-PYTHONPATH and the folder of a script come before the standard library. If they hold a `queue.py`, all
-libraries import it in place of Python's own, and fail with a traceback that does not name the file.
+Python searches the folders of PYTHONPATH and the folder of a script before the standard library. If such a
+folder holds a `queue.py`, all libraries import that file instead of Python's `queue`. They then fail with a
+traceback that does not name the file.
 
-Programs that run no code of the user import from such folders last. Other programs exit with an error: the
-user's code may need its own `queue`, while the libraries need Python's.
+A program that runs no code of the user moves these folders to the end of the search path. Any other program
+exits with an error, because the user's code may need its own `queue` while the libraries need Python's.
 
-This module runs before the shadowed modules are known. Until it is clear that no module of the standard
-library is shadowed, it imports only built-in and frozen modules.
+This module must not import a shadowed module itself. So it imports only built-in and frozen modules until it
+has checked the standard library.
 """
 
 import os
@@ -20,7 +21,8 @@ _WITH_CODE_OF_USERS = (
 )
 _WRONG_INPUT = 2
 _OURS = ("palaestra", "palaestra-sim", "palaestra-trainer")
-# Modules that no metadata names: ours in a checkout, the distribution's, and webots_ros, which we generate.
+# Modules that are not in the metadata of an installed package: our own in a checkout, those of Debian's
+# packages, and webots_ros, which we generate.
 _UNNAMED = (
     *("palaestra", "palaestra_protocol", "palaestra_sim", "palaestra_trainer"),
     *("rospy", "rosgraph", "rosmaster", "roslib", "rospkg", "genpy", "genmsg", "catkin_pkg", "webots_ros"),
@@ -29,11 +31,11 @@ _UNNAMED = (
 
 
 def settle_imports() -> None:
-    """Make imports in this process find the right modules; our packages call this before other imports.
+    """Make sure that imports in this process find the right modules; our packages call this first.
 
     Raises:
-        ImportError: a module of the user shadows another one.
-        SystemExit: the same, in a program of ours; it has printed the reason.
+        ImportError: a module of the user shadows a module that Palaestra needs.
+        SystemExit: the same in a program of Palaestra, after the reason was printed.
     """
     program = _program()
     if _is_ours(program) and program not in _WITH_CODE_OF_USERS:
@@ -51,13 +53,13 @@ def settle_imports() -> None:
 
 
 def shadows(python_path: str) -> list[str]:
-    """Return a line for each module that this PYTHONPATH shadows in a new process, with the remedy."""
+    """Return a line for each module that `python_path` would shadow in a new process, with the remedy."""
     folders = [os.path.abspath(folder) for folder in python_path.split(os.pathsep)] if python_path else []
     return [reason for _, reason in _shadows(folders, _others([*folders, *_ahead()]))]
 
 
 def _program() -> str:
-    """Return the name of the program that this process runs, or of the module that `python -m` runs."""
+    """Return the name of this process's program; for `python -m`, the name of the module."""
     if sys.argv[:1] == ["-m"] and "-m" in sys.orig_argv:
         return sys.orig_argv[sys.orig_argv.index("-m") + 1]
     return os.path.basename(sys.argv[0]) if sys.argv else ""
@@ -85,11 +87,14 @@ def _import_last(folders: list[str]) -> None:
         if name in sys.modules and getattr(sys.modules[name], "__file__", None) == file:
             _forget(name)
         if name in sys.stdlib_module_names and _spec(name, others) is None:
-            vars(sys)["modules"][name] = None  # this system lacks the module, so its import must fail
+            vars(sys)["modules"][name] = None  # this system lacks the module, so make its import fail
 
 
 def _forget(name: str) -> None:
-    """Unload a module and the standard library modules that reference it; the next import reloads them."""
+    """Unload a module, and each module of the standard library that references it.
+
+    The next import loads them again.
+    """
     module = sys.modules.pop(name)
     library = os.path.dirname(os.__file__)
     for other, holder in list(sys.modules.items()):
@@ -107,14 +112,14 @@ def _others(folders: list[str]) -> list[str]:
 
 
 def _shadows(folders: list[str], others: list[str]) -> list[tuple[str, str]]:
-    """Return the name of each shadowed module, and a line with file, fact and remedy."""
+    """Return the name of each shadowed module, and a message with file, fact and remedy."""
     found = [each for folder in folders for each in _hidden(folder, others)]
     library = [
         (name, f"{file}: shadows the module {name} of Python's standard library; rename it")
         for name, file, _ in found
         if name in sys.stdlib_module_names
     ]
-    # `_is_needed` imports much of the standard library, so it must not run before the library is checked.
+    # `_is_needed` imports many modules of the standard library. So it runs only if none of them is shadowed.
     return library or [
         (name, f"{file}: shadows the module {name}, which Palaestra needs; rename it")
         for name, file, folder in found
@@ -123,24 +128,25 @@ def _shadows(folders: list[str], others: list[str]) -> list[tuple[str, str]]:
 
 
 def _hidden(folder: str, others: list[str]) -> list[tuple[str, str, str]]:
-    """Return name, file and folder of each module in a folder that shadows a module of the others."""
+    """Return name, file and folder of each module in `folder` that shadows a module in `others`."""
     try:
         names = {file.partition(".")[0] for file in os.listdir(folder or os.curdir)}
-    except OSError:  # Python ignores it too
+    except OSError:  # Python also ignores a folder that it cannot read
         return []
     found = []
     for name in sorted(filter(str.isidentifier, names)):
         mine, other = _spec(name, [folder]), _spec(name, others)
         if not (mine and mine.origin):  # a folder without `__init__.py` does not shadow a module
             continue
-        # The library tries to import some modules that a system lacks, such as msvcrt, to recognize it.
+        # Some modules of the standard library, such as msvcrt, exist only on other systems. The library tries
+        # to import them to recognize the system. So a user's module with such a name shadows too.
         if name in sys.stdlib_module_names if other is None else not _same(mine.origin, other.origin):
             found.append((name, mine.origin, folder))
     return found
 
 
 def _spec(name: str, folders: list[str]) -> ModuleSpec | None:
-    """Return the import spec of a module in these folders; None also for a module built into Python."""
+    """Return the import spec of a module in these folders; None if absent, or built into Python."""
     if BuiltinImporter.find_spec(name) or FrozenImporter.find_spec(name):
         return None
     return PathFinder.find_spec(name, folders)
@@ -151,19 +157,19 @@ def _same(file: str, other: str | None) -> bool:
 
 
 def _loaded(name: str, folders: list[str]) -> bool:
-    """Return whether this process has already imported a module from another folder than these."""
+    """Return whether this process has already imported the module from a folder outside `folders`."""
     origin = getattr(getattr(sys.modules.get(name), "__spec__", None), "origin", None)
     mine = _spec(name, folders)
     return origin is not None and mine is not None and origin != mine.origin
 
 
 def _holds_installed(folder: str) -> bool:
-    """Return whether a folder holds installed packages; their versions were chosen on purpose."""
+    """Return whether a folder holds installed packages; a user chose their versions on purpose."""
     return any(name.endswith((".dist-info", ".egg-info")) for name in os.listdir(folder or os.curdir))
 
 
 def _is_needed(name: str, folders: list[str]) -> bool:
-    """Return whether a module belongs to a package that ours need, directly or indirectly."""
+    """Return whether a module belongs to a package that Palaestra needs, directly or indirectly."""
     from importlib.metadata import distributions
 
     installed = {_normal(each.name): each for each in distributions(path=folders)}

@@ -1,4 +1,7 @@
-"""Select the signals that a program handles, and let them set an event; the same rules for every program."""
+"""Select the signals that a program handles, and set an event when such a signal arrives.
+
+All programs of Palaestra use these rules.
+"""
 
 import os
 import signal
@@ -7,10 +10,10 @@ from collections.abc import Collection, Iterable
 
 
 def obeyed(numbers: Iterable[signal.Signals]) -> list[signal.Signals]:
-    """Return the signals that may get a handler: SIGTERM, and those that are not ignored.
+    """Return the signals that may get a handler: SIGTERM, and each signal that the process does not ignore.
 
-    A signal that was ignored when the program started stays ignored. Examples are SIGINT for a background
-    command of a script, and SIGHUP under nohup.
+    If a signal was ignored when the program started, it must stay ignored. Examples are SIGINT for a
+    background command of a script, and SIGHUP under nohup.
     """
     return [
         number
@@ -20,10 +23,11 @@ def obeyed(numbers: Iterable[signal.Signals]) -> list[signal.Signals]:
 
 
 def set_at_signals(event: threading.Event, numbers: Collection[signal.Signals]) -> None:
-    """From now on, set `event` at each of these signals; call it in the main thread, once.
+    """From now on, set `event` when one of these signals arrives; call this once, in the main thread.
 
-    A thread sets the event. Python runs handlers in the main thread. A handler that set the event would wait
-    for the event's lock forever if the signal arrived just when the main thread begins to wait for the event.
+    A separate thread sets the event, because Python runs signal handlers in the main thread. The main thread
+    holds the event's lock while it begins to wait for the event. A handler that set the event at that moment
+    would wait for the same lock forever.
     """
     read, write = os.pipe()
     os.set_blocking(write, False)

@@ -1,6 +1,7 @@
-"""A TCP server with a limited number of connections, each in its own thread: the base of all our servers.
+"""A TCP server with a limited number of connections, each in its own thread; the base class of our servers.
 
-A subclass has a handler that reads a request. While it processes one, it marks its connection in `slots`.
+A subclass supplies the handler that reads requests. While the handler processes a request, it marks its
+connection as busy in `slots`, so that the connection is not closed for a newer one.
 """
 
 import logging
@@ -16,16 +17,16 @@ log = logging.getLogger(__name__)
 
 
 class TcpServer(socketserver.ThreadingTCPServer):
-    """A server on one port, which is bound at once; it responds from `start` until `close`.
+    """A server on one port; the constructor binds the port, and requests are served from `start` to `close`.
 
     Attributes:
         poll_s: maximum duration of `close`.
 
     Args:
-        address: host and port on which it listens; port 0 stands for any free port.
-        handler: serves one connection.
-        name: for its thread and its log.
-        slots: the slots of its connections.
+        address: host and port on which the server listens; port 0 means that the system chooses a free port.
+        handler: the class that serves one connection.
+        name: the name of the server in its log and of its thread.
+        slots: the slots of the server's connections.
 
     Raises:
         OSError: the address is in use, or does not belong to this machine.
@@ -56,7 +57,7 @@ class TcpServer(socketserver.ThreadingTCPServer):
         self._thread.start()
 
     def close(self) -> None:
-        """Accept no more connections and free the address."""
+        """Stop accepting connections, and free the address."""
         if self._thread is not None:
             self.shutdown()
             self._thread.join()
@@ -77,13 +78,13 @@ class TcpServer(socketserver.ThreadingTCPServer):
         self.close()
 
     def process_request(self, request: Any, client_address: Any) -> None:
-        """Start a thread for a connection, or close the connection if no slot is available for it."""
+        """Start a thread for a connection; if no slot is available, close the connection."""
         if not self.slots.take(request, client_address[0]):
             self.shutdown_request(request)
             return
         try:
             super().process_request(request, client_address)
-        except RuntimeError:  # the system refuses another thread
+        except RuntimeError:  # the system cannot start another thread
             self.slots.leave(request)
             raise
 
@@ -95,7 +96,7 @@ class TcpServer(socketserver.ThreadingTCPServer):
             self.slots.leave(request)
 
     def handle_error(self, request: Any, client_address: Any) -> None:  # noqa: ARG002 - socketserver's
-        """Log an error of this program; a client that disconnects is not logged."""
+        """Log an error of this program; the disconnection of a client is not logged."""
         error = sys.exception()
         if not isinstance(error, OSError):
             log.error("%s: a request failed: %r", self.name, error)

@@ -1,4 +1,4 @@
-"""The programs of a simulator's container: worlds, the sidecar, the stub and MuJoCo simulators."""
+"""The programs of a simulator's container: the sidecar, the stub, the MuJoCo simulator, and worlds."""
 
 from palaestra_protocol.shadowing import settle_imports
 

@@ -44,29 +44,30 @@ _WRONG_WORLD = 2
 _NO_MASTER = 1
 
 _EPILOG = """\
-Reads the world, and ROS_MASTER_URI and ROS_HOSTNAME as every ROS node does. If
-PALAESTRA_SIMULATOR_LEFT_OUT is set, as by a sidecar, writes the nodes that it leaves out into that file. If
-PALAESTRA_SIMULATOR_VIEW is set, describes its world on this Unix socket, at the request of a viewer.
+The program reads the world, and like every ROS node the variables ROS_MASTER_URI and ROS_HOSTNAME. A sidecar
+may set two more variables. PALAESTRA_SIMULATOR_LEFT_OUT names a file; the program writes to it which nodes it
+leaves out. PALAESTRA_SIMULATOR_VIEW names a Unix socket; on it the program describes its world to viewers.
 
-faults: such as crash:step=2000, or lost:topic=ir1/value,probability=0.01; docs/reference/faults.md has them.
-PALAESTRA_STUB_FAULTS holds faults with spaces between, PALAESTRA_STUB_FAULT_SEED the value of --fault-seed,
-PALAESTRA_SIMULATOR_START the value of --fault-life.
+faults: for example crash:step=2000, or lost:topic=ir1/value,probability=0.01. docs/reference/faults.md lists
+all faults. PALAESTRA_STUB_FAULTS may hold several faults with spaces between them. Instead of --fault-seed
+you can set PALAESTRA_STUB_FAULT_SEED, instead of --fault-life PALAESTRA_SIMULATOR_START.
 
-exit codes: 0 after SIGTERM; the status of `simulation_quit`; 1 the ROS master does not respond, or no longer;
-2 the world or the options cannot be used; the code that a fault names
+exit codes: 0 after SIGTERM; the status of `simulation_quit`; the code that a fault names;
+1 the ROS master does not respond, or has stopped responding; 2 the world or the options cannot be used
 """
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Program:
-    """One simulator.
+    """The program of one simulator.
 
     Attributes:
         name: the name of the program.
-        description: for its help.
-        physics: returns the physics of a world that is about to be read.
-        mjcf: returns the simulation of an MJCF world. Its files are in the given folder or, with None, in the
-            nearest folder that holds them all. None if the program does not simulate MJCF.
+        description: the description in the program's help.
+        physics: returns a new physics object for a world that is about to be loaded.
+        mjcf: returns the simulation of an MJCF world; None if the program does not simulate MJCF. Its last
+            argument is the folder that holds all files of the world. For None, the simulation uses the
+            nearest folder that holds all of them.
     """
 
     name: str
@@ -81,7 +82,7 @@ class Program:
         try:
             return self._check(options) if options.check else self._simulate(options)
         except WorldRefusedError as error:
-            # A sidecar reports only the last line.
+            # A sidecar reports only the last line of the output, so the summary comes last.
             sys.stderr.write(f"{error}\n{self.name}: {error.summary}\n")
         except SimError as error:
             sys.stderr.write(f"{self.name}: {error}\n")
@@ -96,10 +97,10 @@ class Program:
         return _WRONG_WORLD
 
     def _check(self, options: argparse.Namespace) -> int:
-        """Print the summary of the world; return 0 if it can be started with these options.
+        """Print the summary of the world; return 0 if the world can be started with these options.
 
-        Without --leave-out, all nodes that the simulator does not support are left out, so that all are
-        listed.
+        Without --leave-out, this check leaves out every node that the simulator does not support, so that the
+        summary can list all of them.
         """
         chosen = _leave_out(options.leave_out) if options.leave_out else LeaveOut(everything=True)
         load = self._loader(options, replace(chosen, names=True))
@@ -126,7 +127,7 @@ class Program:
 
 
 class _Process:
-    """The event loop, its ROS nodes, and the simulator that connects them."""
+    """The process of a simulator: its event loop, its ROS nodes, and the simulation that they serve."""
 
     def __init__(self, options: argparse.Namespace, load: Load) -> None:
         self._ordered = faults.read_options(options, os.environ)
@@ -150,7 +151,7 @@ class _Process:
         self._simulator.on_quit(self.end)
 
     def run(self) -> int:
-        """Serve until the end; return the exit code."""
+        """Run the simulator until it has to end; return the exit code."""
         self._loop.wake_on_signals()
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, lambda *_: self._loop.post(lambda: self.end(0)))
@@ -167,7 +168,7 @@ class _Process:
         return self._exit_code
 
     def end(self, status: int) -> None:
-        """Let `run` return that exit code after everything is closed in order."""
+        """Make `run` close everything and return `status`."""
         self._exit_code = status
         self._loop.stop()
 
@@ -185,7 +186,7 @@ class _Process:
             self._nodes[name].unregister()
 
     def _start(self) -> None:
-        # Before the rest, because a sidecar reads the file when the simulator is ready.
+        # The report comes first, because a sidecar reads the file as soon as the simulator is ready.
         self._report_left_out()
         self._simulator.start()
         silent = silent_devices(self._simulator.simulation.robots)
@@ -197,7 +198,7 @@ class _Process:
         self._loop.later(_CHECK_MASTER_S, self._check_master)
 
     def _viewing(self) -> LocalSocket | None:
-        """Return the socket for viewers; None if nobody wants one, or it cannot be made."""
+        """Return the socket for viewers; None if the environment names no socket, or it cannot be created."""
         path = os.environ.get(VIEW_SOCKET)
         if path is None:
             return None
@@ -215,7 +216,7 @@ class _Process:
             write_left_out(left_out, Path(file))
 
     def _start_as_ordered(self, fault_state: faults.FaultState) -> None:
-        """Start with the faults of a fault state: late, or not at all."""
+        """Start with injected faults, which may delay the start or prevent it."""
         log.info("faults: %s", self._ordered)
         refused, delay_s = fault_state.start()
         if refused is None:
@@ -225,7 +226,7 @@ class _Process:
             self._loop.later(0.0, lambda: self.end(refused.code))
 
     def _node_maker(self) -> Callable[[str], RosNode]:
-        """Return the function that makes the node of a name: a plain node, unless faults are given."""
+        """Return the function that makes a ROS node: a `RosNode`, or a `FaultyNode` if there are faults."""
         if self._course is None:
             return partial(RosNode, self._loop, master_uri=self._master_uri)
         failing = faults.Failing(course=self._course, effects=faults.ProcessFaults(self))
@@ -238,14 +239,18 @@ class _Process:
         return node
 
     def _lose(self, name: str, reason: str) -> None:
-        """End one controller whose node was shut down; the simulation continues without it."""
+        """Close the controller whose ROS node was shut down; the simulation continues without it."""
         log.warning("the node %s was shut down (%s); its robot no longer has a controller", name, reason)
         controller = self._simulator.controllers.pop(name, None)
         if controller is not None:
             controller.close()
 
     def _check_master(self) -> None:
-        """Exit if the master is gone, because it has lost the names; Webots' controller exits too."""
+        """Exit if the ROS master does not respond.
+
+        A restarted master does not know this simulator's names, so clients could not find the simulator.
+        Webots' controller exits in this case too.
+        """
         for name in self._simulator.controllers:
             try:
                 self._nodes[name].check_master()
@@ -298,11 +303,11 @@ def _parser(program: Program) -> argparse.ArgumentParser:
 
 
 def _stand_ins(files: Sequence[Path]) -> Mapping[str, StandIn]:
-    """Return the entries of these files; of two entries with one name, the last counts.
+    """Return the stand-ins in these files by name; a later entry replaces an earlier one of that name.
 
     Raises:
         StandInError: a file is not a valid table of stand-ins.
-        OSError: it cannot be read.
+        OSError: a file cannot be read.
     """
     table: dict[str, StandIn] = {}
     for file in files:

@@ -1,6 +1,6 @@
-"""The ROS node that a controller needs, as a Protocol, and services that do not yet belong to a node.
+"""The interface of the ROS node that a controller needs, and the form in which modules declare services.
 
-The wire protocol is in `ros`; nothing here needs a socket.
+The package `ros` implements the interface with sockets. This module uses no socket.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from palaestra_sim.errors import SimError
 
 Fields = Mapping[str, Any]
 Handler = Callable[[Any], Any]
-Row = tuple[str, str, Handler]  # a row of the services: last part of the path, type without package, handler
+Row = tuple[str, str, Handler]  # a declared service: last part of the path, type without package, handler
 
 
 class UnsimulatedError(SimError, NotImplementedError):
@@ -30,26 +30,26 @@ class Service(NamedTuple):
 
 
 class PublisherInterface(Protocol):
-    """Sends to the subscribers that are connected at that moment."""
+    """Sends messages of one topic to the subscribers that are connected at that moment."""
 
     @property
     def heard(self) -> bool:
-        """Whether there is a subscriber."""
+        """Whether the topic has a subscriber."""
         ...
 
     def send(self, fields: Fields) -> None:
-        """Send a message of these fields."""
+        """Send a message with these fields."""
         ...
 
     def send_value(self, value: Any) -> None:
-        """Send a message stamped with the wall clock: the template, and `value` in its last field.
+        """Send the template with `value` in its last field; the wall clock is the time stamp.
 
-        If the field has several numbers, `value` is a tuple of them.
+        If the last field has several numbers, `value` is a tuple of them.
         """
         ...
 
     def send_stamped(self, fields: Fields) -> None:
-        """Send a message stamped with the wall clock, of these fields over the template's."""
+        """Send the template with `fields` in place of its own; the wall clock is the time stamp."""
         ...
 
 
@@ -59,7 +59,7 @@ class NodeInterface(Protocol):
     Attributes:
         name: the name of the node.
         blocked: returns whether requests have to wait; called before each request.
-        current_call: identifies the request in progress, for `answer`.
+        current_call: the request in progress; a handler that returns LATER passes it to `answer`.
     """
 
     name: str
@@ -67,11 +67,11 @@ class NodeInterface(Protocol):
     current_call: object | None
 
     def serve(self, path: str, type_name: str, handler: Handler) -> None:
-        """Serve a service; `handler` returns the response to a request, or LATER to send it later."""
+        """Serve a service; `handler` returns the response to a request, or LATER if it will call `answer`."""
         ...
 
     def together(self) -> AbstractContextManager[None]:
-        """Register the services and topics of a block together at its end, in their order."""
+        """Register all services and topics of a `with` block at its end, in their order."""
         ...
 
     def advertise(
@@ -83,11 +83,19 @@ class NodeInterface(Protocol):
         template: Fields | None = None,
         reading: str = "",
     ) -> PublisherInterface:
-        """Return a publisher of a topic, relative or with a leading slash; `reading` is the value's field."""
+        """Return a publisher of a topic.
+
+        Args:
+            path: relative to the node's name, or global with a leading slash.
+            type_name: the message type.
+            latched: whether a late subscriber gets the last message.
+            template: the constant fields of the messages.
+            reading: the name of the field with the value; "" means the last field.
+        """
         ...
 
     def withdraw(self, publisher: Any) -> None:
-        """Withdraw a publisher: its topic ends."""
+        """Remove a publisher; a topic without publishers ends."""
         ...
 
     def answer(self, call: Any, fields: Fields) -> None:
@@ -95,28 +103,28 @@ class NodeInterface(Protocol):
         ...
 
     def later(self, delay_s: float, callback: Callable[[], None]) -> None:
-        """Call back after a delay; 0 means after the response of the current call was sent."""
+        """Call `callback` after a delay; 0 means right after the response to the current call."""
         ...
 
     def close(self) -> None:
-        """Unregister and close everything."""
+        """Unregister all services and topics, and close all sockets."""
         ...
 
 
 def topic_name(name: str) -> str:
-    """Return a name in the form that the controller uses in paths: five characters become underscores."""
+    """Return a device's name as the controller writes it in paths: `-`, `.`, space, `(`, `)` become `_`."""
     return name.translate(_REPLACED)
 
 
 def as_ros_name(name: str) -> str:
-    """Return a name in which each character that `is_ros_name` refuses is an underscore."""
+    """Return `name` with an underscore in place of each character that `is_ros_name` refuses."""
     return "/".join(_ILLEGAL.sub("_", part) for part in name.split("/") if part) or "_"
 
 
 def is_ros_name(name: str) -> bool:
-    """Return whether ROS accepts a name as a part of paths, in the form that the controller gives it.
+    """Return whether ROS accepts `topic_name(name)` as a part of a path.
 
-    Webots' controller exits at a name that ROS refuses.
+    Webots' controller exits if a device has a name that ROS refuses.
     """
     return _LEGAL.fullmatch(topic_name(name)) is not None
 

@@ -1,4 +1,4 @@
-"""Write a file atomically: at each moment, and after a kill, it has its old or its new content."""
+"""Write a file atomically: a reader sees the old or the new content, even if the writer is killed."""
 
 from __future__ import annotations
 
@@ -7,12 +7,13 @@ from pathlib import Path
 
 
 def write_whole(path: Path, content: bytes) -> None:
-    """Create or replace `path`, whose folder exists.
+    """Create or replace the file `path`; its folder must exist.
 
-    The write does not wait for the disk, because a simulator's files are written again after a crash.
+    The function does not wait until the content is on the disk, because a simulator's files are written again
+    after a crash of the machine.
 
     Raises:
-        OSError: it cannot be written; no partial file is left.
+        OSError: the file cannot be written; no partial file is left.
     """
     unfinished = path.with_name(f".{path.name}.{os.getpid()}")
     try:

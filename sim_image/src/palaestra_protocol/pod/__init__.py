@@ -1,5 +1,5 @@
 """The reports of a trainer that the operator reads.
 
-- `status`: `/status` while the trainer runs, and the termination message at its end
-- `enums`: the enumerations of both: exit codes, kinds of faults, causes of time, roles
+- `status`: `/status` while the trainer runs, and the termination message after it has ended
+- `enums`: exit codes, kinds of faults, uses of time, roles
 """

@@ -1,17 +1,20 @@
-"""The enumerations that trainer and operator share: exit codes, kinds of faults, causes of time, roles."""
+"""The enumerations that trainer and operator share: exit codes, kinds of faults, uses of time, roles."""
 
 from enum import IntEnum, StrEnum
 
-# Reason of the failure if a trainer exits with 0 but its training is not complete.
+# The failure reason for a trainer that exits with code 0 before its training is complete.
 SILENT = "the trainer ended with exit code 0, and did not report that it was complete"
 
 
 class ExitCode(IntEnum):
-    """The exit codes of a trainer; after any other code a retry may help.
+    """The exit codes of a trainer; after a code that is not listed here, a retry may help.
 
-    DONE: the run has ended. CONFIGURATION: it is wrong; do not retry. INTERRUPTED: a signal ended it after a
-    checkpoint. FAULT_BUDGET: a simulator failed too often; do not retry. DIVERGED: the learner diverged; do
-    not retry. STALLED: no environment step for too long; retry.
+    - DONE: the run is complete.
+    - CONFIGURATION: the configuration is wrong; do not retry.
+    - INTERRUPTED: a signal ended the trainer, which saved a checkpoint first.
+    - FAULT_BUDGET: a simulator failed too often; do not retry.
+    - DIVERGED: the learner diverged; do not retry.
+    - STALLED: no environment step completed for too long; retry.
     """
 
     DONE = 0
@@ -23,7 +26,7 @@ class ExitCode(IntEnum):
 
 
 class FaultKind(StrEnum):
-    """The kinds of a simulator's faults; SLOW is only counted, without a restart."""
+    """The kinds of a simulator's faults; the trainer counts SLOW, but does not restart the simulator."""
 
     DEAD = "dead"
     HUNG = "hung"
@@ -32,12 +35,16 @@ class FaultKind(StrEnum):
 
 
 class Cause(StrEnum):
-    """The use of a trainer's time; every second of an attempt has exactly one cause.
+    """The uses of a trainer's time; every second of an attempt belongs to exactly one.
 
-    STEPPING: training waited for a step of the simulators. TRANSPORT: the rest of a step: requests, reading,
-    the environment. LEARNING: the rest of the algorithm. EVALUATING, CHECKPOINTING: as named. STARTING: until
-    the first step. RECOVERING: every simulator was broken, or a resumed run was restored to its last state.
-    RECYCLING: a planned restart of a healthy simulator.
+    - STEPPING: training waited for a step of the simulators.
+    - TRANSPORT: the other parts of a step: requests, reading of messages, the environment.
+    - LEARNING: all other work of the algorithm.
+    - EVALUATING: the trainer evaluated the policy.
+    - CHECKPOINTING: the trainer wrote a checkpoint.
+    - STARTING: the time before the first step.
+    - RECOVERING: every simulator was broken, or the trainer restored the last state of a resumed run.
+    - RECYCLING: a planned restart of a healthy simulator.
     """
 
     STEPPING = "stepping"
@@ -58,7 +65,7 @@ class StandbyState(StrEnum):
 
 
 class Role(StrEnum):
-    """The purpose of a simulator's episodes: to learn from, or to evaluate the policy."""
+    """The purpose of a simulator's episodes: to train the policy, or to evaluate it."""
 
     COLLECT = "Collect"
     EVALUATE = "Evaluate"

@@ -1,7 +1,7 @@
-"""A trainer's reports: `/status` while it runs, and the termination message at its end.
+"""A trainer's reports: `/status` while it runs, and the termination message after it has ended.
 
-The operator reads both from a pod that it does not trust, so readers are strict and bounded. Writers keep the
-same bounds, so that a long error message of a trainer never hides its status.
+The operator does not trust the pod that sends them, so readers check the type and the bounds of each value.
+Writers keep the same bounds. So a long error message of a trainer does not make its status unreadable.
 """
 
 from __future__ import annotations
@@ -48,18 +48,18 @@ __all__ = [
 ]
 
 MOST_SIMULATORS = 32
-MOST_FAULTS = 10  # the newest ones, in a termination message
-MOST_LINES = 10  # the last lines of the trainer's log, in a termination message
-MOST_LINE = 200  # characters of such a log line, and of the fact of such a fault
+MOST_FAULTS = 10  # in a termination message; older faults are dropped
+MOST_LINES = 10  # of the trainer's log, in a termination message; older lines are dropped
+MOST_LINE = 200  # characters of such a log line, and of `FaultRecord.fact`
 MOST_REASON = 2000
-MOST_TERMINATION_BYTES = 4096  # Source: Kubernetes cuts a container's termination message there
+MOST_TERMINATION_BYTES = 4096  # Kubernetes cuts a container's termination message at this length
 
 _LONGEST_ESCAPE = 12  # bytes of one character in JSON: two \uXXXX
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CheckpointStatus(JsonMessage):
-    """The newest checkpoint: its environment step, and when it was written (RFC 3339)."""
+    """The newest checkpoint: its environment step, and the time at which it was written (RFC 3339)."""
 
     step: Annotated[int, Whole()]
     time: Annotated[str, Time()]
@@ -67,12 +67,12 @@ class CheckpointStatus(JsonMessage):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SuccessInterval(JsonMessage):
-    """The 95 % confidence interval of a policy's success rate, from the episodes that were played.
+    """The 95 % confidence interval of a policy's success rate in an evaluation.
 
     Attributes:
-        low: its lower bound, 0 to 1.
-        high: its upper bound, 0 to 1.
-        episodes: how many were played.
+        low: the lower bound, 0 to 1.
+        high: the upper bound, 0 to 1.
+        episodes: the number of episodes in the evaluation.
     """
 
     low: Annotated[float, Number(0.0, 1.0)]
@@ -82,17 +82,17 @@ class SuccessInterval(JsonMessage):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SimulatorStatus(JsonMessage):
-    """One simulator, from its trainer's view.
+    """The status of one simulator, as its trainer reports it.
 
     Attributes:
         name: group and number, such as collect-0.
         role: Collect or Evaluate.
-        state: one of the states of a sidecar.
-        restarts: after faults, in this attempt; planned recycling is not counted.
-        last_fault: in a sentence; None if it had no fault in this attempt.
-        flapping: whether it fails repeatedly.
-        given_up: whether its restart budget is spent, so that the run continues without it.
-        standby: the state of its standby, starting or ready; None if it has no standby.
+        state: a `SidecarState`.
+        restarts: number of restarts after faults in this attempt; planned recycling is not counted.
+        last_fault: the last fault in this attempt, in a sentence; None if there was no fault.
+        flapping: whether the simulator fails repeatedly.
+        given_up: whether the simulator's restart budget is spent, so that the run continues without it.
+        standby: the state of the simulator's standby, starting or ready; None if it has no standby.
     """
 
     name: Annotated[str, Text(MOST_NAME, least=1)]
@@ -110,22 +110,22 @@ class TrainerStatus(JsonMessage):
     """The progress and state of a run.
 
     Attributes:
-        step: valid environment steps learned from, over all attempts.
-        target: steps at which the run ends.
-        episodes: training episodes that ended.
-        mean_return: the mean return of recent training episodes; None if none has ended yet.
-        success_rate: the success rate of the last evaluation or confirmation, 0 to 1; None before the first
-            one, or if the environment does not report success.
-        success_interval: around `success_rate`; None in the same cases.
-        steps_per_second: recently; None if unknown.
-        simulators: one status for each.
-        last_checkpoint: the newest; None if there is no checkpoint yet.
-        last_progress: time of the last environment step (RFC 3339); None before the first one.
-        last_progress_age_s: seconds since then by the trainer's monotonic clock, which does not depend on
-            the wall clock; None before the first step.
+        step: number of valid environment steps that the algorithm learned from, over all attempts.
+        target: number of steps after which the run ends.
+        episodes: number of training episodes that ended.
         phase: the current activity of the trainer, in one word.
+        mean_return: the mean return of recent training episodes; None before the first episode has ended.
+        success_rate: the success rate of the last evaluation or confirmation, 0 to 1; None before the first
+            evaluation, or if the environment does not report success.
+        success_interval: the confidence interval of `success_rate`; None if `success_rate` is None.
+        steps_per_second: the recent speed; None if unknown.
+        simulators: the status of each simulator.
+        last_checkpoint: the newest checkpoint; None if there is no checkpoint yet.
+        last_progress: time of the last environment step (RFC 3339); None before the first step.
+        last_progress_age_s: seconds since the last environment step; None before the first step. The trainer
+            measures them with a monotonic clock, so a change of the wall clock has no effect.
         attempt: number of this attempt in the run directory's record, from 1; None if not recorded yet.
-        faults: how many of each `FaultKind`, over all attempts.
+        faults: number of faults of each `FaultKind`, over all attempts.
         goodput: seconds spent on each `Cause`, over all attempts.
         steps_lost: valid steps that were lost, over all attempts: steps after the checkpoint from which an
             attempt resumed, and steps in a training or evaluation episode that a fault cut short.
@@ -158,11 +158,11 @@ class FaultRecord(JsonMessage):
     """One fault of one simulator, in a termination message.
 
     Attributes:
-        time: when the trainer detected it (RFC 3339).
+        time: the time at which the trainer detected the fault (RFC 3339).
         simulator: group and number, such as collect-0.
         kind: one of `FaultKind`.
-        fact: what happened, in a sentence.
-        step: number of valid environment steps that the run had then.
+        fact: a description of the fault, in a sentence.
+        step: number of valid environment steps of the run at that time.
     """
 
     time: Annotated[str, Time()]
@@ -174,19 +174,21 @@ class FaultRecord(JsonMessage):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Termination(JsonMessage):
-    """A trainer's termination message, which reaches the operator even if no poll came in time.
+    """A trainer's termination message.
+
+    Kubernetes keeps it in the pod's status, so the operator can read it after the trainer has ended.
 
     Attributes:
-        step: valid environment steps learned from.
-        reason: the reason for its end, in a sentence.
+        step: number of valid environment steps that the algorithm learned from.
+        reason: the reason for which the trainer ended, in a sentence.
         success_rate: the success rate of the last evaluation or confirmation, 0 to 1; None without an
             evaluation, or if the environment does not report success.
-        success_interval: around `success_rate`; None in the same cases.
-        last_checkpoint: the newest; None if there is no checkpoint.
+        success_interval: the confidence interval of `success_rate`; None if `success_rate` is None.
+        last_checkpoint: the newest checkpoint; None if there is no checkpoint.
         attempt: number of this attempt in the run directory's record, from 1; None if not recorded.
-        restarts: the restarts of simulators after faults, in this attempt; None if not reported.
-        log: the last lines of the trainer's log, the newest last; at most ten.
-        faults: the last ones of this attempt, the newest last; at most ten.
+        restarts: number of restarts of simulators after faults in this attempt; None if not reported.
+        log: the last lines of the trainer's log, at most ten, the newest last.
+        faults: the last faults of this attempt, at most ten, the newest last.
     """
 
     step: Annotated[int, Whole()]
@@ -202,7 +204,8 @@ class Termination(JsonMessage):
     def to_message(self) -> str:
         """Return the termination message: JSON of at most 4096 bytes.
 
-        To fit, the oldest lines and faults are dropped; after the last of them, the reason is cut.
+        If the message is too long, the oldest log lines and faults are dropped. If it is still too long
+        without them, the reason is cut.
         """
         word = self
         while (excess := _length(word.to_json()) - MOST_TERMINATION_BYTES) > 0:
@@ -223,11 +226,11 @@ class Termination(JsonMessage):
         """Return the object that `to_message` wrote.
 
         Raises:
-            ProtocolError: it is anything else, such as the end of a log, or too long.
+            ProtocolError: `message` is anything else, such as the end of a log, or is too long.
         """
         return cls.from_json(decoded(message.encode("utf-8", "replace"), MOST_TERMINATION_BYTES))
 
 
 def _length(content: object) -> int:
-    """Return the length of `content` in bytes as JSON in ASCII."""
+    """Return the number of bytes of `content` as JSON in ASCII."""
     return len(json.dumps(content))

@@ -1,6 +1,7 @@
 """Encode the values of a ROS message to bytes, and decode them.
 
-A message of fixed size is one precompiled struct; any other is written and read section by section.
+A message of fixed size is packed with one precompiled struct. Any other message is written and read section
+by section.
 """
 
 from __future__ import annotations
@@ -19,9 +20,10 @@ class Codec(Protocol):
     """Encodes the values of one message to bytes, and decodes them."""
 
     def encode(self, fields: Mapping[str, Any]) -> bytes:
-        """Return the bytes of a message; absent fields are zero, empty or False.
+        """Return the bytes of a message; a field that is absent from `fields` is zero, empty or False.
 
-        A nested message is a mapping too, or a tuple of all its fields in order, as `decode` returns.
+        The value of a nested message is a mapping too, or a tuple of all its fields in order. `decode`
+        returns such tuples.
 
         Raises:
             ValueError: a value does not fit its field.
@@ -37,13 +39,13 @@ class Codec(Protocol):
         ...
 
     def decode(self, payload: bytes | memoryview) -> Any:
-        """Return a named tuple of the fields; a name that Python reserves gets an underscore, as `from_`.
+        """Return a named tuple of the fields; if Python reserves a name, an underscore follows it: `from_`.
 
-        An array of numbers is a tuple, or bytes for `uint8` and `char`; an array of other elements is a list.
-        Characters that are not UTF-8 are replaced.
+        An array of numbers is a tuple, or bytes for `uint8` and `char`. Any other array is a list. Bytes of a
+        string that are not UTF-8 are replaced.
 
         Raises:
-            ValueError: the bytes are not such a message.
+            ValueError: `payload` is not a message of this type.
         """
         ...
 
@@ -52,7 +54,7 @@ def codec_of(message: Message, find: Find) -> Codec:
     """Return the codec of a message.
 
     Args:
-        message: its definition.
+        message: the definition of the message.
         find: returns the definition of a nested message by its name.
     """
     if all(has_fixed_size(field, find) for field in message.fields):
@@ -61,7 +63,7 @@ def codec_of(message: Message, find: Find) -> Codec:
 
 
 class _FixedCodec:
-    """A message of fixed size: one precompiled struct."""
+    """The codec of a message of fixed size: one precompiled struct."""
 
     def __init__(self, name: str, record: Record) -> None:
         self._name = name
@@ -93,7 +95,7 @@ class _FixedCodec:
 
 
 class _VariableCodec:
-    """A message with strings or lists."""
+    """The codec of a message with strings or lists."""
 
     def __init__(self, name: str, sections: Sections) -> None:
         self._name = name

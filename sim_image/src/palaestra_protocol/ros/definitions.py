@@ -1,6 +1,6 @@
 """The definitions of the ROS types of the interface, as text and parsed.
 
-The file `definitions.txt` holds them, nested messages included, so no ROS package has to be installed.
+The file `definitions.txt` holds all of them, nested messages included. So no ROS package has to be installed.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from importlib import resources
 
 from palaestra_protocol.ros.syntax import Message, parse
 
-_PARTING = "---"  # between request and response
+_PARTING = "---"  # the separator between the request and the response of a service
 
 
 def type_names() -> tuple[tuple[str, ...], tuple[str, ...]]:

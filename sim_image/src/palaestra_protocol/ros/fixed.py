@@ -1,6 +1,6 @@
-"""Messages of fixed size: their values become a flat sequence of numbers, for one struct.
+"""Messages of fixed size: their values become one flat sequence of numbers, which one struct packs.
 
-Every motor command and every step is such a message, so this codec limits the speed of a simulator.
+Every motor command and every step is such a message, so the speed of this code limits that of a simulator.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class FixedPart(Protocol):
 
     @property
     def codes(self) -> str:
-        """Return the format codes of its numbers, for `struct`."""
+        """Return the format codes of the field's numbers, for `struct`."""
         ...
 
     @property
@@ -55,12 +55,12 @@ class Record:
 
     Attributes:
         names: the names of the fields.
-        parts: one for each field; None if the field is one number.
-        placed: the parts, each with the index of its first number among all.
-        empties: the value of each field if it is absent.
+        parts: the part of each field; None if the field is one number.
+        placed: each part, with the index of its first number in the flat sequence.
+        empties: the value that each field has if it is absent.
         codes: the format codes of all numbers, in order.
         make: makes a named tuple of the values.
-        flat: whether all fields are numbers.
+        flat: whether every field is one number.
     """
 
     names: tuple[str, ...]
@@ -102,7 +102,7 @@ class Record:
         )
 
     def unfit(self, fields: Mapping[str, Any]) -> str:
-        """Return the name of the first field whose value does not fit; each is packed without the others."""
+        """Return the name of the first field whose value does not fit; each field is packed by itself."""
         for name in filter(fields.__contains__, self.names):
             try:
                 struct.pack(f"<{self.codes}", *self.flatten({name: fields[name]}))
@@ -143,7 +143,7 @@ def check_length(value: Sequence[Any], length: int) -> None:
     """Check the number of elements of an array.
 
     Raises:
-        ValueError: it is not `length`.
+        ValueError: the number of elements is not `length`.
     """
     if len(value) != length:
         raise ValueError(f"{len(value)} elements for {length}")
@@ -163,12 +163,12 @@ def maker(message: Message, fields: Sequence[MessageField]) -> Callable[[Iterabl
 
 
 def message_of(type_: str, find: Find) -> Message:
-    """Return the definition of a type that is a message; a time counts as a message."""
+    """Return the definition of a message type; the built-in types of time count as messages."""
     return TIMES.get(type_) or find(type_)
 
 
 def record(message: Message, fields: Sequence[MessageField], find: Find) -> Record:
-    """Return the record of some fields of a message, which all have a fixed size."""
+    """Return the record of `fields`, which all have a fixed size and belong to `message`."""
     parts = tuple(_part(field, find) for field in fields)
     codes = [part.codes if part else NUMBERS[field.type] for field, part in zip(fields, parts, strict=True)]
     return Record(

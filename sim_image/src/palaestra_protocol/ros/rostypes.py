@@ -1,4 +1,4 @@
-"""The ROS types of the interface, each with the md5 that peers compare and its codecs."""
+"""The ROS types of the interface; each has its codecs, and the md5 sum that peers compare."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ __all__ = [
 
 
 class MessageType(NamedTuple):
-    """One topic type: its name, the md5 that peers compare, its definition, its codec."""
+    """One topic type: its name, the md5 sum that peers compare, its definition, and its codec."""
 
     name: str
     md5: str
@@ -32,15 +32,15 @@ class MessageType(NamedTuple):
 
 
 class ServiceType(NamedTuple):
-    """One service type: its name, the md5 that peers compare, and the two codecs.
+    """One service type: its name, the md5 sums that peers compare, and the two codecs.
 
     Attributes:
         name: `package/name`.
-        md5: that of Webots R2023b.
-        request: the request of a call.
-        response: to a call.
-        later_md5: that of Webots R2025a, whose clients send the same bytes; equal to `md5` if nothing was
-            renamed.
+        md5: the md5 sum in Webots R2023b.
+        request: the codec of a call's request.
+        response: the codec of a call's response.
+        later_md5: the md5 sum in Webots R2025a. It differs from `md5` if R2025a renamed a field. Both
+            releases send the same bytes.
     """
 
     name: str
@@ -93,7 +93,7 @@ def service_type(name: str) -> ServiceType:
 def last_field(name: str) -> struct.Struct | None:
     """Return the layout of the last field of the message type `package/Name`.
 
-    It is None if the field is neither a number nor a message of numbers: a time, a string or an array.
+    Return None if the field is a time, a string or an array, so that it has no layout of numbers.
 
     Raises:
         KeyError: `definitions.txt` has no such message.
@@ -109,15 +109,15 @@ def last_field(name: str) -> struct.Struct | None:
 def reading_field(name: str, field: str) -> tuple[struct.Struct, int] | None:
     """Return the layout of a field of the message type `package/Name`, and the number of bytes after it.
 
-    It is None if the field is neither a number nor a message of numbers, or if a later field has variable
+    Return None if the field is neither a number nor a message of numbers, or if a later field has variable
     size.
 
     Args:
         name: the name of the message type.
-        field: its name; "" is the last field.
+        field: the name of the field; "" means the last field.
 
     Raises:
-        KeyError: `definitions.txt` has no such message, or it has no such field.
+        KeyError: `definitions.txt` has no such message, or the message has no such field.
     """
     if not field:
         last = last_field(name)

@@ -2,14 +2,14 @@
 
 import socket
 
-# For `socket.setsockopt`. Small messages are sent at once. BBR, the default congestion control of many
-# machines, is off: its model of the path and its timer per connection cost more than they gain for a few
-# bytes.
+# The arguments of `socket.setsockopt`. TCP_NODELAY sends small messages at once. Reno replaces BBR, the
+# default congestion control of many machines: for messages of a few bytes, BBR's model of the path and its
+# timers cost more time than they save.
 OPTIONS = (
     (socket.IPPROTO_TCP, socket.TCP_NODELAY, 1),
     (socket.IPPROTO_TCP, socket.TCP_CONGESTION, b"reno"),
 )
 
-# Size of the first read. What a step needs is shorter, and Python keeps blocks of up to 512 bytes at hand,
-# which all connections reuse in turn. The rest of a longer message comes with the next read.
+# Size of the first read. The messages of a step are shorter. Python caches memory blocks of up to 512 bytes,
+# so all connections reuse the same block in turn. The next read returns the rest of a longer message.
 FIRST_BYTES = 448

@@ -1,7 +1,7 @@
 """The parser for the text of a ROS message: its fields and constants.
 
-The rules are those of ROS's own parser, even where they are surprising. For example, the value of a constant
-of type `string` is the rest of its line, so a `#` there does not begin a comment.
+The parser has the rules of ROS's own parser, even surprising ones. For example, the value of a constant of
+type `string` is the rest of its line, so a `#` in that line does not begin a comment.
 Source: http://wiki.ros.org/msg
 """
 
@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-# The types that are one number, with their format codes for `struct`.
+# The built-in types whose value is one number, with their format codes for `struct`.
 NUMBERS = {
     "bool": "?",
     "int8": "b",
@@ -36,9 +36,9 @@ class MessageField:
     """One field of a message.
 
     Attributes:
-        type: the type of the field, or of one element: built in, or `package/Name`.
-        array: empty, `[]` for any number of elements, or the number, as in `[9]`.
-        name: as in the text, even if Python reserves it.
+        type: the type of the field, or of one element of an array: a built-in type, or `package/Name`.
+        array: "" for a field that is not an array, `[]` for a list of any length, or a length such as `[9]`.
+        name: the name in the text, even if it is a keyword of Python.
     """
 
     type: str
@@ -47,7 +47,7 @@ class MessageField:
 
     @property
     def length(self) -> int | None:
-        """The number of elements of an array of fixed length."""
+        """The number of elements of an array of fixed length; None for any other field."""
         return int(self.array[1:-1]) if len(self.array) > len("[]") else None
 
 
@@ -58,8 +58,8 @@ class Message:
     Attributes:
         name: `package/Name`.
         text: the source text of the definition.
-        constants: for each one, its line in the text from which the md5 is computed.
-        fields: in the order of their bytes.
+        constants: a line for each constant, in the form that the md5 sum covers.
+        fields: the fields, in the order of their bytes.
     """
 
     name: str
@@ -69,7 +69,7 @@ class Message:
 
 
 def parse(name: str, text: str) -> Message:
-    """Return the message of a definition.
+    """Return the definition of the message `name`, parsed from its text.
 
     Raises:
         ValueError: a line is neither a field nor a constant.
@@ -104,7 +104,7 @@ def _field(message: str, bare: str) -> MessageField:
 
 
 def _resolved(type_: str, message: str) -> str:
-    """Return a type name with its package; without one, the package is that of the message."""
+    """Return a type name with its package; without one, the type is in the package of the message."""
     if type_ == "Header":
         return "std_msgs/Header"
     if type_ in BUILT_IN or "/" in type_:

@@ -1,6 +1,6 @@
 """The wire format of ROS 1: connection headers and length-prefixed frames, as bytes.
 
-Pure: no socket is used here, so both ends (the simulator and the trainer) share it.
+Pure: this module uses no socket, so the simulator and the trainer can share it.
 Source: http://wiki.ros.org/ROS/TCPROS and http://wiki.ros.org/ROS/Connection%20Header
 """
 
@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping
 
 LENGTH = struct.Struct("<I")
 
-# No message of the interface comes near this; a longer length means that the stream is out of sync.
+# Much longer than any message of the interface. A larger length in a frame means that the stream is corrupt.
 MAX_FRAME_BYTES = 64 * 1024 * 1024
 
 
@@ -25,15 +25,15 @@ def frame(payload: bytes) -> bytes:
 
 
 def encode_header(fields: Mapping[str, str]) -> bytes:
-    """Return the connection header of `fields`, framed, ready to send."""
+    """Return `fields` as a connection header, preceded by its length."""
     return frame(b"".join(frame(f"{name}={value}".encode()) for name, value in fields.items()))
 
 
 def decode_header(payload: bytes) -> dict[str, str]:
-    """Return the fields of a connection header, given without its outer length.
+    """Return the fields of a connection header; `payload` is the header without its own length.
 
     Raises:
-        FramingError: a length points past the end, or a field has no `=`.
+        FramingError: the length of a field points past the end, or a field has no `=`.
     """
     fields: dict[str, str] = {}
     at = 0
@@ -50,7 +50,7 @@ def decode_header(payload: bytes) -> dict[str, str]:
 
 
 class FrameReader:
-    """Cuts a stream into frames, in whatever pieces the network delivered it."""
+    """Splits a stream of bytes into frames; a frame may arrive in several pieces."""
 
     __slots__ = ("_buffer",)
 
@@ -58,14 +58,14 @@ class FrameReader:
         self._buffer = bytearray()
 
     def feed(self, data: bytes) -> Iterable[bytes]:
-        """Return the payload of every frame that `data` completes, to be iterated over once.
+        """Return the payload of every frame that `data` completes; iterate over the result only once.
 
         Raises:
-            FramingError: during iteration, a frame claims more than MAX_FRAME_BYTES.
+            FramingError: the length of a frame exceeds MAX_FRAME_BYTES; raised during the iteration.
         """
         begins_here = not self._buffer and len(data) >= LENGTH.size
         if begins_here and LENGTH.unpack_from(data)[0] == len(data) - LENGTH.size <= MAX_FRAME_BYTES:
-            return (data[LENGTH.size :],)  # nearly always, exactly one whole frame has arrived
+            return (data[LENGTH.size :],)  # the usual case: the data is exactly one whole frame
         self._buffer += data
         return self._cut()
 

@@ -1,9 +1,10 @@
 """Messages with strings and lists, written and read section by section.
 
-Consecutive fields of fixed size are one section, with one struct. A string, a list, and a nested message
-that has one are each a section of their own.
+Consecutive fields of fixed size form one section, which one struct packs. Each string, each list, and each
+nested message of variable size is a section of its own.
 
-Peers are not trusted: a length is compared with the remaining bytes before an object of that length is made.
+Peers are not trusted. So the reader compares a length with the number of remaining bytes before it creates an
+object of that length.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ _length_at = LENGTH.unpack_from
 
 
 class _Layout(Protocol):
-    """The layout of a value in bytes."""
+    """Writes and reads the bytes of one value."""
 
     @property
     def empty(self) -> Any:
@@ -51,10 +52,10 @@ class _Layout(Protocol):
 
 
 class Sections:
-    """A message with strings or lists.
+    """Writes and reads a message with strings or lists.
 
     Args:
-        message: its definition.
+        message: the definition of the message.
         find: returns the definition of a nested message by its name.
     """
 
@@ -68,10 +69,14 @@ class Sections:
         self._reads = tuple((layout.read, isinstance(layout, _Packed)) for _, layout in self._sections)
 
     def write(self, value: Any, pieces: list[Piece]) -> None:
-        """Append the bytes of a message, given as a mapping, or as a tuple of all fields in order.
+        """Append the bytes of a message to `pieces`.
+
+        Args:
+            value: the message, as a mapping, or as a tuple of all fields in order.
+            pieces: the bytes written so far.
 
         Raises:
-            ValueError: a value does not fit its field, or its name is not a field.
+            ValueError: a value does not fit its field, or a name is not that of a field.
         """
         fields = dict(zip(self._names, value, strict=True)) if isinstance(value, tuple) else value
         if not fields.keys() <= self._known:
@@ -134,13 +139,13 @@ class _Text:
 
 
 class _Octets:
-    """A list of `uint8` or `char`, as bytes; an image is not copied before it is sent."""
+    """A list of `uint8` or `char`, as bytes; writing does not copy them, because images are large."""
 
     empty = b""
 
     def write(self, value: Any, pieces: list[Piece]) -> None:
         if not isinstance(value, bytes | bytearray | memoryview | list | tuple):
-            raise TypeError(f"{type(value).__name__} where bytes are needed")
+            raise TypeError(f"{type(value).__name__} is not a type of bytes")
         octets = bytes(value) if isinstance(value, list | tuple) else memoryview(value).cast("B")
         pieces += LENGTH.pack(len(octets)), octets
 
@@ -207,7 +212,7 @@ class _Elements:
     def read(self, data: bytes, at: int) -> tuple[Any, int]:
         count = self._length
         if count is None:
-            at, _, count = _counted(data, at, LENGTH.size)  # the fewest bytes of an element
+            at, _, count = _counted(data, at, LENGTH.size)  # every element has at least a length
         items = []
         read = self._element.read
         for _ in range(count):
@@ -217,10 +222,12 @@ class _Elements:
 
 
 def _counted(data: bytes, at: int, size: int) -> tuple[int, int, int]:
-    """Return the offsets of a list's first element and end, and its number of elements of `size` bytes.
+    """Return the offset of a list's first element, the offset of its end, and the number of its elements.
+
+    Each element has `size` bytes.
 
     Raises:
-        ValueError, struct.error: the data ends before the list.
+        ValueError, struct.error: the data ends before the end of the list.
     """
     (count,) = _length_at(data, at)
     start = at + _LENGTH_SIZE
@@ -235,7 +242,7 @@ def _too_long(count: int, left: int) -> ValueError:
 
 
 def _sections(message: Message, find: Find) -> Iterator[tuple[str, _Layout]]:
-    """Yield each section, with the name of its field if it is one field."""
+    """Yield each section with the name of its field; the name is "" for fields of fixed size."""
     for is_fixed, group in groupby(message.fields, lambda field: has_fixed_size(field, find)):
         fields = list(group)
         if is_fixed:

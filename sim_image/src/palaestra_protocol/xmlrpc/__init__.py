@@ -1,7 +1,7 @@
 """XML-RPC as ROS 1 uses it, between peers that are not trusted.
 
-- `documents`: requests and responses, as bytes; pure
-- `responses`: the response of every ROS call; pure
-- `server`: one port that serves calls
-- `client`: one call, with a deadline
+- `documents`: encodes and decodes requests and responses; pure
+- `responses`: the value that every ROS call returns; pure
+- `server`: a server on one port
+- `client`: makes one call, with a deadline
 """

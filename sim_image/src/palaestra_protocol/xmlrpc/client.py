@@ -1,4 +1,4 @@
-"""One XML-RPC call over a connection of its own, with a deadline for all of it."""
+"""Make one XML-RPC call over a new connection, with a deadline for the whole call."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ MOST_RESPONSE_BYTES = 2**20
 
 
 def call(uri: str, deadline_s: float, method: str, *parameters: Any) -> Any:
-    """Return the value of a call.
+    """Call a method of a server and return the value.
 
     Args:
         uri: the URI of the server, e.g. http://localhost:11311/
-        deadline_s: for the whole call, from the connection to the last byte of the response.
-        method: its name.
+        deadline_s: time limit for the whole call, from the connection to the last byte of the response.
+        method: the name of the method.
         parameters: the parameters of the method.
 
     Raises:
         OSError: the server cannot be reached; TimeoutError: the deadline passed.
-        UnreadableDocument: the URI or the response is not one of XML-RPC, or the response is too long.
-        xmlrpc.client.Fault: the server could not make the call.
-        TypeError, OverflowError: XML-RPC has no such parameter.
+        UnreadableDocument: the URI is invalid, or the response is too long or is not XML-RPC.
+        xmlrpc.client.Fault: the server reported that the call failed.
+        TypeError, OverflowError: XML-RPC cannot express a parameter.
     """
     ends = time.monotonic() + deadline_s
     host, port, path = _parts(uri)
@@ -46,7 +46,8 @@ def _parts(uri: str) -> tuple[str, int, str]:
     try:
         parts = urlsplit(uri)
         if parts.scheme == "http" and parts.hostname and parts.port and uri.isascii():
-            parts.hostname.encode("idna")  # else the lookup of its address would fail with another error
+            # An invalid name raises UnicodeError, a ValueError, here and not in the lookup of its address.
+            parts.hostname.encode("idna")
             return parts.hostname, parts.port, parts.path or "/"
     except ValueError:
         pass
@@ -61,7 +62,7 @@ def _left(ends: float) -> float:
 
 
 class _Stream(io.RawIOBase):
-    """The bytes of a response, until a deadline and a largest number."""
+    """Reads a response; raises an error after the deadline, or if the response is too long."""
 
     def __init__(self, connection: socket.socket, ends: float) -> None:
         self._connection = connection
@@ -80,16 +81,17 @@ class _Stream(io.RawIOBase):
         return count
 
     def makefile(self, _mode: str) -> io.BufferedReader:
-        """Return a reader, as http.client asks a socket for one."""
+        """Return a reader; `http.client` calls this method of a socket."""
         return io.BufferedReader(self)
 
 
 def _body(stream: _Stream) -> bytes:
-    response = http.client.HTTPResponse(cast("socket.socket", stream))  # it only calls `makefile`
+    # HTTPResponse calls only the method `makefile` of its socket.
+    response = http.client.HTTPResponse(cast("socket.socket", stream))
     try:
         response.begin()
         if response.status != http.client.OK:
             raise UnreadableDocument(f"the response has the HTTP status {response.status}, not 200")
         return response.read()
     except http.client.HTTPException as error:
-        raise UnreadableDocument(f"the response is not one of HTTP: {error!r}") from error
+        raise UnreadableDocument(f"the response is not HTTP: {error!r}") from error

@@ -1,7 +1,8 @@
-"""Requests and responses of XML-RPC, as bytes.
+"""Encode and decode the requests and responses of XML-RPC.
 
-Python's own reader of XML-RPC expands entities and takes values that are nested at any depth. This one
-refuses a document type, without which there are no entities, and deep values.
+Python's own XML-RPC reader expands entities and accepts values nested at any depth, so a small document can
+exhaust memory. This reader refuses a document type, which is the only way to declare entities, and it limits
+the depth of values.
 """
 
 from __future__ import annotations
@@ -10,35 +11,35 @@ import xmlrpc.client
 from typing import Any
 from xml.parsers import expat
 
-MOST_DEPTH = 64  # levels of arrays and structs; a tree of ROS parameters has few
-FAULT = 1  # the code of every fault; ROS's clients read only the text
+MOST_DEPTH = 64  # levels of arrays and structs; a tree of ROS parameters has far fewer
+FAULT = 1  # the code of every fault; ROS clients read only the text
 _NESTING = frozenset({"array", "struct"})
 
 
 class UnreadableDocument(ValueError):
-    """The bytes are not a document of XML-RPC, or they exceed a limit."""
+    """The bytes are not an XML-RPC document, or the document exceeds a limit."""
 
 
 def encode_request(method: str, parameters: tuple[Any, ...]) -> bytes:
-    """Return a request.
+    """Return the request that calls `method` with `parameters`.
 
     Raises:
-        TypeError, OverflowError: XML-RPC has no such value.
+        TypeError, OverflowError: XML-RPC cannot express a parameter.
     """
     return xmlrpc.client.dumps(parameters, method).encode()
 
 
 def encode_response(value: Any) -> bytes:
-    """Return the response with a value.
+    """Return the response of a call that returns `value`.
 
     Raises:
-        TypeError, OverflowError: XML-RPC has no such value.
+        TypeError, OverflowError: XML-RPC cannot express the value.
     """
     return xmlrpc.client.dumps((value,), methodresponse=True).encode()
 
 
 def encode_fault(text: str) -> bytes:
-    """Return the response of a call that could not be made."""
+    """Return the response of a call that failed; `text` is the reason."""
     return xmlrpc.client.dumps(xmlrpc.client.Fault(FAULT, text)).encode()
 
 
@@ -46,7 +47,7 @@ def decode_request(data: bytes) -> tuple[str, tuple[Any, ...]]:
     """Return the method and the parameters of a request.
 
     Raises:
-        UnreadableDocument: see the class.
+        UnreadableDocument: `data` is not an XML-RPC request, or it exceeds a limit.
     """
     reader = _read(data)
     method = reader.getmethodname()
@@ -59,8 +60,8 @@ def decode_response(data: bytes) -> Any:
     """Return the value of a response.
 
     Raises:
-        UnreadableDocument: see the class.
-        xmlrpc.client.Fault: the server could not make the call.
+        UnreadableDocument: `data` is not an XML-RPC response, or it exceeds a limit.
+        xmlrpc.client.Fault: the response reports that the call failed.
     """
     values = _values(_read(data))
     if len(values) != 1:
@@ -89,7 +90,7 @@ def _read(data: bytes) -> xmlrpc.client.Unmarshaller:
     parser.EndElementHandler = end
     parser.CharacterDataHandler = reader.data
     parser.StartDoctypeDeclHandler = _refuse_document_type
-    reader.xml("", None)  # without an encoding, because expat decodes
+    reader.xml("", None)  # no encoding, because expat decodes the text
     try:
         parser.Parse(data, True)
     except UnreadableDocument:

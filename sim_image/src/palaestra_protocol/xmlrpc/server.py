@@ -1,8 +1,9 @@
-"""A port that answers XML-RPC: the ROS master's, and that of a node.
+"""An XML-RPC server on one port, for the ROS master and for nodes.
 
-Connections stay open for more calls, as the clients of ROS expect. Their number, the length of a request and
-every wait are limited: a new connection replaces an idle one (`connection_limits`).
-Several calls may come in one request (`system.multicall`); they are made in their order.
+A connection stays open for further calls, because ROS clients expect that. The number of connections, the
+length of a request and the duration of every wait are limited. If all connections are in use, a new one
+replaces an idle one (`connection_limits`). One request may contain several calls (`system.multicall`); the
+server makes them in their order.
 """
 
 from __future__ import annotations
@@ -26,25 +27,25 @@ from palaestra_protocol.xmlrpc.documents import (
     encode_response,
 )
 
-MOST_REQUEST_BYTES = 8 << 20  # a robot's description is a parameter of up to a few MB
+MOST_REQUEST_BYTES = 8 << 20  # a robot's description is a parameter, and may have a few MB
 MOST_CONNECTIONS = 256  # each has a thread; a simulator keeps one connection for each robot
-REQUEST_S = 10.0  # limit from the first byte of a request to its last, and again for the response
-IDLE_S = 60.0  # between two requests
+REQUEST_S = 10.0  # time limit for reading a request after its first byte, and for sending the response
+IDLE_S = 60.0  # time limit of the wait for the next request
 _MULTICALL = "system.multicall"
 
 _LOOPBACK = frozenset({"localhost", "127.0.0.1"})
 
 Method = Callable[[tuple[Any, ...]], Any]
-"""Returns the value of a call with these parameters."""
+"""Takes the parameters of a call and returns its value."""
 
 
 def host_name(environment: Mapping[str, str]) -> str:
-    """Return the name of this machine for other nodes, by the rules of ROS: ROS_HOSTNAME, ROS_IP, its own."""
+    """Return the name by which other nodes reach this machine: ROS_HOSTNAME, ROS_IP, or its host name."""
     return environment.get("ROS_HOSTNAME") or environment.get("ROS_IP") or socket.gethostname()
 
 
 def bind_address(host: str) -> str:
-    """Return the address on which a ROS node of that host name listens: loopback, or every interface."""
+    """Return the address on which a ROS node named `host` listens: loopback, or "" for all interfaces."""
     return "127.0.0.1" if host in _LOOPBACK else ""
 
 
@@ -52,8 +53,8 @@ class RpcServer(TcpServer):
     """A server on one port; see `TcpServer`.
 
     Args:
-        address: host and port on which it listens; port 0 stands for any free port.
-        find: returns the method of a name, or None. Methods are called in several threads.
+        address: host and port on which the server listens; port 0 means that the system chooses a free port.
+        find: returns the method with a name, or None. The server calls methods in several threads.
         request_s: see REQUEST_S.
         idle_s: see IDLE_S.
 
@@ -82,11 +83,11 @@ class RpcServer(TcpServer):
 
     @property
     def port(self) -> int:
-        """The port on which it listens."""
+        """The port on which the server listens."""
         return int(self.socket.getsockname()[1])
 
     def close(self) -> None:
-        """Accept no more connections, close those that are open, and free the port."""
+        """Stop accepting connections, close the open connections, and free the port."""
         super().close()
         self.slots.clear()
 
@@ -108,7 +109,7 @@ class RpcServer(TcpServer):
             raise xmlrpc.client.Fault(FAULT, f"{name} is not a method of this server")
         try:
             return method(parameters)
-        except Exception as error:  # whatever fails, the caller must get a response, and others continue
+        except Exception as error:  # after any error, the caller must get a response
             raise xmlrpc.client.Fault(FAULT, f"{name}: {error!r}") from error
 
     def _several(self, parameters: tuple[Any, ...]) -> list[Any]:
@@ -118,19 +119,19 @@ class RpcServer(TcpServer):
         raise xmlrpc.client.Fault(FAULT, f"{_MULTICALL} takes one list of calls")
 
     def _one_of_several(self, wanted: Any) -> Any:
-        """Return a list with the value of a call; a mapping if it is a fault."""
+        """Return a list with the value of the call `wanted`; if the call fails, a mapping with the fault."""
         try:
             match wanted:
                 case {"methodName": str(name), "params": list(parameters)} if name != _MULTICALL:
                     return [self._called(name, tuple(parameters))]
                 case _:
                     return {"faultCode": FAULT, "faultString": "a call has a methodName and a list params"}
-        except xmlrpc.client.Fault as fault:  # a call that fails prevents no other call of the request
+        except xmlrpc.client.Fault as fault:  # the other calls of the request are still made
             return {"faultCode": fault.faultCode, "faultString": fault.faultString}
 
 
 class _Handler(BaseHTTPRequestHandler):
-    """The requests of one connection."""
+    """Handles the requests of one connection."""
 
     protocol_version = "HTTP/1.1"
     disable_nagle_algorithm = True
@@ -168,7 +169,7 @@ class _Handler(BaseHTTPRequestHandler):
         return cast("RpcServer", self.server)
 
     def _responded(self, body: bytes) -> bytes:
-        """Return the response; until then the connection keeps its slot."""
+        """Return the response to a request; meanwhile the connection keeps its slot."""
         self._server.slots.answering(self.connection, now=True)
         try:
             return self._server.respond(body)
@@ -189,7 +190,7 @@ class _Handler(BaseHTTPRequestHandler):
 
 
 class _Reader(io.RawIOBase):
-    """Reads a connection: it may be idle for a while, but a request that has begun has a deadline."""
+    """Reads a connection; limits the wait for a request, and the time to read the rest of the request."""
 
     def __init__(self, connection: socket.socket, server: RpcServer) -> None:
         self._connection = connection
@@ -200,7 +201,7 @@ class _Reader(io.RawIOBase):
         return True
 
     def renew(self) -> None:
-        """Wait for another request."""
+        """Prepare for the next request: until its first byte, only the limit for idle connections applies."""
         self._ends = None
 
     def readinto(self, buffer: Any) -> int:

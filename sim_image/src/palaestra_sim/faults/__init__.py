@@ -1,16 +1,16 @@
-"""Injected faults: the stub fails as a simulator does, to test training code.
+"""Injected faults: the stub imitates the failures of real simulators, so that users can test training code.
 
-- `kinds`: the faults, as data
-- `parser`: parses `crash:probability=0.0005`, or raises an error with the mistake
-- `options`: the faults from the command line and the environment
-- `schedule`, pure: the faults of the k-th step, reset, call or start of a life
-- `fault_state`, pure: the fate of each request and message, from counts and the schedule
-- `corruption`, pure: damaged messages and responses, as bytes
-- `known_paths`: the paths that a world serves, so that a misspelled path is an error
-- `faulty_node`, with I/O: a ROS node whose traffic passes through the fault state
-- `process_faults`, with I/O: signals, memory, exits
+- `kinds`: the kinds of faults, as data
+- `parser`: parses a description such as `crash:probability=0.0005`
+- `options`: reads the faults from the command line and the environment
+- `schedule`, pure: decides which faults occur at the k-th step, reset, call or start of a process
+- `fault_state`, pure: decides what happens to each request and message
+- `corruption`, pure: changes the bytes of messages and responses
+- `known_paths`: lists the paths that a world serves, so that a misspelled path is an error
+- `faulty_node`, with I/O: a ROS node that drops, delays or changes its requests and messages
+- `process_faults`, with I/O: sends signals to the process, allocates memory, or exits
 
-A stub without faults uses the plain node, so this package costs it nothing.
+A stub without faults uses the plain `RosNode`, so this package does not slow it down.
 """
 
 from palaestra_sim.faults.fault_state import FaultState

@@ -1,6 +1,7 @@
-"""Damage messages and responses, as bytes.
+"""Change the bytes of messages and responses, as a fault requires.
 
-Pure. The length prefix of a message stays correct, so that the reader finds the next message.
+Pure: bytes in, bytes out. The length prefix of a message stays correct, so a client can still find the next
+message in the stream.
 """
 
 from __future__ import annotations
@@ -20,7 +21,14 @@ _FLOAT32 = struct.Struct("<f")
 
 
 def damaged_message(type_name: str, data: bytes, damages: Sequence[Damage], field: str = "") -> bytes:
-    """Return a framed message of a topic with all `damages`; `field` is its reading, "" the last field."""
+    """Return a framed message of a topic, changed by all `damages`.
+
+    Args:
+        type_name: the message type.
+        data: the framed message.
+        damages: the faults to apply, in this order.
+        field: the field with the sensor's reading; "" means the last field.
+    """
     payload = data[LENGTH.size :]
     reading = reading_field(type_name, field) if type_name else None
     for damage in damages:
@@ -34,7 +42,10 @@ def damaged_message(type_name: str, data: bytes, damages: Sequence[Damage], fiel
 
 
 def _with_reading_of_any_size(payload: bytes, type_name: str, field: str, value: float) -> bytes:
-    """Return a message with `value` in place of each float of a list, or of each float32 of an image."""
+    """Return a message whose reading has variable size, with `value` in place of each float.
+
+    If the reading is bytes, such as a depth image, each float32 in the bytes is replaced.
+    """
     if not type_name or not field:
         return payload
     codec = message_type(type_name).codec
@@ -51,7 +62,7 @@ def _with_reading_of_any_size(payload: bytes, type_name: str, field: str, value:
 
 
 def _with_reading(payload: bytes, reading: struct.Struct, behind: int, value: float) -> bytes:
-    """Return a message with `value` in place of each float in its reading."""
+    """Return a message with `value` in place of each float in its reading, which `behind` bytes follow."""
     end = len(payload) - behind
     start = end - reading.size
     codes = reading.format.lstrip("<")
@@ -61,9 +72,9 @@ def _with_reading(payload: bytes, reading: struct.Struct, behind: int, value: fl
 
 
 def damaged_answer(response: Codec, data: bytes, damages: Sequence[Damage]) -> bytes:
-    """Return a service's response, a status byte and a frame, with all `damages`.
+    """Return the response of a service, changed by all `damages`; `data` is a status byte and a frame.
 
-    The response of a failed call stays unchanged.
+    The response of a failed call is not changed.
     """
     succeeded, payload = data[:1], data[1 + LENGTH.size :]
     if succeeded != b"\1":
@@ -78,7 +89,7 @@ def damaged_answer(response: Codec, data: bytes, damages: Sequence[Damage]) -> b
 
 
 def _with_floats(part: Any, value: float) -> Any:
-    """Return a decoded message, or a part of one, with `value` in place of each float."""
+    """Return a decoded message, or a part of a message, with `value` in place of each float."""
     if isinstance(part, float):
         return value
     if isinstance(part, list | tuple):

@@ -1,7 +1,8 @@
-"""The state of the faults in one life: it decides the fate of each request and message.
+"""Decide which faults each request and message suffers, in one run of the simulator's process (a life).
 
-Pure: it only counts, and uses no socket, process or clock. A fault that names a service and occurs at a step
-or reset lasts from then on; so does a hang of a service.
+Pure: this module only counts events, and uses no socket, process or clock. If a fault names a service and
+its trigger is a step or a reset, the service has the fault from that event to the end of the process. A
+service that hangs stays hung too.
 """
 
 from __future__ import annotations
@@ -31,13 +32,13 @@ Damage = WrongValue | WrongShape
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ruling:
-    """The fate of a request or a message.
+    """The decision about a request or a message.
 
     Attributes:
-        lost: whether it is dropped.
-        delay_s: its delay.
-        damages: the faults of the response or the message.
-        effects: the faults that the process suffers first, in this order.
+        lost: whether the request or message is dropped.
+        delay_s: its delay in seconds.
+        damages: the changes to the response or the message.
+        effects: the faults of the process, which occur before the request is handled, in this order.
     """
 
     lost: bool = False
@@ -50,7 +51,7 @@ UNHARMED = Ruling()
 
 
 class FaultState:
-    """The counts of this life so far, and the rulings that follow from them."""
+    """Counts the events of this life; decides from the counts and the schedule which faults occur."""
 
     def __init__(self, schedule: FaultSchedule) -> None:
         self._schedule = schedule
@@ -62,7 +63,7 @@ class FaultState:
 
     @property
     def schedule(self) -> FaultSchedule:
-        """Return the faults with their times."""
+        """The schedule of the faults in this life."""
         return self._schedule
 
     def start(self) -> tuple[StartRefused | None, float]:
@@ -76,7 +77,7 @@ class FaultState:
         return refused, sum(delays)
 
     def request(self, robot: str, path: str) -> Ruling:
-        """Return the ruling on a request to `path`, below the robot's name."""
+        """Return the decision about a request to `path`, which is relative to the robot's name."""
         delay_s, effects = 0.0, []
         number, faults = self._count(robot, path)
         for fault in faults:
@@ -89,7 +90,7 @@ class FaultState:
         return self._with_service_faults(path, delay_s, tuple(effects))
 
     def message(self, path: str) -> Ruling:
-        """Return the ruling on a message of the topic `path`; a leading slash means that no robot owns it."""
+        """Return the decision about a message of the topic `path`, relative to the robot, or global (`/`)."""
         number = self._counts[FaultEvent.STEP]
         faults = [message for message in self._messages if _matches(path, message.topic)]
         if not faults:
@@ -101,12 +102,18 @@ class FaultState:
         )
 
     def closed(self, robot: str) -> None:
-        """Record the end of a robot's controller; if its steps were counted, another robot's count next."""
+        """Record that a robot's controller has ended.
+
+        If its steps were counted, the steps of another robot are counted from now on.
+        """
         if self._stepping == robot:
             self._stepping = None
 
     def _count(self, robot: str, path: str) -> tuple[int, tuple[InjectedFault, ...]]:
-        """Return the number of the step or reset that a request starts, or 0, and the faults at it."""
+        """Count the step or reset that a request starts; return its number and the faults that occur at it.
+
+        Return 0 and no faults for any other request.
+        """
         event = FaultEvent.RESET if path in RESET_PATHS else None
         if path == STEP_PATH:
             self._stepping = self._stepping or robot
@@ -132,7 +139,7 @@ class FaultState:
         return Ruling(lost=lost, delay_s=delay_s, damages=tuple(damages), effects=effects)
 
     def _befalls(self, fault: InjectedFault) -> bool:
-        """Count a call of a service that `fault` names, and return whether the call is affected."""
+        """Count a call of a service that `fault` names; return whether the fault affects this call."""
         self._calls[fault] += 1
         if fault.trigger.event is FaultEvent.CALL and self._schedule.happens(fault, self._calls[fault]):
             if isinstance(fault, Hang):

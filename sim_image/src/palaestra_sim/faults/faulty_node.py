@@ -1,7 +1,7 @@
-"""A ROS node whose requests, responses and messages pass through the fault state.
+"""A ROS node that applies faults to its requests, responses and messages.
 
-It sits between the connections and the node. After the header of a connection, each message is forwarded,
-changed, delayed or dropped. The node below it is the same that runs without faults.
+It wraps each connection. After the header of a connection, it forwards, changes, delays or drops each
+message, as the fault state decides. It inherits everything else from the `RosNode` of a stub without faults.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from palaestra_sim.ros.topics import PublishedTopic
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Failing:
-    """The fault state and the process faults that the nodes of one stub share."""
+    """The fault state and the process faults, which all nodes of one stub share."""
 
     course: FaultState
     effects: ProcessFaults
@@ -32,10 +32,10 @@ class FaultyNode(RosNode):
     """A RosNode with injected faults.
 
     Args:
-        loop: the event loop of its sockets.
+        loop: the event loop of the node's sockets.
         name: the node's name and the prefix of its relative paths.
-        master_uri: the master.
-        failing: shared by all nodes of a stub.
+        master_uri: the URI of the ROS master.
+        failing: the faults, which all nodes of a stub share.
     """
 
     def __init__(self, loop: Loop, name: str, master_uri: str, failing: Failing) -> None:
@@ -45,11 +45,11 @@ class FaultyNode(RosNode):
         self._master_lost = False
 
     def lose_master(self) -> None:
-        """Keep the names registered at the master when this node is closed."""
+        """Make `close` leave the names of this node registered at the master."""
         self._master_lost = True
 
     def close(self) -> None:
-        """Close like a RosNode; if the master is lost, leave the names registered."""
+        """Close like a RosNode; after `lose_master`, leave the names registered."""
         self._failing.course.closed(self.name)
         if self._master_lost:
             self.abandon()
@@ -57,7 +57,7 @@ class FaultyNode(RosNode):
             super().close()
 
     def request(self, end: ServiceEnd, payload: bytes) -> None:
-        """Handle a request; during a slow step it waits, as during any step."""
+        """Handle a request; if a slow step is in progress, handle it after the step."""
         if self._held_steps:
             self._waiting.append((end, payload))
         else:
@@ -69,7 +69,7 @@ class FaultyNode(RosNode):
             super().take_waiting()
 
     def receive(self, path: str, answers: _Answers, pass_on: Callable[[], None]) -> None:
-        """Forward, delay or drop a request from a connection, by the ruling of the fault state."""
+        """Forward, delay or drop a request from a connection, as the fault state decides."""
         ruling = self._failing.course.request(self.name, path)
         if not self._failing.effects.happen(ruling.effects) or ruling.lost:
             return
@@ -105,12 +105,12 @@ class FaultyNode(RosNode):
         return _Requests(self, self._path(name), answers, super()._greet(answers, header))
 
     def _path(self, name: str) -> str:
-        """Return a name in the form that faults use: relative to the robot, or with a leading slash."""
+        """Return a name as faults write it: relative to the robot, or global with a leading slash."""
         return name.removeprefix(f"/{self.name}/")
 
 
 class _Requests:
-    """Receives one client's requests to one service."""
+    """Receives the requests of one client to one service, and applies faults to them."""
 
     def __init__(self, node: FaultyNode, path: str, answers: _Answers, endpoint: Endpoint) -> None:
         self._node = node
@@ -126,11 +126,11 @@ class _Requests:
 
 
 class _Answers:
-    """A client's connection, on which the response to the current request may be damaged.
+    """The connection of a service's client; it changes responses as faults require.
 
     Attributes:
-        link: the connection itself.
-        damages: the damages of the next response.
+        link: the wrapped connection.
+        damages: the changes to the next response.
     """
 
     def __init__(self, link: Connection, response: Codec | None) -> None:
@@ -159,10 +159,10 @@ class _Answers:
 
 
 class _Messages:
-    """A subscriber's connection, on which messages may be lost, late or damaged.
+    """The connection of a subscriber; it drops, delays or changes messages as faults require.
 
     Attributes:
-        link: the connection itself.
+        link: the wrapped connection.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""The kinds of faults, as data; docs/reference/faults.md describes the effect of each on a client."""
+"""The kinds of faults, as data; docs/reference/faults.md describes the effect of each kind on a client."""
 
 from __future__ import annotations
 
@@ -14,12 +14,15 @@ RESET_PATHS = frozenset(
 
 
 class FaultEvent(StrEnum):
-    """Events that are counted, from 1, in each life of a stub; the parent program counts the lives.
+    """The events that trigger faults.
 
-    - step: a `time_step` request of the first robot that sent one, so one event a step for any number of
-    robots.
+    A life is one run of the stub's process. In each life, the events of each kind are counted from 1.
+
+    - step: a `time_step` request of one robot, the first that sent such a request. So a world with several
+      robots also has one event for each step.
     - reset: a request for a reset of the world.
     - call: a call of a service that the fault names.
+    - start: a start of the stub. The program that starts the stub counts the starts.
     """
 
     STEP = "step"
@@ -30,13 +33,13 @@ class FaultEvent(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trigger:
-    """The events at which a fault occurs: one, every n-th, a random share of them, or all.
+    """The events at which a fault occurs: one event, every n-th, a random share of them, or all of them.
 
     Attributes:
-        event: the kind of events.
-        at: the number of the only event; None if another attribute decides.
-        every: the fault occurs at each multiple of this.
-        probability: the probability of the fault at each event.
+        event: the kind of event.
+        at: the number of the only event at which the fault occurs; None if the other attributes decide.
+        every: the fault occurs at each event whose number is a multiple of this.
+        probability: the probability of the fault at each such event.
     """
 
     event: FaultEvent
@@ -56,10 +59,11 @@ class InjectedFault:
     """A fault.
 
     Attributes:
-        text: as it was written.
-        trigger: the events at which it occurs.
-        service: the affected services, relative to the robot, `*` for anything; "" for no service.
-        topic: the affected topics, in the same form.
+        text: the description of the fault as the user wrote it.
+        trigger: the events at which the fault occurs.
+        service: a pattern for the paths of the affected services, relative to the robot; `*` matches any
+            text, and "" means that no service is affected.
+        topic: a pattern for the affected topics, in the same form.
     """
 
     text: str
@@ -77,7 +81,7 @@ class Crash(InjectedFault):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Exit(InjectedFault):
-    """The process closes everything and exits too early."""
+    """The process closes all connections and exits, although no client requested that."""
 
     code: int = 0
 
@@ -89,7 +93,7 @@ class Hang(InjectedFault):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Delayed(InjectedFault):
-    """A delay: the latency, plus a random share of the jitter."""
+    """A fault with a delay: the latency, plus a random share of the jitter."""
 
     latency_s: float = 0.0
     jitter_s: float = 0.0
@@ -102,7 +106,7 @@ class Slow(Delayed):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Late(Delayed):
-    """Messages of a step arrive after its response."""
+    """Messages of a step arrive late, after the response to the step."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -112,19 +116,19 @@ class Lost(InjectedFault):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WrongValue(InjectedFault):
-    """Floats have another value."""
+    """Each float in the reading of a message, or in a response, has the value `value`."""
 
     value: float = math.nan
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WrongShape(InjectedFault):
-    """The second half of the bytes is missing."""
+    """The second half of the bytes of a message or response is missing."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MemoryGrowth(InjectedFault):
-    """Memory is allocated and never freed, up to `most_mib`."""
+    """The process allocates `mib` at each event and never frees it, up to a total of `most_mib`."""
 
     mib: float = 1.0
     most_mib: float = 1024.0
@@ -144,9 +148,9 @@ class SlowStart(Delayed):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MasterLostFault(InjectedFault):
-    """The stub ends as if the ROS master were gone; its names stay registered."""
+    """The stub exits as if the ROS master did not respond; the stub's names stay registered."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NamesLost(InjectedFault):
-    """The master forgets the stub, like a restarted master; connections stay open."""
+    """The master has no names of the stub, as after a restart of the master; connections stay open."""

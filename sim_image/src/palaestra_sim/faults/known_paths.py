@@ -1,6 +1,8 @@
-"""Find the services and topics of a world: its controllers start on nodes that only record them.
+"""Find the services and topics of a world.
 
-So a fault that names an unknown path is an error at the start, instead of a fault that never occurs.
+The controllers of the world are started with nodes that only record the names of services and topics. With
+this list, a fault with an unknown path is an error at the start. Otherwise the fault would never occur, and
+its author would not notice.
 """
 
 from __future__ import annotations
@@ -33,9 +35,9 @@ class KnownPaths:
     """The services and topics of a world.
 
     Attributes:
-        simulator: the name of its first robot, without the part that differs from job to job.
-        services: the type of each, by its path relative to the robot.
-        topics: in the same way; those of sensors appear only after the sensors are enabled.
+        simulator: the name of the first robot, without the part that differs from job to job.
+        services: the type of each service, by its path relative to the robot.
+        topics: the type of each topic, in the same form, including those of sensors that are not yet enabled.
     """
 
     simulator: str
@@ -44,11 +46,11 @@ class KnownPaths:
 
 
 def survey(load: Load, world_path: Path) -> KnownPaths:
-    """Return the services and topics of the world in that file, loaded by `load`.
+    """Return the services and topics of the world in a file, which `load` loads.
 
     Raises:
-        WorldError: the file is wrong, or contains an object that cannot be simulated.
-        OSError: it cannot be read.
+        WorldError: the file is wrong, or contains a node that cannot be simulated.
+        OSError: the file cannot be read.
     """
     nodes: list[_Listener] = []
 
@@ -68,12 +70,12 @@ def survey(load: Load, world_path: Path) -> KnownPaths:
 
 
 def begin(ordered: Ordered, load: Load, world_path: Path) -> FaultState:
-    """Return the fault state of a life with the given faults, in the world that `load` loads.
+    """Return the fault state of this process, for the faults `ordered` and the world that `load` loads.
 
     Raises:
         FaultError: a fault names a path that the world does not have.
         WorldError: the world is wrong.
-        OSError: it cannot be read.
+        OSError: the world cannot be read.
     """
     found = survey(load, world_path)
     check(ordered.faults, found)
@@ -125,7 +127,7 @@ class _Listener:
         self.topics: dict[str, str] = {}
 
     def enable_all(self, period_ms: int) -> None:
-        """Enable every sensor, because only this creates its topic; a device that refuses gets no topic."""
+        """Enable every sensor, because a sensor's topic exists only then; ignore devices that refuse."""
         for path, handler in self.services.items():
             if path.endswith(_ENABLES):
                 with contextlib.suppress(ServiceFailed):
@@ -137,7 +139,7 @@ class _Listener:
         self.types[path] = type_name
 
     def together(self) -> contextlib.AbstractContextManager[None]:
-        """Do nothing: nothing is registered."""
+        """Do nothing: this node registers no names."""
         return contextlib.nullcontext()
 
     def advertise(
@@ -155,13 +157,13 @@ class _Listener:
         return _Silent()
 
     def withdraw(self, publisher: Any) -> None:
-        """Keep the topic in the record."""
+        """Do nothing: the topic stays in the record."""
 
     def answer(self, call: Any, fields: Fields) -> None:
-        """Do nothing: no client called."""
+        """Do nothing: this node has no clients."""
 
     def later(self, delay_s: float, callback: Callable[[], None]) -> None:
-        """Never call back: no step runs here."""
+        """Do nothing: only steps use delays, and no step runs here."""
 
     def close(self) -> None:
-        """Do nothing: it has no sockets."""
+        """Do nothing: this node has no sockets."""

@@ -1,4 +1,4 @@
-"""The faults from the command line and the environment, and the number of this life."""
+"""Read the faults, their seed and the number of this life from the command line and the environment."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ class Ordered:
     """The faults of this process.
 
     Attributes:
-        faults: in the order in which they were written, options before those of the environment.
+        faults: the faults of the command line, then those of the environment, each in the written order.
         seed: the seed of all random draws.
         life: the number of this start of the simulator, from 1.
-        counted: whether a sidecar or a person counts the lives; otherwise `life` is random.
+        counted: whether a sidecar or a person chose `life`; otherwise `life` is random.
     """
 
     faults: tuple[InjectedFault, ...]
@@ -39,14 +39,14 @@ class Ordered:
 
 
 def add_options(add: Callable[..., Any]) -> None:
-    """Add the options for faults to a parser, by its `add_argument`."""
-    add("--fault", action="append", default=[], metavar="KIND[:KEY=VALUE,...]", help="fail so; repeatable")
+    """Add the options for faults to a parser; `add` is the parser's `add_argument`."""
+    add("--fault", action="append", default=[], metavar="KIND[:KEY=VALUE,...]", help="a fault; repeatable")
     add("--fault-seed", metavar="N", help="seed of all random draws (default: 0)")
     add("--fault-life", metavar="N", help="number of this start of the simulator, from 1 (default: random)")
 
 
 def read_options(options: argparse.Namespace, environment: Mapping[str, str]) -> Ordered | None:
-    """Return the faults of the options and the environment together; None if there are no faults.
+    """Return the faults of the command line and the environment; None if there are no faults.
 
     Raises:
         FaultError: a description or a number is wrong.

@@ -1,6 +1,7 @@
-"""The language of faults: KIND, or KIND:KEY=VALUE,KEY=VALUE, with spaces between faults.
+"""Parse descriptions of faults: KIND, or KIND:KEY=VALUE,KEY=VALUE, with spaces between faults.
 
-Pure: it returns data, or raises an error. A fault needs no quotes in YAML; in a shell only `*` needs them.
+Pure: text in, data or an error out. A description needs no quotes in YAML. In a shell, a description needs
+quotes only if it contains `*`.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from palaestra_sim.faults.kinds import FaultEvent, InjectedFault, Trigger
 
 _MOST_MS: Final = 3_600_000.0
 _MOST_MIB: Final = 1_048_576.0
-_FLOAT32: Final = struct.Struct("<f")  # the field with the smallest range that may receive the value
+_FLOAT32: Final = struct.Struct("<f")  # the type with the smallest range among fields that get a wrong value
 _SIGNALS: Final = ("SIGABRT", "SIGBUS", "SIGFPE", "SIGILL", "SIGKILL", "SIGSEGV")
 
 
@@ -72,7 +73,10 @@ def _path(text: str) -> str:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Key:
-    """A key: its field, and the parser of its text, whose ValueError describes the allowed values."""
+    """A key of a description: its field in the fault class, and the parser of its value.
+
+    If the value is wrong, the parser raises a ValueError that describes the allowed values.
+    """
 
     field: str
     read: Callable[[str], Any]
@@ -90,10 +94,11 @@ _COUNT: Final = _whole(1, 10**12)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Kind:
-    """A word of the language: the fault class, its keys, and the events at which it can occur.
+    """A kind of fault: its class, its keys, and the events at which it can occur.
 
-    `every` and `probability` count the first event. `topic` is the default if the text names neither a topic
-    nor a service. If `needs` is not empty, the text must contain at least one of these keys.
+    The first of `events` is the event that the keys `every` and `probability` count. `topic` is the default
+    topic for a description that names neither a topic nor a service. If `needs` is not empty, a description
+    must contain at least one of these keys.
     """
 
     make: type[InjectedFault]
@@ -135,7 +140,7 @@ _CALLS: Final = (FaultEvent.CALL, FaultEvent.STEP, FaultEvent.RESET)
 
 
 def parse(text: str, where: str) -> tuple[InjectedFault, ...]:
-    """Return the faults in `text`; errors name its origin, `where`.
+    """Return the faults in `text`; an error names `where`, the option or variable that holds the text.
 
     Raises:
         FaultError: a description is wrong.
@@ -144,7 +149,7 @@ def parse(text: str, where: str) -> tuple[InjectedFault, ...]:
 
 
 class _Reader:
-    """Reads one fault."""
+    """Parses the description of one fault."""
 
     def __init__(self, text: str, where: str) -> None:
         self._text = text
@@ -185,7 +190,7 @@ class _Reader:
         return pairs
 
     def _trigger(self, given: dict[str, str]) -> Trigger:
-        """Remove the keys of the trigger from `given`, and return the trigger."""
+        """Return the trigger, and remove its keys from `given`."""
         said = [it for it in ("every", "probability", *FaultEvent) if it in given]
         if len(said) > 1:
             raise self._error(f"{said[0]} and {said[1]} set two different times", "remove one")

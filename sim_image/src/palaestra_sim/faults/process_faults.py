@@ -1,4 +1,4 @@
-"""The effects of faults on the process: signals, memory, exits. Other modules decide when they occur."""
+"""Apply faults to the process: send a signal, allocate memory, exit. Other modules decide when."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ log = logging.getLogger(__name__)
 
 
 class Endings(Protocol):
-    """The effects that concern the whole process."""
+    """The methods of the program that end the process, or that affect all ROS nodes of the process."""
 
     def end(self, status: int) -> None:
-        """Close everything and exit with that code."""
+        """Close all connections and exit with the code `status`."""
         ...
 
     def lose_master(self) -> None:
@@ -69,11 +69,11 @@ class ProcessFaults:
         return True
 
     def _crash(self, fault: Crash) -> bool:
-        # A core file in the work folder would only take up space.
+        # Write no core file: the crash is intended, and the file would only take up space.
         resource.setrlimit(resource.RLIMIT_CORE, (0, resource.getrlimit(resource.RLIMIT_CORE)[1]))
         if fault.signal is not signal.SIGKILL:
             signal.signal(fault.signal, signal.SIG_DFL)
-        signal.raise_signal(fault.signal)  # this thread gets the signal, so it sends no further response
+        signal.raise_signal(fault.signal)  # ends the process before it can send another response
         return False
 
     def _exit(self, fault: Exit) -> bool:
@@ -82,7 +82,7 @@ class ProcessFaults:
 
     def _hang(self, _fault: Hang) -> bool:
         signal.raise_signal(signal.SIGSTOP)
-        return True  # the process received SIGCONT
+        return True  # a SIGCONT has continued the process
 
     def _lose_master(self, _fault: MasterLostFault) -> bool:
         self._endings.lose_master()
@@ -95,6 +95,6 @@ class ProcessFaults:
     def _grow(self, fault: MemoryGrowth) -> bool:
         if self._kept_mib + fault.mib <= fault.most_mib:
             self._kept_mib += fault.mib
-            # The kernel shares pages of zeros, so they would occupy no memory.
+            # Not zeros, because the kernel could keep pages of zeros without using memory.
             self._kept.append(b"\1" * int(fault.mib * _MIB))
         return True

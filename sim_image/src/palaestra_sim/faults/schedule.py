@@ -1,9 +1,8 @@
-"""The schedule of a life: the faults at its k-th event.
+"""Decide which faults occur at the k-th event of a life, one run of the simulator's process.
 
-Pure, and a function rather than a stream: the random draw for an event is a hash over the seed, the
-simulator, its life, the fault and the event's number. So a draw does not depend on earlier draws, and one
-more fault does not change the others. Two lives of a simulator, or two simulators of a group, have different
-draws.
+Pure: the random number for an event is a hash of the seed, the simulator, its life, the fault and the number
+of the event. So it does not depend on earlier events, and an additional fault does not change when the others
+occur. Two lives of a simulator, or two simulators of a group, get different random numbers.
 """
 
 from __future__ import annotations
@@ -20,12 +19,12 @@ _DRAWS = float(256**_DRAW_BYTES)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Life:
-    """The values that distinguish the faults of one life.
+    """The inputs of the random numbers; they are constant in one life.
 
     Attributes:
-        seed: chosen by a person.
-        simulator: its name, which distinguishes it from others with that seed.
-        number: the number of the life, counted from 1 by the program that starts the simulator.
+        seed: the seed that a user chose.
+        simulator: the name of the simulator, so that simulators with the same seed get different numbers.
+        number: the number of the life; the program that starts the simulator counts lives from 1.
     """
 
     seed: int = 0
@@ -45,17 +44,17 @@ class FaultSchedule:
         return fault.trigger.fires(number, self._draw(fault, number, "happens"))
 
     def at(self, event: FaultEvent, number: int) -> tuple[InjectedFault, ...]:
-        """Return the faults that occur at event `number`, in the order in which they were written."""
+        """Return the faults that occur at event `number`, in the order in which the user wrote them."""
         return tuple(
             fault for fault in self.faults if fault.trigger.event is event and self.happens(fault, number)
         )
 
     def delay_s(self, fault: Delayed, number: int) -> float:
-        """Return the delay of event `number` by the fault: the latency, plus a random share of the jitter."""
+        """Return the delay in seconds at event `number`: the latency, plus a random share of the jitter."""
         return fault.latency_s + fault.jitter_s * self._draw(fault, number, "jitter")
 
     def _draw(self, fault: InjectedFault, number: int, purpose: str) -> float:
-        """Return a number in [0, 1), uniformly distributed."""
+        """Return a random number in [0, 1), uniformly distributed."""
         life = self.life
         words = (life.seed, life.simulator, life.number, fault.text, number, purpose)
         digest = hashlib.blake2b(repr(words).encode(), digest_size=_DRAW_BYTES).digest()

@@ -13,11 +13,11 @@ from pathlib import Path
 from palaestra_sim.errors import SimError
 
 _WRONG = 2
-_GENERATORS = {"genmsg", "genpy"}  # modules of ROS, in a package of the distribution
+_GENERATORS = {"genmsg", "genpy"}  # modules of ROS, which Debian's python3-genpy installs
 
 _EPILOG = """\
-Writes FOLDER/webots_ros. ROS's tools find it if FOLDER is on ROS_PACKAGE_PATH; they find /usr/share without
-that. An installed webots_ros is used instead if it is importable, or earlier on ROS_PACKAGE_PATH.
+The program writes FOLDER/webots_ros. ROS's tools find the package if FOLDER is /usr/share, or is on
+ROS_PACKAGE_PATH. If another webots_ros is importable, or is earlier on ROS_PACKAGE_PATH, ROS uses that one.
 
 exit codes: 0; 2 genpy is not installed, the folder cannot be written, or it has a webots_ros that Palaestra
 did not write

@@ -1,15 +1,15 @@
-"""Every file of the package webots_ros, as text: a manifest, the definitions, and genpy's Python modules.
+"""Generate the files of the package webots_ros: a manifest, the definitions, and genpy's Python modules.
 
-The package has two peculiarities, so that it works next to an installed webots_ros and on a plain Debian.
+Two details make the package work next to an installed webots_ros and on a plain Debian:
 
-`src/webots_ros` has no `__init__.py`. Python uses a folder without one only if no entry of `sys.path`, not
-even a later one, has a package of that name. So an installed webots_ros is imported instead.
+- `src/webots_ros` has no `__init__.py`. Python uses such a folder only if no entry of `sys.path` has a
+  regular package of the same name. So if another webots_ros is installed, Python imports that one.
+- The manifest is a `manifest.xml`, because roslib adds `src` to the path of ROS's tools only for such a
+  package. The manifest names no dependencies, because roslib requires a manifest of each dependency. Debian
+  installs the manifests of std_msgs, geometry_msgs and sensor_msgs only with their C++ packages.
 
-The manifest is a `manifest.xml` and names no dependencies. Only for such a package does roslib add `src` to
-the path of ROS's tools, and only if each dependency has a manifest. Debian has the manifests of std_msgs,
-geometry_msgs and sensor_msgs in their C++ packages.
-
-Only this module needs genpy and genmsg: its Python modules are for rospy, which depends on both.
+Only this module imports genpy and genmsg. They are available wherever the generated modules are useful,
+because rospy depends on both.
 """
 
 from __future__ import annotations
@@ -79,6 +79,7 @@ def _context() -> Any:
 
 
 def _text(lines: Iterable[str]) -> str:
-    # genpy counts variables across modules; a reset before each module keeps the text of a type the same.
+    # genpy numbers its variables across modules. After a reset, the text of a module does not depend on the
+    # modules that were generated before it.
     genpy.generator.reset_var()
     return "".join(f"{line}\n" for line in lines)

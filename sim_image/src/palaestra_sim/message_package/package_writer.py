@@ -1,4 +1,4 @@
-"""Write the package webots_ros into a folder, atomically, and never over a package of another origin."""
+"""Write the package webots_ros into a folder, atomically; never replace a package that we did not write."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from palaestra_sim.whole_file import write_whole
 
 
 def write(folder: Path) -> Path:
-    """Write the package into `folder`, in place of one of an earlier release, and return its path.
+    """Write the package into `folder` and return its path; a package of an earlier release is replaced.
 
-    If the process is killed, the folder has the whole earlier package, the whole new one, or neither.
+    If the process is killed, the folder has the complete old package, the complete new one, or no package.
 
     Raises:
         ForeignPackageError: the folder has a webots_ros that Palaestra did not write.
@@ -36,7 +36,7 @@ def write(folder: Path) -> Path:
 def make_importable(package: Path, packages_of_python: Path) -> None:
     """Make the package importable for the Python whose packages are in `packages_of_python`.
 
-    A package webots_ros that is installed there is imported instead.
+    If that folder has another webots_ros, Python imports the other one.
     """
     lines = packages_of_python / f"{NAME}.pth"
     write_whole(lines, f"{package.resolve() / 'src'}\n".encode())

@@ -1,21 +1,22 @@
-"""MuJoCo as the physics of a scene: masses, forces, contacts, and dynamic solids that move when pushed.
+"""The MuJoCo simulator: a physics with masses, forces, contacts, and solids that move when pushed.
 
-- `entry`: the start of `palaestra-mujoco`, which refuses a system other than Linux; `cli`: the program
-- `physics`: the bodies and obstacles of a world
+- `entry`: checks that the system is Linux, then starts `cli`; `cli`: the program `palaestra-mujoco`
+- `physics`: moves the bodies of a world, and casts the rays of sensors
 - `model`: builds MuJoCo's model from robots and shapes
-- `geoms`: builds parts of a model from shapes, and sets which of them may touch
-- `friction`: between materials
+- `geoms`: makes geoms from shapes, and sets which geoms may touch
+- `friction`: sets the friction between materials
 - `links`: parts of robots on joints, and doors
-- `body`: a robot that drives
+- `body`: the base of a robot that drives
 - `free_bodies`: dynamic solids
-- `library`: MuJoCo itself
-- `rays`: the distances that the beams of sensors travel to a boundingObject
-- `lidar_rays`: the distances that the beams of lidars travel to a shape
+- `library`: imports MuJoCo
+- `rays`: the distances that sensor beams travel until they meet a boundingObject
+- `lidar_rays`: the distances that lidar beams travel until they meet a visible shape
 - `camera`, `renderer`: the images of cameras
 - `visual_model`: a separate model of the visible shapes
-- `gl_context`, `pixels`: OpenGL
-- `video`: the file of a movie
-- `mjcf`: worlds in MuJoCo's own format, independent of the modules above
+- `gl_context`, `pixels`: the OpenGL context, and the conversion of its pixels
+- `video`: writes the file of a movie
+- `mjcf`: simulates worlds in MuJoCo's own format; it uses few of the modules above
 
-Worlds, devices and the interface are those of all simulators: `scene` and `ros_controller`.
+All simulators share `scene`, which has the worlds and devices, and `ros_controller`, which has the interface
+of Webots' `ros` controller.
 """

@@ -1,8 +1,8 @@
-"""A robot in MuJoCo: three joints on the floor, and three force-limited servos in the robot's own axes.
+"""The base of a robot in MuJoCo: one body with three joints (x, y, heading), which three servos move.
 
-Once a basic step, the wheel kinematics set the target speed of the servos. The wheels themselves touch
-nothing: rollers and capsules as wheels are 4 to 25 times as slow, and drift by decimeters
-(docs/decisions/0017).
+The servos act along the axes of the robot, and their forces are limited. In each basic step, the wheel
+kinematics set the target speeds of the servos. The wheels themselves have no contacts. A simulation of wheels
+by rollers or capsules takes 4 to 25 times as long, and robots drift by decimeters (docs/decisions/0017).
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ class MujocoBody:
     """A robot that drives; see `Body`.
 
     Attributes:
-        build: its parts.
-        base: its wheels.
-        poses: the pose of each shape of its outline, in its own frame.
-        radius_m: the radius of the circle around its outline.
+        build: the parts of the robot.
+        base: the wheels of the robot.
+        poses: the pose of each shape of the outline, in the robot's frame.
+        radius_m: the radius of the circle around the outline.
         x, y, heading_rad, c, s, velocity, touched: see `Body`.
     """
 
@@ -35,14 +35,14 @@ class MujocoBody:
         self.build = build
         self.base = build.base
         self.radius_m = max((_reach(shape) for shape in build.outline), default=0.1)
-        # Read now, while they are relative to the robot; later they are poses in the world.
+        # The poses are now relative to the robot; later they are poses in the world.
         self.poses = tuple(shape.pose for shape in build.outline)
         self.touched = 0
         self.velocity = (0.0, 0.0, 0.0)
         self._joints: Any = None  # views of MuJoCo's arrays; None before the first model
         self._speeds: Any = None
         self._controls: Any = None
-        # In the robot's axes: see `command`.
+        # The target speeds and their corrections, in the robot's axes; see `command`.
         self._wanted: Sequence[float] = _REST
         self._changes: Sequence[float] = _REST
         self._aims: Sequence[float] = _REST
@@ -51,22 +51,22 @@ class MujocoBody:
         self.c = 1.0
 
     def attach(self, joints: Any, speeds: Any, controls: Any) -> None:
-        """Use the parts of a new model's arrays that belong to this body, and write its state there."""
+        """Use these arrays of a new model for this body, and write the state of the body to them."""
         self._joints, self._speeds, self._controls = joints, speeds, controls
         self.write()
 
     def write(self) -> None:
-        """Write its state to MuJoCo's arrays."""
+        """Write the state of the body to MuJoCo's arrays."""
         self._joints[:] = self.x, self.y, self.heading_rad
         self._speeds[:] = self.velocity
 
     def bits(self, outline: Sequence[Shape]) -> int:
-        """Return the parts of the body that match these shapes, as bits of `touched`."""
+        """Return the bits in `touched` of the parts that have these shapes."""
         parts = (*self.build.outline, *(shape for link in self.build.links for shape in link.shapes))
         return sum(1 << index for index, shape in enumerate(parts) if shape in outline)
 
     def place(self, x: float, y: float, heading_rad: float) -> None:
-        """Set the position and heading of the robot; its motion continues."""
+        """Set the position and heading of the robot; the robot keeps its velocity."""
         self._stand(x, y, heading_rad)
         if self._joints is not None:
             self._joints[:] = x, y, heading_rad
@@ -78,15 +78,15 @@ class MujocoBody:
         self._set_speed(0.0, 0.0, 0.0)
 
     def push(self, vx: float, vy: float, omega: float) -> None:
-        """Give the body a velocity in world axes; its motors continue from there."""
+        """Give the body a velocity in world axes; its motors start from the matching speeds."""
         self.base.push(vx * self.c + vy * self.s, vy * self.c - vx * self.s, omega)
         self._set_speed(vx, vy, omega)
 
     def command(self, step_s: float, *, powered: bool) -> None:
-        """Turn the wheels for one basic step, and set the speeds of the servos.
+        """Turn the wheels for one basic step, and set the target speeds of the servos.
 
-        A servo needs a part of the step to reach a new speed. The next step compensates for the distance that
-        is lost in this time. So a robot stops where the wheel kinematics say.
+        A servo needs a part of the step to reach a new speed, so the robot loses distance. The target speeds
+        of the next step make up for this distance. So a robot stops where the wheel kinematics predict.
         """
         if powered:
             self.base.turn(step_s)
@@ -106,10 +106,11 @@ class MujocoBody:
         self._stand(x, y, heading)
 
     def _lagged(self, heading_rad: float) -> list[float]:
-        """Return the mean speed that the servos missed in this step, seen from the middle of the step.
+        """Return the mean difference between the target speeds and the actual speeds in this step.
 
-        It is at most the change of the target speed. An obstacle that holds a robot back does not change the
-        target speed, so the robot does not jump when it is free again.
+        The differences are in the robot's axes at the middle of the step. Each is at most the change of the
+        target speed in this step. So while an obstacle stops the robot and the target speed is constant, no
+        difference accumulates, and the robot does not jump when it is free again.
         """
         c, s = math.cos(heading_rad), math.sin(heading_rad)
         vx, vy, omega = self.velocity
@@ -120,7 +121,7 @@ class MujocoBody:
         ]
 
     def _forget(self) -> None:
-        """Let the servos start from rest."""
+        """Discard the target speeds of the last step; the servos start from rest."""
         self._wanted = self._changes = self._aims = self._lags = _REST
 
     def _set_speed(self, vx: float, vy: float, omega: float) -> None:
@@ -137,12 +138,12 @@ class MujocoBody:
         self.s = math.sin(heading_rad)
 
 
-_RESERVE: Final = 2.0  # times the force for the largest acceleration: a servo that lags must catch up
-GAIN: Final = 500.0  # in 1/s: a servo reaches its speed within one or two substeps of 4 ms
+_RESERVE: Final = 2.0  # factor on the force for the largest acceleration, so that a servo can catch up
+GAIN: Final = 500.0  # in 1/s: a servo reaches its target speed within one or two MuJoCo steps of 4 ms
 
 
 def servo(axis: int, inertia: float) -> tuple[float, float]:
-    """Return gain and largest force of the servo along an axis, for a mass in kg or an inertia in kg m2."""
+    """Return the gain and the maximum force of a servo; `inertia` is a mass in kg or an inertia in kg m2."""
     return GAIN * inertia, _RESERVE * ACCELERATIONS[axis] * inertia
 
 

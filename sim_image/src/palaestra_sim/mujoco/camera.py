@@ -1,4 +1,4 @@
-"""A camera in MuJoCo: see `CameraInterface`."""
+"""A camera that MuJoCo renders; it implements `CameraInterface`."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _BLACK: Final = bytes((0, 0, 0, 255))
 
 
 class MujocoCamera:
-    """A frame and a lens, and the images of the world from there."""
+    """Renders images of the world from a frame through a lens."""
 
     def __init__(self, pictures: Renderer, place: Frame, lens: Lens) -> None:
         self._pictures = pictures
@@ -33,7 +33,10 @@ class MujocoCamera:
         return self._pictures.colors(self._place, self._lens)
 
     def depths(self, nearest_m: float, resolution_m: float) -> memoryview:
-        """Return the distance of each pixel."""
+        """Return the distance of each pixel in meters, as float32.
+
+        A distance below `nearest_m` is infinite. If `resolution_m` is above 0, distances are rounded to it.
+        """
         depths = self._pictures.depths(self._place, self._lens)
         depths[depths < nearest_m] = math.inf
         if resolution_m > 0.0:
@@ -41,7 +44,7 @@ class MujocoCamera:
         return memoryview(depths).cast("B")
 
     def patches(self, owner: Callable[[SceneNode], SceneNode | None]) -> dict[SceneNode, Corners]:
-        """Return the image rectangle in which each owner is visible."""
+        """Return the image rectangle of each visible object; `owner` returns the object of a shape's node."""
         numbers = self._pictures.segments(self._place, self._lens)
         owners = [owner(thing.node) for thing in self._pictures.things]
         known = list(dict.fromkeys(it for it in owners if it is not None))
@@ -52,7 +55,7 @@ class MujocoCamera:
         return {known[at]: _corners(of_owner == at) for at in np.unique(of_owner).tolist() if at >= 0}
 
     def painted(self, color: Callable[[SceneNode], bytes | None]) -> memoryview:
-        """Return an image in which each shape has one color."""
+        """Return an image in which each shape has the color that `color` returns for its node."""
         numbers = self._pictures.segments(self._place, self._lens)
         colors = [color(thing.node) or _BLACK for thing in self._pictures.things]
         table = np.frombuffer(b"".join((*colors, _BLACK)), np.uint8).reshape(-1, len(_BLACK))
@@ -61,6 +64,6 @@ class MujocoCamera:
 
 
 def _corners(mask: Any) -> Corners:
-    """Return the rectangle around the pixels of a mask."""
+    """Return the rectangle around the pixels that are set in a mask."""
     rows, columns = np.nonzero(mask)
     return int(columns.min()), int(rows.min()), int(columns.max()) + 1, int(rows.max()) + 1

@@ -1,4 +1,4 @@
-"""`palaestra-mujoco`."""
+"""The program `palaestra-mujoco`."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from palaestra_sim.scene.mode import Mode
 from palaestra_sim.scene.physics import Physics
 from palaestra_sim.scene.validation import LeaveOut
 
-# These functions import MuJoCo, so that the program can report a missing MuJoCo as its own error, and
-# `--help` works without it.
+# The functions import MuJoCo, because an import at the top of this module would fail without MuJoCo. So
+# `--help` always works, and the program can report a missing MuJoCo as an error with a remedy.
 
 
 def _physics() -> Physics:
@@ -32,7 +32,7 @@ def _mjcf(world_path: Path, mode: Mode, leave_out: LeaveOut, root: Path | None) 
     Raises:
         MissingLibraryError: MuJoCo is not installed.
         WorldError: the world is wrong.
-        OSError: it cannot be read.
+        OSError: the world cannot be read.
     """
     loading = importlib.import_module("palaestra_sim.mujoco.mjcf.loader")
     simulation: Backend = loading.load(world_path, mode, leave_out, root=root)

@@ -1,4 +1,4 @@
-"""A dynamic solid in MuJoCo: a body on a free joint."""
+"""A dynamic solid in MuJoCo: a body with a free joint."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ from typing import Any, Final
 from palaestra_sim.scene.dynamic_solids import BodyState, DynamicFrame
 from palaestra_sim.scene.geometry import Pose, quaternion_to_matrix, to_quaternion
 
-_PLACE: Final = 7  # numbers of a free joint: a position, and a quaternion w, x, y, z
-_SPEED: Final = 6  # a velocity in world axes, and an angular velocity in the body's
+_PLACE: Final = 7  # numbers of a free joint's pose: a position, and a quaternion w, x, y, z
+_SPEED: Final = 6  # a velocity in world axes, and an angular velocity in the axes of the body
 
 
 class FreeBody:
-    """One dynamic solid of a model; its frame follows it.
+    """One dynamic solid of a model; the solid's frame in the scene gets its pose from here.
 
     Attributes:
-        place: its frame in the scene.
-        number: the number of its body in the model.
+        place: the frame of the solid in the scene.
+        number: the number of the solid's body in the model.
     """
 
     def __init__(self, place: DynamicFrame, model: Any, data: Any, number: int) -> None:
@@ -28,7 +28,7 @@ class FreeBody:
         self._speed = data.qvel[speed : speed + _SPEED]
 
     def begin(self, state: BodyState, changed: dict[DynamicFrame, None]) -> None:
-        """Start from a state; a client's change to the frame adds the frame to `changed`."""
+        """Set the initial state; from now on, a client's change to the frame adds the frame to `changed`."""
         self._write(state.pose)
         self._move(state)
         self.place.put = False
@@ -58,5 +58,5 @@ class FreeBody:
         self._where[:] = (*pose.position, w, x, y, z)
 
     def _move(self, state: BodyState) -> None:
-        """Write the velocities of a state; its angular velocity is in world axes."""
+        """Write the velocities of a state to MuJoCo; the angular velocity of `state` is in world axes."""
         self._speed[:] = (*state.velocity, *state.pose.inverse.turned(state.turning))

@@ -1,8 +1,8 @@
-"""Frictions between pairs of materials in MuJoCo, where each geom has only one friction.
+"""Set the friction between each pair of materials, although a geom of MuJoCo has only one friction.
 
-If two geoms touch, MuJoCo uses the friction of the one with the higher priority. The rarer a material is, the
-higher is its priority, and its friction is the one with the most common material. Where this gives a wrong
-friction, the pairs of geoms are listed explicitly.
+If two geoms touch, MuJoCo uses the friction of the geom with the higher priority. Here, geoms of rarer
+materials have higher priorities. The friction of a geom is that between its own material and the most common
+material. This is wrong for some pairs of materials. Pairs of such geoms are listed in the model explicitly.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from typing import Any, Final
 from palaestra_sim.scene.physics_settings import PhysicsSettings
 
 _WORLD: Final = "world"
-_CONTACT: Final = 3  # condim: sliding friction without torsion
+_CONTACT: Final = 3  # MuJoCo's condim: a contact with sliding friction only
 Surface = tuple[Any, str]  # a geom, and its material
 
 
 def set_frictions(spec: Any, surfaces: Sequence[Surface], surroundings: PhysicsSettings) -> None:
-    """Give all geoms of a model under construction the frictions of their materials."""
+    """Set the frictions of all geoms of a model that is not compiled yet, by their materials."""
     ranks = [material for material, _ in Counter(material for _, material in surfaces).most_common()]
     friction = {material: surroundings.friction(material, ranks[0]) for material in ranks}
     for geom, material in surfaces:
@@ -43,7 +43,7 @@ def set_frictions(spec: Any, surfaces: Sequence[Surface], surroundings: PhysicsS
 def _exceptions(
     spec: Any, surfaces: Sequence[Surface], friction: dict[str, float], surroundings: PhysicsSettings
 ) -> Iterator[tuple[Surface, Surface]]:
-    """Yield the pairs of geoms that may touch and whose friction differs from the rarer material's."""
+    """Yield the pairs of geoms that may touch, and whose priorities give the wrong friction."""
     ranks = list(friction)
     wrong = {
         frozenset((one, other))

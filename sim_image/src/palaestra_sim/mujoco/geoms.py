@@ -1,6 +1,7 @@
-"""Shapes as MuJoCo's geoms: their sizes, the geoms that they touch, and their masses.
+"""Make MuJoCo's geoms from shapes: set their sizes and masses, and which geoms may touch.
 
-32 bits decide which geoms touch: one for the height range of each robot, and three for all.
+MuJoCo compares 32 bits of two geoms to decide whether they may touch. Three of the bits have a fixed meaning.
+Each robot has one of the other bits, which is set in obstacles at the height of the robot.
 """
 
 from __future__ import annotations
@@ -19,8 +20,8 @@ from palaestra_sim.scene.shapes import Shape
 if TYPE_CHECKING:
     from palaestra_sim.mujoco.body import MujocoBody
 
-SEEN: Final = 0  # the group of geoms that rays and contacts meet
-UNSEEN: Final = 1  # while a robot's sensors cast rays, the group of its own links
+SEEN: Final = 0  # the group of geoms that rays can meet
+UNSEEN: Final = 1  # the group of a robot's own links while its sensors cast rays
 ROBOTS: Final = 1 << 0  # all robots touch each other
 LOOSE: Final = 1 << 1  # dynamic solids touch each other and robots
 STANDING: Final = 1 << 2  # robots' links and dynamic solids touch obstacles and floors
@@ -28,7 +29,7 @@ _FIRST_ROBOT: Final = 3
 _BITS: Final = 32
 _LEAST_M3: Final = 1e-9
 _LEAST_M: Final = 1e-6  # minimum length of the straight part of a capsule
-FRICTION: Final = (1.0, 0.005, 0.0001)  # sliding: Webots' coulombFriction of two materials without their own
+FRICTION: Final = (1.0, 0.005, 0.0001)  # sliding (Webots' default coulombFriction), torsional, rolling
 
 _GEOMS: Final = {
     "box": mujoco.mjtGeom.mjGEOM_BOX,
@@ -41,7 +42,7 @@ _GEOMS: Final = {
 
 @dataclass(frozen=True, slots=True)
 class Touch:
-    """The geoms that a geom touches, as bits of MuJoCo: its own type, and the types that it meets."""
+    """The bits of MuJoCo that decide what a geom touches: its own types, and the types that it may touch."""
 
     contype: int
     conaffinity: int
@@ -49,22 +50,29 @@ class Touch:
 
 @dataclass(slots=True, eq=False)
 class Marks:
-    """The geoms of a model under construction, each with its shape; for a robot also its body and bit."""
+    """The geoms of a model that is not compiled yet.
+
+    Each entry has a geom and its shape. For a part of a robot it also has the robot's body, and the bit of
+    the part in `touched`.
+    """
 
     entries: list[tuple[Any, Shape, MujocoBody | None, int]] = field(default_factory=list)
 
     def note(self, geom: Any, shape: Shape, body: MujocoBody | None = None, bit: int = 0) -> None:
-        """Record the shape of a geom, and its robot's body."""
+        """Add an entry for a geom."""
         self.entries.append((geom, shape, body, bit))
 
 
 def own_bit(index: int) -> int:
-    """Return the bit for the height range of a robot; robots beyond the last bit share it."""
+    """Return the bit for obstacles at the height of a robot; robots with a high index share the last bit."""
     return 1 << min(_FIRST_ROBOT + index, _BITS - 2)
 
 
 def add_geom(spec: Any, body: Any, shape: Shape, pose: Pose, touch: Touch) -> Any:
-    """Add a shape to a body of a model, at a pose in its frame; return the geom, whose mass is 0."""
+    """Add a geom for a shape to a body; return the geom, whose mass is 0.
+
+    `pose` is the pose of the geom in the frame of the body.
+    """
     geom = body.add_geom(
         type=_GEOMS[shape.kind],
         **_form(spec, shape),
@@ -79,7 +87,7 @@ def add_geom(spec: Any, body: Any, shape: Shape, pose: Pose, touch: Touch) -> An
 
 
 def _form(spec: Any, shape: Shape) -> dict[str, Any]:
-    """Return the arguments of a geom that are its size; of a mesh, its name. Rays meet its triangles."""
+    """Return the arguments that set the size of a geom; for a mesh, the argument that names the mesh."""
     x, _, z = half = [length / 2.0 for length in shape.size]
     match shape.kind:
         case "box":
@@ -101,15 +109,22 @@ def _form(spec: Any, shape: Shape) -> dict[str, Any]:
 
 
 def fill(geom: Any, shape: Shape, density: float) -> None:
-    """Give a geom the mass of its shape, from a density in kg/m3."""
+    """Set the mass of a geom from its shape and a density in kg/m3."""
     if shape.mesh is None:
         geom.density = density
-    else:  # MuJoCo would fill the convex hull
+    else:  # MuJoCo would compute the mass of the convex hull
         geom.mass = density * volume_m3(shape)
 
 
 def add_matter(body: Any, matter: MassProperties, frame: Pose, geoms: Mapping[Shape, Any]) -> None:
-    """Give a body the mass of a Solid with the pose `frame` in the body; `geoms` are those of its shapes."""
+    """Add the mass of a Solid to a body.
+
+    Args:
+        body: the body.
+        matter: the mass of the Solid.
+        frame: the pose of the Solid in the frame of the body.
+        geoms: the geoms of the Solid's shapes.
+    """
     if matter.mass_kg <= 0.0:
         return
     if matter.shapes and matter.center is None and matter.inertia is None:
@@ -131,14 +146,18 @@ def spread(mass_kg: float, shapes: Sequence[Shape], geoms: Iterable[Any]) -> Non
 
 
 def put(position: Any, quaternion: Any, pose: Pose) -> None:
-    """Write a pose to arrays of MuJoCo."""
+    """Write a pose to MuJoCo's arrays of a position and a quaternion."""
     position[:] = pose.position
     x, y, z, w = to_quaternion(pose.rotation)
     quaternion[:] = np.array((w, x, y, z))
 
 
 def _inertia(matter: MassProperties) -> tuple[float, ...]:
-    """Return the inertia of boxes around its shapes; without shapes, of a ball as dense as water."""
+    """Return a default inertia for a mass, if the user did not set one.
+
+    The mass fills the bounding boxes of its shapes. If it has no shapes, it is a ball with the density of
+    water.
+    """
     if not matter.shapes:
         radius_m = (matter.mass_kg / 1000.0 * 0.239) ** (1.0 / 3.0)
         turning = 0.4 * matter.mass_kg * radius_m**2

@@ -1,7 +1,8 @@
-"""The one OpenGL context of a process: it has no window, and is opened for the first image.
+"""The OpenGL context of the process; it has no window.
 
-A simulator without cameras needs no OpenGL. One context serves all worlds of a process, one at a time: the
-objects of a world in it are freed when another world renders, and at the end of the process.
+The context is opened for the first image, because a simulator without cameras must work without OpenGL. All
+worlds of a process share the context, one at a time. The OpenGL objects of a world are freed when another
+world renders, and at the end of the process.
 """
 
 from __future__ import annotations
@@ -16,27 +17,29 @@ from typing import Any, Final
 from palaestra_sim.mujoco.library import mujoco
 from palaestra_sim.ros_interfaces import UnsimulatedError
 
+# The OpenGL libraries that MuJoCo can use without a window, each with the Debian packages that it needs.
 _BACKENDS: Final = {
     "egl": "libegl1 libgl1-mesa-dri libopengl0",
     "osmesa": "libosmesa6",
-}  # values: the packages in Debian
+}
 _FONT: Final = mujoco.mjtFontScale.mjFONTSCALE_100.value  # the smallest font, because no text is rendered
 
 
 class GlContext:
-    """An OpenGL context, and the objects of the current world in it."""
+    """An OpenGL context, and the OpenGL objects of the current world."""
 
     def __init__(self) -> None:
         self._context: Any = _open_context()
         self._drawing: Any = None
         self._owner: object = None
         self._size = (0, 0)
-        atexit.register(self.close)  # registered after the hook of mujoco.egl, so it runs before that
+        atexit.register(self.close)  # runs before the exit hook of mujoco.egl, which was registered earlier
 
     def take(self, owner: object, model: Any, size: tuple[int, int]) -> Any:
-        """Return the rendering context of a model, with room for an image of `size`.
+        """Return MuJoCo's rendering context for a model; it can render images up to `size`.
 
-        `owner` keeps the context until another owner takes it, and always passes the same model.
+        The OpenGL objects of `owner` are kept until another owner calls this method. An owner must always
+        pass the same model.
         """
         self._context.make_current()
         if self._owner is not owner or self._drawing is None:
@@ -52,14 +55,14 @@ class GlContext:
         return self._drawing
 
     def release(self) -> None:
-        """Free the objects of the current world in the context."""
+        """Free the OpenGL objects of the current world."""
         if self._drawing is not None:
             self._context.make_current()
             self._drawing.free()
         self._drawing = self._owner = None
 
     def close(self) -> None:
-        """Free everything; safe to call again."""
+        """Free the context and all its objects; safe to call again."""
         self.release()
         self._context.free()
 
@@ -75,17 +78,18 @@ def canvas() -> GlContext:
 
 
 def _open_context() -> Any:
-    """Return a context of OpenGL.
+    """Return a new OpenGL context.
 
     Raises:
-        UnsimulatedError: the library is missing, or does not work.
+        UnsimulatedError: the OpenGL library is missing, or does not work.
     """
     name = os.environ.get("MUJOCO_GL", "").strip().lower() or "egl"
     if name not in _BACKENDS:
         raise UnsimulatedError(f"MUJOCO_GL={name} draws no pictures; use {' or '.join(_BACKENDS)}")
-    # Mesa would otherwise render with its own threads, which wait for each other in small images.
+    # By default Mesa renders with its own threads. For small images, these threads mostly wait for each
+    # other.
     os.environ.setdefault("LP_NUM_THREADS", "0")
-    # The logger reports a missing accelerator that is not needed.
+    # At the level INFO, this logger reports that an optional accelerator module is missing.
     logging.getLogger("OpenGL.acceleratesupport").setLevel(logging.WARNING)
     try:
         return import_module(f"mujoco.{name}").GLContext(1, 1)

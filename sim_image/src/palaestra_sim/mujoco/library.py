@@ -1,4 +1,4 @@
-"""MuJoCo itself, whose compiled modules have no type information."""
+"""Import MuJoCo; its compiled modules have no type information, so the module has the type Any."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rays of MuJoCo for the lidars of one robot, cast in the model from which images are rendered."""
+"""The distances that lidar beams travel; MuJoCo casts the rays in the model of the visible shapes."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from palaestra_sim.scene.sensor_rays import Beam
 
 _GROUPS: Final = np.array([int(group == 0) for group in range(mujoco.mjNGROUP)], dtype=np.uint8)
 
-_PAST_M: Final = 1e-6  # how far behind a triangle the next ray begins
-_MOST_TRIANGLES: Final = 100  # number of triangles that one ray passes from behind
+_PAST_M: Final = 1e-6  # a ray that passed a triangle continues at this distance behind it
+_MOST_TRIANGLES: Final = 100  # maximum number of triangles that one ray passes from behind
 
 
 class LidarBeams:
-    """The beams of one robot; beams that begin at one point are cast together.
+    """The lidar beams of one robot; beams with the same origin are cast together.
 
-    A beam passes through its robot, and through shapes that contain its origin: the renderer does not show
-    a surface from inside either.
+    A beam passes through the robot itself. It also passes through a shape that contains the origin of the
+    beam, because a camera does not show the inner side of a surface either.
     """
 
     def __init__(self, pictures: Renderer, figure: Figure, beams: Sequence[Beam]) -> None:
@@ -37,7 +37,7 @@ class LidarBeams:
         self._own: tuple[VisualModel | None, Any] = (None, np.empty(0, int))
 
     def cast(self) -> list[float]:
-        """Return the distance that each beam travels now, in meters; its full reach if it meets nothing."""
+        """Return the distance in meters that each beam travels now; at most the reach of the beam."""
         visible = self._pictures.placed()
         pose = self._figure.place.world_pose
         turned = np.array(pose.rotation).reshape(3, 3)
@@ -55,7 +55,7 @@ class LidarBeams:
         return travelled
 
     def _own_geoms(self, visible: VisualModel) -> Any:
-        """Return the numbers of the geoms that the robot carries; they are computed once for each model."""
+        """Return the numbers of the robot's own geoms; they are computed once for each model."""
         if self._own[0] is not visible:
             carrier = self._figure.place
             places = [thing.place for thing in visible.things]
@@ -67,7 +67,7 @@ class LidarBeams:
 
 
 def _seen_from_below(visible: VisualModel, origin: Any) -> Any:
-    """Return the numbers of the Planes below whose upper side a point is: only that one is drawn."""
+    """Return the numbers of the Planes that are above a point: only the upper side of a Plane is visible."""
     planes = visible.planes
     offsets = origin - visible.data.geom_xpos[planes]
     heights = np.sum(offsets * visible.data.geom_xmat[planes][:, 2::3], axis=1)
@@ -76,7 +76,7 @@ def _seen_from_below(visible: VisualModel, origin: Any) -> Any:
 
 @contextmanager
 def _without(visible: VisualModel, geoms: Any) -> Iterator[None]:
-    """Hide some geoms until the end of the context; those that were hidden before stay hidden."""
+    """Hide some geoms until the end of the block; geoms that were hidden before stay hidden."""
     shown = geoms[visible.model.geom_group[geoms] == 0]
     visible.model.geom_group[shown] = PASSED
     try:
@@ -86,7 +86,10 @@ def _without(visible: VisualModel, geoms: Any) -> Iterator[None]:
 
 
 def _cast(visible: VisualModel, origin: Any, directions: Any, passed: list[Any]) -> Any:
-    """Return the distances to surfaces that face the beams; add geoms around the origin to `passed`."""
+    """Return the distance along each beam to the first surface that faces the origin.
+
+    Geoms that contain the origin are hidden, and their numbers are added to `passed`.
+    """
     count = len(directions)
     hits, distances, normals = np.empty(count, np.int32), np.empty(count), np.empty((count, 3))
     while True:
@@ -116,7 +119,10 @@ def _cast(visible: VisualModel, origin: Any, directions: Any, passed: list[Any])
 
 
 def _beyond(visible: VisualModel, origin: Any, direction: Any, distance_m: float) -> float:
-    """Return the distance to the next visible surface behind the back of a triangle; -1 without one."""
+    """Return the distance to the first triangle that faces the origin, beyond a triangle seen from behind.
+
+    Return -1 if the ray meets no such triangle.
+    """
     normal = np.empty(3)
     for _ in range(_MOST_TRIANGLES):
         distance_m += _PAST_M

@@ -1,7 +1,8 @@
-"""Links in MuJoCo: bodies on joints, servos that turn them, and sensors of the force on fixed links.
+"""Links in MuJoCo: bodies on joints, the servos that move the joints, and force sensors in fixed links.
 
-A servo targets the speed that the motor demands, with at most the motor's force. It adds the force against
-gravity, so a motor that holds a weight does not sag. Links touch everything except their own robot.
+A servo moves its joint at the speed that the motor demands; its force is at most that of the motor. The servo
+also compensates for gravity, so a motor that holds a weight does not sag. Links may touch all bodies except
+those of their own robot.
 """
 
 from __future__ import annotations
@@ -19,18 +20,20 @@ from palaestra_sim.scene.joints import Joint
 from palaestra_sim.scene.links import Link, frames_between, link_around
 from palaestra_sim.scene.motors import Motor
 
-# With the defaults, a held weight creeps, and a strong motor drives a joint a centimeter beyond its stop.
+# MuJoCo's defaults are too soft: a weight that a motor holds creeps, and a strong motor moves a joint a
+# centimeter beyond its stop.
 _STIFF: Final = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 _TOUCH: Final = Touch(ROBOTS, STANDING | LOOSE | ROBOTS)
 
 
 @dataclass(slots=True, eq=False)
 class Added:
-    """The parts of a link in a model under construction.
+    """The parts of a link in a model that is not compiled yet.
 
     Attributes:
-        body: its body.
-        joint, servo, sensor: None if the link does not have it.
+        link: the link in the scene.
+        body: the body of the link.
+        joint, servo, sensor: the joint, the servo and the force sensor; None if the link does not have it.
     """
 
     link: Link
@@ -45,8 +48,11 @@ class Ground:
     """The bodies on which links are mounted.
 
     Attributes:
+        spec: the model that is not compiled yet.
         roots: the bodies of robots and dynamic solids, by their frames.
-        stands: the bodies of obstacles, by their frames; mounting a link adds to them.
+        stands: the bodies of obstacles, by their frames. If a link is mounted on a frame without a body, a
+            new body is added.
+        names: new names for bodies and joints.
     """
 
     spec: Any
@@ -55,7 +61,7 @@ class Ground:
     names: Iterator[str] = field(default_factory=lambda: (f"link {number}" for number in range(10**9)))
 
     def under(self, place: Frame | None) -> tuple[Frame | None, Any]:
-        """Return the frame of the body around the frame `place`, and that body."""
+        """Return the body to which the frame `place` belongs, preceded by the frame of this body."""
         around = () if place is None else place.chain()
         for outer in around:
             if outer in self.roots:
@@ -68,7 +74,14 @@ class Ground:
 
 
 def add_links(ground: Ground, links: Sequence[Link], marks: Marks, body: MujocoBody | None) -> list[Added]:
-    """Add the links of one robot, outer ones first, or a link without a robot; `body` is the robot's."""
+    """Add links to a model and return their parts.
+
+    Args:
+        ground: the bodies on which the links are mounted.
+        links: the links of one robot, or links without a robot; a link comes before the links on it.
+        marks: gets an entry for each geom.
+        body: the body of the robot; None without a robot.
+    """
     added: dict[Link, Added] = {}
     bit = 0 if body is None else len(body.build.outline)
     for link in links:
@@ -125,7 +138,7 @@ def _add_joint(ground: Ground, added: Added) -> None:
 
 
 def _exclude(ground: Ground, added: Sequence[Added]) -> None:
-    """Prevent contacts of a robot's links with each other and with the bodies on which they are mounted."""
+    """Prevent contacts between links of the same robot, and between links and the bodies that carry them."""
     pairs = [(one.body.name, other.body.name) for one, other in combinations(added, 2)]
     for it in added:
         around = [place for place in it.link.place.chain() if place in ground.stands or place in ground.roots]
@@ -135,12 +148,12 @@ def _exclude(ground: Ground, added: Sequence[Added]) -> None:
 
 
 class LinkBody:
-    """One link of a compiled model; it updates its joint and motor in the scene.
+    """One link of a compiled model; it updates the joint and the motor in the scene.
 
     Args:
-        added: its parts in the model.
-        model: the model.
-        data: its data.
+        added: the parts of the link in the model.
+        model: the compiled model.
+        data: the data of the model.
 
     Attributes:
         link: the link in the scene.
@@ -152,7 +165,7 @@ class LinkBody:
         self._joint: Joint | None = added.link.joint
         self._motor: Motor | None = None if self._joint is None else self._joint.motor
         self._known: tuple[float, float] | None = None
-        self._aim = 0.0  # target speed in rad/s or m/s: the acceleration limits its changes, as in Webots
+        self._aim = 0.0  # target speed in rad/s or m/s; the motor's acceleration limits its changes
         self._set: tuple[float, float, bool] | None = None
         self._sensor = -1 if added.sensor is None else int(model.sensor_adr[added.sensor.id])
         self._servo = -1 if added.servo is None else int(added.servo.id)
@@ -162,11 +175,11 @@ class LinkBody:
             self._gain = GAIN * float(model.dof_M0[self._dof])
 
     def forget(self) -> None:
-        """Write position and speed of the joint again before the next step."""
+        """Make the next `take` write the position and the speed of the joint to MuJoCo."""
         self._known = None
 
     def take(self) -> bool:
-        """Copy a client's changes of the joint to MuJoCo; return whether there were any."""
+        """Copy a client's change of the joint to MuJoCo; return whether there was a change."""
         joint = self._joint
         if joint is None or self._known == (joint.now, joint.turning):
             return False
@@ -193,11 +206,11 @@ class LinkBody:
         data.ctrl[self._servo] = self._aim + load / self._gain
 
     def follow(self) -> None:
-        """Copy the values that MuJoCo has computed."""
+        """Copy the position, speed and force that MuJoCo has computed to the scene."""
         data, joint, motor = self._data, self._joint, self._motor
         if joint is None:
             x, y, z = data.sensordata[self._sensor : self._sensor + 3].tolist()
-            self.link.force = (-x, -y, -z)  # MuJoCo measures the force that holds the link
+            self.link.force = (-x, -y, -z)  # MuJoCo measures the opposite force, which holds the link
             return
         position, speed = float(data.qpos[self._at]), float(data.qvel[self._dof])
         joint.follow(position, speed)
@@ -206,7 +219,7 @@ class LinkBody:
             motor.feedback_nm = float(data.actuator_force[self._servo])
 
     def _limit(self, joint: Joint, motor: Motor | None) -> None:
-        """Set the limit and the damping of the joint, if they have changed."""
+        """Set the force limit and the damping of the joint, if they have changed."""
         model, dof = self._model, self._dof
         damping = joint.braking
         limit, direct = 0.0, False
@@ -226,5 +239,5 @@ class LinkBody:
 
 
 def bodies(added: Mapping[Any, Sequence[Added]], model: Any, data: Any) -> dict[Any, tuple[LinkBody, ...]]:
-    """Return the links of a compiled model, by their robot."""
+    """Return the links of a compiled model, by robot; the key of links without a robot is None."""
     return {whose: tuple(LinkBody(it, model, data) for it in links) for whose, links in added.items()}

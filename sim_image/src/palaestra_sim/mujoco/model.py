@@ -1,7 +1,8 @@
 """Build MuJoCo's model from the robots, shapes and links of a world.
 
-A robot is one body on three joints, an obstacle a body without joints. Heights decide which of them touch, as
-in the stub: a robot does not touch an object that it drives over or under.
+The base of a robot is a body with three joints; an obstacle is a body without joints. As in the stub, a robot
+may touch an obstacle only if they are at the same height. It does not touch an obstacle that it drives over
+or under.
 """
 
 from __future__ import annotations
@@ -40,8 +41,8 @@ from palaestra_sim.scene.physics import Figure, Push
 from palaestra_sim.scene.physics_settings import PhysicsSettings, material_of
 from palaestra_sim.scene.shapes import Shape
 
-MASS_KG: Final = 23.0  # mass of a robot without Physics; a Robotino 3 has it with its batteries
-STANDING_KG: Final = 1e5  # mass of a robot without a drive, so that it stands like a wall
+MASS_KG: Final = 23.0  # mass of a robot without Physics: that of a Robotino 3 with batteries
+STANDING_KG: Final = 1e5  # mass of a robot without a drive, so that other robots cannot push it
 _LEAST_KG: Final = 1e-6
 _LEAST_KG_M2: Final = 1e-9
 
@@ -51,15 +52,17 @@ class Built:
     """A compiled model with its data, and the objects of the scene to which its parts belong.
 
     Attributes:
-        figures: each robot that moves, with its body and the number of this in the model.
-        geoms: by number, the shapes that are obstacles or outlines, with the body of a robot's.
-        stands: the number of the body of each place that has obstacles, or links mounted on it.
-        loose: the loose things.
-        links: the links of each robot, and under None those on no robot.
-        own_geoms: the numbers of the geoms on them.
-        fixed: where the obstacles are that do not move.
-        of_robots: whether a geom is a part of a robot, by number.
-        changed: the loose things that clients moved since the physics looked.
+        model, data: the model and the data of MuJoCo.
+        figures: the robots that move, each with its body, and the number of this body in the model.
+        geoms: by number of the geom: its shape, the body of its robot (None for other shapes), and the bit of
+            the shape in `touched`.
+        stands: the number of the body of each frame that has obstacles, or on which links are mounted.
+        loose: the dynamic solids, by their frames.
+        links: the links of each robot; the key None has the links without a robot.
+        own_geoms: the numbers of the geoms of these links, by the same keys.
+        fixed: the poses of the obstacles that cannot move in this model, by their frames.
+        of_robots: whether a geom is a part of a robot, by number of the geom.
+        changed: the dynamic solids that a client has moved since the last `take`.
         floors_m: the heights of the Planes of the world.
     """
 
@@ -77,7 +80,7 @@ class Built:
     floors_m: tuple[float, ...]
 
     def body_of(self, figure: Figure) -> int:
-        """Return the number of a robot's body; -1 if it does not have one."""
+        """Return the number of a robot's body; -1 if the robot has no body."""
         found = self.figures.get(figure)
         return -1 if found is None else found[1]
 
@@ -117,7 +120,7 @@ class Built:
                 body.touched |= bit
 
     def take(self) -> bool:
-        """Apply clients' changes of dynamic solids and joints; return whether there were any."""
+        """Apply clients' changes of dynamic solids and joints; return whether there were changes."""
         changed = list(self.changed)
         self.changed.clear()
         for place in changed:
@@ -141,7 +144,7 @@ class Built:
         self.data.xfrc_applied[number] += np.concatenate((push.force, torque))
 
     def settle(self) -> None:
-        """Compute all poses, from the joints and the obstacles."""
+        """Compute the poses of all bodies from the positions of joints and obstacles."""
         mujoco.mj_kinematics(self.model, self.data)
 
 
@@ -163,10 +166,11 @@ class Contents:
 def build(contents: Contents, surroundings: PhysicsSettings, moved: frozenset[Frame] = frozenset()) -> Built:
     """Return the model of robots, obstacles, dynamic solids and links, in their current state.
 
-    A body that touches a movable obstacle never sleeps in MuJoCo. So if there are bodies that can sleep,
-    obstacles are fixed, except those that have `moved`.
+    To save time, MuJoCo does not simulate bodies at rest: they sleep. But a body that touches a movable
+    obstacle never sleeps. So if the world has bodies that can sleep, obstacles are fixed in the model, except
+    those that a client has moved (`moved`).
     """
-    # The values of the previous model, if there was one.
+    # The solids still have the states that the previous model computed.
     states = [thing.place.course for thing in contents.loose]
     spec, marks, moving = mujoco.MjSpec(), Marks(), contents.moving
     stands, fixed = _add_obstacles(spec, contents, moved, marks)
@@ -205,12 +209,13 @@ def build(contents: Contents, surroundings: PhysicsSettings, moved: frozenset[Fr
 
 
 def _begin_spec(spec: Any, surroundings: PhysicsSettings) -> list[Any]:
-    """Set the options of the whole model; return the floors."""
+    """Set the options of the whole model, and add the floors; return the geoms of the floors."""
     spec.option.gravity = [0.0, 0.0, -surroundings.gravity_m_s2]
     spec.compiler.degree = False
     spec.compiler.balanceinertia = True  # Webots accepts any inertia matrix
     spec.compiler.boundmass, spec.compiler.boundinertia = _LEAST_KG, _LEAST_KG_M2
-    # The fast integrator drops terms between x and y: a robot is then slower across the axes than along them.
+    # The faster integrator ignores the coupling of x and y. A robot would then be slower in diagonal
+    # directions than along the axes.
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICIT
     spec.option.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
     return [
@@ -246,7 +251,7 @@ def _of_robots(count: int, marks: Marks) -> Any:
 
 
 def _begin(built: Built) -> None:
-    """Set the poses of obstacles and robots; scale the servos of a robot to the mass of its links."""
+    """Set the poses of obstacles and robots; adapt the servos of a robot's base to the mass of its links."""
     built.put_obstacles()
     model, data = built.model, built.data
     for figure, (body, number) in built.figures.items():
@@ -265,7 +270,7 @@ def _begin(built: Built) -> None:
 def _add_obstacles(
     spec: Any, contents: Contents, moved: frozenset[Frame], marks: Marks
 ) -> tuple[dict[Frame, Any], dict[Frame, Pose]]:
-    """Add all obstacles; return their bodies, and the poses of those that are fixed."""
+    """Add all obstacles; return their bodies, and the poses of the fixed obstacles."""
     by_place: dict[Frame, list[Shape]] = {}
     for shape in contents.solids:
         by_place.setdefault(shape.place, []).append(shape)

@@ -1,7 +1,8 @@
-"""The physics of MuJoCo: one model of all robots and obstacles, rebuilt when one is added or removed.
+"""The physics of a world in MuJoCo.
 
-A basic step is a whole number of MuJoCo's steps. After it, every body has the pose that the scene's devices
-read. Rays are cast when a sensor is sampled. Images are rendered from a separate model.
+One model has all robots and obstacles. It is built again when an object is added or removed. A basic step is
+a whole number of MuJoCo's steps. After each basic step, the poses are copied to the scene, where devices read
+them. Rays are cast when a sensor is sampled. Images are rendered from a separate model.
 """
 
 from __future__ import annotations
@@ -31,11 +32,11 @@ from palaestra_sim.scene.sensor_rays import Beam
 from palaestra_sim.scene.shapes import Shape
 from palaestra_sim.scene.visuals import View
 
-LONGEST_STEP_S: Final = 0.004  # MuJoCo's step; with a longer one, contacts are soft
+LONGEST_STEP_S: Final = 0.004  # maximum duration of MuJoCo's step; with longer steps, contacts are soft
 
 
 class MujocoPhysics:
-    """The motion of one world; see `Physics`."""
+    """Computes the motion, the sensor rays and the images of one world; see `Physics`."""
 
     abilities = Abilities(name="MuJoCo", loose=True, leaning=True, forces=True, joints=True)
 
@@ -52,7 +53,7 @@ class MujocoPhysics:
         self._pictures: Renderer
 
     def body(self, build: Build) -> MujocoBody:
-        """Return the body of a robot that is being read."""
+        """Return the body of a robot that is being loaded."""
         return MujocoBody(build)
 
     def begin(self, surroundings: PhysicsSettings) -> None:
@@ -76,7 +77,7 @@ class MujocoPhysics:
             self._floors = floors
             self._stale = True
         heights = [figure.place.height_m for figure, _ in contents.moving]
-        if heights != self._heights:  # the height at which a robot moves decides what it touches
+        if heights != self._heights:  # a robot touches only obstacles at its own height
             self._heights = heights
             self._stale = True
         if contents == self._contents:
@@ -116,7 +117,10 @@ class MujocoPhysics:
         self._settled = False
 
     def reset(self) -> None:
-        """Discard the past, such as the forces of the last step, from which the solver would start."""
+        """Discard the state of the solver, such as the forces of the last step, from which it would start.
+
+        The positions and speeds of bodies and joints stay as the scene has set them.
+        """
         mujoco.mj_resetData(self._built.model, self._built.data)
         self._built.put_obstacles()
         self._pushes.clear()
@@ -129,7 +133,7 @@ class MujocoPhysics:
         self._settled = False
 
     def look(self, figure: Figure, beams: Sequence[Beam]) -> Cast:
-        """Return a function that returns the distance that each beam of a robot travels now, in meters."""
+        """Return a function that computes the distance in meters that each beam of a robot travels now."""
         bundle = Beams(figure, beams)
 
         def cast() -> Sequence[float]:
@@ -139,7 +143,7 @@ class MujocoPhysics:
         return cast
 
     def see(self, figure: Figure, beams: Sequence[Beam]) -> Cast:
-        """Return the same function for beams that meet visible objects and pass through the robot itself."""
+        """Return such a function for beams that meet visible shapes; they pass through the robot itself."""
         return LidarBeams(self._pictures, figure, beams).cast
 
     def push(self, target: Figure | DynamicSolid, push: Push) -> None:
@@ -147,7 +151,7 @@ class MujocoPhysics:
         self._pushes.append((target, push))
 
     def show(self, view: View) -> None:
-        """Set the visible part of the world, for cameras and lidars."""
+        """Set the visible shapes of the world, for cameras and lidars."""
         self._pictures = Renderer(view)
 
     def eye(self, place: Frame, lens: Lens) -> MujocoCamera | None:
@@ -159,7 +163,7 @@ class MujocoPhysics:
         return MujocoVideo(movie)
 
     def contacts(self) -> Iterator[ContactPoint]:
-        """Yield the contact points of robots with obstacles and with each other now."""
+        """Yield the current contact points of robots with obstacles and with each other."""
         self._settle()
         mujoco.mj_collision(self._built.model, self._built.data)
         contacts = self._built.data.contact
@@ -170,7 +174,7 @@ class MujocoPhysics:
                 yield ContactPoint((x, y, z), (_solid(sides[0][0].node), _solid(sides[1][0].node)))
 
     def _fresh(self) -> Built:
-        """Return the model; rebuild it if objects were added or removed, or if a fixed obstacle moved."""
+        """Return the model; build it again if objects were added or removed, or if a fixed obstacle moved."""
         if self._stale:
             self._stale = False
             self._built = build(self._contents, self._surroundings, self._moved)

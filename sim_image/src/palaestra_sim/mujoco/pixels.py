@@ -1,4 +1,4 @@
-"""Pixels of OpenGL in the order of Webots' cameras."""
+"""Convert the pixels of OpenGL to the order of Webots' cameras."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ _OPAQUE: Final = 255
 
 
 def blue_first(read: Any) -> memoryview:
-    """Return blue, green, red and alpha of each pixel, row by row from the top left, one byte each.
+    """Return four bytes for each pixel (blue, green, red, alpha), row by row from the top left.
 
-    `read` has red, green and blue from the bottom left: (height, width, 3) uint8.
+    `read` has red, green and blue, row by row from the bottom left: (height, width, 3) uint8.
     """
     height, width, _ = read.shape
     pixels = np.empty((height, width, 4), np.uint8)
-    for channel in range(3):  # one channel at a time is four times as fast as all at once
+    for channel in range(3):  # a copy of one channel at a time is four times as fast as one copy of all
         pixels[:, :, channel] = read[::-1, :, 2 - channel]
     pixels[:, :, 3] = _OPAQUE
     return pixels.data.cast("B")

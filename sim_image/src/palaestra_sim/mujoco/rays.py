@@ -1,4 +1,4 @@
-"""Rays of MuJoCo: the distances that the beams of one robot travel, without hits on the robot itself."""
+"""The distances that the sensor beams of a robot travel; they pass through the robot itself."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _GROUPS: Final = np.array([int(group == SEEN) for group in range(mujoco.mjNGROUP
 
 
 class Beams:
-    """The beams of one robot; beams that begin at one point are cast together."""
+    """The beams of one robot; beams with the same origin are cast together."""
 
     def __init__(self, figure: Figure, beams: Sequence[Beam]) -> None:
         self._figure = figure
@@ -30,7 +30,7 @@ class Beams:
         self._bundles = bundles(self._origins)
 
     def cast(self, built: Built) -> list[float]:
-        """Return the distance that each beam travels, in meters; its full reach if it meets nothing."""
+        """Return the distance in meters that each beam travels; at most the reach of the beam."""
         pose = self._figure.place.ground_pose
         turned = np.array(pose.rotation).reshape(3, 3)
         origins = self._origins @ turned.T + pose.position
@@ -46,7 +46,7 @@ class Beams:
         return travelled
 
     def _meet_floors_from_below(self, built: Built, origins: Any, directions: Any) -> None:
-        """Shorten the beams that meet a floor from below: MuJoCo's planes have an upper side alone."""
+        """Shorten the beams that meet a floor from below; MuJoCo's rays pass through a plane from below."""
         for height_m in built.floors_m:
             ways = height_m - origins[:, 2]
             if ways.max(initial=0.0) > 0.0:
@@ -74,13 +74,13 @@ class Beams:
 
 
 def bundles(origins: Any) -> list[tuple[int, int]]:
-    """Return the first and the last index, exclusive, of each run of beams that begin at one point."""
+    """Return the first index and the end index of each run of consecutive beams with the same origin."""
     order = groupby(range(len(origins)), key=lambda index: tuple(origins[index]))
     return [(run[0], run[-1] + 1) for _, indices in order if (run := list(indices))]
 
 
 def origins_and_directions(beams: Sequence[Beam]) -> tuple[Any, Any]:
-    """Return the origins and unit directions of beams in the robot's frame, each (n, 3), in meters."""
+    """Return the origins (in meters) and unit directions of beams in the robot's frame, (n, 3) each."""
     origins = np.array([[beam.ray[0], beam.ray[1], beam.height_m] for beam in beams])
     stretch = [math.hypot(1.0, beam.slope) for beam in beams]
     directions = np.array(

@@ -1,8 +1,8 @@
-"""Images of a world: colors, distances, and the shape in each pixel.
+"""Render images of a world: the color, the distance, or the shape of each pixel.
 
-They are rendered from a separate model, which has only visible shapes. So the physics needs no colors, and
-visible shapes may differ from the obstacles of robots. Before each image, the shapes on robots and joints get
-their current poses; other shapes get theirs only after one of them was moved.
+The renderer uses a separate model, which has only the visible shapes. So the model of the physics needs no
+colors, and the visible shapes may differ from the obstacles. Before each image, the shapes on robots and
+joints get their current poses. The other shapes get new poses only after a client has moved one of them.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from palaestra_sim.scene.geometry import Pose
 from palaestra_sim.scene.visuals import Drawn, View
 
 _HORIZON_M: Final = 1000.0  # the view distance of a camera without `far`
-_BEYOND: Final = 1.1  # end of the frustum, times the distance of the sky, so that the sky itself is rendered
+_BEYOND: Final = 1.1  # the frustum ends at this times the distance of the sky, so that the sky is rendered
 # Webots' cameras look along x with z up; MuJoCo's look along -z with y up. Columns: right, up, back.
 _TURNED: Final = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 
@@ -32,7 +32,7 @@ class Renderer:
     """Renders one world.
 
     Args:
-        view: the visible part of the world.
+        view: the visible shapes of the world.
     """
 
     def __init__(self, view: View) -> None:
@@ -43,7 +43,7 @@ class Renderer:
 
     @property
     def things(self) -> tuple[Drawn, ...]:
-        """The visible shapes of the last image, by number."""
+        """The visible shapes of the last image; a shape's index is its number."""
         return self._visible.things
 
     def placed(self) -> VisualModel:
@@ -60,7 +60,7 @@ class Renderer:
         canvas()
 
     def colors(self, place: Frame, lens: Lens) -> memoryview:
-        """Return blue, green, red, alpha of each pixel, row by row from the top left, one byte each."""
+        """Return four bytes for each pixel (blue, green, red, alpha), row by row from the top left."""
         context, rect = self._draw(place, lens)
         width, height = lens.size
         read = np.empty((height, width, 3), np.uint8)
@@ -70,21 +70,21 @@ class Renderer:
     def depths(self, place: Frame, lens: Lens) -> Any:
         """Return the distance of each pixel along the axis of the lens, in meters: (height, width) float32.
 
-        It is infinite beyond the far end of the lens.
+        A distance beyond the view distance of the lens is infinite.
         """
         context, rect = self._draw(place, lens, segments=True)
         width, height = lens.size
         read = np.empty((height, width), np.float32)
         mujoco.mjr_readPixels(None, read, rect, context)
         near, far = lens.near_m, _BEYOND * _far(lens)
-        # The depth buffer is 1 at the near end and 0 at the far one, and linear in 1 / distance.
+        # The depth buffer is 1 at the near end and 0 at the far end; it is linear in 1 / distance.
         depths = read[::-1].astype(np.float64)
         meters = near * far / (near + depths * (far - near))
         meters[meters > _far(lens)] = math.inf
         return meters.astype(np.float32)
 
     def segments(self, place: Frame, lens: Lens) -> Any:
-        """Return the index in `things` of each pixel's shape, -1 for none: (height, width) int32."""
+        """Return the index in `things` of the shape in each pixel: (height, width) int32; -1 for no shape."""
         context, rect = self._draw(place, lens, segments=True)
         width, height = lens.size
         read = np.empty((height, width, 3), np.uint8)
@@ -98,7 +98,7 @@ class Renderer:
         return owners[numbers]
 
     def _draw(self, place: Frame, lens: Lens, *, segments: bool = False) -> tuple[Any, Any]:
-        """Render; return the context to read from, and the rectangle to read."""
+        """Render an image; return the context and the rectangle from which it can be read."""
         self._refresh()
         visible = self._visible
         model, scene = visible.model, visible.scene
@@ -116,7 +116,7 @@ class Renderer:
         return context, rect
 
     def _aim(self, place: Frame, lens: Lens) -> None:
-        """Set the camera to a frame, and the sky behind everything."""
+        """Place the camera at a frame, and the sky at the end of the camera's view."""
         model, data = self._visible.model, self._visible.data
         pose = place.world_pose
         turned = np.reshape(pose.rotation, (3, 3))
@@ -153,7 +153,7 @@ class Renderer:
             rotations[part] = (turned @ turns).reshape(-1, 9)
 
     def _place_all(self) -> None:
-        """Set the poses of all shapes that do not move by themselves; record the carriers of the others."""
+        """Set the poses of shapes that do not move; record the frames that carry the other shapes."""
         visible = self._visible
         self._carried = []
         for place, group in groupby(range(len(visible.things)), lambda at: visible.things[at].place):

@@ -1,8 +1,8 @@
-"""The file of a movie: H.264 in MP4, encoded by PyAV, which is loaded for the first movie.
+"""Write the file of a movie: H.264 in MP4, encoded by PyAV.
 
-It is written under a hidden name in the same folder, and renamed when it is complete. The simulator that
-writes it holds a lock on it. So a hidden file without a lock is from a simulator that was killed, and the
-next movie of the same name removes it.
+The file has a hidden name in the same folder until it is complete; then it is renamed. While a simulator
+writes a file, it holds a lock on the file. So a hidden file without a lock belongs to a simulator that was
+killed. The next movie with the same name removes such a file.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class MujocoVideo:
         self._stream.pix_fmt = "yuv420p"
         rate = _WORST - _STEPS * movie.quality // 100
         self._stream.options = {"crf": str(rate), "preset": "veryfast"}
-        # Only the simulator's own thread, because several simulators share the processor.
+        # One thread, because several simulators share the processor.
         self._stream.thread_count = 1
 
     def add(self, pixels: bytes | memoryview) -> None:
@@ -84,23 +84,23 @@ def _new_file(path: Path) -> tuple[int, str]:
     """Return the descriptor that holds the lock of a new hidden file, and the file's name."""
     while True:
         lock, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}-", suffix=_UNFINISHED)
-        with suppress(OSError):  # on a file system without locks, no file is removed either
+        with suppress(OSError):  # on a file system without locks, `_remove_stale` removes no file
             fcntl.flock(lock, fcntl.LOCK_EX)
         if os.fstat(lock).st_nlink:
             return lock, name
-        os.close(lock)  # another simulator removed it before the lock
+        os.close(lock)  # another simulator removed the file before this one locked it
 
 
 def _abandon(lock: int, name: str) -> None:
-    """Remove a hidden file, if it still has this name, and release its lock."""
+    """Remove a hidden file, unless it was renamed, and release its lock."""
     Path(name).unlink(missing_ok=True)
     os.close(lock)
 
 
 def _remove_stale(path: Path) -> None:
-    """Remove the hidden files of a movie that no simulator writes any longer."""
+    """Remove the hidden files of a movie whose simulators were killed."""
     for stale in path.parent.glob(f".{glob.escape(path.name)}-*{_UNFINISHED}"):
-        with suppress(OSError), stale.open("rb+") as file:  # it may be locked, or already removed
+        with suppress(OSError), stale.open("rb+") as file:  # the file may be locked, or already removed
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             stale.unlink()
 
@@ -109,7 +109,7 @@ def _library() -> Any:
     """Return PyAV.
 
     Raises:
-        UnsimulatedError: it is not installed.
+        UnsimulatedError: PyAV is not installed.
     """
     try:
         return import_module("av")

@@ -20,25 +20,26 @@ _GEOMS: Final = {
     "capsule": mujoco.mjtGeom.mjGEOM_CAPSULE,
     "mesh": mujoco.mjtGeom.mjGEOM_MESH,
 }
-# No shadows, no smoothed edges and few corners: rendering is 10 times as fast without a graphics card.
+# No shadows, no smoothed edges and few corners: without a graphics card, rendering is then 10 times as fast.
 _QUALITY: Final = {"shadowsize": 0, "offsamples": 0, "numslices": 20, "numstacks": 10, "numquads": 1}
 _AMBIENT: Final = 0.45
 _FROM_CAMERA: Final = 0.25
 _FROM_ABOVE: Final = 0.30
 SUN: Final = (-0.3, 0.4, -0.866)  # the direction of the sun's light: a unit vector, in axes where z points up
 SKY: Final = 1  # the group of the sky's geom, which is the last geom of the model
-PASSED: Final = 2  # while a lidar measures, the group of the geoms through which its beams pass
+PASSED: Final = 2  # the group of geoms through which the beams of a lidar pass, while the lidar measures
 
 
 @dataclass(slots=True, eq=False)
 class VisualModel:
-    """A compiled model, and the objects that are needed to render it.
+    """A compiled model of the visible shapes, and the objects that are needed to render it.
 
     Attributes:
-        things: by the number of their geom; the last geom is the sky.
-        positions, rotations: the poses of the geoms in the frames of their places, (n, 3) and (n, 3, 3).
-        planes: the numbers of those that are Planes.
-        sun: the direction of its light.
+        things: the visible shapes; a shape's index is the number of its geom. The last geom is the sky.
+        model, data: the model and the data of MuJoCo.
+        positions, rotations: the poses of the geoms in the frames of their shapes, (n, 3) and (n, 3, 3).
+        planes: the numbers of the geoms that are Planes.
+        sun: the direction of the sun's light.
         scene, option, camera: the objects of MuJoCo's visualizer.
     """
 
@@ -59,8 +60,8 @@ def build(things: Sequence[Drawn], sky: Vector, sun: Vector) -> VisualModel:
 
     Args:
         things: all visible shapes, without the sky.
-        sky: its color, red, green and blue from 0 to 1.
-        sun: the direction of its light.
+        sky: the color of the sky: red, green and blue from 0 to 1.
+        sun: the direction of the sun's light.
     """
     spec = mujoco.MjSpec()
     for name, value in _QUALITY.items():
@@ -105,7 +106,7 @@ def _light(spec: Any, sun: Vector) -> None:
 
 
 def _hang_sky(spec: Any) -> None:
-    """Add the sky as a board behind everything: MuJoCo's own sky takes more time than all other shapes."""
+    """Add the sky as a flat box behind all shapes; MuJoCo's own sky takes longer than all other shapes."""
     material = spec.add_material(name="sky")
     material.emission = 0.5  # replaced before each image
     spec.worldbody.add_geom(
@@ -120,7 +121,7 @@ def _hang_sky(spec: Any) -> None:
 
 
 def glow(forward: Sequence[float], sun: Vector) -> float:
-    """Return the emission that gives the sky its own color, if a camera looks along `forward`."""
+    """Return the emission with which the lit sky has exactly its own color, for a view along `forward`."""
     from_above = max(0.0, sum(a * b for a, b in zip(forward, sun, strict=True)))
     return 1.0 - _AMBIENT - _FROM_CAMERA - _FROM_ABOVE * from_above
 

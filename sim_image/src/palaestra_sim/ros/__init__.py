@@ -1,9 +1,14 @@
-"""The ROS side of a simulator: nodes that behave like roscpp's to clients, in one loop.
+"""The ROS nodes of a simulator; to clients they behave like nodes of roscpp.
 
-rospy has one node in a process and a thread for each connection, but a simulator has a node for each robot
-and one hot path. So it implements the protocols itself: XML-RPC with the master (`master`), connections
-(`links`), one selector loop for all sockets (`loop`), topics (`topics`), and names and services (`node`).
-Besides ROS, the loop answers a sidecar (`local_socket`).
+rospy allows only one node in a process, and uses a thread for each connection. A simulator needs a node for
+each robot, and fast responses. So this package implements the protocols itself:
+
+- `loop`: one event loop for all sockets and timers
+- `master`: XML-RPC with the ROS master and with other nodes
+- `links`: connections to clients and subscribers
+- `topics`: topics and their publishers
+- `node`: names and services
+- `local_socket`: a Unix socket in the same loop, for the sidecar
 """
 
 from palaestra_sim.ros.local_socket import LocalSocket

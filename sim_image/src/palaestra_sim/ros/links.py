@@ -1,7 +1,7 @@
-"""One TCPROS connection each: a client of a service, or a subscriber of a topic.
+"""TCPROS connections: each serves one client of a service, or one subscriber of a topic.
 
-Sockets are non-blocking. Responses to a service client are queued without loss; a subscriber that reads too
-slowly gets only the newest message, as with a publisher of queue size 1.
+Sockets are non-blocking. Responses to the client of a service are queued without loss. A subscriber that
+reads too slowly gets only the newest message, as from a publisher with queue size 1.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ from palaestra_protocol.ros import sockets
 from palaestra_protocol.ros.tcpros import FrameReader, FramingError, decode_header, encode_header
 from palaestra_sim.ros.loop import Loop
 
-# The node closes a connection after this time, so that roscpp and rospy can close first. A client that
-# reads until the end of the stream waits for that.
+# The node closes a finished connection after this time. By then roscpp and rospy have closed it themselves. A
+# client that reads until the end of the stream waits for the node.
 LINGER_S = 1.0
 
-# The node drops a client that stops reading in the middle of a long response after this time.
+# If a client stops reading in the middle of a long response, the node closes the connection after this time.
 SEND_S = 60.0
 
 
 class Endpoint(Protocol):
-    """The receiver of a connection after its header has been read."""
+    """The receiver of a connection's frames; a node creates it when it has read the connection's header."""
 
     def receive(self, payload: bytes) -> None:
         """Handle one frame from the peer."""
@@ -35,11 +35,11 @@ class Endpoint(Protocol):
 
 
 class Connection(Protocol):
-    """The connection through which an endpoint sends: a link, or a wrapper of one."""
+    """The connection through which an endpoint sends: a `RosLink`, or a wrapper around a `RosLink`."""
 
     @property
     def closed(self) -> bool:
-        """Return whether it is closed; then nothing can be sent."""
+        """Whether the connection is closed."""
         ...
 
     def send(self, data: bytes) -> None:
@@ -47,29 +47,30 @@ class Connection(Protocol):
         ...
 
     def send_newest(self, data: bytes) -> None:
-        """Send `data`; while the peer does not read, keep only the newest."""
+        """Send `data`; while the peer does not read, only the newest data waits to be sent."""
         ...
 
     def finish(self) -> None:
-        """Receive nothing more; close when the peer closes, or some time after all was sent."""
+        """Ignore further requests; close when the peer closes, or some time after all data was sent."""
         ...
 
     def close(self) -> None:
-        """Close it; safe to call again."""
+        """Close the connection; safe to call again."""
         ...
 
 
 class HeaderRefused(Exception):
-    """The header names a service or topic that this node does not have; the text is sent to the peer."""
+    """The header names a service or topic that this node does not have; the peer gets the error text."""
 
 
 Greet = Callable[["RosLink", Mapping[str, str]], Endpoint]
 
 
 class Lingering:
-    """The finished connections; each is closed after one to two times LINGER_S.
+    """The finished connections; each is closed between one and two LINGER_S after it was added.
 
-    They share one timer, because a client without a persistent connection may make a thousand calls a second.
+    All of them share one timer. A timer for each would be expensive: a client that opens a connection for
+    each call may make a thousand calls a second.
     """
 
     def __init__(self, loop: Loop) -> None:
@@ -84,7 +85,7 @@ class Lingering:
         self._new.add(link)
 
     def discard(self, link: RosLink) -> None:
-        """Remove a link that is already closed."""
+        """Remove `link`, which is already closed."""
         self._new.discard(link)
         self._old.discard(link)
 
@@ -100,11 +101,11 @@ class RosLink:
     """A connection from accept to close.
 
     Args:
-        loop: the event loop of its socket.
+        loop: the event loop of the socket.
         connection: the accepted socket.
-        greet: turns the header into an endpoint.
-        lingering: closes it later, after it is finished.
-        gone: called when it is closed, even before its header was read.
+        greet: returns the endpoint for the header of the connection.
+        lingering: closes the connection some time after `finish`.
+        gone: called when the connection is closed, even if its header was not read yet.
     """
 
     __slots__ = (
@@ -153,17 +154,18 @@ class RosLink:
             self._write(data)
 
     def send_newest(self, data: bytes) -> None:
-        """Send `data`; while the peer does not read, keep it in place of the data kept before."""
+        """Send `data`; while the peer does not read, `data` replaces older data that waits to be sent."""
         if self._unsent:
             self._newest = data
         else:
             self._write(data)
 
     def finish(self) -> None:
-        """Receive nothing more; close the connection when the peer does, or some time after all was sent.
+        """Ignore further requests; close when the peer closes, or some time after all data was sent.
 
-        Roscpp drops a response that it has not read yet when the server closes (ros/ros_comm#1976).
-        A long response gets SEND_S, so that a client that has stopped reading does not keep it in memory.
+        The node must not close at once: roscpp would drop a response that it has not read yet
+        (ros/ros_comm#1976). A long response is dropped after SEND_S, because a client that has stopped
+        reading would otherwise keep it in memory.
         """
         if self.closed:
             return
@@ -194,7 +196,7 @@ class RosLink:
             self.close()
             return
         if sent < len(data):
-            self._unsent = memoryview(data)[sent:]  # an image is sent in many parts, without copies
+            self._unsent = memoryview(data)[sent:]  # no copy, because an image is sent in many parts
             self._loop.watch(self._socket, self._ready, writing=True)
         elif self._unsent:
             self._unsent = b""

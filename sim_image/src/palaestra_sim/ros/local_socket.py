@@ -1,8 +1,8 @@
-"""A Unix socket on which the sidecar of a simulator asks for what a viewer sees.
+"""A Unix socket on which a sidecar requests the data for viewers: shapes, poses, camera pictures.
 
-A request is one line; its response is its length, in four bytes with the first one largest, and that many
-bytes. Requests are answered in the loop between two steps, one at a time, and nothing is computed without a
-request. The socket is a file of this machine, so only processes with rights in its folder can use it.
+A request is one line. A response is the number of its bytes, as a big-endian 32-bit integer, and then these
+bytes. The event loop handles requests between two steps, one at a time. Without requests the simulator
+computes no data for viewers. The socket is a file, so only processes with access to its folder can use it.
 """
 
 from __future__ import annotations
@@ -33,11 +33,11 @@ class LocalSocket:
 
     Args:
         loop: the event loop.
-        path: of the socket; a file of that name is replaced.
-        answers: return the response to each line.
+        path: the path of the socket; an existing file is replaced.
+        answers: for each request line, the function that returns the response.
 
     Raises:
-        OSError: the socket cannot be made there.
+        OSError: the socket cannot be created at `path`.
     """
 
     def __init__(self, loop: Loop, path: Path, answers: Answers) -> None:
@@ -57,7 +57,7 @@ class LocalSocket:
         self._path.unlink(missing_ok=True)
 
     def _accept(self) -> None:
-        with contextlib.suppress(OSError):  # the peer has gone again
+        with contextlib.suppress(OSError):  # the peer has closed the connection already
             connection, _ = self._listener.accept()
             if len(self._peers) >= _MOST_PEERS:
                 next(iter(self._peers.values())).close()
@@ -65,7 +65,7 @@ class LocalSocket:
 
 
 class _Peer:
-    """One connection; it has at most one response on the way."""
+    """One connection of a sidecar; the next request is read after the last response was sent."""
 
     def __init__(
         self,
@@ -84,7 +84,7 @@ class _Peer:
         loop.watch(connection, self._ready)
 
     def close(self) -> None:
-        """Close it."""
+        """Close the connection."""
         if self._peers.pop(self._socket, None) is not None:
             self._loop.forget(self._socket)
             self._socket.close()
@@ -110,7 +110,7 @@ class _Peer:
             self._line = b""
             try:
                 response = self._answers[line]()
-            except Exception:  # a world that cannot be shown must not end a training
+            except Exception:  # an error in the data for viewers must not end the simulator
                 log.exception("no response to a viewer's %s", line.decode())
                 self.close()
                 return
@@ -126,7 +126,11 @@ class _Peer:
 
 
 def _listening(path: Path) -> socket.socket:
-    """Return a listening socket; its path may be longer than the 107 bytes of a socket's address."""
+    """Return a listening socket at `path`.
+
+    A socket's address has at most 107 bytes. To allow longer paths, the address is the file name below
+    `/proc/self/fd/N`, where N is an open descriptor of the folder.
+    """
     path.unlink(missing_ok=True)
     folder = os.open(path.parent, os.O_PATH | os.O_DIRECTORY | os.O_CLOEXEC)
     listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)

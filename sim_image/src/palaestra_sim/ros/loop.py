@@ -1,7 +1,7 @@
 """One selector loop for every socket and timer of a simulator.
 
-It is independent of ROS: links register sockets, the simulator registers timers. Other threads may only call
-`post`.
+The loop is independent of ROS: links register sockets, and the simulator registers timers. Other threads may
+call only `post`.
 """
 
 from __future__ import annotations
@@ -20,22 +20,23 @@ from collections.abc import Callable
 Callback = Callable[[], None]
 _File = int | socket.socket
 
-# In a virtual machine a wake-up costs 30 us, more than the response to a request. So if all recent waits were
-# short, the loop polls a few times before it waits, and yields the processor in between. One longer wait in
-# every step is enough to stop polling, because useless polls take processor time from other simulators.
+# In a virtual machine a wake-up takes 30 us, longer than the response to a request. So if the last _STREAK
+# waits were all shorter than _QUICK_S, the loop polls up to _LOOKS times before it waits, and yields the
+# processor between two polls. If each step contains one longer wait, the loop never polls. That is intended:
+# in this case most polls would find nothing, and would take processor time from other simulators.
 _QUICK_S = 200e-6
-_STREAK = 10  # waits; a trainer's step has fewer
+_STREAK = 10  # a step of a trainer causes fewer waits
 _LOOKS = 30
 
-_EVENTS = 32  # in one poll; further ready files come with the next poll
+_EVENTS = 32  # maximum number of ready files in one poll; the next poll returns the others
 
-# If a callback, such as the end of a step, is due within this time, the peers are waiting for it. They send
-# nothing before it, so a poll would only delay it, and take processor time from other programs.
+# If a callback, such as the end of a step, is due within this time, the peers wait for its result. They send
+# nothing before that, so polls would only take processor time from other programs.
 _NEAR_S = 10e-3
 
 
 class Loop:
-    """Runs callbacks when sockets are ready, timers are due, or other threads posted some."""
+    """Runs callbacks when sockets are ready, when timers are due, or when other threads have posted them."""
 
     def __init__(self) -> None:
         self._epoll = select.epoll()
@@ -65,7 +66,7 @@ class Loop:
             self._epoll.unregister(number)
 
     def later(self, delay_s: float, callback: Callback) -> None:
-        """Call `callback` once, `delay_s` seconds from now; 0 means after the callbacks that are ready."""
+        """Call `callback` once after `delay_s` seconds; 0 means after the callbacks that are ready now."""
         heapq.heappush(self._timers, (time.monotonic() + delay_s, next(self._order), callback))
 
     def post(self, callback: Callback) -> None:
@@ -76,7 +77,10 @@ class Loop:
             os.write(self._wake_write, b"\0")
 
     def wake_on_signals(self) -> None:
-        """Let signals end the wait, so that a handler runs even if its signal came just before the wait."""
+        """Let a signal end the wait of the loop, even if it arrives just before the wait begins.
+
+        Python runs the handler of a signal only after the wait.
+        """
         signal.set_wakeup_fd(self._wake_write, warn_on_full_buffer=False)
         self._wakes_on_signals = True
 
@@ -89,7 +93,7 @@ class Loop:
         self._running = True
         while self._running:
             for number, _ in self._ready():
-                # An earlier callback may have stopped the watch of this file.
+                # An earlier callback of this round may have called `forget` for this file.
                 if (ready := self._watched.get(number)) is not None:
                     ready()
             while self._timers and self._timers[0][0] <= time.monotonic():
@@ -104,7 +108,10 @@ class Loop:
         os.close(self._wake_write)
 
     def _ready(self) -> list[tuple[int, int]]:
-        """Return the ready files after a wait; if a short wait is expected, poll a few times first."""
+        """Wait until a file is ready or a timer is due; return the ready files.
+
+        If recent waits were short, poll a few times before the wait.
+        """
         wait_s = self._wait_s()
         if wait_s == 0.0:
             return self._epoll.poll(0, _EVENTS)
@@ -116,7 +123,7 @@ class Loop:
         return ready
 
     def _look(self) -> list[tuple[int, int]]:
-        """Return the ready files after a few polls; an empty list if none becomes ready."""
+        """Poll a few times; return the ready files, or an empty list if no file becomes ready."""
         for _ in range(_LOOKS):
             if ready := self._epoll.poll(0, _EVENTS):
                 return ready

@@ -1,7 +1,7 @@
-"""The XML-RPC side of a node: its calls to the ROS master, and the slave API that other nodes call.
+"""The XML-RPC interface of a node: its calls to the ROS master, and the slave API that other nodes call.
 
+The slave API is used rarely, so it runs in a separate thread. It passes all work to the event loop.
 Source: http://wiki.ros.org/ROS/Master_API and http://wiki.ros.org/ROS/Slave_API
-The slave API runs in a separate thread, because it is used rarely, and passes all work to the loop.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class MasterUnreachable(ConnectionError):
 
 
 class _Transport(xmlrpc.client.Transport):
-    """Keeps one connection, and gives up on a master that does not respond."""
+    """Keeps one connection open, and raises TimeoutError if the master does not respond in time."""
 
     _kept: http.client.HTTPConnection | None = None
 
@@ -35,16 +35,16 @@ class _Transport(xmlrpc.client.Transport):
         return self._kept
 
     def close(self) -> None:
-        """Close the connection; the next call opens another."""
+        """Close the connection; the next call opens a new one."""
         super().close()
         self._kept = None
 
 
 class Master:
-    """The ROS master, for the calls of one node.
+    """Calls the ROS master in the name of one node.
 
     Args:
-        uri: its address, e.g. http://localhost:11311
+        uri: the URI of the master, e.g. http://localhost:11311
         node: the full name of the calling node, e.g. /robotino
     """
 
@@ -55,18 +55,20 @@ class Master:
         self._gathered: list[tuple[str, tuple[Any, ...]]] | None = None
 
     def call(self, method: str, *arguments: Any) -> Any:
-        """Return the value of a call in the node's name.
+        """Call a method of the master and return its value.
 
         Raises:
-            MasterUnreachable: no response, or an invalid one.
+            MasterUnreachable: the master sent no response or an invalid one, or refused the call.
         """
         return self._checked(method, self._sent(method, self._node, *arguments))
 
     def tell(self, method: str, *arguments: Any) -> None:
-        """Make a call whose value is not needed: at once, or with others at the end of `together`.
+        """Make a call whose value is not needed.
+
+        Inside a `together` block the call is sent at the end of the block, otherwise at once.
 
         Raises:
-            MasterUnreachable: as `call`.
+            MasterUnreachable: see `call`.
         """
         if self._gathered is None:
             self.call(method, *arguments)
@@ -75,13 +77,14 @@ class Master:
 
     @contextmanager
     def together(self) -> Iterator[None]:
-        """Send all `tell` calls of the block in one request: a robot has hundreds of services.
+        """Send all `tell` calls of the block in one request.
 
-        If the master has no `system.multicall`, the calls are sent one after another. If the block raises an
-        error, nothing is sent.
+        One request is much faster, because a robot registers hundreds of services. If the master has no
+        `system.multicall`, the calls are sent one after another. If the block raises an error, no call is
+        sent.
 
         Raises:
-            MasterUnreachable: as `call`.
+            MasterUnreachable: see `call`.
         """
         gathered = self._gathered = []
         try:
@@ -123,24 +126,25 @@ class Master:
 
 
 class Bus(Protocol):
-    """The topics of a node and their subscribers; called from another thread."""
+    """The topics of a node and their subscribers; the methods are called from another thread."""
 
     def publications(self) -> list[list[str]]:
         """Return the name and type of each topic."""
         ...
 
     def connections(self) -> list[list[Any]]:
-        """Return an entry of `getBusInfo` for each subscriber that is connected."""
+        """Return an entry of `getBusInfo` for each connected subscriber."""
         ...
 
 
 class SlaveApi:
-    """Serves requests of the master, subscribers and tools for one node.
+    """Serves the requests that the master, subscribers and tools send to one node.
 
     Args:
-        host: the name under which others reach this machine.
-        bus: the topics that the node publishes, and their subscribers.
+        host: the name under which other nodes reach this machine.
+        master_uri: the URI of the master.
         tcpros_port: the port of the node's TCPROS listener.
+        bus: the topics that the node publishes, and their subscribers.
         on_shutdown: called in another thread when the master requests the end of the node.
     """
 
@@ -163,7 +167,7 @@ class SlaveApi:
         self._server.start()
 
     def close(self) -> None:
-        """Stop answering; the port is free afterwards."""
+        """Stop serving requests and free the port."""
         self._server.close()
 
     def _find(self, name: str) -> Method | None:

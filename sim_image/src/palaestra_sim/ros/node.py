@@ -1,8 +1,9 @@
 """A ROS node: services and published topics, under one name.
 
-The robot's controller uses this interface. A handler gets the decoded request and returns the fields of the
-response. If it returns `LATER`, it calls `answer` itself later. A step does so while it waits for another
-robot or for the end of a pause.
+The controller of a robot uses this interface. The handler of a service gets the decoded request and returns
+the fields of the response. A handler may return `LATER` instead; the controller then calls `answer` when the
+response is ready. The handler of a step does so while the step waits for another robot or for the end of a
+pause.
 """
 
 from __future__ import annotations
@@ -37,9 +38,9 @@ class RosNode:
     """One node with its services and topics, registered at the master from `start` to `close`.
 
     Args:
-        loop: the event loop of its sockets.
+        loop: the event loop of the node's sockets.
         name: the node's name and the prefix of its relative paths, e.g. "robotino".
-        master_uri: the master, e.g. http://localhost:11311
+        master_uri: the URI of the ROS master, e.g. http://localhost:11311
     """
 
     def __init__(self, loop: Loop, name: str, master_uri: str) -> None:
@@ -69,7 +70,7 @@ class RosNode:
         return path if path.startswith("/") else f"/{self.name}/{path}"
 
     def serve(self, path: str, type_name: str, handler: Handler) -> None:
-        """Serve a service; it is registered at once, or at the end of `together`.
+        """Serve a service; register it at once, or inside a `together` block at the end of the block.
 
         Raises:
             MasterUnreachable: the master did not accept the registration.
@@ -91,14 +92,14 @@ class RosNode:
         template: Mapping[str, Any] | None = None,
         reading: str = "",
     ) -> Publisher:
-        """Return a new publisher of a topic; several of one topic share its subscribers.
+        """Return a new publisher of a topic; all publishers of one topic share its subscribers.
 
         Args:
             path: relative to the node, or global with a leading slash.
             type_name: e.g. sensor_msgs/Range
             latched: whether a late subscriber gets the last message.
             template: the constant fields, for `Publisher.send_value`.
-            reading: the field of the value, for faults; "" for the last one.
+            reading: the field with the sensor's value, which faults change; "" means the last field.
         """
         name = self.resolve(path)
         topic = self._topics.get(name)
@@ -111,7 +112,7 @@ class RosNode:
         return Publisher(topic, dict(template or {}))
 
     def withdraw(self, publisher: Publisher) -> None:
-        """Remove one publisher; without publishers, the topic is closed."""
+        """Remove one publisher; after the last one, close the topic."""
         topic = publisher.topic
         topic.publishers -= 1
         if topic.publishers == 0:
@@ -121,7 +122,7 @@ class RosNode:
                 link.close()
 
     def answer(self, call: object, fields: Mapping[str, Any]) -> None:
-        """Send the response to a call whose handler returned LATER, then handle the requests that waited."""
+        """Send the response to a call whose handler returned LATER; then handle the waiting requests."""
         if isinstance(call, ServiceEnd):
             call.answer(fields)
         self._loop.later(0, self.take_waiting)
@@ -131,13 +132,13 @@ class RosNode:
         self._loop.later(delay_s, callback)
 
     def take_waiting(self) -> None:
-        """Handle the requests that came while the controller was blocked, in their order."""
+        """Handle the requests that arrived while the controller was blocked, in their order."""
         while self._waiting and not self.blocked():
             end, payload = self._waiting.popleft()
             end.handle(payload)
 
     def request(self, end: ServiceEnd, payload: bytes) -> None:
-        """Handle a request now, or after the step that blocks the controller."""
+        """Handle a request; while a step blocks the controller, the request waits."""
         if self.blocked():
             self._waiting.append((end, payload))
         else:
@@ -150,7 +151,7 @@ class RosNode:
 
     def unregister(self) -> None:
         """Unregister every service and topic at the master; connections stay open."""
-        # A master that is gone has already lost our names.
+        # A master that does not run has no names to unregister.
         with contextlib.suppress(MasterUnreachable), self._master.together():
             for name in self._services:
                 self._master.tell("unregisterService", name, self._rosrpc)
@@ -170,7 +171,7 @@ class RosNode:
         """Check that the master responds.
 
         Raises:
-            MasterUnreachable: it does not.
+            MasterUnreachable: the master does not respond.
         """
         self._master.call("getPid")
 
@@ -179,13 +180,14 @@ class RosNode:
         return [[topic.name, topic.type.name] for topic in tuple(self._topics.values())]
 
     def connections(self) -> list[list[Any]]:
-        """Return number, subscriber, direction, transport and topic of each, for `getBusInfo`."""
+        """Return number, subscriber, direction, transport and topic of each connection, for `getBusInfo`."""
         return list(self._subscribers.values())
 
     def on_end(self, callback: Callable[[str], None]) -> None:
-        """Set the function to call with the reason when this node is requested to end.
+        """Set the function to call when another program requests the end of this node.
 
-        `rosnode kill` sends such a request; so does the master when a newer node registers the same name.
+        The argument is the reason. `rosnode kill` sends such a request. The master sends one when another
+        node registers the same name.
         """
         self._ended = callback
 
@@ -247,7 +249,11 @@ class RosNode:
 
 
 def _agreed_md5(header: Mapping[str, str], type_name: str, *known: str) -> str:
-    """Return the md5 of a type that both ends know."""
+    """Return the md5 sum that the header of a client names, or the first known sum if it accepts any.
+
+    Raises:
+        HeaderRefused: the client's md5 sum is not one of `known`.
+    """
     theirs = header.get("md5sum", "*")
     if theirs not in {"*", *known}:
         raise HeaderRefused(f"client wants md5sum {theirs}, but {type_name} has {known[0]}")
@@ -269,11 +275,11 @@ class ServiceEnd:
         self._persistent = persistent
 
     def receive(self, payload: bytes) -> None:
-        """Receive a request from the connection."""
+        """Handle a request from the connection, or let it wait; see `RosNode.request`."""
         self._node.request(self, payload)
 
     def handle(self, payload: bytes) -> None:
-        """Handle a request, and send the response, unless the handler sends it later."""
+        """Call the handler of a request and send its response, unless the handler returns LATER."""
         self._node.current_call = self
         try:
             fields = self._handler(self._service.request.decode(payload))
@@ -288,7 +294,7 @@ class ServiceEnd:
         self._send(b"\1" + self._service.response.frame(fields))
 
     def lost(self) -> None:
-        """Do nothing: a response to a closed connection is dropped."""
+        """Do nothing: a later response is dropped, because the connection is closed."""
 
     def _send(self, data: bytes) -> None:
         self._link.send(data)

@@ -1,4 +1,4 @@
-"""Topics that a node publishes: the connected subscribers, and the messages that they get."""
+"""The topics that a node publishes, their subscribers, and the messages to these subscribers."""
 
 from __future__ import annotations
 
@@ -20,9 +20,12 @@ class PublishedTopic:
     """A published topic and the connections of its subscribers.
 
     Attributes:
-        links: the links of the connected subscribers.
+        name: the global name of the topic.
+        type: the message type.
+        latched: whether a late subscriber gets the last message.
+        links: the connections of the subscribers.
         publishers: number of publishers that share the topic.
-        reading: the field of the value; "" for the last one.
+        reading: the field with the sensor's value; "" means the last field.
     """
 
     __slots__ = ("_last", "latched", "links", "name", "publishers", "reading", "type")
@@ -37,7 +40,12 @@ class PublishedTopic:
         self._last: bytes | None = None
 
     def connect(self, link: Connection, dropped: Callable[[Connection], object]) -> Endpoint:
-        """Add a subscriber; if the topic is latched, send it the last message."""
+        """Add a subscriber; if the topic is latched, send the last message to the subscriber.
+
+        Args:
+            link: the connection of the subscriber.
+            dropped: called with the connection after the subscriber has disconnected.
+        """
         self.links.append(link)
         if self._last is not None:
             link.send(self._last)
@@ -52,7 +60,7 @@ class PublishedTopic:
 
 
 class _SubscriberEnd:
-    """The publisher's end of one subscriber's connection; it only waits for the close."""
+    """The publisher's end of one subscriber's connection; it only waits until the subscriber disconnects."""
 
     __slots__ = ("_dropped", "_link", "_topic")
 
@@ -64,7 +72,7 @@ class _SubscriberEnd:
         self._dropped = dropped
 
     def receive(self, payload: bytes) -> None:
-        """Ignore it: a subscriber sends nothing after its header."""
+        """Ignore the data: a subscriber has nothing to send after its header."""
 
     def lost(self) -> None:
         self._topic.links.remove(self._link)
@@ -72,7 +80,7 @@ class _SubscriberEnd:
 
 
 class Publisher:
-    """Sends messages to the subscribers that are connected at that moment, queue size 1."""
+    """Sends messages to the current subscribers of a topic, with queue size 1."""
 
     __slots__ = ("_frame", "_pack", "_reading_at", "_sequence", "_template", "topic")
 
@@ -80,28 +88,28 @@ class Publisher:
         self.topic = topic
         self._template = template
         self._sequence = 0
-        # `send_value` makes these at its first call.
+        # The first call of `send_value` sets these three attributes.
         self._frame = bytearray()
         self._reading_at = 0
         self._pack: _Pack = _STAMP.pack_into
 
     @property
     def heard(self) -> bool:
-        """Whether there is a subscriber."""
+        """Whether the topic has a subscriber."""
         return bool(self.topic.links)
 
     def send(self, fields: Mapping[str, Any]) -> None:
-        """Send a message of `fields`, over the template's."""
+        """Send the template with `fields` in place of its own."""
         self.topic.send(self.topic.type.codec.frame({**self._template, **fields}))
 
     def send_value(self, value: Any, stamp_ns: int | None = None) -> None:
-        """Send a stamped message: the fields of the template, with `value` in the last one.
+        """Send the template with `value` in its last field; its header gets a time stamp and a number.
 
-        Without a subscriber no message is sent or counted.
+        If the topic has no subscriber, this method does nothing; the sequence number does not increase.
 
         Args:
-            value: the reading, or a tuple of the numbers of the last field.
-            stamp_ns: nanoseconds of the header's time; the wall clock by default.
+            value: the value of the last field; a tuple if the field has several numbers.
+            stamp_ns: the time in the header, in nanoseconds; the wall clock by default.
         """
         if not self.topic.links:
             return
@@ -115,9 +123,9 @@ class Publisher:
         self.topic.send(bytes(data))
 
     def send_stamped(self, fields: Mapping[str, Any]) -> None:
-        """Send a message with the template's fields, `fields`, and the wall clock in its header.
+        """Send the template with `fields` in place of its own; the wall clock is the time stamp.
 
-        Without a subscriber no message is sent or counted.
+        If the topic has no subscriber, this method does nothing; the sequence number does not increase.
         """
         if not self.topic.links:
             return
@@ -127,7 +135,7 @@ class Publisher:
         self.send({**fields, "header": {**self._template.get("header", {}), **stamp}})
 
     def _prepare(self) -> None:
-        """Encode the template to a frame once, and find the reading in it."""
+        """Encode the template to a frame once, and find the offset of its last field."""
         type_ = self.topic.type
         reading = last_field(type_.name)
         if reading is None:
@@ -138,7 +146,7 @@ class Publisher:
 
 
 def _pack_tuple(layout: struct.Struct) -> _Pack:
-    """Return `layout.pack_into` for the numbers of a tuple."""
+    """Return a function like `layout.pack_into` that takes the numbers as one tuple."""
 
     def pack(data: bytearray, at: int, values: tuple[float, ...]) -> None:
         layout.pack_into(data, at, *values)

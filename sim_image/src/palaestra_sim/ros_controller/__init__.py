@@ -1,1 +1,1 @@
-"""The `ros` controllers of the robots: names, services, topics and messages, over a node of `ros`."""
+"""The `ros` controllers of robots: their services, topics and messages; the package `ros` has the nodes."""

@@ -1,7 +1,7 @@
-"""The simulation that `ros_controller` needs: robots with devices, nodes with fields, and steps.
+"""The interface of a simulation: robots with devices, nodes with fields, and steps.
 
-`ros_controller` turns it into names, services and topics. A simulator other than the scene implements this
-Protocol to serve the same clients.
+`ros_controller` offers a simulation to clients as ROS services and topics. The package `scene` implements
+this Protocol. Another simulator that implements it can serve the same clients.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from palaestra_sim.scene.tree.scene_tree import SceneTree
 
 
 class MotionBackend(Protocol):
-    """The motion of nodes: m/s, rad/s, N and N m, in the axes of the world file."""
+    """The motion of nodes, in m/s, rad/s, N and N m, in the axes of the world file."""
 
     def velocity(self, node: SceneNode) -> tuple[Vector, Vector]:
         """Return the linear and angular velocity of a node."""
         ...
 
     def set_velocity(self, node: SceneNode, velocity: Vector, turning: Vector) -> None:
-        """Give a node a linear and an angular velocity; no effect on a node that cannot move."""
+        """Set the linear and the angular velocity of a node; do nothing if the node cannot move."""
         ...
 
     def halt(self, node: SceneNode) -> None:
@@ -38,33 +38,40 @@ class MotionBackend(Protocol):
     def add_force(
         self, node: SceneNode, force: Vector, *, relative: bool, offset: Vector | None = None
     ) -> None:
-        """Apply a force in the next basic step, at an offset in the node's frame or at the center of mass."""
+        """Apply a force in the next basic step.
+
+        Args:
+            node: the node.
+            force: the force.
+            relative: whether the force is in the axes of the node, not in those of the world.
+            offset: the point of the force in the node's frame; None for the center of mass.
+        """
         ...
 
     def add_torque(self, node: SceneNode, torque: Vector, *, relative: bool) -> None:
-        """Apply a torque in the next basic step."""
+        """Apply a torque in the next basic step; see `add_force` for `relative`."""
         ...
 
 
 class AppearanceInterface(Protocol):
-    """What a viewer sees of a world; nothing is computed before a request."""
+    """The data of a world for viewers; the data is computed only at a request."""
 
     def scene(self, world: str) -> VisibleScene:
-        """Return the looks of the world now; `world` is its name."""
+        """Return the current nodes and visible shapes of the world; `world` is its name."""
         ...
 
     def state(self, time_ms: int) -> SceneState:
-        """Return the poses of what moves, and the positions of joints."""
+        """Return the current poses of moving nodes, and the positions of joints."""
         ...
 
 
 class Backend(Protocol):
-    """One loaded world. A reload makes another Backend.
+    """The simulation of one loaded world; a reload creates a new Backend.
 
     Attributes:
         tree: the nodes of the world.
-        time_ms: simulated time; a reset sets it to 0.
-        mode: in PAUSE nothing moves.
+        time_ms: simulated time in milliseconds; a reset sets it to 0.
+        mode: the simulation mode; in PAUSE no steps run.
         quit_status: the exit status that `quit` requested; None before.
         movies: recordings of the Viewpoint's view.
     """
@@ -77,12 +84,12 @@ class Backend(Protocol):
 
     @property
     def appearance(self) -> AppearanceInterface:
-        """What a viewer sees of it."""
+        """The data of the world for viewers."""
         ...
 
     @property
     def motion(self) -> MotionBackend:
-        """The motion of its nodes."""
+        """The motion of the nodes."""
         ...
 
     @property
@@ -92,7 +99,7 @@ class Backend(Protocol):
 
     @property
     def left_out(self) -> Sequence[WorldError]:
-        """The unsupported nodes that the user left out, each with its place."""
+        """An error for each unsupported node that was left out, with its line and column in the file."""
         ...
 
     @property
@@ -102,20 +109,20 @@ class Backend(Protocol):
 
     @property
     def unread_textures(self) -> int:
-        """How many visible shapes have a texture that infra-red sensors do not see."""
+        """The number of visible shapes whose texture has no effect on infra-red sensors."""
         ...
 
     @property
     def basic_step_ms(self) -> int:
-        """WorldInfo.basicTimeStep."""
+        """The basic time step in milliseconds: the field WorldInfo.basicTimeStep."""
         ...
 
     def advance(self, duration_ms: int) -> None:
-        """Simulate for `duration_ms`; the sensors keep their values."""
+        """Simulate for `duration_ms`; the values of sensors do not change until `sample`."""
         ...
 
     def sample(self) -> None:
-        """Set the value of every sensor to that of this moment."""
+        """Measure the value of every sensor now."""
         ...
 
     def before_next_step(self, change: Callable[[], None], /) -> None:
@@ -123,7 +130,7 @@ class Backend(Protocol):
         ...
 
     def changed(self, node: SceneNode, field: str, /) -> None:
-        """Apply the effect of a field that has a new value."""
+        """Apply the effect of a field whose value a client has changed."""
         ...
 
     def reset(self) -> None:
@@ -131,7 +138,7 @@ class Backend(Protocol):
         ...
 
     def reset_physics(self) -> None:
-        """Stop all motion, at once."""
+        """Stop all motion immediately."""
         ...
 
     def quit(self, status: int) -> None:
@@ -139,11 +146,11 @@ class Backend(Protocol):
         ...
 
     def robot_of(self, node: SceneNode) -> Robot | None:
-        """Return the robot of a Robot node; None for any other node."""
+        """Return the robot that belongs to a Robot node; None for any other node."""
         ...
 
     def add(self, text: str, field: NodeField, index: int) -> bool:
-        """Insert the nodes of `text` into a field; return False if `index` is not a valid position in it."""
+        """Insert the nodes of `text` into a field; return False if `index` is not a valid position there."""
         ...
 
     def remove(self, node: SceneNode) -> None:
@@ -153,12 +160,15 @@ class Backend(Protocol):
     def export_image(self, path: str, quality: int) -> bool:
         """Save an image of the Viewpoint's view to a file; return whether that was possible.
 
-        `quality` is that of a JPEG file, from 1 to 100.
+        `quality` is the quality of a JPEG file, from 1 to 100.
         """
         ...
 
     def contact_points(self, node: SceneNode, *, descendants: bool) -> Sequence[tuple[Vector, int]]:
-        """Return a node's contact points: positions in meters, each with the number of a node."""
+        """Return the contact points of a node: each has a position in meters and the number of a node.
+
+        With `descendants`, the contact points of all nodes inside it are included.
+        """
         ...
 
     def save_state(self, node: SceneNode, name: str) -> None:

@@ -1,16 +1,19 @@
-"""The `ros` controller of one robot: its services, its steps, and the messages that it publishes after them.
+"""The `ros` controller of one robot: its services, its steps, and the messages that it sends after each step.
 
-The real controller's main loop is a thread that polls; this one follows a few rules:
+Webots' controller has a main loop in a thread that polls. This controller imitates its behavior:
 
-- `time_step` is refused unless it is 0 or a positive multiple of the basic step. While it is pending, the
-  robot is `blocked`: Webots holds a mutex that every other service needs.
-- Messages follow the response, once a step, for every enabled sensor that is due: (count * step) % period
-  is 0. They go to the subscribers that are connected at that moment.
-- The count increases before the step runs, and the step of the last accepted call is used. Elapsed time is a
-  product, not a sum, so a change of the step disturbs the phase of longer periods.
+- A `time_step` of 0 or of a positive multiple of the basic step is accepted; any other value is refused.
+  While a step is pending, the robot is `blocked` and other services wait: Webots holds a mutex that all of
+  them need.
+- After the response to a step, the controller sends one message for each enabled sensor that is due. A sensor
+  is due if (count * step) % period is 0. Subscribers that are connected at that moment get the message.
+- `count` is the number of steps. It increases before the step runs. `step` is the value of the last accepted
+  `time_step`. So if a client changes the value, `count * step` is not the elapsed time, and sensors with
+  longer periods are due at other times than before.
 
-With `lost_wakeup`, a step that is requested while the loop still handles the previous one runs and gets a
-response, but its messages are lost. Without it, the messages of the previous step are sent first.
+With the option `lost_wakeup`, a step may be requested while the main loop still handles the previous step.
+The new step then runs and gets a response, but its messages are lost. Without the option, the controller
+sends the messages of the previous step first.
 """
 
 from __future__ import annotations
@@ -57,7 +60,7 @@ class RosController:
     """The controller of one robot, from `start` to `close`.
 
     Attributes:
-        blocked: whether a step is pending, so that all other requests have to wait.
+        blocked: whether a step is pending; then all other requests have to wait.
     """
 
     def __init__(
@@ -100,8 +103,8 @@ class RosController:
         self._count = 0
         self._call: object | None = None
         self._answer: Any = None
-        self._asking = False  # the request for the step is still in progress
-        self._heard = True  # whether the main loop noticed the last step
+        self._asking = False  # whether `_time_step` has not returned yet
+        self._heard = True  # whether the main loop noticed the last step; see `lost_wakeup`
         self._publish_due = False
         self._published_s = -math.inf
         self._paced_until_s = -math.inf
@@ -109,7 +112,7 @@ class RosController:
         self._closed = False
 
     def start(self) -> None:
-        """Advertise everything, `robot/get_device_list` last."""
+        """Advertise all services and topics; `robot/get_device_list` comes last."""
         self.node.blocked = lambda: self.blocked
         with self.node.together():
             self._advertise()
@@ -137,9 +140,9 @@ class RosController:
         self._serve(services.device_list())
 
     def pictures(self) -> Iterator[tuple[str, tuple[int, int], bytes | memoryview]]:
-        """Yield name, width and height, and the newest picture of each camera that has sent one.
+        """Yield the name, the size and the newest picture of each camera that has sent a picture.
 
-        A pixel has four bytes: blue, green, red, alpha.
+        The size is width and height in pixels. A pixel has four bytes: blue, green, red, alpha.
         """
         for name, (kind, _) in self.robot.parts.devices.rows.items():
             if kind.node == _CAMERA:
@@ -148,14 +151,14 @@ class RosController:
                     yield name, (image.constants["width"], image.constants["height"]), image.newest
 
     def close(self) -> None:
-        """Remove the robot from the steps, and its services and topics from ROS."""
+        """Stop waiting for this robot in steps, and remove its services and topics from ROS."""
         self._closed = True
         self._publish_due = False
         self._stepping.leave(self.robot)
         self.node.close()
 
     def publish(self) -> None:
-        """Send the messages of the last step, if they were not sent yet."""
+        """Send the messages of the last step, unless they were sent already."""
         if not self._publish_due:
             return
         self._publish_due = False
@@ -170,7 +173,7 @@ class RosController:
             self._published_s = self._host_clock()
 
     def _enable_all(self) -> None:
-        """Enable every device that accepts it; log the reason for each other one."""
+        """Enable every device; if a device cannot be enabled, log the reason."""
         for name, outlet in self._outlets.items():
             try:
                 outlet.enable(self._basic_ms, self._basic_ms)
@@ -212,7 +215,10 @@ class RosController:
         return self._answer
 
     def _loop_hears(self) -> bool:
-        """Return whether the main loop will notice that the count increased; it may be too busy."""
+        """Return whether the main loop will notice the new step, and so will send its messages.
+
+        With `lost_wakeup`, the main loop does not notice a step while it sends the messages of the last step.
+        """
         if not self._options.lost_wakeup:
             self.publish()
             return True
@@ -220,7 +226,7 @@ class RosController:
         return not (self._publish_due or busy)
 
     def _stepped(self, done: bool) -> None:  # noqa: FBT001 - what Stepping calls back
-        """Handle the end of a step: respond now, or after the real time that the step has to take."""
+        """Respond to a step that has ended, or respond later if it was faster than its minimum real time."""
         delay_s = self._delay_s() if done else 0.0
         if delay_s > 0.0:
             self.node.later(delay_s, lambda: self._finish(done))
@@ -238,11 +244,11 @@ class RosController:
             self.node.answer(self._call, {"success": done})
 
     def _delay_s(self) -> float:
-        """Return the remaining real time that the step has to take."""
+        """Return the real time in seconds for which the response to the step has to wait."""
         delay_s = self._options.step_sleep_s
         if self.simulation.mode is Mode.REAL_TIME:
             now_s = self._host_clock()
-            # After a pause of the client, only one basic step is made up, not the whole pause.
+            # After a long pause of the client, the simulation may catch up only one basic step.
             owed_s = now_s - self._basic_ms / 1000.0
             self._paced_until_s = max(self._paced_until_s, owed_s) + self._asked_ms / 1000.0
             delay_s = max(delay_s, self._paced_until_s - now_s)

@@ -1,8 +1,8 @@
-"""The handles of nodes and fields that clients of a supervisor hold.
+"""The handles by which clients of a supervisor refer to nodes and fields.
 
-Handles are numbers that look like the addresses of Webots. They are valid for one load of a world; a service
-refuses a handle of another load. In Webots such a handle is a dangling pointer, which may crash the
-controller, so never keep one.
+A handle is a number that looks like a memory address, because Webots' handles are memory addresses. A handle
+is valid until the world is loaded again; after that, services refuse it. In Webots an old handle is a
+dangling pointer and may crash the controller, so clients must request new handles after each load.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ from palaestra_sim.ros_controller.backend import Backend
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.tree.fields import NodeField
 
-_FIRST_ADDRESS: Final = 0x5580_0000_0000  # Linux places the heap of a position-independent program there
+_FIRST_ADDRESS: Final = 0x5580_0000_0000  # Linux places the heap of a program near this address
 _LOAD_SPACING: Final = 0x0001_0000_0000
 _SPACING: Final = 0x90
 
 
 class NoSuchHandleError(SimError, LookupError):
-    """This load of the world never returned that handle; Webots could crash."""
+    """The handle is not one of the loaded world; Webots might crash at such a handle."""
 
 
 class Handles:
@@ -28,7 +28,7 @@ class Handles:
 
     Args:
         simulation: the simulation of that world.
-        load: number of earlier loads, so that handles of different loads differ.
+        load: the number of earlier loads; it makes the handles of different loads differ.
     """
 
     def __init__(self, simulation: Backend, load: int = 0) -> None:
@@ -53,7 +53,7 @@ class Handles:
         """Return the node of a handle.
 
         Raises:
-            NoSuchHandleError: it is 0, from another load, of a removed node, or not a handle of a node.
+            NoSuchHandleError: the handle is 0, from another load, of a removed node, or not that of a node.
         """
         held = self._held.get(handle)
         if not isinstance(held, SceneNode) or self._is_gone(held):
@@ -64,7 +64,7 @@ class Handles:
         """Return the field of a handle.
 
         Raises:
-            NoSuchHandleError: it is 0, from another load, of a removed node, or not a handle of a field.
+            NoSuchHandleError: the handle is 0, from another load, of a removed node, or not that of a field.
         """
         held = self._held.get(handle)
         if not isinstance(held, NodeField) or self._is_gone(held.node):
@@ -75,5 +75,5 @@ class Handles:
         return self.tree.of_number(node.number) is not node
 
     def field_of(self, node: SceneNode, name: str) -> NodeField | None:
-        """Return a node's field; None if this node type does not have it."""
+        """Return the field `name` of a node; None if its node type has no such field."""
         return self.tree.field_of(node, name, self.simulation)

@@ -1,6 +1,7 @@
-"""The interface of the running simulator for a controller and its services.
+"""The interface through which a controller and its services use the running simulator.
 
-The simulator starts and ends controllers, so it imports them; they import this Protocol instead.
+The module of the simulator imports the controllers, because it starts and ends them. To avoid an import
+cycle, the controllers import only this Protocol.
 """
 
 from __future__ import annotations
@@ -16,11 +17,11 @@ from palaestra_sim.scene.robot import Robot
 
 
 class Host(Protocol):
-    """A running simulator, from one world to the next.
+    """A running simulator; it may load several worlds one after another.
 
     Attributes:
-        world_path: the world that is loaded now.
-        options: see FrontOptions.
+        world_path: the path of the loaded world.
+        options: the options of controllers.
         clock: returns seconds of real time, from any origin.
     """
 
@@ -33,11 +34,11 @@ class Host(Protocol):
         ...
 
     def set_mode(self, mode: Mode) -> None:
-        """Pause or run; pending steps run when the simulation does."""
+        """Set the simulation mode; pending steps run as soon as the mode is not PAUSE."""
         ...
 
     def quit(self, status: int) -> None:
-        """End with that exit status, after the response to the current call."""
+        """End the simulator with the exit code `status`, after the response to the current call."""
         ...
 
     def reload(self) -> None:
@@ -45,7 +46,7 @@ class Host(Protocol):
         ...
 
     def load(self, path: str) -> bool:
-        """Load another world, after the response to the current call; return False if it cannot be loaded."""
+        """Load another world, after the response to the current call; return False if that is impossible."""
         ...
 
     def restart(self, robot: Robot) -> None:

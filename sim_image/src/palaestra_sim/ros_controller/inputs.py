@@ -1,7 +1,7 @@
-"""Battery, keyboard and joystick: every robot's controller has them, although the world does not.
+"""Battery, keyboard and joystick: the controller of every robot has these devices, although no node has them.
 
-In a pod no person sits at the simulator, so clients press the keys. The services for this, below
-`palaestra/`, are not in Webots. They do not depend on the backend, so they work with every simulator.
+In a pod nobody can press keys, so clients press them through services below `palaestra/`. Webots does not
+have these services. They do not depend on the backend, so they work with every simulator.
 """
 
 from __future__ import annotations
@@ -16,18 +16,21 @@ from palaestra_sim.scene.devices.device_type import DeviceTopic, Enable, whole_s
 from palaestra_sim.scene.robot import Robot
 
 _MOST_KEYS: Final = 7  # Webots reports at most this many keys at once
-_AXES: Final = 6  # our services connect a gamepad with two sticks and two triggers
+_AXES: Final = 6  # the simulated gamepad has two sticks with two axes each, and two triggers
 _POVS: Final = 1
 _BYTE: Final = (-128, 127)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Input:
-    """A pseudo device, with the attributes of a row in the table of devices.
+    """A device that is not a node of the world.
 
     Attributes:
-        rows: services besides `enable` and `get_sampling_period`, below its name.
-        own_rows: services that Webots does not have, below `palaestra/` and its name.
+        name: the first part of its paths.
+        topics: its topics.
+        enable: returns whether the device accepts a sampling period.
+        rows: its services besides `enable` and `get_sampling_period`.
+        own_rows: its services that Webots does not have; their paths begin with `palaestra/`.
     """
 
     name: str
@@ -51,7 +54,7 @@ class _Pressed:
     value: list[int] = field(default_factory=list)
 
     def press(self, key: int) -> bool:
-        """Press a key; return False if the number is not a key, or if too many keys are pressed."""
+        """Press a key; return False if `key` is negative, or if too many keys are pressed already."""
         if key in self.value:
             return True
         if key < 0 or len(self.value) >= self.most:
@@ -60,7 +63,7 @@ class _Pressed:
         return True
 
     def release(self, key: int) -> bool:
-        """Release a key, or all for -1; return False if the key is not pressed."""
+        """Release a key, or all keys if `key` is -1; return False if the key is not pressed."""
         if key == -1:
             self.value.clear()
             return True
@@ -70,7 +73,7 @@ class _Pressed:
         return True
 
     def rows(self) -> tuple[Row, ...]:
-        """Return the services that press and release."""
+        """Return the services that press and release keys or buttons."""
         return (
             ("press", "set_int", lambda request: {"success": self.press(request.value)}),
             ("release", "set_int", lambda request: {"success": self.release(request.value)}),
@@ -85,7 +88,7 @@ def _keyboard() -> Input:
 
 @dataclass(slots=True, eq=False)
 class _Joystick:
-    """A gamepad; the first successful call of one of our services connects it."""
+    """A gamepad; it is connected by the first successful call of a service that moves it."""
 
     buttons: _Pressed = field(default_factory=lambda: _Pressed(_BYTE[1]))
     axes: list[int] = field(default_factory=lambda: [0] * _AXES)
@@ -93,11 +96,14 @@ class _Joystick:
     connected: bool = False
 
     def count(self, parts: Sequence[int]) -> int:
-        """Return the number of parts; -1, as libController, before it is connected."""
+        """Return the number of axes or points of view; -1 before the gamepad is connected, as in Webots."""
         return len(parts) if self.connected else -1
 
     def turn(self, parts: list[int], values: Sequence[float]) -> bool:
-        """Set axes or points of view, from the first one; return False if the values are out of range."""
+        """Set the first axes or points of view to `values`; return False if there are too many values.
+
+        Also return False if a value is out of range.
+        """
         low, high = _BYTE
         if len(values) > len(parts) or not all(low <= value <= high for value in values):
             return False
@@ -107,7 +113,7 @@ class _Joystick:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Part:
-    """One axis or point of view; its value is a list of one number, or empty before it is connected."""
+    """One axis or point of view; its value is a list of one number, or empty if no gamepad is connected."""
 
     joystick: _Joystick
     parts: list[int]
@@ -143,7 +149,7 @@ def _joystick_answers(joystick: _Joystick) -> tuple[Row, ...]:
 
 
 def _force_feedback() -> tuple[Row, ...]:
-    """Return the services for forces, which return success for any joystick, as the controller does."""
+    """Return the services for force feedback, which only return success, as in Webots' controller."""
     types = {
         "set_constant_force": "set_int",
         "set_constant_force_duration": "set_float",
@@ -166,7 +172,7 @@ def _joystick_moves(joystick: _Joystick) -> tuple[Row, ...]:
 
 
 def _connecting(joystick: _Joystick, row: Row) -> Row:
-    """Return a row that connects the joystick when its handler succeeds."""
+    """Return the service `row`, changed so that a successful call also connects the joystick."""
     name, type_name, handler = row
 
     def handle(request: Any) -> Fields:

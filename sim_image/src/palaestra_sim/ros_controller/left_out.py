@@ -1,4 +1,4 @@
-"""The nodes that a simulator leaves out, as lines for its sidecar; see `palaestra_protocol.control`."""
+"""Report the nodes that a simulator leaves out to its sidecar; see `palaestra_protocol.control`."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from typing import Final
 from palaestra_sim.errors import WorldError
 from palaestra_sim.whole_file import write_whole
 
-_MOST_PLACES: Final = 8  # a line names at most so many places
+_MOST_PLACES: Final = 8  # maximum number of line numbers in one report line
 
 
 def write_left_out(left_out: Iterable[WorldError], file: Path) -> None:
-    """Write the whole `file`, with one line for each kind of node.
+    """Write `file` with one line for each kind of node.
 
     Raises:
-        OSError: it cannot be written; no partial file is left.
+        OSError: the file cannot be written; no partial file is left.
     """
     write_whole(file, "".join(f"{line}\n" for line in left_out_lines(left_out)).encode())
 
 
 def left_out_lines(left_out: Iterable[WorldError]) -> Iterator[str]:
-    """Yield a line for each kind of node, with its places."""
+    """Yield a line for each kind of node, with the line numbers of these nodes in the world file."""
     kinds: dict[tuple[str, str], list[WorldError]] = {}
     for error in left_out:
         kinds.setdefault((error.world, error.fact), []).append(error)

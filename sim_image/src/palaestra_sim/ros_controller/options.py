@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FrontOptions:
-    """The behavior of controllers where that of Webots varies.
+    """Options that imitate the timing of Webots' controller, which depends on the world and the machine.
 
     Attributes:
-        step_sleep_s: minimum real time of a `time_step`, to imitate a bigger world.
-        lost_wakeup: whether the controller can lose a wake-up, as the real one does. If a step is requested
-            before the messages of the previous step are sent, or within `publish_delay_s` after that, its
-            messages are lost.
+        step_sleep_s: minimum real time of a `time_step`, to imitate a larger world.
+        lost_wakeup: whether the controller can lose the messages of a step, as Webots' controller can. The
+            messages are lost if the step is requested before the messages of the previous step are sent, or
+            within `publish_delay_s` after that.
         publish_delay_s: delay from the end of a step to its messages; 0 means right after the response.
     """
 

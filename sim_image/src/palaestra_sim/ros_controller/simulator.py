@@ -1,7 +1,8 @@
-"""One running simulator: a simulation and the controllers of its robots, from one world to the next.
+"""A running simulator: the simulation of a world, and the controllers of its robots.
 
-Controllers start and end with worlds, as Webots starts and kills them; the simulator outlives them. The
-program around it (command line, loop, signals) gives it nodes and a clock, and ends when it calls back.
+When a client loads another world, the controllers of the old world end and those of the new world start; the
+simulator continues. The module `program` has the command line, the event loop and the signals. It gives the
+simulator ROS nodes and a clock, and ends the process when the simulator calls its callback.
 """
 
 from __future__ import annotations
@@ -28,24 +29,24 @@ Load = Callable[[Path, Mode], Backend]
 
 
 class RunningSimulator:
-    """A simulator whose world has been checked.
+    """A simulator; its constructor loads and checks the world, and `start` starts the controllers.
 
     Args:
-        world_path: the world file, read at once and again at each reload.
+        world_path: the world file; each reload reads it again.
         load: returns the simulation of a world file, which starts in the given mode.
         make_node: returns the ROS node for a name.
-        options: see FrontOptions.
-        mode: the mode at the start.
+        options: the options of controllers.
+        mode: the simulation mode at the start.
         clock: returns seconds of real time, from any origin.
 
     Attributes:
-        simulation: the simulation of the world that is loaded now.
-        controllers: by ROS name, of the robots whose controller is "ros".
-        quit_status: the exit status from `simulation_quit`; None before.
+        simulation: the simulation of the loaded world.
+        controllers: the controllers of robots whose controller is "ros", by ROS name.
+        quit_status: the exit status that a client set with `simulation_quit`; None before.
 
     Raises:
-        WorldError: the file is wrong, or contains an object that cannot be simulated.
-        OSError: it cannot be read.
+        WorldError: the file is wrong, or contains a node that cannot be simulated.
+        OSError: the file cannot be read.
     """
 
     def __init__(
@@ -76,7 +77,7 @@ class RunningSimulator:
             self._start_controller(robot)
 
     def on_quit(self, callback: Callable[[int], None]) -> None:
-        """Set the function to call with the exit status after a client has requested the end."""
+        """Set the function that ends the program; its argument is the exit status that a client requested."""
         self._ended = callback
 
     def arguments(self, robot: Robot) -> ControllerArguments:
@@ -84,12 +85,15 @@ class RunningSimulator:
         return self._arguments[robot]
 
     def set_mode(self, mode: Mode) -> None:
-        """Pause or run; then run the steps that waited for the end of a pause."""
+        """Set the simulation mode; after a pause, run the steps that waited for its end."""
         self.simulation.mode = mode
         self._stepping.advance()
 
     def quit(self, status: int) -> None:
-        """End, after the response to the current call: pending steps fail, then the callback is called."""
+        """End the simulator after the response to the current call.
+
+        Pending steps fail; then the callback of `on_quit` is called.
+        """
         if self.quit_status is not None:
             return
         self.quit_status = status
@@ -101,9 +105,9 @@ class RunningSimulator:
         self.load(str(self.world_path))
 
     def load(self, path: str) -> bool:
-        """Load another world, after the response to the current call; return False if it cannot be loaded.
+        """Load another world, after the response to the current call; return False if that is impossible.
 
-        All controllers end, and those of the new world start: services disappear and reappear, and all
+        All controllers end, and those of the new world start. So services disappear and appear again, and all
         devices are off.
         """
         world_path = Path(path).absolute()
@@ -127,7 +131,7 @@ class RunningSimulator:
         self.controllers.clear()
 
     def _read(self, world_path: Path, mode: Mode) -> tuple[Backend, dict[Robot, ControllerArguments]]:
-        """Return a world that is ready to run, with the arguments of its robots."""
+        """Return the simulation of a world, and the arguments of its robots with a "ros" controller."""
         simulation = self._load(world_path, mode)
         arguments = {robot: robot.parts.arguments for robot in simulation.robots}
         return simulation, {robot: given for robot, given in arguments.items() if given is not None}
@@ -161,9 +165,9 @@ class RunningSimulator:
         self._ended(self.quit_status or 0)
 
     def _soon(self, callback: Callable[[], None]) -> None:
-        """Call back after the response to the current call was sent."""
+        """Call `callback` after the response to the current call was sent."""
         next(iter(self.controllers.values())).node.later(0.0, callback)
 
 
 def _ignore(_status: int) -> None:
-    """Ignore the end; `on_quit` replaces this function."""
+    """Do nothing at the end; `on_quit` replaces this function."""

@@ -1,4 +1,4 @@
-"""What a viewer may ask of a running simulator: the looks of its world, its poses, a robot's camera."""
+"""The data of a running simulator for viewers: visible shapes, poses, and the pictures of a camera."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class _Json(Protocol):
 
 
 def answers(simulator: RunningSimulator) -> Mapping[bytes, Callable[[], bytes]]:
-    """Return the responses to the requests of a sidecar, each computed when it is called."""
+    """Return, for each request of a sidecar, the function that computes the response."""
 
     def scene() -> VisibleScene:
         return simulator.simulation.appearance.scene(simulator.world_path.name)
@@ -28,7 +28,7 @@ def answers(simulator: RunningSimulator) -> Mapping[bytes, Callable[[], bytes]]:
         return simulation.appearance.state(simulation.time_ms)
 
     def camera() -> bytes:
-        """Return the newest picture of the first camera that has sent one; null without one."""
+        """Return the newest picture of the first camera that has sent a picture; null if none has."""
         controllers = simulator.controllers.values()
         newest = next((picture for controller in controllers for picture in controller.pictures()), None)
         return b"null" if newest is None else _written(_reduced(*newest))
@@ -41,7 +41,7 @@ def answers(simulator: RunningSimulator) -> Mapping[bytes, Callable[[], bytes]]:
 
 
 def _reduced(name: str, size: tuple[int, int], pixels: bytes | memoryview) -> CameraPicture:
-    """Return a picture of blue, green, red and alpha, without the columns and rows that are too many."""
+    """Return the picture of `pixels` (blue, green, red, alpha); if it is too large, drop rows and columns."""
     width, height = size
     every = math.ceil(max(size) / MOST_SIDE)
     cells = memoryview(pixels).cast("B").cast("I")

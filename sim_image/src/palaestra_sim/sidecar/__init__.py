@@ -1,21 +1,22 @@
 """The sidecar: one process that starts, watches and stops a simulator on request of a trainer.
 
-It may have a second simulator as a standby. The two share the process and its ports, and nothing else.
+A sidecar may have a second simulator as a standby. The two simulators share only the sidecar's process and
+ports.
 
-- `entry`: the start: blocks signals before it imports anything else; `blocked_signals`: the list of these
-- `cli`: the command line: check everything, then run; `options`: its options
-- `world_files`: the world that the simulator will run, with its own ROS names
-- `project`: the Webots project around that world: a folder, and links to the files around the source
+- `entry`: the start of the program: blocks signals before other imports; `blocked_signals`: lists the signals
+- `cli`: checks options and world, then runs the simulators; `options`: the command-line options
+- `world_files`: writes the world that the simulator will run, with its own ROS names
+- `project`: makes a Webots project around that world, with links to the files around the source world
 - `drivers`: the command lines of stub, MuJoCo, Webots and other programs
-- `lifecycle`: the events that each state allows, as a table; pure
-- `simulator`: the one owner of the state, which receives events in order and runs the table's actions
+- `lifecycle`: the table of states, events and actions; pure
+- `simulator`: the owner of a simulator's state, which handles events in order and runs the table's actions
 - `process`: the only module that starts a process
-- `reaper`: the small program between sidecar and simulator, from which no process can escape
-- `signals`: the thread that only waits for signals
-- `output`: the simulator's output, forwarded line by line
-- `left_out`: the simulator's report on the nodes that it leaves out of its world
-- `viewing`: what the simulator shows to viewers, read at most 30 times a second
-- `server`: the routes of the two ports: control, and health with metrics and state
-- `metric_definitions`: every metric by name, as data
-- `metrics`: the content of /metrics
+- `reaper`: a small program between sidecar and simulator, which ends all descendants of the simulator
+- `signals`: the thread that waits for signals
+- `output`: forwards the simulator's output line by line
+- `left_out`: reads the simulator's report on the nodes that it leaves out of its world
+- `viewing`: reads the simulator's data for viewers, at most 30 times a second
+- `server`: the routes of the control port and of the health port
+- `metric_definitions`: declares every metric
+- `metrics`: the values in /metrics
 """

@@ -1,4 +1,4 @@
-"""The signals that the sidecar blocks before it does anything else; `signals` receives them."""
+"""Block the signals that the sidecar will handle; the module `signals` receives them later."""
 
 import signal
 
@@ -7,5 +7,8 @@ TAKEN = ENDS | {signal.SIGCHLD}
 
 
 def hold_back() -> None:
-    """Block the signals, so that they stay pending until received; call this before another thread starts."""
+    """Block the signals, so that they stay pending until a thread receives them.
+
+    Call this before any other thread starts, because new threads inherit the blocked signals.
+    """
     signal.pthread_sigmask(signal.SIG_BLOCK, TAKEN)

@@ -1,4 +1,7 @@
-"""The command line of the sidecar: check everything, listen, log the addresses, then run the simulators."""
+"""The command line of the sidecar.
+
+It checks the options and the world, opens the two ports, logs their addresses, and runs the simulators.
+"""
 
 import argparse
 import ipaddress
@@ -39,8 +42,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def work_folder(given: argparse.Namespace) -> Iterator[None]:
     """Set `given.work` to a temporary folder for the block, if a folder is needed and --work names none.
 
-    --suffix needs it for the world, and viewers for a socket. The sidecar owns the folder: its parent may be
-    killed, but the sidecar then still shuts down in order.
+    The generated world of --suffix needs a folder, and so does the socket for viewers. The sidecar removes
+    the folder itself, because its parent process may be killed.
     """
     needed = given.suffix or Driver(given.driver) in SHOWN
     if not needed or given.job is not None or given.work is not None:
@@ -52,7 +55,7 @@ def work_folder(given: argparse.Namespace) -> Iterator[None]:
 
 
 def look_after(given: argparse.Namespace) -> int:
-    """Run the simulators of these options until a signal requests the end; return the exit code."""
+    """Run the simulators until a signal requests the end; return the exit code."""
     try:
         simulators = prepare(given)
         missing = _missing_controllers(given)
@@ -74,13 +77,13 @@ def look_after(given: argparse.Namespace) -> int:
 
 
 def shut_down(simulators: Sequence[SupervisedSimulator]) -> None:
-    """End all simulators at once and make `run` return; safe from any thread."""
+    """End all simulators at the same time and make `run` return; safe to call from any thread."""
     for simulator in simulators:
         simulator.shut_down()
 
 
 def run(simulators: Sequence[SupervisedSimulator]) -> None:
-    """Run all simulators, each in its own thread, until a shutdown has ended them."""
+    """Run all simulators, each in its own thread; return when a shutdown has ended all of them."""
     first, *others = simulators
     threads = [threading.Thread(target=other.run, name="simulator", daemon=True) for other in others]
     for thread in threads:
@@ -91,7 +94,7 @@ def run(simulators: Sequence[SupervisedSimulator]) -> None:
 
 
 def prepare(given: argparse.Namespace) -> tuple[SupervisedSimulator, ...]:
-    """Return the simulators, not started yet: one, or two with --standby.
+    """Return the simulators, which are not started yet: one, or two with --standby.
 
     Raises:
         SimError: an option, the world or the program is wrong.
@@ -128,14 +131,14 @@ def _simulator(given: argparse.Namespace, driver: Driver, slot: str) -> Supervis
 
 
 def end_with_stdin() -> None:
-    """When standard input closes, send SIGTERM to this process, because its parent is gone."""
+    """Send SIGTERM to this process when standard input closes, which means that the parent has ended."""
     while os.read(sys.stdin.fileno(), 4096):
         pass
     os.kill(os.getpid(), signal.SIGTERM)
 
 
 def log_to_stdout() -> None:
-    """Send the log to standard output, like the simulator's output."""
+    """Write the log to standard output, to which the simulator's output goes too."""
     logging.basicConfig(level=logging.INFO, handlers=[LineHandler()])
 
 
@@ -162,9 +165,9 @@ def _world(given: argparse.Namespace, slot: str) -> Path:
 
 
 def _left_out(given: argparse.Namespace, world: Path) -> Path | None:
-    """Return the file for the simulator's report on nodes that it leaves out.
+    """Return the file for the simulator's report on the nodes that it leaves out.
 
-    None if its world is not in the work folder.
+    Return None if the simulator's world is not in the work folder.
     """
     if given.work is None or world == Path(given.world).absolute():
         return None
@@ -172,7 +175,10 @@ def _left_out(given: argparse.Namespace, world: Path) -> Path | None:
 
 
 def _view_socket(given: argparse.Namespace, driver: Driver, world: Path) -> Path | None:
-    """Return the socket on which the simulator describes its world; None if it does not, or has no folder."""
+    """Return the path of the socket on which the simulator describes its world.
+
+    Return None if this driver does not describe its world, or if there is no work folder.
+    """
     if given.work is None or driver not in SHOWN:
         return None
     return Path(given.work).absolute() / f"{world.stem}.view"

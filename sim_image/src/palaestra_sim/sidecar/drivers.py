@@ -1,4 +1,4 @@
-"""The command lines of the simulators: the stub, MuJoCo, Webots, and any other program."""
+"""The command lines of the simulators: the stub, MuJoCo, Webots, and other programs."""
 
 import os
 import shutil
@@ -11,7 +11,7 @@ from pathlib import Path
 from palaestra_sim.errors import SidecarError
 from palaestra_sim.sidecar.process import CommandLine
 
-WORLD = "{world}"  # a command has it in place of the path of the world
+WORLD = "{world}"  # in the arguments of a program, stands for the path of the world
 _NOT_ROOT = "palaestra"
 _MESA_THREADS = "LP_NUM_THREADS"
 
@@ -29,14 +29,18 @@ class Driver(StrEnum):
     COMMAND = "command"
 
 
-SHOWN = (Driver.STUB, Driver.MUJOCO)  # these describe their world to viewers
+SHOWN = (Driver.STUB, Driver.MUJOCO)  # these simulators describe their world to viewers
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Launch:
-    """The inputs of a start: a world, options of the simulator, and its program for `command`.
+    """The inputs of a start.
 
-    `root` is the folder that holds the world's files; None if the simulator has to find it.
+    Attributes:
+        world: the path of the world.
+        root: the folder that holds all files of the world; None if the simulator has to find it.
+        options: additional options for the simulator.
+        program: for the driver `command`, the program and its arguments.
     """
 
     world: Path
@@ -49,7 +53,7 @@ def command(driver: Driver, launch: Launch, environment: Mapping[str, str]) -> C
     """Return the command line that starts the simulator, with the full path of its program.
 
     Raises:
-        SidecarError: the program does not exist, or none is given where one is needed.
+        SidecarError: the program does not exist, or the driver `command` has no program.
     """
     arguments = _ARGUMENTS[driver](launch)
     own = {**environment, **_ENVIRONMENT[driver](environment)}
@@ -83,15 +87,19 @@ def _nothing(environment: Mapping[str, str]) -> dict[str, str]:
 
 
 def _for_mujoco(environment: Mapping[str, str]) -> dict[str, str]:
-    """Return a variable that makes Mesa render on the simulator's thread: other simulators share the cores.
+    """Return a variable that makes Mesa render in the simulator's own thread.
 
-    MUJOCO_GL stays unset. If it is set, MuJoCo loads OpenGL at its import, and fails on a machine without it.
+    More threads would take cores from other simulators. MUJOCO_GL stays unset: if it is set, `import mujoco`
+    loads OpenGL, and fails on a machine without OpenGL.
     """
     return {_MESA_THREADS: environment.get(_MESA_THREADS, "0")}
 
 
 def _for_webots(environment: Mapping[str, str]) -> dict[str, str]:
-    """Return Webots' variables: a user, which containers often lack, and one that prevents extra files."""
+    """Return the environment variables for Webots.
+
+    Webots needs USER, which containers often lack. The other variable prevents files next to the world.
+    """
     return {
         "USER": environment.get("USER", _NOT_ROOT),
         "WEBOTS_DISABLE_SAVE_SCREEN_PERSPECTIVE_ON_CLOSE": "true",

@@ -1,7 +1,8 @@
-"""The start of the sidecar's program: it blocks signals before it imports anything else.
+"""The start of `palaestra-sidecar`: it blocks signals before it imports the other modules.
 
-Process 1 of a container loses a signal that arrives before the process blocks or handles it. If the trainer
-ended during the imports of the sidecar, the pod would stay for its whole grace period.
+In a container the sidecar is process 1. The kernel drops a signal to process 1 that the process neither
+blocks nor handles. If SIGTERM arrived during the imports and was dropped, the pod would stay for its whole
+grace period.
 """
 
 import sys

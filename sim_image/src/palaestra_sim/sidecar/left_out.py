@@ -1,7 +1,7 @@
 """The file in which a simulator reports the nodes that it leaves out of its world.
 
-The simulator may be any program, so the file is read with limits. A log would not do: its lines are for
-people, and each simulator has its own format.
+The simulator may be any program, so the size of the file is limited. The simulator's log could not replace
+the file, because each simulator has its own format of log lines.
 """
 
 from pathlib import Path
@@ -12,7 +12,7 @@ _MOST_BYTES = 2**16
 def read_left_out(file: Path) -> tuple[str, ...]:
     """Return the lines of the file without empty ones; () if the file cannot be read."""
     try:
-        if not file.is_file():  # opening a pipe would block
+        if not file.is_file():  # if it is a pipe, to open it would block
             return ()
         with file.open("rb") as opened:
             text = opened.read(_MOST_BYTES).decode("utf-8", "replace")

@@ -18,16 +18,17 @@
 
 Rules:
 
-1. A simulator is started only when none runs: in `idle` and `failed`.
-2. The sidecar cannot see whether the simulator is ready; the trainer reports it, after a real round trip.
-3. After an announced stop, an exit is expected, with any exit code. Before that it is a fault, even with
-   code 0, because a simulator does not exit by itself.
-4. After a stop request, the trainer's supervisor ends the simulator; at the deadline, the sidecar kills it.
-   A second stop request can only bring the deadline forward.
-5. A shutdown of the sidecar stops the simulator without a trainer: it sends SIGTERM, then kills.
-6. An event that is not in the table is refused and changes nothing.
+1. The sidecar starts the simulator only in the states `idle` and `failed`, in which no process runs.
+2. The sidecar cannot detect that the simulator is ready. The trainer reports it after a real round trip.
+3. After a stop request, an exit is expected, with any exit code. Without such a request, an exit is a fault,
+   even with code 0, because a simulator does not exit by itself.
+4. After a stop request, the trainer's supervisor robot ends the simulation. If the process still runs at the
+   deadline, the sidecar kills it. A second stop request can only make the deadline earlier.
+5. At a shutdown, the sidecar itself ends the simulator: it sends SIGTERM, and after a deadline it kills the
+   process.
+6. An event that is not in the table is refused, and the state does not change.
 
-All decisions about states are in this file; `simulator` runs the actions.
+This file has all decisions about states. The module `simulator` runs the actions.
 """
 
 from enum import StrEnum
@@ -37,7 +38,7 @@ from palaestra_protocol.control import SidecarState
 
 
 class LifecycleEvent(StrEnum):
-    """An event: a trainer's request, an exit of the process, a deadline, or the shutdown of the container."""
+    """An event: a request of the trainer, an exit of the process, a deadline, a shutdown of the container."""
 
     START = "start"
     READY = "ready"
@@ -50,9 +51,14 @@ class LifecycleEvent(StrEnum):
 class Action(StrEnum):
     """The action of a transition from one state to the next.
 
-    spawn: start the process. wait: let it end by itself, until the deadline of the request.
-    terminate: send SIGTERM to its process group, with a deadline. kill: kill all of its processes.
-    note: read its report on left-out nodes. blame: count a fault. accept: record an expected exit.
+    - nothing: do nothing.
+    - spawn: start the process.
+    - note: read the simulator's report on left-out nodes.
+    - wait: wait until the process ends, or until the deadline of the request.
+    - terminate: send SIGTERM to the process group, and set a deadline.
+    - kill: kill all processes of the simulator.
+    - blame: count a fault.
+    - accept: record an expected exit.
     """
 
     NOTHING = "nothing"

@@ -1,7 +1,7 @@
-"""Every metric of a sidecar, by name; `palaestra_sim.sidecar.metrics` supplies their values.
+"""The declarations of a sidecar's metrics; `palaestra_sim.sidecar.metrics` supplies the values.
 
-They describe the simulator's process. The trainer exports the metrics of the episodes, and Prometheus adds
-the labels of job and simulator.
+These metrics describe the simulator's process. The trainer exports metrics of the episodes. Prometheus adds
+the labels for job and simulator.
 """
 
 from palaestra_protocol.control import SidecarState

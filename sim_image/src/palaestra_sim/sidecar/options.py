@@ -13,23 +13,23 @@ from palaestra_sim.sidecar.world_files import located
 EXIT_WRONG = 2
 
 EPILOG = """
-This program does not start the simulator by itself; POST /start on the control port does, see
-palaestra_protocol.control. The simulator inherits the environment: ROS_MASTER_URI and ROS_HOSTNAME.
+This program does not start the simulator by itself. A client starts it with POST /start on the control port;
+see palaestra_protocol.control. The simulator inherits the environment, with ROS_MASTER_URI and ROS_HOSTNAME.
 
-reads   the world; with --job it writes the world with its own ROS names, GROUP-INDEX.wbt, to --work;
-        for Webots as a project there, with links to the controllers, PROTOs and so on around the world
+reads   the world; with --job it writes a copy, GROUP-INDEX.wbt, with other ROS names to the --work folder;
+        for Webots the copy is in a project, with links to the controllers and PROTOs around the world
 prints  first the two addresses; then its own lines, as "palaestra-sidecar: ...", and the simulator's
 serves  control: /start /ready /stop /state; health: /healthz /state /metrics; both: /scene /watch /camera
 
-With --standby there is a second simulator, slot b, with its own world, ROS names and process
-(GROUP-INDEXb.wbt; /standby/start and so on), so that one can start while the other works. Lines then begin
-with "a: " or "b: ". A simulator finds its slot in PALAESTRA_SIMULATOR_SLOT.
+With --standby the sidecar has a second simulator, slot b, which can start while the first one works. It has
+its own world (GROUP-INDEXb.wbt), ROS names, process and paths (/standby/start and so on). Output lines begin
+with "a: " or "b: ". The variable PALAESTRA_SIMULATOR_SLOT holds the slot of a simulator.
 
 With --work, PALAESTRA_SIMULATOR_LEFT_OUT names a file. Before the simulator is ready, it may write to this
-file which nodes it leaves out of the world: one line for each kind of node. /state has these lines.
+file which nodes it leaves out of the world: one line for each kind of node. /state returns these lines.
 
-exit codes: 0 after SIGTERM or SIGINT, if all processes ended; 1 if one of them hung and was left behind;
-            2 wrong options or world, a port in use, a missing program: nothing was started
+exit codes: 0 after SIGTERM or SIGINT, if all processes ended; 1 if a process hung and still runs;
+            2 wrong options or world, a port in use, a missing program: no simulator was started
 """
 
 
@@ -41,7 +41,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
-    """Return the options; if they are wrong, exit with code 2."""
+    """Return the options; if an option is wrong, exit with code 2."""
     parser = _Parser(
         prog="palaestra-sidecar",
         description="Start, watch and stop one simulator at its trainer's command.",
@@ -107,5 +107,5 @@ def _address(text: str) -> Address:
     try:
         return Address.parse(text)
     except ValueError as error:
-        # argparse drops the messages of other exceptions.
+        # argparse prints the message of this exception only; it drops that of a ValueError.
         raise argparse.ArgumentTypeError(str(error)) from error

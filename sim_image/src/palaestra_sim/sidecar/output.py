@@ -1,8 +1,8 @@
-"""Write whole lines to standard output, the simulator's and the sidecar's own.
+"""Write lines of the simulator and of the sidecar to standard output.
 
-A line is written at once and is never longer than one atomic write to a pipe. So lines of several writers do
-not mix, and no writer holds a lock while it waits for a full pipe. If a simulator prints faster than the
-container's log reads, it has to wait: the sidecar buffers only one line.
+Each line is one write, and is short enough that a write to a pipe is atomic. So the lines of several writers
+do not mix, although the writers use no lock. If a simulator prints faster than the container's log reads, the
+simulator has to wait, because the sidecar buffers only one line.
 """
 
 import logging
@@ -26,7 +26,7 @@ def write_line(line: bytes) -> None:
 
 
 class LineHandler(logging.Handler):
-    """Writes log records as whole lines, after the program's name."""
+    """Writes each log record as one line that begins with the program's name."""
 
     def emit(self, record: logging.LogRecord) -> None:
         """Write one record."""
@@ -35,11 +35,11 @@ class LineHandler(logging.Handler):
 
 
 class Passage:
-    """Forwards the output from a pipe, line by line, until its end.
+    """Forwards the output of a simulator, line by line, from a pipe to standard output.
 
     Args:
-        source: the pipe.
-        mark: text before each line.
+        source: the read end of the pipe.
+        mark: the prefix of each line.
 
     Attributes:
         last_line: the last non-empty line, as text.
@@ -52,7 +52,7 @@ class Passage:
         self._most = MOST_LINE - 1 - len(self._mark)
 
     def run(self) -> None:
-        """Forward everything; after all writers have closed the pipe, close it too and return."""
+        """Forward all output; when all writers have closed the pipe, close the read end and return."""
         rest = b""
         while chunk := os.read(self._source, _CHUNK):
             *lines, rest = (rest + chunk).split(b"\n")

@@ -1,8 +1,9 @@
-"""The one module that starts processes: a simulator, under a reaper that ends all of its descendants.
+"""Start a simulator's process under a reaper, a small program that ends all descendants of the simulator.
 
-The sidecar talks to the reaper through two pipes, and threads wait for its end, so nothing here blocks. The
-sidecar reaps children for the whole container, because it may be process 1: `reap` collects every child that
-ended, both reapers and the orphans that only process 1 inherits.
+No other module of the sidecar starts processes. The sidecar and a reaper exchange messages through two pipes.
+Threads wait for these messages, so no method of this module blocks. The sidecar may be process 1 of its
+container, and process 1 inherits all orphans. So `reap` collects the exit status of every child that has
+ended: of reapers and of orphans.
 """
 
 import contextlib
@@ -19,17 +20,17 @@ from palaestra_sim.sidecar import reaper
 from palaestra_sim.sidecar.output import Passage
 
 _REAPER = Path(reaper.__file__)
-# In /proc/PID/stat after the name: time of the process, and of its children that have ended, in ticks.
+# Fields of /proc/PID/stat after the name: processor time of the process, and of its ended children, in ticks.
 _OWN_TIME, _ENDED_TIME = slice(11, 13), slice(13, 15)  # Source: proc_pid_stat(5)
-_LAST_OUTPUT_S = 0.2  # time for lines that are still in the pipe after the simulator has ended
+_LAST_OUTPUT_S = 0.2  # time limit for reading the rest of the output after the simulator has ended
 
-_reapers: set[int] = set()  # running reapers: the only children that are not orphans
-_reapers_lock = threading.Lock()  # held from the start of a reaper until it is in the set
+_reapers: set[int] = set()  # running reapers; every other child of the sidecar is an orphan
+_reapers_lock = threading.Lock()  # held while a reaper is started and added to the set
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CommandLine:
-    """A program with its arguments, its environment, and the prefix of each line that it prints."""
+    """A program with its arguments, its environment, and the prefix of its output lines (`mark`)."""
 
     arguments: tuple[str, ...]
     environment: Mapping[str, str]
@@ -38,17 +39,20 @@ class CommandLine:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Started:
-    """A report: the simulator's first process runs."""
+    """Reports that the first process of the simulator runs."""
 
     pid: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ended:
-    """A report: the simulator and all of its descendants have ended.
+    """Reports that the simulator and all of its descendants have ended.
 
-    `code` or `signal` (as "SIGBUS") is set; if both are unknown, `problem` is the reason.
-    `last_line` is the last line that the simulator printed.
+    Attributes:
+        code: the exit code; None if a signal ended the simulator.
+        signal: the name of that signal, such as "SIGBUS"; otherwise None.
+        problem: the reason for which both `code` and `signal` are unknown; otherwise None.
+        last_line: the last line that the simulator printed.
     """
 
     code: int | None = None
@@ -82,7 +86,9 @@ class SimulatorProcess:
 
     @classmethod
     def start(cls, command: CommandLine, report: Report) -> Self:
-        """Start a simulator; a thread calls `report`: with Started, and at the end once with Ended.
+        """Start a simulator and return its process.
+
+        A thread calls `report` with `Started` after the start, and with `Ended` after the end.
 
         Raises:
             OSError: the system cannot start another process.
@@ -114,27 +120,32 @@ class SimulatorProcess:
         self._say(reaper.KILL)
 
     def close(self) -> None:
-        """Close the pipe to the reaper, which then kills all remaining processes."""
+        """Close the pipe to the reaper; the reaper then kills all remaining processes."""
         _close(self._commands)
 
     def usage(self) -> Usage:
-        """Return the usage of all processes of the simulator; shared pages count twice. Thread-safe."""
+        """Return the resource usage of all processes of the simulator; safe to call from any thread.
+
+        Memory that several processes share counts once for each process.
+        """
         below = found = reaper.children({self.reaper})
         while found := reaper.children(found):
             below |= found
         ticks = sum(_ticks(pid, _OWN_TIME) + _ticks(pid, _ENDED_TIME) for pid in below)
         cpu_s = (ticks + _ticks(self.reaper, _ENDED_TIME)) / os.sysconf("SC_CLK_TCK")
-        self._cpu_s = max(self._cpu_s, cpu_s)  # a process that ends during the count may be missing in both
+        # A process that ends during the count may be missing both as a running and as an ended process. Then
+        # the sum falls, but a counter must not fall.
+        self._cpu_s = max(self._cpu_s, cpu_s)
         pages = sum(_resident_pages(pid) for pid in below)
         return Usage(rss_bytes=pages * os.sysconf("SC_PAGE_SIZE"), cpu_s=self._cpu_s)
 
     def _say(self, command: bytes) -> None:
-        with contextlib.suppress(BrokenPipeError):  # the reaper has ended, so Ended will be reported
+        with contextlib.suppress(BrokenPipeError):  # the reaper has ended; another thread reports that
             os.write(self._commands, command)
 
 
 def reap() -> None:
-    """Collect the exit status of every child that has ended, so that none stays a zombie."""
+    """Collect the exit status of every child that has ended, so that no child stays a zombie."""
     with contextlib.suppress(ChildProcessError):
         while os.waitpid(-1, os.WNOHANG)[0]:
             pass
@@ -154,7 +165,12 @@ def _ticks(pid: int, fields: slice) -> int:
 
 
 def _spawn(command: CommandLine, descriptors: Mapping[int, int]) -> int:
-    """Start the reaper with these descriptors as its own, detached from the terminal."""
+    """Start a reaper in a new session, and return its process ID.
+
+    Args:
+        command: the command line of the simulator.
+        descriptors: for each descriptor of the reaper, the descriptor of this process that becomes it.
+    """
     with _reapers_lock:
         pid = os.posix_spawn(
             sys.executable,
@@ -169,7 +185,7 @@ def _spawn(command: CommandLine, descriptors: Mapping[int, int]) -> int:
 
 
 def _watch(reaper_pid: int, reports: int, reader: threading.Thread, passage: Passage, report: Report) -> None:
-    """Report the reaper's messages until it has ended."""
+    """Pass the messages of a reaper to `report` until the reaper has ended."""
     said: dict[str, int] = {}
     with os.fdopen(reports) as lines:
         for line in lines:
@@ -186,10 +202,10 @@ def _watch(reaper_pid: int, reports: int, reader: threading.Thread, passage: Pas
 
 
 def _end_orphans() -> None:
-    """Kill the descendants of a reaper that was killed itself; they are now children of this process."""
+    """Kill the descendants of a reaper that was itself killed; they have become children of this process."""
     while orphans := _kill_orphans():
         for pid in orphans:
-            with contextlib.suppress(ChildProcessError):  # the signal thread has reaped it
+            with contextlib.suppress(ChildProcessError):  # the signal thread has reaped the orphan
                 os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT)
         reap()
 

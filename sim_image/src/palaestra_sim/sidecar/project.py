@@ -1,11 +1,13 @@
-"""Lay a generated world out as a Webots project, in which Webots finds the files of the source world.
+"""Make a Webots project for a generated world, in which Webots finds the files of the source world.
 
-Webots takes the parent of a world's folder as its project, and looks there for `controllers/<name>/`, PROTOs
-and plugins. If a controller is missing, Webots only prints a warning and starts `<generic>`. So the generated
-world gets a folder like that of its source, with links to everything next to the source and next to its
-folder. If a world names files above its project, the folders up to them are made too, each with such links.
+Webots uses the parent of a world's folder as the project, and searches it for `controllers/<name>/`, PROTOs
+and plugins. If a controller is missing, Webots only prints a warning and starts `<generic>`. So the project
+of the generated world has links to all files and folders next to the source world, and next to the source
+world's folder. If the world names files above its project, the project has folders up to these files, with
+links in each folder.
 
-A world from a ConfigMap has no project: the files next to its folder belong to others and are not linked.
+A world from a ConfigMap has no project. The files next to its folder do not belong to the world, so they are
+not linked.
 """
 
 import os
@@ -15,32 +17,37 @@ from pathlib import Path
 from palaestra_sim.errors import SidecarError
 from palaestra_sim.world import own_controllers, placed
 
-# Source: Webots' guide, "The Standard File Hierarchy of a Project". A folder that has one of these is a
-# project.
+# If a folder has one of these subfolders, it is a project. Source: Webots' guide, "The Standard File
+# Hierarchy of a Project".
 FOLDERS = ("controllers", "libraries", "plugins", "protos")
-# The folders of the system, and /proc and /sys. A world in /worlds does not need them. Source: Filesystem
-# Hierarchy Standard 3.0
+# The folders of the operating system below /. They are not linked: for a world in /worlds, the project is /,
+# and the world does not need them. Source: Filesystem Hierarchy Standard 3.0
 _OF_THE_SYSTEM = frozenset(
     {
         *("bin", "boot", "dev", "etc", "lib", "lib32", "lib64", "libx32", "lost+found"),
         *("proc", "root", "run", "sbin", "sys", "tmp", "usr", "var"),
     }
 )
-_EXTRA_PROJECTS = "WEBOTS_EXTRA_PROJECT_PATH"  # a list, as PATH
-_MOST_NAMED = 20  # robots named in a warning, which is one line of the log
+_EXTRA_PROJECTS = "WEBOTS_EXTRA_PROJECT_PATH"  # a list of folders, in the format of PATH
+_MOST_NAMED = 20  # maximum number of robots that one warning names
 
 
 def has_project(world: Path) -> bool:
-    """Return whether a world, given by its absolute path, is in a Webots project."""
+    """Return whether the world at an absolute path is in a Webots project."""
     root = world.parent.parent
     return root != world.parent and any(_is_folder(root / name) for name in FOLDERS)
 
 
 def lay_out(world: Path, project: Path, root: Path, *, linked: bool) -> Path:
-    """Return the folder for a world that is generated from `world`, in the folder `project`.
+    """Make a project and return the folder in it for the generated world.
 
-    With `linked`, everything next to `world`, and next to each folder from it up to `root`, is linked at the
-    same relative path. Links of an earlier start are renewed. All paths are absolute.
+    Args:
+        world: the absolute path of the source world.
+        project: the absolute path of the project to make.
+        root: the absolute path of the outermost source folder. For each folder from `root` to that of
+            `world`, the project gets a folder.
+        linked: whether to link everything next to `world`, and next to each folder from it up to `root`, at
+            the same relative path. Links of an earlier start are renewed.
 
     Raises:
         SidecarError: `project` is the project of `world` itself, or a folder cannot be read.
@@ -56,7 +63,7 @@ def lay_out(world: Path, project: Path, root: Path, *, linked: bool) -> Path:
         raise SidecarError(f"--world: {error.filename}: {error.strerror}; make it readable") from error
     for made in folders:
         if made.is_symlink():
-            made.unlink()  # a link from an earlier start, for another world of this project
+            made.unlink()  # an earlier start, for another world of the same source project, made this link
         made.mkdir(parents=True, exist_ok=True)
     for link in [link for made in folders for link in made.iterdir()]:
         if link not in wanted and _is_ours(link, folders.values()):
@@ -67,9 +74,14 @@ def lay_out(world: Path, project: Path, root: Path, *, linked: bool) -> Path:
 
 
 def missing_controllers(world: Path, source: bytes, environment: Mapping[str, str]) -> str | None:
-    """Return a warning about robots whose controllers Webots cannot find, for a world without a project.
+    """Return a warning if a world has no project and Webots cannot find the controllers of some robots.
 
-    None if every controller can be found. `environment` is that of Webots: it may name more projects.
+    Return None if Webots can find every controller.
+
+    Args:
+        world: the path of the world.
+        source: the content of the world file.
+        environment: the environment variables of Webots, which may name more projects.
 
     Raises:
         WorldError: `source` is not a world file.
@@ -96,7 +108,7 @@ def missing_controllers(world: Path, source: bytes, environment: Mapping[str, st
 
 
 def _folders(world: Path, project: Path, root: Path) -> Iterator[tuple[Path, Path]]:
-    """Yield each folder to make for a world, from `project` to the world's own, with its source folder."""
+    """Yield each folder to make, from `project` to the folder of the world, with its source folder."""
     names = world.parent.relative_to(root).parts
     if not names:  # the world has no project
         yield project / "worlds", world.parent
@@ -106,7 +118,7 @@ def _folders(world: Path, project: Path, root: Path) -> Iterator[tuple[Path, Pat
 
 
 def _links(folders: Mapping[Path, Path]) -> Iterator[tuple[Path, Path]]:
-    """Yield each link around the folder of the generated world, with its target."""
+    """Yield each link to make in the folders of the project, with its target."""
     *_, own = folders
     for made, source in folders.items():
         for neighbor in _inside(source, own):
@@ -115,7 +127,10 @@ def _links(folders: Mapping[Path, Path]) -> Iterator[tuple[Path, Path]]:
 
 
 def _inside(source: Path, folder: Path) -> Iterator[Path]:
-    """Yield the entries of `source` except system folders and the one with `folder`, which would loop."""
+    """Yield the entries of `source`, without system folders and without the entry that contains `folder`.
+
+    A link to that entry would make a loop.
+    """
     for path in source.iterdir():
         of_the_system = source == source.parent and path.name in _OF_THE_SYSTEM
         if not of_the_system and not folder.is_relative_to(path):
@@ -123,7 +138,7 @@ def _inside(source: Path, folder: Path) -> Iterator[Path]:
 
 
 def _is_ours(link: Path, sources: Collection[Path]) -> bool:
-    """Return whether an earlier start of this container made this link, to an entry of one of `sources`."""
+    """Return whether `link` leads to an entry of `sources`; an earlier start made such links."""
     if not link.is_symlink():
         return False
     target = link.readlink()
@@ -131,7 +146,10 @@ def _is_ours(link: Path, sources: Collection[Path]) -> bool:
 
 
 def _link(link: Path, target: Path) -> None:
-    """Make a link; keep an equal link, which the other simulator may be using, and keep a written world."""
+    """Make a link, unless an equal link or a file already exists.
+
+    The other simulator of this sidecar may be using an equal link. A file is a generated world.
+    """
     if link.is_symlink():
         if link.readlink() == target:
             return
@@ -143,7 +161,7 @@ def _link(link: Path, target: Path) -> None:
 def _is_folder(path: Path) -> bool:
     try:
         return path.is_dir()
-    except OSError:  # Webots may not read it either
+    except OSError:  # Webots cannot read such a folder either
         return False
 
 

@@ -1,21 +1,23 @@
-"""The reaper: a program between the sidecar and its simulator; no process of the simulator can outlive them.
+"""The reaper: a program between the sidecar and a simulator, which ends all processes of the simulator.
 
-It runs once for each start of the simulator, as `python -I -S reaper.py PROGRAM ...`. A pipe from the
-sidecar is its standard input, and a pipe to the sidecar is its descriptor 3:
+The sidecar starts one reaper for each start of the simulator, as `python -I -S reaper.py PROGRAM ...`. The
+standard input of the reaper is a pipe from the sidecar; its descriptor 3 is a pipe to the sidecar:
 
     in   T             send SIGTERM to the simulator's process group
-         K, or EOF     kill everything; EOF also arrives when the sidecar was killed with SIGKILL
-    out  started PID   the simulator's first process
-         error ERRNO   its program could not be run
-         exit STATUS   it ended, with this wait status, and so did all of its descendants
+         K, or EOF     kill all processes; EOF also arrives when the sidecar was killed with SIGKILL
+    out  started PID   the simulator's first process runs
+         error ERRNO   the simulator's program could not be run
+         exit STATUS   the first process ended with this wait status, and all of its descendants have ended
 
-It is a subreaper: a descendant that loses its parent becomes its child, even after `setsid`, a double
-fork or a change of environment. A process group, a parent-death signal or a marker in the environment would
-lose such a process. So the reaper kills its children until none is left. Each killed parent hands over its
-own children before its end is visible (Linux: exit_notify). That needs no timer: SIGCHLD triggers the next
-search.
+The reaper is a subreaper: if a descendant loses its parent, the descendant becomes a child of the reaper.
+That holds even after `setsid`, a double fork or a change of environment. A process group, a parent-death
+signal or a marker in the environment would lose such a process.
 
-It uses Linux and the standard library only, and imports nothing from this package: it is started as a file.
+To end the simulator, the reaper kills its children until it has no more. When a killed process ends, the
+kernel first makes its children those of the reaper (exit_notify). Then the kernel sends SIGCHLD, at which the
+reaper searches for children again. So the reaper needs no timer.
+
+The sidecar starts this file directly, so it imports only the standard library.
 """
 
 import contextlib
@@ -31,16 +33,16 @@ TERMINATE = b"T"
 KILL = b"K"
 
 _PR_SET_CHILD_SUBREAPER = 36  # Source: linux/prctl.h
-_GIVE_UP_S = 20.0  # a process that outlives SIGKILL for this long hangs in the kernel
-_NOT_RUN = 127  # the exit code of a shell that finds no program
-_PARENT = 1  # index among the fields after the name in /proc/PID/stat: state, parent, ...
+_GIVE_UP_S = 20.0  # if a process survives SIGKILL for this long, it hangs in the kernel
+_NOT_RUN = 127  # a shell exits with this code if it does not find a program
+_PARENT = 1  # index of the parent among the fields after the name in /proc/PID/stat: state, parent, ...
 
 
 def adopt_orphans() -> None:
-    """Make this process the parent of every orphan among its descendants.
+    """Make this process the parent of each of its descendants that loses its own parent.
 
     Raises:
-        OSError: the kernel refuses.
+        OSError: the kernel refused the request.
     """
     libc = ctypes.CDLL(None, use_errno=True)
     if libc.prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0) != 0:
@@ -48,7 +50,7 @@ def adopt_orphans() -> None:
 
 
 def children(parents: set[int]) -> set[int]:
-    """Return the processes whose parent is one of `parents`, from one pass over /proc."""
+    """Return the IDs of the processes whose parent is one of `parents`; this reads all of /proc once."""
     found = set()
     for name in os.listdir("/proc"):
         if name.isdigit():
@@ -61,19 +63,20 @@ def children(parents: set[int]) -> set[int]:
 
 
 def kill_children(spared: frozenset[int] = frozenset()) -> set[int]:
-    """Send SIGKILL to every child of this process that is not `spared`, and return them.
+    """Send SIGKILL to every child of this process except those in `spared`; return the other children.
 
-    The kill cannot hit another process: the number stays in use until this process reaps it.
+    The signal cannot hit a wrong process, because the system does not reuse the ID of a child before this
+    process has reaped the child.
     """
     found = children({os.getpid()}) - spared
     for pid in found:
-        with contextlib.suppress(OSError):  # it runs as another user now, who must end it
+        with contextlib.suppress(OSError):  # a child that now runs as another user cannot be killed
             os.kill(pid, signal.SIGKILL)
     return found
 
 
 def main() -> None:
-    """Start the program in `argv`, run the commands, and return when none of its processes is left."""
+    """Start the program in `argv` and run the sidecar's commands until all processes have ended."""
     for number in (signal.SIGHUP, signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
     adopt_orphans()
@@ -89,7 +92,7 @@ def main() -> None:
 
 
 def _keep(pid: int, woken: int) -> int:
-    """Return the wait status of `pid` after it and all of its descendants have ended."""
+    """Wait until the process `pid` and all of its descendants have ended; return its wait status."""
     status: int | None = None
     ending = False
     while True:
@@ -112,16 +115,22 @@ def _keep(pid: int, woken: int) -> int:
 
 
 def _obey(pid: int) -> bool:
-    """Run one command of the sidecar for `pid`, which is not reaped yet; return whether to kill."""
+    """Run one command of the sidecar; return whether the command is to kill all processes.
+
+    `pid` is the first process of the simulator, which is not reaped yet.
+    """
     command = os.read(COMMANDS, 1)
     if command == TERMINATE:
-        with contextlib.suppress(ProcessLookupError):  # it does not have a group yet
+        with contextlib.suppress(ProcessLookupError):  # the process has not created its group yet
             os.killpg(pid, signal.SIGTERM)
     return command != TERMINATE
 
 
 def _reap() -> dict[int | None, int]:
-    """Return the wait status of every child that has ended; the key None means that no child is left."""
+    """Reap every child that has ended; return the wait status of each, by process ID.
+
+    The result has the key None if no child is left.
+    """
     ended: dict[int | None, int] = {}
     try:
         while (result := os.waitpid(-1, os.WNOHANG))[0]:
@@ -132,7 +141,7 @@ def _reap() -> dict[int | None, int]:
 
 
 def _spawn(arguments: list[str]) -> int:
-    """Start the program as leader of a new session and group; return its process id."""
+    """Start the program as leader of a new session and process group; return its process ID."""
     pid = os.fork()
     if pid:
         return pid
@@ -149,17 +158,17 @@ def _spawn(arguments: list[str]) -> int:
 
 
 def _yield_to_the_trainer() -> None:
-    """Set a scheduling policy with which the program does not preempt a trainer on the same processor.
+    """Set a scheduling policy with which the simulator does not preempt a trainer on the same processor.
 
-    A trainer wakes its simulators one after another by requests. Without this, a woken simulator preempted
-    the trainer at nearly each request.
+    A trainer sends requests to its simulators, one after another. With the default policy, the kernel
+    interrupts the trainer at nearly each request, to run the simulator that gets the request.
     """
     with contextlib.suppress(OSError):  # optional, because sandboxes may refuse it
         os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
 
 
 def _report(line: str) -> None:
-    """Report to the sidecar, if it still runs."""
+    """Send a line to the sidecar; do nothing if the sidecar has ended."""
     with contextlib.suppress(BrokenPipeError):
         os.write(REPORTS, f"{line}\n".encode())
 

@@ -1,8 +1,8 @@
-"""The routes of a sidecar's two ports; `simulator` decides what a request does.
+"""The routes of a sidecar's two ports.
 
-Control is for the trainer of the same pod and has no authentication, so it listens on loopback only.
-Health is for all clients that can reach the pod, so none of its requests changes anything. Both have the
-routes of a viewer (`viewing`).
+The control port is for the trainer in the same pod. It has no authentication, so it listens on loopback only.
+The module `simulator` decides whether the simulator's state allows a request. All clients that can reach the
+pod can use the health port, so its requests only read. Both ports have the routes for viewers (`viewing`).
 """
 
 from collections.abc import Callable, Sequence
@@ -34,9 +34,9 @@ def bound(option: str, address: Address, routes: Routes) -> Server:
     """Return a server for these routes, not yet started.
 
     Args:
-        option: the option with the address, for messages.
-        address: to listen on.
-        routes: its paths.
+        option: the command-line option that set the address, for messages.
+        address: the address on which the server listens.
+        routes: the function for each method and path.
 
     Raises:
         SidecarError: the address is in use, or does not belong to this machine.
@@ -89,7 +89,7 @@ def _view_routes(simulators: Sequence[SupervisedSimulator]) -> dict[tuple[str, s
 
 
 def _viewed(read: Callable[[], bytes], _: bytes) -> Response:
-    """Return what the simulator shows, or a sentence about the reason that it shows nothing."""
+    """Return a response with the data that `read` returns, or an error response with the reason."""
     try:
         return Response(status=HTTPStatus.OK, body=read(), content_type="application/json")
     except NothingToSee as error:
@@ -99,7 +99,7 @@ def _viewed(read: Callable[[], bytes], _: bytes) -> Response:
 
 
 def _state(simulator: SupervisedSimulator) -> Route:
-    """Return the route of a request for a simulator's state."""
+    """Return the route that returns a simulator's state."""
     return lambda _: json_response(HTTPStatus.OK, simulator.as_answered().to_json())
 
 
@@ -117,7 +117,7 @@ def _plain(simulator: SupervisedSimulator, event: LifecycleEvent) -> Route:
 
 
 def _stop(simulator: SupervisedSimulator) -> Route:
-    """Return the route of an announced stop."""
+    """Return the route of a stop request."""
 
     def route(body: bytes) -> Response:
         try:
@@ -130,7 +130,7 @@ def _stop(simulator: SupervisedSimulator) -> Route:
 
 
 def _asked(ask: Callable[[], CommandResult]) -> Response:
-    """Return the response of the simulator's owner to a request."""
+    """Return the response for a request that `ask` sends to the owner of the simulator's state."""
     try:
         answer = ask()
     except NoAnswer as error:

@@ -1,8 +1,8 @@
-"""A simulator of this sidecar: the one owner of its state.
+"""One simulator of a sidecar, and the thread that owns its state.
 
-Requests, reports of the process, the deadline of a stop and the shutdown of the container all become messages
-in one queue, and one thread handles them in order. So no two of them can act on the same state, and no lock
-is needed. Other threads read `state`, an immutable value that is replaced as a whole.
+Requests, reports of the process, the deadline of a stop, and the shutdown of the container become messages in
+one queue. One thread handles the messages in order, so no lock is needed. Other threads may read `state`; it
+is an immutable value, which the owner replaces as a whole.
 """
 
 import logging
@@ -19,7 +19,7 @@ from palaestra_sim.sidecar.lifecycle import Action, LifecycleEvent
 from palaestra_sim.sidecar.process import CommandLine, Ended, SimulatorProcess, Started, Usage
 from palaestra_sim.sidecar.viewing import Viewing
 
-SHUTDOWN_GRACE_S = 1.0  # time from SIGTERM to SIGKILL; the whole shutdown has 2 s
+SHUTDOWN_GRACE_S = 1.0  # time from SIGTERM to SIGKILL; the whole shutdown may take 2 s
 _ANSWER_S = 5.0
 
 FAULT_KINDS = ("code", "signal", "unknown")
@@ -28,12 +28,12 @@ log = logging.getLogger(__name__)
 
 
 class NoAnswer(TimeoutError):
-    """The owner of the state did not respond to a request in time."""
+    """The thread that owns the state did not respond to a request in time."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CommandResult:
-    """Whether a request was allowed, and the state after it."""
+    """The result of a request: whether it was allowed, and the state after it."""
 
     allowed: bool
     state: SimulatorState
@@ -53,14 +53,14 @@ class SupervisedSimulator:
     Attributes:
         state: the current state; may be read from any thread.
         faults: number of faults by kind; may be read from any thread.
-        viewing: reads what the simulator shows to viewers; may be used from any thread.
+        viewing: reads the simulator's data for viewers; may be used from any thread.
 
     Args:
-        command: starts the simulator.
+        command: the command line that starts the simulator.
         state: the state before the first start.
-        left_out: the file in which the simulator reports the nodes that it leaves out; None without such a
+        left_out: the file in which the simulator reports the nodes that it leaves out; None if it has no such
             file.
-        viewing: see Attributes; None if it shows nothing.
+        viewing: see Attributes; None if the simulator has no socket for viewers.
         clock: returns seconds, from any origin.
     """
 
@@ -94,7 +94,9 @@ class SupervisedSimulator:
         }
 
     def ask(self, event: LifecycleEvent, deadline_s: float = 0.0) -> CommandResult:
-        """Send a request to the owner and return the result; safe from any thread except the owner's.
+        """Send a request to the owner of the state and return the result.
+
+        Any thread may call this method, except the owner itself.
 
         Raises:
             NoAnswer: the owner hangs, or has ended.
@@ -117,7 +119,10 @@ class SupervisedSimulator:
         return replace(state, rss_bytes=self.usage().rss_bytes) if ready else state
 
     def usage(self) -> Usage:
-        """Return the usage of its processes; zero if none runs. Safe from any thread."""
+        """Return the resource usage of the simulator's processes; zero if no process runs.
+
+        Any thread may call this method.
+        """
         process = self._process
         return Usage() if process is None else process.usage()
 
@@ -138,7 +143,7 @@ class SupervisedSimulator:
             return _Message(event=LifecycleEvent.DEADLINE)
 
     def _take(self, message: _Message) -> None:
-        """Run the table's action for one message, and send the result."""
+        """Run the action that the table has for one message, and send the result to the caller of `ask`."""
         self._closing |= message.event is LifecycleEvent.SHUTDOWN
         step = lifecycle.step(self.state.state, message.event)
         if step is not None:
@@ -167,7 +172,7 @@ class SupervisedSimulator:
         return state if self._left_out is None else replace(state, left_out=read_left_out(self._left_out))
 
     def _numbered(self, start: int) -> CommandLine:
-        """Return the command with the number of this start, so that random faults differ each time."""
+        """Return the command with the number of this start, so that random faults differ in each start."""
         environment = {**self._command.environment, "PALAESTRA_SIMULATOR_START": str(start)}
         return replace(self._command, environment=environment)
 
@@ -204,13 +209,13 @@ class SupervisedSimulator:
         return replace(state, pid=None, last_exit=last)
 
     def _to_end_within(self, deadline_s: float, state: SimulatorState) -> SimulatorState:
-        """Set the time of the kill, if it is earlier than the current one; return the new state."""
+        """Set the time of the kill, unless an earlier time is set already; return the new state."""
         kill_at = self._clock() + deadline_s
         self._kill_at = kill_at if self._kill_at is None else min(self._kill_at, kill_at)
         return replace(state, detail=f"to be killed in {self._kill_at - self._clock():.1f} s")
 
     def _report(self, report: Started | Ended) -> None:
-        """Receive a report from a thread of the process."""
+        """Put a report from a thread of the process into the queue."""
         if isinstance(report, Ended):
             self._inbox.put(_Message(event=LifecycleEvent.EXITED, ended=report))
         else:
@@ -218,7 +223,7 @@ class SupervisedSimulator:
 
 
 def _described(ended: Ended) -> tuple[str, str]:
-    """Return the kind of an unexpected end, and a sentence about it."""
+    """Return the kind of an unexpected end, and a sentence that describes it."""
     said = f"; its last line: {ended.last_line}" if ended.last_line else ""
     if ended.code is not None:
         return "code", f"the simulator ended with code {ended.code}{said}"

@@ -1,7 +1,8 @@
-"""Read what a simulator shows to viewers: states at most 30 times a second, however many viewers there are.
+"""Read a simulator's data for viewers: shapes, poses, camera pictures.
 
-The simulator computes it between two steps, so every request costs the training a little. The responses are
-passed on as they are: who reads them checks them.
+The simulator computes the data between two steps, so every request slows the training a little. So poses are
+read at most 30 times a second, and all viewers share the same response. The sidecar does not check the
+responses; viewers do.
 """
 
 from __future__ import annotations
@@ -23,20 +24,20 @@ from palaestra_protocol.scene import MOST_SCENE_BYTES, MOST_STATE_BYTES
 _LENGTH: Final = struct.Struct(">I")
 _STATE_S: Final = 1.0 / 30.0
 _PICTURE_S: Final = 0.2
-_SCENE_S: Final = 1.0  # a scene changes when an episode does, and may be large
+_SCENE_S: Final = 1.0  # long, because a scene may be large and seldom changes within an episode
 _DEADLINE_S: Final = 2.0
 
 
 class NothingToSee(Exception):
-    """This simulator does not describe its world; the text is for people."""
+    """This simulator does not describe its world; the error text is for people."""
 
 
 class SimulatorSilent(Exception):
-    """The simulator does not run, or does not respond; the text is for people."""
+    """The simulator does not run, or does not respond; the error text is for people."""
 
 
 class Viewing:
-    """The scene and the newest state of one simulator; safe from any thread.
+    """Reads the scene, the newest state and the newest picture of one simulator; safe from any thread.
 
     Args:
         path: the socket on which the simulator listens.
@@ -54,13 +55,13 @@ class Viewing:
 
     @classmethod
     def without(cls, reason: str) -> Self:
-        """Return an object whose methods raise NothingToSee with this sentence."""
+        """Return an object whose methods raise NothingToSee with the text `reason`."""
         nothing = cls(Path())
         nothing._reason = reason
         return nothing
 
     def scene(self) -> bytes:
-        """Return the looks of the world as JSON; at most a second old.
+        """Return the scene of the world (`VisibleScene`) as JSON, at most a second old.
 
         Raises:
             NothingToSee, SimulatorSilent
@@ -68,7 +69,7 @@ class Viewing:
         return self._read(self._scene)
 
     def state(self) -> bytes:
-        """Return the poses of the newest step as JSON; at most a thirtieth of a second old.
+        """Return the state of the world (`SceneState`) as JSON, at most a thirtieth of a second old.
 
         Raises:
             NothingToSee, SimulatorSilent
@@ -76,7 +77,7 @@ class Viewing:
         return self._read(self._state)
 
     def camera(self) -> bytes:
-        """Return the newest picture of a camera as JSON, null without one; at most a fifth of a second old.
+        """Return the newest picture of a camera as JSON, at most a fifth of a second old; null without one.
 
         Raises:
             NothingToSee, SimulatorSilent
@@ -84,14 +85,14 @@ class Viewing:
         return self._read(self._camera)
 
     def close(self) -> None:
-        """Close the connection to the simulator; the next request opens another."""
+        """Close the connection to the simulator; the next request opens a new one."""
         with self._lock:
             self._link.close()
 
     def _read(self, newest: _Newest) -> bytes:
         if self._reason:
             raise NothingToSee(self._reason)
-        with self._lock:  # others wait for this response, and take it
+        with self._lock:  # other threads wait here, and then return the same response
             now = self._clock()
             if now >= newest.due:
                 newest.content = self._link.ask(newest.request, newest.most_bytes)
@@ -100,7 +101,7 @@ class Viewing:
 
 
 class _Newest:
-    """The last response to a request, and when the next one may be sent."""
+    """The last response to a request, and the time at which the request may be sent again."""
 
     def __init__(self, request: bytes, most_bytes: int, period_s: float) -> None:
         self.request = request
@@ -111,14 +112,14 @@ class _Newest:
 
 
 class _Link:
-    """A connection to the socket, opened at the first request and again after a failure."""
+    """A connection to the simulator's socket; the first request opens it, and so does one after a failure."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
         self._socket: socket.socket | None = None
 
     def ask(self, request: bytes, most_bytes: int) -> bytes:
-        """Return the response to a request.
+        """Send a request to the simulator and return the response.
 
         Raises:
             SimulatorSilent: the simulator does not run, or does not respond in time.
@@ -162,14 +163,18 @@ class _Link:
         return bytes(read)
 
     def close(self) -> None:
-        """Close the connection; the next request opens another."""
+        """Close the connection; the next request opens a new one."""
         if self._socket is not None:
             self._socket.close()
             self._socket = None
 
 
 def _connected(path: Path) -> socket.socket:
-    """Return a connection; the path may be longer than the 107 bytes of a socket's address."""
+    """Return a connection to the socket at `path`.
+
+    A socket's address has at most 107 bytes. To allow longer paths, the address is the file name below
+    `/proc/self/fd/N`, where N is an open descriptor of the folder.
+    """
     with contextlib.ExitStack() as failing:
         connection = failing.enter_context(socket.socket(socket.AF_UNIX, socket.SOCK_STREAM))
         connection.settimeout(_DEADLINE_S)

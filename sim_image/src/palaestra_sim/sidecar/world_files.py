@@ -1,7 +1,7 @@
-"""Write the file of the world that the simulator will run, in a folder where it finds all other files.
+"""Write the world that the simulator will run, into a folder in which the simulator finds all other files.
 
-Only the sidecar writes ROS names into a world. It gets a source world, from the image or from the replica's
-ConfigMap.
+The source is a world of the image or of the replica's ConfigMap. Only the sidecar changes the ROS names in a
+world.
 """
 
 from collections.abc import Callable
@@ -21,7 +21,7 @@ _PROJECT = "project"
 
 
 def located(world: str) -> Path:
-    """Return the path of a world: a file, or else the shipped world of that name."""
+    """Return the path of a world: the file `world`, or the shipped world of that name if it is missing."""
     path = Path(world)
     shipped = builtin_path(world) if path.name == world and not path.exists() else None
     return shipped or path
@@ -48,15 +48,15 @@ def named(
     as_project: bool = False,
     root: Path | None = None,
 ) -> Path:
-    """Write this simulator's world, generated from `world`, into the folder `work`; return its path.
+    """Generate this simulator's world from `world`, write it into the folder `work`, and return its path.
 
-    With `as_project`, or if the world names files by paths relative to it, the result is a Webots project in
-    `work`, with links to the files around `world`. The links reach up to `root`; if it is None, to the
-    nearest folder that holds all files.
+    With `as_project`, or if the world names files by relative paths, the result is a Webots project in
+    `work`, with links to the files around `world`. These are the files in all folders from that of `world` up
+    to `root`. If `root` is None, it is the nearest folder that holds all files that the world names.
 
     Raises:
         WorldError: the world is wrong.
-        SidecarError: it cannot be read or written; no partial file is left.
+        SidecarError: the world cannot be read or written; no partial file is left.
     """
     source = read(world)
     make = partial(generate, source, identity, clock=clock, name=str(world))
@@ -69,10 +69,10 @@ def renamed(
 ) -> Path:
     """Write a copy of `world` with `ending` appended to its ROS names into `work`; return its path.
 
-    `as_project` and `root` are as for `named`.
+    `as_project` and `root` have the same meaning as in `named`.
 
     Raises:
-        WorldError, SidecarError: as `named` does.
+        WorldError, SidecarError: see `named`.
     """
     source = read(world)
     make = partial(rename, source, ending, name=str(world))
@@ -81,10 +81,10 @@ def renamed(
 
 
 def root_of(world: Path, given: Path | None) -> Path:
-    """Return the folder around `world` that holds all files that it names: `given`, or the nearest one.
+    """Return the folder that holds `world` and all files that it names: `given`, or the nearest such folder.
 
     Raises:
-        WorldError, SidecarError: as `named` does.
+        WorldError, SidecarError: see `named`.
     """
     try:
         return root_around(placed(world), read(world), given)
@@ -95,10 +95,10 @@ def root_of(world: Path, given: Path | None) -> Path:
 
 
 def root_of_model(world: Path, given: Path | None) -> Path | None:
-    """Return the same for an MJCF model; None for another world, for which no simulator here needs it.
+    """Return `root_of` for an MJCF model; None for any other world, which is loaded without a root.
 
     Raises:
-        WorldError, SidecarError: as `named` does.
+        WorldError, SidecarError: see `named`.
     """
     return root_of(world, given) if suffix(read(world)) == MJCF else None
 
@@ -106,7 +106,7 @@ def root_of_model(world: Path, given: Path | None) -> Path | None:
 def _written(
     world: Path, path: Path, make: Callable[..., bytes], *, as_project: bool, root: Path | None
 ) -> Path:
-    """Write the result of `make` for `world` to `path`, or to a project in the folder of `path`."""
+    """Write the world that `make` returns to `path`, or into a project in the folder of `path`."""
     source, work = placed(world), path.parent
     try:
         generated, linked = make(), as_project and project.has_project(source)
@@ -124,13 +124,13 @@ def _written(
 
 
 def file_name(identity: RunIdentity, ending: str = ".wbt") -> str:
-    """Return the name of a simulator's own world: `collect-0.wbt`, `collect-0b.wbt` for its standby."""
+    """Return the file name of a simulator's world: `collect-0.wbt`, or `collect-0b.wbt` for its standby."""
     slot = "" if identity.slot == SLOTS[0] else identity.slot
     return f"{identity.group}-{identity.index}{slot}{ending}"
 
 
 def described(source: bytes, name: str) -> tuple[RobotName, ...]:
-    """Return the robots of a world that a client can find: those with a ROS name.
+    """Return the robots of a world that have a ROS name, so that clients can find them.
 
     Raises:
         WorldError: the world is wrong.

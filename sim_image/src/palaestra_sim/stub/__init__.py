@@ -1,11 +1,11 @@
-"""The stub simulator: a physics without masses and forces; it is small, fast, and exact within these limits.
+"""The stub simulator: small and fast, because its physics has no masses and no forces.
 
-- `entry`: the start of `palaestra-stub`, which refuses a system other than Linux; `cli`: the program
-- `physics`: the robots and obstacles of a world
-- `body`, `contacts`: motion, and what a robot runs into
-- `rays`, `others`: how far the beams of sensors travel, and robots as they meet them
-- `outline`, `obstacles`: shapes, seen from above
+- `entry`: checks that the system is Linux, then starts `cli`; `cli`: the program `palaestra-stub`
+- `physics`: moves the robots of a world, and computes their contacts and sensor rays
+- `body`, `contacts`: the motion of a robot, and its contact points
+- `rays`, `others`: the distances that sensor rays travel, and the robots that they hit
+- `outline`, `obstacles`: shapes as seen from above
 
-`scene` has worlds and devices, `ros_controller` the interface of Webots' `ros` controller; all simulators
-share them.
+All simulators share `scene`, which has the worlds and devices, and `ros_controller`, which has the interface
+of Webots' `ros` controller.
 """

@@ -1,7 +1,8 @@
-"""A robot on the floor: from the speed of its base to a pose, basic step by basic step.
+"""The motion of a robot on the floor: each basic step, the speed of its base changes its pose.
 
-A robot is one or several upright cylinders. An obstacle pushes it out along the normal, so that it slides
-while its wheels turn. There is no mass, no bounce and no friction. The motion depends only on the commands.
+A robot consists of one or several upright cylinders. If a cylinder is inside an obstacle, the robot is pushed
+out along the surface normal; while its wheels turn, it slides along the surface. There is no mass, no bounce
+and no friction, so the motion depends only on the commands.
 """
 
 from __future__ import annotations
@@ -16,29 +17,29 @@ from palaestra_sim.scene.shapes import Shape
 from palaestra_sim.stub.obstacles import Contact, Disc, FlatObstacle, Neighborhood
 from palaestra_sim.stub.outline import RoundPart
 
-_PASSES: Final = 4  # a corner has two walls and perhaps a robot; more passes change nothing
-_RESTING_M: Final = 1e-9  # a robot that was pushed out rests at the surface, up to rounding
-_STRIDE: Final = 0.3  # maximum motion between two checks for contacts, in smallest radii
+_PASSES: Final = 4  # enough for a corner of two walls and another robot
+_RESTING_M: Final = 1e-9  # maximum depth of a robot that rests at a surface, because of rounding
+_STRIDE: Final = 0.3  # maximum motion between two checks for contacts, as a share of the smallest radius
 
 
 class StubBody(Disc):
-    """A robot of upright cylinders: see `Body`.
+    """The body of a robot that consists of upright cylinders; see `Body`.
 
-    As a `Disc` it is the disc around all of them.
+    The base class `Disc` is the circle around all cylinders.
 
     Args:
-        base: its wheels.
-        outline: the cylinders; without any, nothing can touch it.
+        base: the wheels of the robot.
+        outline: the cylinders; if there are none, the robot has no contacts.
         rim: for each cylinder, the shape to which it belongs.
-        heights: z of their lower and upper ends, in the robot's frame.
+        heights: z of the lower and the upper end of all cylinders, in the robot's frame.
 
     Attributes:
         base, rim, heights: the arguments.
-        heading_rad: in (-pi, pi].
+        heading_rad: the heading, in (-pi, pi].
         c, s: cosine and sine of the heading.
         velocity: vx, vy in m/s and omega in rad/s, in world axes, over the last basic step.
-        touched: the cylinders that were touched since the bumpers were last read, one bit each (the first is
-            1); the bumpers' reader clears it.
+        touched: one bit for each cylinder that touched an obstacle since the bumpers were last read; the
+            first cylinder has bit 1. The code that reads the bumpers clears the bits.
     """
 
     __slots__ = (
@@ -70,8 +71,8 @@ class StubBody(Disc):
         self.heights = heights
         self._parts = tuple(outline)
         self._stride_m = _STRIDE * min((radius for _, _, radius in outline), default=0.0)
-        # The distance of the farthest axis from the middle; a turn does not move a cylinder whose axis is
-        # in the middle.
+        # The distance from the robot's origin to the farthest cylinder axis. It is 0 if all axes are at the
+        # origin; a turn then moves no cylinder.
         self._arm_m = max((math.hypot(x, y) for x, y, _ in outline), default=0.0)
         self._solids = Neighborhood((), 0.0)
         self._others: tuple[StubBody, ...] = ()
@@ -85,23 +86,23 @@ class StubBody(Disc):
 
     @property
     def discs(self) -> list[Disc]:
-        """The cylinders where they are now, seen from above."""
+        """The cylinders at their current positions, as seen from above."""
         return [
             Disc(self.x + along * self.c - aside * self.s, self.y + along * self.s + aside * self.c, radius)
             for along, aside, radius in self._parts
         ]
 
     def bits(self, outline: Sequence[Shape]) -> int:
-        """Return the cylinders that belong to these shapes, as bits of `touched`."""
+        """Return the bits in `touched` of the cylinders that belong to these shapes."""
         return sum(1 << index for index, shape in enumerate(self.rim) if shape in outline)
 
     def face(self, solids: Neighborhood, others: Sequence[StubBody]) -> None:
-        """Set the obstacles of the body."""
+        """Set the obstacles of the body: solids, and the bodies of other robots."""
         self._solids = solids
         self._others = tuple(others)
 
     def contact(self, x: float, y: float, radius: float) -> Contact | None:
-        """Return the push that moves a round robot at x, y out of this one; None if they do not touch."""
+        """Return the contact of a round robot at x, y with this robot; None if they do not touch."""
         deepest: Contact | None = None
         for disc in self.discs:
             contact = disc.contact(x, y, radius)
@@ -110,12 +111,12 @@ class StubBody(Disc):
         return deepest
 
     def scan(self, frame: tuple[float, float, float, float], rays: Sequence[Ray], reach: list[float]) -> None:
-        """Shorten `reach` to where the rays of a robot at `frame` meet a part of this one."""
+        """Shorten each `reach` to the distance at which its ray, of a robot at `frame`, meets this robot."""
         for disc in self.discs:
             disc.scan(frame, rays, reach)
 
     def place(self, x: float, y: float, heading_rad: float) -> None:
-        """Set the position and heading of the robot; its motion continues."""
+        """Set the position and heading of the robot; the robot keeps its velocity."""
         self.x = x
         self.y = y
         self.heading_rad = heading_rad
@@ -123,7 +124,10 @@ class StubBody(Disc):
         self.s = math.sin(heading_rad)
 
     def crossing(self, frame: tuple[float, float, float, float], ray: Ray) -> tuple[float, float]:
-        """Return the meters to where a ray enters and leaves the first part; enter > leave if it misses."""
+        """Return the distances in meters at which a ray enters and leaves the first cylinder that it meets.
+
+        If the ray meets no cylinder, the first number is greater than the second.
+        """
         crossings = [disc.crossing(frame, ray) for disc in self.discs]
         met = [crossing for crossing in crossings if crossing[1] >= 0.0 and crossing[0] <= crossing[1]]
         return min(met, default=(math.inf, -math.inf))
@@ -135,7 +139,7 @@ class StubBody(Disc):
         self.touched = 0
 
     def push(self, vx: float, vy: float, omega: float) -> None:
-        """Give the body a velocity in world axes; its motors continue from there."""
+        """Give the body a velocity in world axes; its motors start from the matching speeds."""
         self.base.push(vx * self.c + vy * self.s, vy * self.c - vx * self.s, omega)
         self.velocity = (vx, vy, omega)
 
@@ -148,7 +152,7 @@ class StubBody(Disc):
             self._push_out()
 
     def _move(self, step_s: float) -> None:
-        """Drive along an arc, in strides short enough that the robot passes through nothing."""
+        """Drive along an arc, in strides so short that the robot cannot pass through an obstacle."""
         base = self.base
         c = self.c
         s = self.s
@@ -183,7 +187,7 @@ class StubBody(Disc):
         self.s = math.sin(heading)
 
     def _push_out(self) -> None:
-        """Push the robot out of obstacles along the normals; the remaining motion is sliding."""
+        """Push the robot out of obstacles along their normals, so that it slides along their surfaces."""
         for _ in range(_PASSES):
             clear = True
             for solid in self._solids.near(self.x, self.y):
@@ -194,7 +198,7 @@ class StubBody(Disc):
                 return
 
     def _leave(self, obstacle: FlatObstacle) -> bool:
-        """Push the robot out of one obstacle; return whether it did not touch it."""
+        """Push the robot out of one obstacle; return True if the robot did not touch the obstacle."""
         clear = True
         bit = 1
         for along, aside, radius in self._parts:
@@ -213,7 +217,7 @@ class StubBody(Disc):
         return clear
 
     def feel(self, x: float, y: float, radius: float) -> None:
-        """Record which parts a round robot at x, y touches."""
+        """Record which cylinders of this robot a round robot at x, y touches."""
         for index, disc in enumerate(self.discs):
             contact = disc.contact(x, y, radius)
             if contact is not None and contact[2] > _RESTING_M:

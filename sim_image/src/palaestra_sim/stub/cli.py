@@ -1,4 +1,4 @@
-"""`palaestra-stub`."""
+"""The program `palaestra-stub`."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """The contact points of robots with obstacles and with each other, for requests of a supervisor.
 
-The floor does not count: wheels roll on it without contact points.
+Contacts with the floor are not reported: in the stub, wheels roll without contact points.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from palaestra_sim.stub.body import StubBody
 from palaestra_sim.stub.obstacles import Disc, FlatObstacle
 from palaestra_sim.stub.outline import obstacle
 
-_TOUCH_M: Final = 1e-6  # a robot rests at the surface that pushed it out, up to rounding
+_TOUCH_M: Final = 1e-6  # tolerance: because of rounding, a robot may rest this far from a surface
 
 
 def contact_points(
     robots: Sequence[tuple[Figure, StubBody]], solids: Sequence[Shape]
 ) -> Iterator[ContactPoint]:
-    """Yield the contact points of robots now, each at the lowest height that both sides have."""
+    """Yield the current contact points of robots, each at the lowest height that both shapes have."""
     for index, (robot, body) in enumerate(robots):
         for disc, part, bottom, top in _parts(robot, body):
             for shape in solids:
@@ -35,7 +35,7 @@ def contact_points(
 
 
 def _parts(robot: Figure, body: StubBody) -> Iterator[tuple[Disc, SceneNode, float, float]]:
-    """Yield each cylinder of a robot, with the node to which it belongs, its lower and its upper end."""
+    """Yield each cylinder of a robot, its node, and the heights of its lower and its upper end."""
     low, high = body.heights
     height = robot.place.height_m
     for disc, shape in zip(body.discs, body.rim, strict=True):

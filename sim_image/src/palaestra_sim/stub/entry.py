@@ -1,4 +1,4 @@
-"""The start of `palaestra-stub`: the check for Linux precedes the imports, which fail elsewhere."""
+"""The start of `palaestra-stub`: it checks for Linux before it imports modules that need Linux."""
 
 import sys
 from importlib import import_module

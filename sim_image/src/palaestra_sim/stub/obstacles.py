@@ -1,7 +1,7 @@
-"""The obstacles of robots and rays, seen from above: discs, blocks and the hulls of meshes.
+"""The obstacles of robots and rays, as seen from above: discs, blocks, and the convex hulls of meshes.
 
-Each shape computes how deep a round robot is inside it, and the distance that a ray travels until it meets
-the shape. Callers check heights first: here, every shape is as high as the robots.
+Each shape computes the depth of a round robot in the shape, and the distance that a ray travels until it
+meets the shape. This module ignores heights; callers pass only shapes at the height of the robot or ray.
 """
 
 from __future__ import annotations
@@ -12,7 +12,8 @@ from typing import Protocol
 
 from palaestra_sim.scene.sensor_rays import Ray
 
-# A contact: x and y of the unit normal that points at the robot, depth in meters.
+# A contact of a robot with a shape: x and y of the unit normal, which points to the robot, and the depth in
+# meters. A robot that moves by the depth along the normal no longer touches the shape.
 Contact = tuple[float, float, float]
 Point = tuple[float, float]  # x and y in meters
 
@@ -23,11 +24,11 @@ class FlatObstacle(Protocol):
     """A shape on the floor."""
 
     def gap(self, x: float, y: float) -> float:
-        """Return the meters from a point to the shape; 0 or less inside it."""
+        """Return the distance in meters from a point to the shape; 0 or less for a point inside the shape."""
         ...
 
     def contact(self, x: float, y: float, radius: float) -> Contact | None:
-        """Return the push that moves a round robot at x, y out of the shape; None if it does not touch."""
+        """Return the contact of a round robot at x, y with the shape; None if they do not touch."""
         ...
 
     def scan(self, frame: tuple[float, float, float, float], rays: Sequence[Ray], reach: list[float]) -> None:
@@ -35,13 +36,16 @@ class FlatObstacle(Protocol):
 
         Args:
             frame: x, y, cos and sin of the robot's heading.
-            rays: in the robot's frame.
-            reach: in meters, one for each ray; changed in place.
+            rays: the rays, in the robot's frame.
+            reach: a distance in meters for each ray; changed in place.
         """
         ...
 
     def crossing(self, frame: tuple[float, float, float, float], ray: Ray) -> tuple[float, float]:
-        """Return the meters to where a ray enters and leaves the shape; enter > leave if it misses."""
+        """Return the distances in meters at which a ray enters and leaves the shape.
+
+        If the ray misses the shape, the first number is greater than the second.
+        """
         ...
 
 
@@ -56,11 +60,11 @@ class Disc:
         self.radius = radius
 
     def gap(self, x: float, y: float) -> float:
-        """Return the meters from a point to the disc; negative inside it."""
+        """Return the distance in meters from a point to the disc; negative for a point inside the disc."""
         return math.hypot(x - self.x, y - self.y) - self.radius
 
     def contact(self, x: float, y: float, radius: float) -> Contact | None:
-        """Return the push that moves a round robot at x, y out of the disc; None if it does not touch."""
+        """Return the contact of a round robot at x, y with the disc; None if they do not touch."""
         dx = x - self.x
         dy = y - self.y
         reach = radius + self.radius
@@ -90,7 +94,7 @@ class Disc:
                 reach[i] = min(reach[i], max(0.0, along - math.sqrt(half)))
 
     def crossing(self, frame: tuple[float, float, float, float], ray: Ray) -> tuple[float, float]:
-        """Return the meters to where a ray enters and leaves the disc; enter > leave if it misses."""
+        """Return the distances in meters at which a ray enters and leaves the disc; see `FlatObstacle`."""
         x, y, c, s = frame
         dx = self.x - x
         dy = self.y - y
@@ -119,12 +123,12 @@ class Block:
         self.half_y = size[1] / 2.0
 
     def gap(self, x: float, y: float) -> float:
-        """Return the meters from a point to the block; 0 inside it."""
+        """Return the distance in meters from a point to the block; 0 for a point inside the block."""
         lx, ly = self._local(x, y)
         return math.hypot(max(abs(lx) - self.half_x, 0.0), max(abs(ly) - self.half_y, 0.0))
 
     def contact(self, x: float, y: float, radius: float) -> Contact | None:
-        """Return the push that moves a round robot at x, y out of the block; None if it does not touch."""
+        """Return the contact of a round robot at x, y with the block; None if they do not touch."""
         lx, ly = self._local(x, y)
         dx = lx - max(-self.half_x, min(self.half_x, lx))
         dy = ly - max(-self.half_y, min(self.half_y, ly))
@@ -151,7 +155,7 @@ class Block:
                 reach[i] = min(reach[i], enter)
 
     def crossing(self, frame: tuple[float, float, float, float], ray: Ray) -> tuple[float, float]:
-        """Return the meters to where a ray enters and leaves the block; enter > leave if it misses."""
+        """Return the distances in meters at which a ray enters and leaves the block; see `FlatObstacle`."""
         x, y = self._local(frame[0], frame[1])
         c = frame[2] * self.c + frame[3] * self.s
         s = frame[3] * self.c - frame[2] * self.s
@@ -166,7 +170,7 @@ class Block:
         return dx * self.c + dy * self.s, dy * self.c - dx * self.s
 
     def _way_out(self, x: float, y: float, radius: float) -> Contact:
-        """Return the contact of a robot whose center is inside: through the nearest face."""
+        """Return the contact of a robot whose center is inside the block; it leaves by the nearest face."""
         out_x = self.half_x - abs(x)
         out_y = self.half_y - abs(y)
         if out_x < out_y:
@@ -185,12 +189,12 @@ class Hull:
         self.y = sum(y for _, y in self.corners) / len(self.corners)
 
     def gap(self, x: float, y: float) -> float:
-        """Return the meters from a point to the polygon; 0 inside it."""
+        """Return the distance in meters from a point to the polygon; 0 for a point inside the polygon."""
         nearest_x, nearest_y, inside = self._nearest(x, y)
         return 0.0 if inside else math.hypot(x - nearest_x, y - nearest_y)
 
     def contact(self, x: float, y: float, radius: float) -> Contact | None:
-        """Return how a round robot at x, y is to be pushed out, None if it does not touch."""
+        """Return the contact of a round robot at x, y with the polygon; None if they do not touch."""
         nearest_x, nearest_y, inside = self._nearest(x, y)
         distance = math.hypot(x - nearest_x, y - nearest_y)
         if not inside and distance >= radius:
@@ -203,21 +207,21 @@ class Hull:
         return (sign * (x - nearest_x) / distance, sign * (y - nearest_y) / distance, push)
 
     def scan(self, frame: tuple[float, float, float, float], rays: Sequence[Ray], reach: list[float]) -> None:
-        """Shorten `reach` to where the rays of a robot at `frame` meet the polygon."""
+        """Shorten each `reach` to the distance at which its ray, of a robot at `frame`, meets the polygon."""
         for i, ray in enumerate(rays):
             enter, leave = self.crossing(frame, ray)
             if max(enter, 0.0) <= leave:
                 reach[i] = min(reach[i], max(enter, 0.0))
 
     def crossing(self, frame: tuple[float, float, float, float], ray: Ray) -> tuple[float, float]:
-        """Return the meters at which a ray enters and leaves the polygon; enter > leave: it misses."""
+        """Return the distances in meters at which a ray enters and leaves the polygon; see `FlatObstacle`."""
         x, y, c, s = frame
         px, py, ux, uy = ray
         at_x, at_y = x + c * px - s * py, y + s * px + c * py
         way_x, way_y = c * ux - s * uy, s * ux + c * uy
         enter, leave = -math.inf, math.inf
         for (ax, ay), (bx, by) in self._edges():
-            beyond = (at_x - ax) * (by - ay) - (at_y - ay) * (bx - ax)  # positive: outside of this edge
+            beyond = (at_x - ax) * (by - ay) - (at_y - ay) * (bx - ax)  # positive: outside of the edge
             outward = way_x * (by - ay) - way_y * (bx - ax)
             if outward > 0.0:
                 leave = min(leave, -beyond / outward)
@@ -231,7 +235,7 @@ class Hull:
         return zip(self.corners, (*self.corners[1:], self.corners[0]), strict=True)
 
     def _nearest(self, x: float, y: float) -> tuple[float, float, bool]:
-        """Return the point of the edges that is nearest to another one, and whether that one is inside."""
+        """Return the nearest point on the edges to the point x, y, and whether x, y is inside the polygon."""
         best, inside = (math.inf, 0.0, 0.0), True
         for (ax, ay), (bx, by) in self._edges():
             dx, dy = bx - ax, by - ay
@@ -244,7 +248,7 @@ class Hull:
 
 
 def _hull(points: Iterable[Point]) -> list[Point]:
-    """Return the corners of the convex polygon around points, counter-clockwise: Andrew's chains."""
+    """Return the corners of the convex hull of points, counter-clockwise, by Andrew's monotone chains."""
     ordered = sorted(set(points))
     if len(ordered) < len("abc"):
         return ordered
@@ -274,15 +278,15 @@ def _slab(origin: float, direction: float, half: float) -> tuple[float, float]:
 
 
 class Neighborhood:
-    """The obstacles within reach of a point, cached by squares of the floor.
+    """Finds the obstacles near a point; the result is cached for each square of the floor.
 
-    Most squares have at most one obstacle, so the cost of a step does not grow with the world.
+    Most squares have at most one obstacle nearby, so a step takes the same time in a larger world.
     """
 
     __slots__ = ("_margin", "_obstacles", "_squares")
 
     SIDE_M = 0.125
-    LIMIT = 20_000  # squares kept: a robot that escaped to infinity must not fill the memory
+    LIMIT = 20_000  # maximum number of cached squares; a robot that leaves the world must not fill the memory
 
     def __init__(self, obstacles: Sequence[FlatObstacle], reach_m: float) -> None:
         self._obstacles = tuple(obstacles)
@@ -290,8 +294,8 @@ class Neighborhood:
         self._squares: dict[int, tuple[FlatObstacle, ...]] = {}
 
     def near(self, x: float, y: float) -> tuple[FlatObstacle, ...]:
-        """Return at least all obstacles that are within reach of x, y, in their order."""
-        column = int(x * 8.0 + 4096.0)  # 8 = 1 / SIDE_M; the shift makes the numbers of usual floors positive
+        """Return all obstacles within reach of x, y, in their order; the result may have others nearby."""
+        column = int(x * 8.0 + 4096.0)  # 8 = 1 / SIDE_M; the shift makes usual coordinates positive
         row = int(y * 8.0 + 4096.0)
         key = column * 65536 + row
         found = self._squares.get(key)

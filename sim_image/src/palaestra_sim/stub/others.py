@@ -1,4 +1,4 @@
-"""Robots as the rays of other robots meet them: the surface of each part, where it is now."""
+"""The surfaces of robots at their current positions, for the sensor rays of other robots."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from palaestra_sim.scene.hits import first_hit
 from palaestra_sim.scene.shapes import Shape
 from palaestra_sim.stub.body import StubBody
 
-_ALONG: Final = 1.0 - 0.5e-6  # z of a unit vector that is vertical
+_ALONG: Final = 1.0 - 0.5e-6  # minimum z of a unit vector that counts as vertical
 
 
 class OtherRobot:
-    """A robot with a body.
+    """A robot that rays of other robots can hit.
 
     Args:
-        body: the body of the robot.
-        place: its frame, of which the height counts.
-        parts: the shapes of its outline, each with the frame of the robot in that of the shape.
+        body: the body of the robot; it has the current position and heading.
+        place: the frame of the robot; only its height is used.
+        parts: the shapes of the robot's outline, each with the pose of the robot in the frame of the shape.
     """
 
     __slots__ = ("_body", "_parts", "_place", "_radius_m")
@@ -33,7 +33,10 @@ class OtherRobot:
         self._radius_m = max((_reach(shape, inward) for shape, inward in parts), default=0.0)
 
     def stands_along(self, low_m: float, high_m: float) -> bool:
-        """Return whether all of its parts are upright cylinders that reach beyond two heights."""
+        """Return whether all parts of the robot are upright cylinders that span the given heights.
+
+        Level rays between the two heights then meet the robot as they meet its discs.
+        """
         height = self._place.height_m
         return all(
             shape.kind == "cylinder" and abs(inward.rotation[8]) > _ALONG and low < low_m and high_m < high
@@ -42,7 +45,10 @@ class OtherRobot:
         )
 
     def hit(self, origin: Vector, direction: Vector) -> float:
-        """Return the meters from a point along a unit vector, both in the axes of the ground."""
+        """Return the distance in meters from `origin` to the robot along the unit vector `direction`.
+
+        Both are in the axes of the ground. The distance is infinite if the ray misses the robot.
+        """
         body = self._body
         dx, dy = origin[0] - body.x, origin[1] - body.y
         ux, uy, uz = direction
@@ -58,13 +64,13 @@ class OtherRobot:
 
 
 def _heights(shape: Shape, inward: Pose, height_m: float) -> tuple[float, float]:
-    """Return z of the lower and the upper end of a part, of a robot at a height."""
+    """Return z of the lower and the upper end of a part of a robot whose frame is at `height_m`."""
     pose = inward.inverse
     middle, half = pose.position[2] + height_m, shape.half_along(pose.rotation, 2)
     return middle - half, middle + half
 
 
 def _reach(shape: Shape, inward: Pose) -> float:
-    """Return the radius of a circle around the middle of the robot that has all of a part."""
+    """Return the radius of a circle around the robot's origin that contains all of a shape."""
     x, y, _ = inward.inverse.position
     return math.hypot(x, y) + math.hypot(*shape.size) / 2.0

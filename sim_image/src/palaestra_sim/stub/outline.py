@@ -1,11 +1,11 @@
-"""Outlines, seen from above: discs, blocks and hulls of obstacles, and discs of robots.
+"""The outlines of shapes as seen from above: discs, blocks and hulls of obstacles, and discs of robots.
 
-A shape has one outline, which holds from its lower to its upper end. That is exact for boxes and for
-cylinders that stand. Of others it is the widest outline, for contacts; rays meet their true surface.
+A shape has one outline for its whole height. That is exact for boxes and for upright cylinders. For other
+shapes it is the widest outline. Contacts use this outline; rays meet the true surface of such a shape.
 
-A robot's outline is a set of discs, fixed in its frame. A disc keeps its shape however the robot turns, so a
-contact costs the same at every heading. A box becomes a row of discs with its length, its width, and round
-corners.
+The outline of a robot is a set of discs that are fixed in the robot's frame. A disc looks the same at every
+heading, so the check for a contact takes the same time at every heading. A box is replaced by a row of discs
+with the length and width of the box; its corners become round.
 """
 
 from __future__ import annotations
@@ -20,7 +20,8 @@ from palaestra_sim.stub.obstacles import Block, Disc, Hull
 
 _Z: Final = 2
 _ALONG_Z: Final = frozenset(("cylinder", "capsule"))
-_MOST_DISCS: Final = 16  # most discs of one box; in a bar over eight times as long as wide they have gaps
+# Maximum number of discs for one box. If a box is over eight times as long as wide, its discs have gaps.
+_MOST_DISCS: Final = 16
 
 
 class RoundPart(NamedTuple):
@@ -34,10 +35,10 @@ class RoundPart(NamedTuple):
 def discs_of_box(
     x_m: float, y_m: float, heading_rad: float, length_m: float, width_m: float
 ) -> tuple[RoundPart, ...]:
-    """Return discs that cover a box except its corners, and do not extend beyond the box.
+    """Return discs that cover a box except its corners, and that do not extend beyond the box.
 
-    The box has its center at x, y and its length along the heading. The discs are on its longer axis, at most
-    one radius apart, so a long side has dents of at most 7 % of the width.
+    The center of the box is at x, y; its length is along the heading. The discs are on the longer axis, at
+    most one radius apart. So the outline of a long side has dents of at most 7 % of the width.
     """
     if width_m > length_m:
         return discs_of_box(x_m, y_m, heading_rad + math.pi / 2.0, width_m, length_m)
@@ -53,14 +54,14 @@ def discs_of_box(
 
 
 def obstacle(shape: Shape) -> Disc | Block | Hull:
-    """Return the outline of a shape, where it is now."""
+    """Return the outline of a shape at its current pose."""
     if shape.mesh is None:
         return _simple(shape)
     return Hull(shape.pose.carry(point)[:2] for point in shape.mesh.points)
 
 
 def _simple(shape: Shape) -> Disc | Block:
-    """Return a disc or a block around a shape; of a mesh, around its box."""
+    """Return a disc or a block around a shape; for a mesh, around its bounding box."""
     pose = shape.pose
     x, y, _ = pose.position
     vertical = max(range(3), key=lambda axis: abs(pose.rotation[6 + axis]))
@@ -71,12 +72,12 @@ def _simple(shape: Shape) -> Disc | Block:
 
 
 def prismatic(shape: Shape) -> bool:
-    """Return whether the outline of a shape holds from its lower to its upper end."""
+    """Return whether a shape has the same outline at each height between its lower and its upper end."""
     return shape.kind == "box" or (shape.kind == "cylinder" and not shape.lies)
 
 
 def covering(shapes: Iterable[Shape]) -> list[tuple[RoundPart, Shape]]:
-    """Return the discs of a robot's outline with their shapes, without discs inside another one."""
+    """Return the discs of a robot's outline with their shapes; a disc inside another disc is left out."""
     parts = [(part, shape) for shape in shapes for part in _discs(shape)]
     return [
         (part, shape)
@@ -90,7 +91,7 @@ def covering(shapes: Iterable[Shape]) -> list[tuple[RoundPart, Shape]]:
 
 
 def _footprint(shape: Shape, pose: Pose, vertical: int) -> tuple[float, float, float]:
-    """Return the heading of one of its level axes, its extent along this one, and that across."""
+    """Return the heading of a horizontal axis of a shape, and the extents along and across this axis."""
     if shape.kind in _ALONG_Z:
         axis_rad = math.atan2(pose.rotation[3 + _Z], pose.rotation[_Z])
         return axis_rad - math.pi / 2.0, shape.size[0], shape.size[_Z]

@@ -1,6 +1,7 @@
-"""The physics of the stub: every robot moves by itself, and detects the objects around it.
+"""The physics of the stub: it moves robots, and computes the distances that their sensor rays travel.
 
-Heights are checked when the world is arranged. After that, motion and rays are computed as seen from above.
+When the world is arranged, the physics compares heights, and selects the obstacles of each robot and ray.
+After that, it computes motion and level rays in two dimensions.
 """
 
 from __future__ import annotations
@@ -28,16 +29,17 @@ from palaestra_sim.stub.others import OtherRobot
 from palaestra_sim.stub.outline import covering, obstacle, prismatic
 from palaestra_sim.stub.rays import Fan, Met, Rounded, SlopedBeams, Upright
 
-_Tall = tuple[Shape, tuple[float, float]]  # a shape with its lower and its upper end
+_Tall = tuple[Shape, tuple[float, float]]  # a shape, and the heights of its lower and its upper end
 
 
 class _Level(NamedTuple):
-    """The level beams of one robot.
+    """The horizontal beams of one robot.
 
     Attributes:
-        fan: meets what reaches from the lowest to the highest of them.
-        heights: between which they are, in the robot's frame.
-        rest: the same beams, for what some of them pass.
+        fan: the beams in two dimensions; its obstacles are at the height of every beam.
+        heights: the heights of the lowest and of the highest beam, in the robot's frame.
+        rest: the same beams in three dimensions, for obstacles that only some of the beams can meet, and for
+            obstacles that are not upright.
     """
 
     fan: Fan
@@ -53,7 +55,7 @@ class _Level(NamedTuple):
 
 
 class StubPhysics:
-    """The motion of one world, without masses and forces; see `Physics`."""
+    """Computes the motion and the sensor rays of one world, without masses and forces; see `Physics`."""
 
     abilities = Abilities(name="the stub")
 
@@ -72,12 +74,12 @@ class StubPhysics:
         parts = covering(build.outline)
         outline, rim = [part for part, _ in parts], [shape for _, shape in parts]
         body = StubBody(build.base, outline, rim, build.heights)
-        # Read now, in the robot's frame; later the places are those in the world.
+        # The poses are now relative to the robot; later they are poses in the world.
         self._parts[body] = [(shape, shape.pose.inverse) for shape in build.outline]
         return body
 
     def begin(self, surroundings: PhysicsSettings) -> None:
-        """Set the floors of the world; the stub has no forces."""
+        """Set the floors of the world; the stub ignores gravity and friction."""
         self._surroundings = surroundings
 
     def arrange(
@@ -88,7 +90,7 @@ class StubPhysics:
         doors: Sequence[Link] = (),
     ) -> None:
         """Set the obstacles of each robot and of its rays."""
-        del loose, doors  # the world checks refuse worlds with either, see `abilities`
+        del loose, doors  # both are empty: `abilities` excludes them, so the checks of a world refuse them
         self._solids = tuple(solids)
         self._tall = [(shape, shape.heights()) for shape in solids]
         self._moving = [(it, it.body) for it in figures if isinstance(it.body, StubBody)]
@@ -114,10 +116,10 @@ class StubPhysics:
                 body.advance(step_s)
 
     def reset(self) -> None:
-        """Do nothing: no motion depends on the past."""
+        """Do nothing: the physics has no state besides that of the bodies."""
 
     def look(self, figure: Figure, beams: Sequence[Beam]) -> Cast:
-        """Return a function that returns the distance that each beam of a robot travels now, in meters."""
+        """Return a function that computes the distance in meters that each beam of a robot travels now."""
         place, body = figure.place, figure.body
         if not isinstance(body, StubBody) or any(not beam.level for beam in beams):
             sloped = SlopedBeams(beams)
@@ -132,15 +134,15 @@ class StubPhysics:
         return lambda: level.cast((body.x, body.y, body.c, body.s), place.height_m)
 
     def see(self, figure: Figure, beams: Sequence[Beam]) -> Cast:
-        """Return the same function for beams that meet visible objects and pass through the robot itself."""
+        """Return such a function for beams that meet visible shapes; they pass through the robot itself."""
         sight = VisualRays(self._view, figure.place, beams)
         return lambda: [glance.distance_m for glance in sight.cast()]
 
     def push(self, target: Figure | DynamicSolid, push: Push) -> None:
-        """Do nothing: without masses a force has no effect; see `abilities`."""
+        """Do nothing: robots have no masses, so a force has no effect; see `abilities`."""
 
     def show(self, view: View) -> None:
-        """Set the part of the world that lidars see; the stub renders no images."""
+        """Set the visible shapes of the world, for lidars; the stub renders no images."""
         self._view = view
 
     def eye(self, place: Frame, lens: Lens) -> None:
@@ -152,7 +154,7 @@ class StubPhysics:
         del movie
 
     def contacts(self) -> Iterable[ContactPoint]:
-        """Return the contact points of robots with obstacles and with each other now."""
+        """Return the current contact points of robots with obstacles and with each other."""
         return contact_points(self._moving, self._solids)
 
     def _face(self, figure: Figure, others: Sequence[tuple[StubBody, OtherRobot]]) -> None:
@@ -167,7 +169,11 @@ class StubPhysics:
     def _face_level(
         self, level: _Level, height: float, others: Sequence[tuple[StubBody, OtherRobot]]
     ) -> None:
-        """Set the obstacles of level beams: for all at once what all of them meet, for each the others."""
+        """Set the obstacles of horizontal beams.
+
+        Upright obstacles at the height of every beam go to `level.fan`, which is fast. All others go to
+        `level.rest`.
+        """
         low, high = level.heights[0] + height, level.heights[1] + height
         whole, partly = [], []
         rounded: list[Met] = [robot for _, robot in others if not robot.stands_along(low, high)]
@@ -184,13 +190,16 @@ class StubPhysics:
 
 
 def _between(tall: Sequence[_Tall], heights: tuple[float, float], shift: float) -> list[_Tall]:
-    """Return the shapes that reach into a range of heights; touching it, like a floor, is not enough."""
+    """Return the shapes that overlap a range of heights.
+
+    A shape that only touches the end of the range, such as a floor, is left out.
+    """
     low, high = heights[0] + shift, heights[1] + shift
     return [(shape, ends) for shape, ends in tall if ends[0] < high and ends[1] > low]
 
 
 def _is_on(figure: Figure, shape: Shape) -> bool:
-    """Return whether a shape is part of a robot; the robot's own rays pass through it."""
+    """Return whether a shape is part of a robot; the rays of this robot pass through such shapes."""
     return figure.place in shape.place.chain()
 
 

@@ -1,4 +1,4 @@
-"""The distances that the beams of a robot travel. A ray stops at the first obstacle."""
+"""The distances that the sensor beams of a robot travel until they meet an obstacle."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ _GROUND: Final = (0.0, 0.0, 1.0, 0.0)  # a frame in the format of `Fan.cast`
 
 
 class Fan:
-    """All rays of one robot, cast together, so that its frame is computed once.
+    """The rays of one robot in two dimensions; they are cast together, with one read of the robot's frame.
 
     Args:
-        rays: in the robot's frame.
+        rays: the rays, in the robot's frame.
         reach_m: for each ray, the distance beyond which the sensor's value is constant.
     """
 
@@ -40,14 +40,14 @@ class Fan:
         return self._reach
 
     def face(self, solids: Neighborhood, others: Sequence[FlatObstacle]) -> None:
-        """Set the obstacles of the rays: fixed ones and robots."""
+        """Set the obstacles of the rays: solids, and other robots."""
         self._solids = solids
         self._others = tuple(others)
 
     def cast(self, frame: tuple[float, float, float, float]) -> list[float]:
-        """Return the distance that each ray travels in meters; `frame` is x, y, cos and sin of the heading.
+        """Return the distance in meters that each ray travels; at most its reach.
 
-        Rays that meet nothing have their full reach. The next call reuses the list.
+        `frame` is x, y, cosine and sine of the robot's heading. The next call changes the returned list.
         """
         distances = self.distances
         distances[:] = self._blank
@@ -59,7 +59,7 @@ class Fan:
 
 
 class Upright(NamedTuple):
-    """An obstacle with its lower and its upper end, in the world."""
+    """An obstacle that has the same outline at every height between its lower and its upper end."""
 
     outline: FlatObstacle
     low_m: float
@@ -67,33 +67,39 @@ class Upright(NamedTuple):
 
 
 class Rounded(NamedTuple):
-    """An obstacle whose outline is not the same at every height.
+    """An obstacle whose outline differs between heights.
 
     Attributes:
-        shape: as the world has it.
-        inward: the axes of the ground, in its frame.
+        shape: the shape in the world.
+        inward: the pose of the ground's axes in the frame of the shape.
     """
 
     shape: Shape
     inward: Pose
 
     def hit(self, origin: Vector, direction: Vector) -> float:
-        """Return the meters from a point along a unit vector, both in the axes of the ground."""
+        """Return the distance in meters from `origin` to the surface along the unit vector `direction`.
+
+        Both are in the axes of the ground. The distance is infinite if the ray misses the shape.
+        """
         return first_hit(self.shape, self.inward.carry(origin), self.inward.turned(direction))
 
 
 class Met(Protocol):
-    """What rays meet at its surface."""
+    """An obstacle that computes where a ray meets its surface."""
 
     def hit(self, origin: Vector, direction: Vector) -> float:
-        """Return the meters from a point along a unit vector, both in the axes of the ground."""
+        """Return the distance in meters from `origin` to the surface along the unit vector `direction`.
+
+        Both are in the axes of the ground. The distance is infinite if the ray misses the shape.
+        """
         ...
 
 
 class SlopedBeams:
-    """The beams of one robot that may climb or fall, cast one by one.
+    """The beams of one robot, which may be inclined; they are cast one by one.
 
-    Their obstacles include floors, which extend to infinity.
+    Floors are obstacles too; a floor extends to infinity.
     """
 
     __slots__ = ("_beams", "_floors", "_rounded", "_solids", "distances")
@@ -107,7 +113,7 @@ class SlopedBeams:
 
     @property
     def free(self) -> bool:
-        """Whether there is no obstacle."""
+        """Whether the beams have no obstacles except floors."""
         return not (self._solids or self._rounded)
 
     def face(
@@ -116,19 +122,25 @@ class SlopedBeams:
         floors_m: Sequence[float] = (0.0,),
         rounded: Sequence[Met] = (),
     ) -> None:
-        """Set the obstacles of the beams: upright ones and others, and the heights of floors."""
+        """Set the obstacles of the beams.
+
+        Args:
+            solids: the upright obstacles.
+            floors_m: the heights of the floors.
+            rounded: all other obstacles.
+        """
         self._rounded = tuple(rounded)
         self._solids = tuple(solids)
         self._floors = tuple(floors_m)
 
     def cast(self, frame: tuple[float, float, float, float], height_m: float) -> list[float]:
-        """Return the distance that each beam travels, in meters; `height_m` is that of the robot's frame."""
+        """Return the distance in meters that each beam travels; `height_m` is that of the robot's frame."""
         for index, beam in enumerate(self._beams):
             self.distances[index] = self._first(beam, frame, height_m)
         return self.distances
 
     def cast_from(self, pose: Pose) -> list[float]:
-        """Return the same for a robot that may be tilted; `pose` is its frame in the axes of the ground."""
+        """Return the distances for a robot that may be tilted, whose pose in the ground's axes is `pose`."""
         for index, beam in enumerate(self._beams):
             self.distances[index] = self._first(beam.seen_from(pose), _GROUND, 0.0)
         return self.distances
@@ -153,7 +165,7 @@ class SlopedBeams:
     def _round(
         self, beam: Beam, frame: tuple[float, float, float, float], height_m: float, nearest_m: float
     ) -> float:
-        """Return the distance at which a beam meets a shape that is not upright; at most `nearest_m`."""
+        """Return the distance at which a beam meets an obstacle of `_rounded`; at most `nearest_m`."""
         if not self._rounded:
             return nearest_m
         x, y, c, s = frame
@@ -165,7 +177,10 @@ class SlopedBeams:
 
 
 def _between(low_m: float, high_m: float, slope: float) -> tuple[float, float]:
-    """Return the distances along the floor between which a beam is within two heights above its origin."""
+    """Return the distances along the floor between which a beam is between two heights.
+
+    The heights are relative to the origin of the beam.
+    """
     if slope == 0.0:
         return (-math.inf, math.inf) if low_m < 0.0 < high_m else (math.inf, -math.inf)
     return min(low_m / slope, high_m / slope), max(low_m / slope, high_m / slope)

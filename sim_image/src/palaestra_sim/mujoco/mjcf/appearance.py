@@ -1,7 +1,8 @@
-"""The looks of an MJCF world and the poses of its bodies, as data for viewers: `palaestra_protocol.scene`.
+"""The visible shapes of an MJCF world and the poses of its bodies, as data for viewers.
 
-Each body is a node. As in MuJoCo's own viewer, the geoms of the groups 0 to 2 are visible; a model without
-any has all its geoms. A height field is a mesh; textures are not read. Nothing is computed before a request.
+The data has the form of `palaestra_protocol.scene`. Each body is a node. As in MuJoCo's own viewer, the geoms
+of the groups 0 to 2 are visible. If a model has no geoms in these groups, all its geoms are visible. A height
+field becomes a mesh. Textures are ignored. The data is computed only at a request.
 """
 
 from __future__ import annotations
@@ -43,14 +44,15 @@ _KINDS: Final = {
 }
 _ROUND: Final = frozenset((_CAPSULE, int(_GEOM.mjGEOM_CYLINDER)))
 _VISIBLE_GROUPS: Final = 3
-_UNPAINTED: Final = (0.5, 0.5, 0.5, 1.0)  # Source: XML reference, geom/rgba: then the material counts
+# If a geom has this rgba, MuJoCo uses the color of the geom's material. Source: XML reference, geom/rgba
+_UNPAINTED: Final = (0.5, 0.5, 0.5, 1.0)
 
 
 class ModelAppearance:
-    """What a viewer sees of one model.
+    """The data of one model for viewers.
 
     Args:
-        model: with its state.
+        model: the model and its current state.
         robot: the number of the robot's body.
     """
 
@@ -61,7 +63,7 @@ class ModelAppearance:
         self._starts: dict[str, PoseNumbers] = {}
 
     def scene(self, world: str) -> VisibleScene:
-        """Return the looks of the model; `world` is its name."""
+        """Return the bodies and visible shapes of the model; `world` is the name of the world."""
         compiled = self._model.model
         self._begin()
         table = MeshTable()
@@ -90,7 +92,7 @@ class ModelAppearance:
         )
 
     def state(self, time_ms: int) -> SceneState:
-        """Return the poses of all bodies that are not where the scene has them, or that joints move."""
+        """Return the poses of bodies that joints move, and of bodies that a client has moved."""
         self._begin()
         poses = {}
         for body, name in enumerate(self._names):
@@ -109,7 +111,7 @@ class ModelAppearance:
         self._starts = {name: self._pose(body) for body, name in enumerate(self._names)}
 
     def _moves(self, body: int) -> bool:
-        """Return whether a joint moves a body or something around it."""
+        """Return whether a joint moves the body, or moves a body that carries it."""
         return bool(self._model.model.body_weldid[body])
 
     def _pose(self, body: int) -> PoseNumbers:
@@ -118,7 +120,7 @@ class ModelAppearance:
         return x, y, z, w, i, j, k
 
     def _joints(self) -> dict[str, float]:
-        """Return the positions of the hinges and sliders that have a name."""
+        """Return the positions of all hinges and sliders that have names, by name."""
         model = self._model.model
         return {
             model.jnt(joint).name: float(self._model.positions(joint)[0])
@@ -141,7 +143,7 @@ class ModelAppearance:
         return red, green, blue, alpha
 
     def _shape(self, geom: int, table: MeshTable) -> VisualShape | None:
-        """Return a geom as a shape; None for a type that is not drawn."""
+        """Return the visible shape of a geom; None if viewers cannot draw the type of the geom."""
         model = self._model.model
         kind = int(model.geom_type[geom])
         x, y, z = model.geom_pos[geom].tolist()
@@ -163,7 +165,10 @@ class ModelAppearance:
 
 
 def _size(kind: int, halves: list[float]) -> Numbers3:
-    """Return the size of a geom; MuJoCo has halves of it, and a capsule's without its caps."""
+    """Return the size of a geom.
+
+    MuJoCo has half lengths, and its length of a capsule does not include the caps.
+    """
     x, y, z = (2.0 * half for half in halves)
     if kind == _SPHERE:
         return x, x, x
@@ -181,7 +186,7 @@ def _mesh(model: Any, number: int) -> Triangles:
 
 
 def _height_field(model: Any, number: int) -> Triangles:
-    """Return the surface of a height field."""
+    """Return the surface of a height field as triangles."""
     rows, columns = int(model.hfield_nrow[number]), int(model.hfield_ncol[number])
     first = int(model.hfield_adr[number])
     across, along, up, _ = model.hfield_size[number].tolist()

@@ -15,10 +15,10 @@ from palaestra_sim.scene.geometry import (
 
 
 class BodyFrame(Frame):
-    """The frame of a body, which MuJoCo moves.
+    """The frame of a body, whose pose MuJoCo computes.
 
-    A client may set the pose of a body that is free, or that has no joint and whose parent is the world.
-    Joints determine the poses of all other bodies.
+    A client may set the pose of a body that has a free joint, and of a body without joints whose parent is
+    the world. For all other bodies, joints or parent bodies determine the pose.
     """
 
     def __init__(self, parent: Frame | None, model: Model, body: int) -> None:
@@ -30,13 +30,13 @@ class BodyFrame(Frame):
 
     @property
     def placeable(self) -> bool:
-        """Whether the body is free, or has no joint and the world as its parent."""
+        """Whether a client may set the pose; see the class."""
         stands = self.parent is None and not self._model.joints_of(self._body)
         return self._free is not None or stands
 
     @property
     def translation(self) -> Vector:
-        """X, y, z in meters, in the parent's frame."""
+        """X, y, z in meters, in the frame of the parent."""
         return self.pose.position
 
     @translation.setter
@@ -45,7 +45,7 @@ class BodyFrame(Frame):
 
     @property
     def rotation(self) -> AxisAngle:
-        """Axis and angle in radians, in the parent's frame."""
+        """Axis and angle in radians, in the frame of the parent."""
         return to_axis_angle(self.pose.rotation)
 
     @rotation.setter
@@ -54,22 +54,22 @@ class BodyFrame(Frame):
 
     @property
     def pose(self) -> Pose:
-        """The frame, in the parent's."""
+        """The pose of the body in the frame of the parent."""
         pose = self.world_pose
         return pose if self.parent is None else self.parent.world_pose.inverse.after(pose)
 
     @property
     def world_pose(self) -> Pose:
-        """The frame, in the world's."""
+        """The pose of the body in the frame of the world."""
         return self._model.pose(self._body)
 
     @property
     def world_position(self) -> Vector:
-        """The position of its origin in the world, in meters."""
+        """The position of the body's origin in the world, in meters."""
         return self.world_pose.position
 
     def return_to_start(self) -> None:
-        """Do nothing: a reset of the model also resets the frame."""
+        """Do nothing: a reset of the model also resets the pose of the body."""
 
     def _put(self, pose: Pose) -> None:
         x, y, z, w = to_quaternion(pose.rotation)

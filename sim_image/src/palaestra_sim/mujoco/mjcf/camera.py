@@ -1,4 +1,7 @@
-"""A camera of a model: see `CameraInterface`. It shows the geoms, materials and lights of the model."""
+"""A camera of an MJCF model, which implements `CameraInterface`.
+
+Its images show the geoms, materials and lights of the model.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +23,7 @@ _MOST_GEOMS: Final = 10_000
 
 
 class ModelCamera:
-    """The images that one camera of a model takes."""
+    """Renders the images of one camera of a model."""
 
     def __init__(self, model: Model, number: int, lens: Lens) -> None:
         self._model = model
@@ -40,7 +43,7 @@ class ModelCamera:
         canvas()
 
     def colors(self) -> memoryview:
-        """Return blue, green, red and alpha of each pixel."""
+        """Return four bytes for each pixel: blue, green, red, alpha."""
         model, size = self._model.model, self._lens.size
         self._model.settle()
         context = canvas().take(self._model, model, size)
@@ -59,7 +62,7 @@ class ModelCamera:
     def depths(self, nearest_m: float, resolution_m: float) -> memoryview:
         """Raise an error: a model has no RangeFinder."""
         del nearest_m, resolution_m
-        raise UnsimulatedError("a camera of a model measures no distances; add <rangefinder> sensors")
+        raise UnsimulatedError("a camera of a model does not measure distances; add <rangefinder> sensors")
 
     def patches(self, owner: Callable[[SceneNode], SceneNode | None]) -> dict[SceneNode, Corners]:
         """Return an empty mapping: a camera of a model has no Recognition node."""

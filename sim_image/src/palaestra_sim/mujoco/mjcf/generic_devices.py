@@ -1,7 +1,7 @@
-"""Sensors and actuators of a model for which Webots has no device.
+"""Devices for sensors and actuators of a model for which Webots has no device.
 
-They are devices too, with names below `mujoco/`, which no device of Webots has. A sensor publishes its
-numbers unchanged; an actuator takes MuJoCo's control.
+The names of these devices begin with `mujoco/`; no device of Webots has such a name. A sensor publishes its
+numbers unchanged. A client sets the control of an actuator directly.
 """
 
 from __future__ import annotations
@@ -21,11 +21,14 @@ _MUSCLE: Final = int(mujoco.mjtGain.mjGAIN_MUSCLE)
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class MujocoSensor:
-    """A sensor of several numbers; `value` holds those of the last sample.
+    """A sensor that measures several numbers.
 
     Attributes:
+        name: the name of the device.
         type_name: the type of the sensor in the model, such as framelinvel.
-        numbers: a view of its value in the model.
+        numbers: a view of the sensor's current numbers in MuJoCo's data.
+        model: the result of the service `get_model`.
+        value: the numbers of the last sample.
     """
 
     name: str
@@ -35,7 +38,7 @@ class MujocoSensor:
     value: tuple[float, ...] = ()
 
     def sample(self) -> None:
-        """Copy the numbers of this moment."""
+        """Copy the current numbers to `value`."""
         self.value = tuple(self.numbers.tolist())
 
 
@@ -44,9 +47,11 @@ class MujocoActuator:
     """An actuator that is not a motor, such as a muscle or an adhesion.
 
     Attributes:
-        controls: the controls of all actuators of the model.
-        number: the number of this one among them.
+        name: the name of the device.
+        controls: the controls of all actuators in MuJoCo's data.
+        number: the index of this actuator's control.
         low, high: the minimum and the maximum control; infinite if the model has no limits.
+        model: the result of the service `get_model`.
     """
 
     name: str
@@ -59,23 +64,26 @@ class MujocoActuator:
 
     @property
     def control(self) -> float:
-        """Its control: the last command, or else the model's value."""
+        """The control: the last value that a client has set, or the value in MuJoCo's data."""
         return float(self.controls[self.number]) if self._wanted is None else self._wanted
 
     def set_control(self, value: float) -> bool:
-        """Set the control from the next basic step on, within its limits; False if it is not finite."""
+        """Set the control for the following basic steps; a value outside the limits is cut to the limit.
+
+        Return False, and change nothing, if `value` is not finite.
+        """
         if not math.isfinite(value):
             return False
         self._wanted = max(self.low, min(self.high, value))
         return True
 
     def command(self) -> None:
-        """Write the control that a client has set into the model."""
+        """Write the control that a client has set to MuJoCo's data."""
         if self._wanted is not None:
             self.controls[self.number] = self._wanted
 
     def reset(self) -> None:
-        """Return to the state of a new world, without a command."""
+        """Discard the control that a client has set."""
         self._wanted = None
 
 
@@ -88,7 +96,7 @@ def actuator_of(model: Any, data: Any, number: int, name: str) -> MujocoActuator
 
 
 def type_name_of(model: Any, number: int) -> str:
-    """Return the type of a sensor as the model names it, such as framelinvel."""
+    """Return the type of a sensor as in the XML of the model, such as framelinvel."""
     name: str = mujoco.mjtSensor(int(model.sensor_type[number])).name
     return name.removeprefix("mjSENS_").lower()
 

@@ -1,4 +1,4 @@
-"""Load an MJCF file as a simulation; every mistake in it is an error with its place."""
+"""Load an MJCF file as a simulation; the error for a mistake names the line of the file."""
 
 from __future__ import annotations
 
@@ -30,13 +30,17 @@ _LINE: Final = re.compile(r"\bline (\d+)")
 def load(
     world_path: Path, mode: Mode, leave_out: LeaveOut | None = None, *, root: Path | None = None
 ) -> MjcfSimulation:
-    """Return the simulation of an MJCF world, which starts in that mode.
+    """Return the simulation of an MJCF world.
 
-    The model may name files in `root`; if it is None, in the nearest folder that holds all of them.
+    Args:
+        world_path: the MJCF file.
+        mode: the simulation mode at the start.
+        leave_out: the types of sensors and actuators to leave out.
+        root: the folder that holds all files that the model names; None means the nearest such folder.
 
     Raises:
-        WorldError: the file is wrong, or no client could use its model.
-        OSError: it cannot be read.
+        WorldError: the file is wrong, or the model has no body or no actuator.
+        OSError: the file cannot be read.
     """
     source = read_bounded(world_path)
     leave_out = leave_out or LeaveOut()
@@ -79,7 +83,7 @@ def _compiled(world_path: Path) -> Any:
     """Return MuJoCo's model of a file.
 
     Raises:
-        WorldError: MuJoCo refuses it.
+        WorldError: MuJoCo refuses the file.
     """
     try:
         return mujoco.MjModel.from_xml_path(str(world_path))
@@ -103,7 +107,10 @@ def _keyframe(model: Any, description: Description) -> int | None:
 
 
 def _basic_step_ms(model: Any, description: Description) -> int:
-    """Return the basic step; the timestep may come from another file of the model."""
+    """Return the basic step in milliseconds: the one that the file sets, or one that fits the timestep.
+
+    The timestep is read from the compiled model, because an included file may set it.
+    """
     timestep_s = float(model.opt.timestep)
     step_ms = description.basic_step_ms or mjcf.whole_step_ms(timestep_s)
     if step_ms is None:

@@ -1,4 +1,4 @@
-"""A compiled MJCF model with its state."""
+"""A compiled MJCF model with its current state."""
 
 from __future__ import annotations
 
@@ -12,28 +12,30 @@ from palaestra_sim.scene.geometry import Pose
 HINGE: Final = int(mujoco.mjtJoint.mjJNT_HINGE)
 SLIDE: Final = int(mujoco.mjtJoint.mjJNT_SLIDE)
 FREE: Final = int(mujoco.mjtJoint.mjJNT_FREE)
-_POSITIONS: Final = {FREE: 7, int(mujoco.mjtJoint.mjJNT_BALL): 4}  # numbers of a joint; 1 for other types
+# The numbers of positions and of speeds of a joint; joints of other types have one of each.
+_POSITIONS: Final = {FREE: 7, int(mujoco.mjtJoint.mjJNT_BALL): 4}
 _SPEEDS: Final = {FREE: 6, int(mujoco.mjtJoint.mjJNT_BALL): 3}
 
 
 class Model:
-    """One model, and the current state of everything in it.
+    """One model and its current state.
 
-    MuJoCo computes poses and sensors at the beginning of a step. `settle` computes them for the state after
-    the last step, and changes nothing on which the next step depends.
+    MuJoCo computes poses and sensors at the beginning of a step, for the state before the step. `settle`
+    computes them for the state after the last step, and does not affect the next step.
 
     Args:
-        model: the model of MuJoCo.
-        keyframe: the number of the keyframe at which the world begins; None for the model's own positions.
+        model: MuJoCo's model.
+        keyframe: the number of the keyframe with which the world begins; None for the model's own positions.
 
     Attributes:
-        model, data: model and data of MuJoCo.
+        model, data: the model and the data of MuJoCo.
     """
 
     def __init__(self, model: Any, keyframe: int | None = None) -> None:
         self.model = model
         self.data = mujoco.MjData(model)
-        # Values that are not finite must reach the sensors as a fault; MuJoCo would reset silently.
+        # By default MuJoCo resets the world silently when a value is not finite. Here such a value must reach
+        # the sensors, so that the trainer detects the fault.
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
         self._keyframe = keyframe
         self._starts = (model.body_pos.copy(), model.body_quat.copy())
@@ -41,12 +43,12 @@ class Model:
         self.reset()
 
     def step(self, count: int) -> None:
-        """Let MuJoCo make `count` steps."""
+        """Simulate `count` of MuJoCo's steps."""
         mujoco.mj_step(self.model, self.data, nstep=count)
         self._settled = False
 
     def reset(self) -> None:
-        """Return to the start, bit for bit."""
+        """Return to the initial state, bit for bit."""
         self.model.body_pos[:], self.model.body_quat[:] = self._starts
         if self._keyframe is None:
             mujoco.mj_resetData(self.model, self.data)
@@ -55,11 +57,11 @@ class Model:
         self._settled = False
 
     def changed(self) -> None:
-        """Record that the state was written, so that the next `settle` computes again."""
+        """Record that the state has changed, so that the next `settle` computes poses and sensors again."""
         self._settled = False
 
     def settle(self) -> None:
-        """Compute poses, velocities and sensors of this moment, if they are out of date."""
+        """Compute poses, velocities and sensors for the current state, if they are out of date."""
         if not self._settled:
             warm_start = self.data.qacc_warmstart.copy()
             mujoco.mj_forward(self.model, self.data)
@@ -74,7 +76,12 @@ class Model:
         return Pose((x, y, z), (a, b, c, d, e, f, g, h, i))
 
     def velocity(self, kind: int, number: int) -> tuple[list[float], list[float]]:
-        """Return the velocity of an object in m/s and its angular velocity in rad/s, in world axes."""
+        """Return the velocity in m/s and the angular velocity in rad/s of an object, in world axes.
+
+        Args:
+            kind: the type of the object: a value of MuJoCo's mjtObj.
+            number: the number of the object.
+        """
         self.settle()
         found = np.zeros(6)
         mujoco.mj_objectVelocity(self.model, self.data, kind, number, found, 0)

@@ -1,4 +1,4 @@
-"""The motion of a model's bodies, and the forces on them, for a supervisor."""
+"""Read and set the velocities of a model's bodies, and apply forces to them, for a supervisor."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ class BodyMotion:
         return (vx, vy, vz), (wx, wy, wz)
 
     def set_velocity(self, node: SceneNode, velocity: Vector, turning: Vector) -> None:
-        """Give a free body a velocity.
+        """Set the velocity and the angular velocity of a body that has a free joint.
 
         Raises:
-            UnsimulatedError: the body is not free.
+            UnsimulatedError: the body has no free joint.
         """
         free = self._model.free_joint_of(self._body(node))
         if free is None:
@@ -50,7 +50,7 @@ class BodyMotion:
         self._model.changed()
 
     def halt(self, node: SceneNode) -> None:
-        """Stop a body and all bodies on it."""
+        """Stop a body and all bodies inside it."""
         numbers = (self._bodies[it] for it in (node, *node.descendants()) if it in self._bodies)
         for number in numbers:
             for joint in self._model.joints_of(number):
@@ -60,7 +60,7 @@ class BodyMotion:
     def add_force(
         self, node: SceneNode, force: Vector, *, relative: bool, offset: Vector | None = None
     ) -> None:
-        """Apply a force in N in the next basic step; see `Motion`."""
+        """Apply a force in N in the next basic step; see `MotionBackend`."""
         body = self._body(node)
         pose = self._model.pose(body)
         world = np.array(pose.turned(force) if relative else force)

@@ -1,8 +1,9 @@
-"""Actuators as motors: translate commands of Webots to MuJoCo's `ctrl`.
+"""Actuators as motors of Webots: translate a motor's commands to MuJoCo's `ctrl`.
 
-An actuator is a position servo, a velocity servo, or a force. A motor accepts the commands of its actuator;
-a velocity servo also turns to a target as Webots does. Until a client commands a motor, MuJoCo's own value
-stays, 0 or that of the keyframe.
+The control of an actuator sets a position, a velocity or a force, and its motor accepts the matching
+commands. If the control sets a velocity, the motor also accepts a target position, and turns to it as a motor
+of Webots does. Until a client commands a motor, the control keeps its initial value: 0, or the value in the
+keyframe.
 """
 
 from __future__ import annotations
@@ -41,11 +42,11 @@ class ModelActuator:
     """One actuator of a model.
 
     Attributes:
-        control: the quantity that its control sets.
-        scale: its control for a position, velocity or force of 1 at the joint.
-        length: returns the position of its joint or tendon, in rad or m; None if the actuator has neither.
-        read: returns its control.
-        write: sets its control.
+        control: the quantity that the actuator's control sets.
+        scale: the value of the control for a position, velocity or force of 1 at the joint.
+        length: returns the position of the actuator's joint or tendon, in rad or m; None if it has neither.
+        read: returns the control.
+        write: sets the control.
         force: returns the force or torque at the joint, in N or N m.
     """
 
@@ -65,10 +66,10 @@ class ActuatorMotor(Motor):
     def __init__(self, spec: MotorSpec, actuator: ModelActuator) -> None:
         self._actuator = actuator
         super().__init__(spec)
-        self.forceful = True  # MuJoCo moves everything by forces
+        self.forceful = True  # MuJoCo moves all bodies by forces
 
     def reset(self) -> None:
-        """Return to the initial state, without a command; call this after the model was reset."""
+        """Discard all commands; call this after the model was reset."""
         super().reset()
         self._commanded = False
         if self._actuator.length is not None:
@@ -78,13 +79,13 @@ class ActuatorMotor(Motor):
         self._aim: float | None = None  # current target of a position servo
 
     def put(self, angle_rad: float) -> None:
-        """Handle a joint position that a client has set; a motor with a command holds that position."""
+        """Handle the event that a client has set the joint position; a commanded motor then holds it."""
         if self._commanded and self._actuator.control is not Control.FORCE:
             super().put(angle_rad)
         self._aim = None
 
     def set_position(self, target_rad: float) -> None:
-        """Turn to `target_rad`, or with infinity at the commanded velocity; see `Motor`."""
+        """Turn to `target_rad`; if it is infinite, turn at the commanded velocity; see `Motor`."""
         self._require_servo()
         super().set_position(target_rad)
         self._commanded = True
@@ -113,7 +114,7 @@ class ActuatorMotor(Motor):
         self._commanded = self.effort_nm is not None
 
     def set_available_torque(self, torque_nm: float) -> None:
-        """Raise an error, because the model limits the force.
+        """Raise an error, because only the model can limit the force of an actuator.
 
         Raises:
             UnsimulatedError: always.
@@ -125,20 +126,20 @@ class ActuatorMotor(Motor):
         """Set the gains with which a velocity servo turns to a target; see `Motor`.
 
         Raises:
-            UnsimulatedError: the gains are those of the model.
+            UnsimulatedError: the control does not set a velocity, so only the model can set the gains.
         """
         if self._actuator.control is not Control.VELOCITY and (p, i, d) != self.spec.gains:
             raise UnsimulatedError(f"{self._what()}, whose gains the model has; write kp and kv there")
         super().set_control_pid(p, i, d)
 
     def feel(self) -> None:
-        """Copy the position and force of this moment."""
+        """Copy the current position and force from MuJoCo."""
         if self._actuator.length is not None:
             self.angle_rad = self._actuator.length()
         self.feedback_nm = self._actuator.force()
 
     def command(self, step_s: float) -> None:
-        """Set the control for the next basic step, by the last command."""
+        """Set the control for the next basic step, as the last command requires."""
         if self._actuator.length is not None:
             self.angle_rad = self._actuator.length()
         if self._commanded:
@@ -156,7 +157,7 @@ class ActuatorMotor(Motor):
         return self.speed_rad_s
 
     def _next_aim(self, aim: float, step_s: float) -> float:
-        """Return the target of a position servo after a basic step at the commanded velocity."""
+        """Return the next target of a position servo; in a basic step it moves at the commanded velocity."""
         reach = abs(self.velocity_rad_s) * step_s
         if math.isfinite(self.target_rad):
             return max(aim - reach, min(aim + reach, self.target_rad))
@@ -175,7 +176,10 @@ class ActuatorMotor(Motor):
 
 
 def control_of(model: Any, index: int) -> tuple[Control, float] | None:
-    """Return the kind of an actuator's control, and its value for one unit at the joint; None if unknown."""
+    """Return the quantity that an actuator's control sets, and `ModelActuator.scale`.
+
+    Return None if the actuator is not a motor, such as a muscle.
+    """
     gain, bias = model.actuator_gainprm[index], model.actuator_biasprm[index]
     dynamics = int(model.actuator_dyntype[index])
     known = (
@@ -198,13 +202,16 @@ def control_of(model: Any, index: int) -> tuple[Control, float] | None:
 
 
 def kind_of(model: Any, index: int) -> str:
-    """Return a word for the kind of an actuator's control."""
+    """Return a word for the quantity that an actuator's control sets, such as "velocity"."""
     control = control_of(model, index)
     return "actuator" if control is None else control[0].name.lower()
 
 
 def gear_of(model: Any, index: int) -> float:
-    """Return the force at the joint for an actuator force of 1; for a site, in the direction of its gear."""
+    """Return the force at the joint for an actuator force of 1.
+
+    For an actuator on a site, it is the force in the direction of the actuator's gear.
+    """
     gear: list[float] = model.actuator_gear[index].tolist()
     if model.actuator_trntype[index] in _TURNED:
         return gear[0]
@@ -212,7 +219,7 @@ def gear_of(model: Any, index: int) -> float:
 
 
 def length_of(model: Model, index: int) -> Callable[[], float] | None:
-    """Return a function for the position of an actuator's joint or tendon; None if it has neither."""
+    """Return a function that reads the position of an actuator's joint or tendon; None if it has neither."""
     joint = joint_of(model.model, index)
     if joint is not None:
         positions = model.positions(joint)
@@ -224,13 +231,13 @@ def length_of(model: Model, index: int) -> Callable[[], float] | None:
 
 
 def force_of(model: Model, index: int) -> Callable[[], float]:
-    """Return a function for the force of an actuator at its joint, in N or N m."""
+    """Return a function that reads the force of an actuator at its joint, in N or N m."""
     gear, forces = gear_of(model.model, index), model.data.actuator_force
     return lambda: float(forces[index]) * gear
 
 
 def joint_of(model: Any, index: int) -> int | None:
-    """Return the number of the hinge or slider that an actuator moves; None if it moves something else."""
+    """Return the number of the hinge or slider that an actuator moves; None if it moves another object."""
     if model.actuator_trntype[index] not in _JOINTS:
         return None
     joint = int(model.actuator_trnid[index][0])
@@ -238,7 +245,7 @@ def joint_of(model: Any, index: int) -> int | None:
 
 
 def spec_of(model: Any, index: int, name: str, control: Control, scale: float) -> MotorSpec:
-    """Return the specification of a motor, with the limits of the model, if it has any."""
+    """Return the specification of a motor, with the limits that the model sets for the actuator."""
     low, high = 0.0, 0.0
     limit = math.inf
     if model.actuator_ctrllimited[index]:

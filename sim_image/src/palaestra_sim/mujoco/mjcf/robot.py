@@ -1,4 +1,4 @@
-"""The robot of a model: all its actuators, sensors and cameras as devices with names."""
+"""Make devices with names from all actuators, sensors and cameras of a model."""
 
 from __future__ import annotations
 
@@ -31,13 +31,14 @@ class Equipment:
     """The devices of a robot.
 
     Attributes:
-        devices: by name.
-        joints: the number of the joint of each device on a joint, by name.
+        devices: all devices, by name.
+        joints: for each device on a joint, the number of the joint, by name of the device.
         motors: the actuators that are motors.
         actuators: the actuators that are not motors.
         samples: functions that set the values of the sensors.
-        refused: mistakes with devices, each with its place.
-        left_out: sensors and actuators without a device in Webots, which the user left out.
+        refused: an error for each mistake with a device.
+        left_out: an error for each sensor or actuator that the user left out, because Webots has no such
+            device.
     """
 
     devices: Devices = field(default_factory=Devices)
@@ -55,9 +56,10 @@ def equip(model: Model, description: Description, leave_out: LeaveOut) -> Equipm
 
 
 def body_of(model: Any) -> int | None:
-    """Return the number of the robot's body: a top-level body under which an actuator moves a joint.
+    """Return the number of the robot's body.
 
-    If actuators move only tendons, it is the first body. None if the model has no body.
+    It is the top-level body that contains the joint or site of the first actuator that has one. If actuators
+    move only tendons, it is the first body. Return None if the model has no body.
     """
     for index in range(model.nu):
         joint, site = motors.joint_of(model, index), int(model.actuator_trnid[index][0])
@@ -83,7 +85,7 @@ class _Fitter:
     def fit(self) -> Equipment:
         """Return the devices."""
         model = self._model.model
-        self._model.settle()  # needed before motors read the lengths of tendons
+        self._model.settle()  # computes the lengths of tendons, which motors read
         for index in range(model.nu):
             self._add_actuator(index)
         for index in range(model.nsensor):
@@ -174,10 +176,11 @@ class _Fitter:
         return True
 
     def _name(self, section: str, default: str, other: str, folder: str = "") -> str | None:
-        """Return the name of a device, below `folder`; None if the user left the device out.
+        """Return the name of a device, with the prefix `folder`; None if the user left the device out.
 
-        Names in a model are unique within a section; if a device of another section has the name, this device
-        gets `other`. MuJoCo allows all characters in names, ROS only a few.
+        MuJoCo allows all characters in names, but ROS allows only a few, so the others are replaced. In a
+        model, names are unique only within a section. If a device of another section already has the name,
+        this device gets the name `other`.
         """
         key = f"{section}/{default}"
         self._known.add(key)
@@ -188,7 +191,7 @@ class _Fitter:
         return None if name == LEFT_OUT else f"{folder}{name}"
 
     def _is_left_out(self, section: str, given: str, name: str, type_name: str) -> bool:
-        """Return whether the user leaves out this type, which Webots does not have; record it if so."""
+        """Return whether the user leaves out devices of this type; if so, record the device in `left_out`."""
         if type_name not in self._leave_out.types:
             return False
         fact = f"the {section} {name!r} of type {type_name} has no device in Webots"
@@ -196,7 +199,7 @@ class _Fitter:
         return True
 
     def _unknown(self) -> Iterator[WorldError]:
-        """Yield an error for each device name in `custom` that the model does not have."""
+        """Yield an error for each device that `<custom>` names and that the model does not have."""
         for key in self._names:
             if key not in self._known:
                 section = key.partition("/")[0] + "/"
@@ -209,7 +212,7 @@ class _Fitter:
 
     def _shaft(self, joint: int) -> Shaft:
         slides = self._model.model.jnt_type[joint] == SLIDE
-        axis = (1.0, 0.0, 0.0)  # any axis, because MuJoCo moves the joint
+        axis = (1.0, 0.0, 0.0)  # an arbitrary axis: only MuJoCo computes the motion of the joint
         return self._shafts.setdefault(joint, Shaft(joint=Joint(axis=axis, slides=bool(slides))))
 
     def _reader(self, index: int) -> Callable[[], float]:
@@ -226,10 +229,10 @@ class _Fitter:
 
 
 def _actuator_names(model: Any) -> list[str]:
-    """Return the name of each actuator: its own, else that of its joint, else its number.
+    """Return a name for each actuator: its own name, or that of its joint, or "actuator" and its number.
 
-    If several actuators of one joint have no names, such as a position and a velocity servo, their names end
-    with their kinds, or else with their numbers.
+    Several actuators of one joint may lack names; for example, a position servo and a velocity servo. Their
+    names then end with their kinds, or with their numbers if the kinds are equal.
     """
     joints = [motors.joint_of(model, index) for index in range(model.nu)]
     plain = [
@@ -246,9 +249,10 @@ def _actuator_names(model: Any) -> list[str]:
 
 
 def _sensor_names(model: Any) -> list[str]:
-    """Return the name of each sensor: its own, else that of its object, or its number, with its type.
+    """Return a name for each sensor: its own name, or the name of the measured object with the sensor's type.
 
-    If several of one type without names have one object, their names end with their numbers.
+    If the object has no name either, the sensor's number replaces it. If several sensors would get the same
+    name, their names end with their numbers.
     """
     given = [model.sensor(index).name for index in range(model.nsensor)]
     objects = [
@@ -266,6 +270,6 @@ def _sensor_names(model: Any) -> list[str]:
 
 
 def _numbered(names: Sequence[str]) -> list[str]:
-    """Return names; those that occur several times end with their places."""
+    """Return `names`; to each name that occurs several times, its index is appended."""
     counts = Counter(names)
     return [f"{name}{index}" if counts[name] > 1 else name for index, name in enumerate(names)]

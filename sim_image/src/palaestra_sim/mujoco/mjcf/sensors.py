@@ -1,7 +1,8 @@
 """Sensors and cameras of a model as devices of Webots.
 
-A sensor whose value is one number has the interface of a PositionSensor. Sensors with more numbers have
-devices of their own; if Webots has no such device, see `generic_devices`.
+A sensor that measures one number becomes a PositionSensor; exceptions are distance and touch sensors. A
+sensor that measures several numbers becomes the matching device of Webots, such as a Gyro. If Webots has no
+such device, the sensor becomes a `MujocoSensor` of `generic_devices`.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from palaestra_sim.scene.devices.touch_sensor import TOUCH_SENSOR, TouchSensor
 from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.lookup_table import LookupTable
 
-_NOWHERE: Final = Frame(None, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0))  # unused, because MuJoCo measures
+_NOWHERE: Final = Frame(None, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0))  # not used: MuJoCo computes the values
 _PLAIN: Final = Axes(table=None, on=(True, True, True), resolution=-1.0)
 _FORCE: Final = 1  # the value that `get_type` of a touch sensor returns
 _PIXELS: Final = (64, 64)  # Webots' default, for a camera without a resolution
@@ -37,7 +38,7 @@ _PIXELS: Final = (64, 64)  # Webots' default, for a camera without a resolution
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Measured:
-    """A device, its row of the table of devices, and the function that sets its value."""
+    """A device, its device type, and the function that sets its value."""
 
     kind: DeviceType[Any]
     device: Any
@@ -52,8 +53,8 @@ class ModelSensor:
         model: the whole model.
         number: the number of the sensor.
         name: the name of the device.
-        numbers: a view of its value.
-        shaft: the joint that it measures; a new one without devices if it does not measure a joint.
+        numbers: a view of the sensor's current numbers in MuJoCo's data.
+        shaft: the joint that the sensor measures; if it does not measure a joint, a new unused one.
     """
 
     model: Model
@@ -69,13 +70,13 @@ def in_webots(model: Any, number: int) -> bool:
 
 
 def measured(sensor: ModelSensor) -> Measured:
-    """Return the device of a sensor: one of Webots, or else one that publishes the numbers as they are."""
+    """Return the device of a sensor: a device of Webots, or one that publishes the numbers unchanged."""
     make = _maker(sensor.model.model, sensor.number) or _numbers
     return make(sensor)
 
 
 def camera(parent: Model, number: int, name: str) -> Measured:
-    """Return the device of a camera, which shows the model as MuJoCo renders it."""
+    """Return the device of a camera; MuJoCo renders its images."""
     model = parent.model
     width, height = model.cam_resolution[number].tolist()
     size = (width, height) if width > 1 and height > 1 else _PIXELS
@@ -93,7 +94,7 @@ def camera(parent: Model, number: int, name: str) -> Measured:
 
 
 def _by_model(_devices: Sequence[Any], _robot: Carrier) -> Sample:
-    """Return a function without effect: the simulation itself samples the sensors of the model."""
+    """Return a function that does nothing: `MjcfSimulation` samples the sensors of the model."""
     return lambda: None
 
 
@@ -123,7 +124,7 @@ def _number(sensor: ModelSensor) -> Measured:
 
 
 def _distance(sensor: ModelSensor) -> Measured:
-    """Return a distance sensor, which reports its whole reach if it meets nothing."""
+    """Return a distance sensor; if its ray meets no surface, its value is its maximum range."""
     model = sensor.model.model
     reach_m = float(model.sensor_cutoff[sensor.number]) or float(model.vis.map.zfar * model.stat.extent)
     table = LookupTable([(0.0, 0.0, 0.0), (reach_m, reach_m, 0.0)])
@@ -214,7 +215,7 @@ _INERTIAL_UNIT: Final = _own(INERTIAL_UNIT)
 _GPS: Final = _own(GPS)
 _TOUCH_SENSOR: Final = _own(TOUCH_SENSOR)
 _MUJOCO_SENSOR: Final = _own(MUJOCO_SENSOR)
-_CAMERA: Final = replace(CAMERA, attach=lambda _camera, _robot: None)  # the camera's interface is already set
+_CAMERA: Final = replace(CAMERA, attach=lambda _camera, _robot: None)  # the device already has its camera
 _OF_ONE: Final[dict[int, Callable[[ModelSensor], Measured]]] = {
     int(mujoco.mjtSensor.mjSENS_RANGEFINDER): _distance,
     int(mujoco.mjtSensor.mjSENS_TOUCH): _touch,

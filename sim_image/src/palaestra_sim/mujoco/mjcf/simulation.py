@@ -1,6 +1,6 @@
-"""The Backend of an MJCF world: MuJoCo's own model, with one robot that has all devices.
+"""The simulation of an MJCF world (a `Backend`): MuJoCo's own model, with one robot that has all devices.
 
-The same world and commands give the same values, bit for bit, even after a reset.
+The same world and the same commands give the same values, bit for bit, also after a reset.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ class MjcfSimulation:
     """One loaded MJCF world; see `Backend`.
 
     Args:
-        model: in its initial state.
-        tree: its nodes.
+        model: the model in its initial state.
+        tree: the nodes of the model.
         equipment: the devices of the robot.
         robot: the robot itself.
-        basic_step_ms: a whole number of MuJoCo's steps.
-        mode: the mode at the start.
+        basic_step_ms: the basic step in milliseconds, a whole number of MuJoCo's steps.
+        mode: the simulation mode at the start.
     """
 
     def __init__(
@@ -54,8 +54,8 @@ class MjcfSimulation:
         self.time_ms = 0
         self.mode = mode
         self.quit_status: int | None = None
-        self.forces = False  # masses and frictions are MuJoCo's own
-        self.unread_textures = 0  # only infra-red sensors read textures, and no model has such sensors
+        self.forces = False  # the nodes have no masses and frictions; the model has its own
+        self.unread_textures = 0  # textures affect only infra-red sensors, which MJCF does not have
         self.left_out: tuple[WorldError, ...] = tuple(equipment.left_out)
         self.basic_step_ms = basic_step_ms
         self.motion = BodyMotion(model, tree.bodies)
@@ -67,12 +67,12 @@ class MjcfSimulation:
         self._states = BodyStates(model, tree.bodies)
         self._step_s = basic_step_ms / 1000.0
         self._steps = round(self._step_s / float(model.model.opt.timestep))
-        model.model.opt.timestep = self._step_s / self._steps  # a file may round 1/240 s
+        model.model.opt.timestep = self._step_s / self._steps  # exact, although a file may round 1/240 s
         self._pending: list[Callable[[], None]] = []
         self._reset_asked = False
 
     def step(self, duration_ms: int) -> None:
-        """Simulate for `duration_ms`, then set the values of the sensors.
+        """Simulate for `duration_ms`, then measure the value of every sensor.
 
         Raises:
             ValueError: the duration is not a positive multiple of the basic step.
@@ -81,7 +81,7 @@ class MjcfSimulation:
         self.sample()
 
     def advance(self, duration_ms: int) -> None:
-        """Simulate for `duration_ms`; the sensors keep their values.
+        """Simulate for `duration_ms`; the values of sensors do not change until `sample`.
 
         Raises:
             ValueError: the duration is not a positive multiple of the basic step.
@@ -94,7 +94,7 @@ class MjcfSimulation:
             self._basic_step()
 
     def sample(self) -> None:
-        """Set the value of every sensor to that of this moment."""
+        """Measure the value of every sensor now."""
         self._model.settle()
         for motor in self._equipment.motors:
             motor.feel()
@@ -106,7 +106,7 @@ class MjcfSimulation:
         self._pending.append(change)
 
     def changed(self, node: SceneNode, field: str) -> None:
-        """Set the pose of a body to that of its field."""
+        """Set the pose of a body to the new value of its field `translation` or `rotation`."""
         if node.place is None:
             return
         if field == "translation":
@@ -121,7 +121,7 @@ class MjcfSimulation:
         self._reset_asked = True
 
     def reset_physics(self) -> None:
-        """Stop all motion, at once."""
+        """Stop all motion immediately."""
         self._model.data.qvel[:] = 0.0
         self._model.changed()
 
@@ -130,16 +130,16 @@ class MjcfSimulation:
         self.quit_status = status
 
     def robot_of(self, node: SceneNode) -> Robot | None:
-        """Return the robot of its node; None for any other node."""
+        """Return the robot if `node` is its node; None for any other node."""
         return self.robots[0] if node is self._nodes.robot else None
 
     def add(self, text: str, field: NodeField, index: int) -> Never:
-        """Raise an error: a model is compiled once."""
+        """Raise an error: bodies cannot be added to a compiled model."""
         del text, field, index
         raise UnsimulatedError(_FIXED)
 
     def remove(self, node: SceneNode) -> Never:
-        """Raise an error: a model is compiled once."""
+        """Raise an error: bodies cannot be removed from a compiled model."""
         del node
         raise UnsimulatedError(_FIXED)
 
@@ -149,7 +149,10 @@ class MjcfSimulation:
         return False
 
     def contact_points(self, node: SceneNode, *, descendants: bool) -> list[tuple[Vector, int]]:
-        """Return a body's contact points: positions in meters, each with the number of its node."""
+        """Return the contact points of a body: each has a position in meters and the number of a node.
+
+        With `descendants`, the contact points of all bodies inside it are included.
+        """
         self._model.settle()
         asked = {node, *node.descendants()} if descendants else {node}
         touching = {self._nodes.bodies[it]: it.number for it in asked if it in self._nodes.bodies}
@@ -167,7 +170,7 @@ class MjcfSimulation:
         self._states.save(node, name)
 
     def load_state(self, node: SceneNode, name: str) -> None:
-        """Return a node to a saved state, at rest; "__init__" is the state in the world file.
+        """Return a node to a saved state and stop its motion; "__init__" is the state in the world file.
 
         Raises:
             UnsimulatedError: no state of that name was saved.
@@ -175,10 +178,10 @@ class MjcfSimulation:
         self._states.load(node, name)
 
     def set_joint_position(self, node: SceneNode, position: float, index: int) -> None:
-        """Set the position of a hinge or slider within its range, in rad or m, at rest.
+        """Set the position of a hinge or slider in rad or m, cut to its range, and stop its motion.
 
         Raises:
-            UnsimulatedError: the node is not such a joint, or has no axis `index`, counted from 1.
+            UnsimulatedError: the node is not a hinge or slider, or `index` is not 1, the number of its axis.
         """
         joint = self._nodes.joints.get(node)
         model = self._model.model
@@ -216,7 +219,7 @@ class MjcfSimulation:
         self._reset_asked = False
         self.time_ms = 0
         self._model.reset()
-        self._model.settle()  # needed before motors read the lengths of tendons
+        self._model.settle()  # computes the lengths of tendons, which motors read
         for motor in self._equipment.motors:
             motor.reset()
         for actuator in self._equipment.actuators:

@@ -1,4 +1,4 @@
-"""States of bodies, saved and loaded by name: the positions of joints. A loaded body is at rest."""
+"""Save and load states of bodies by name. A state has the positions of joints; a loaded body is at rest."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class BodyStates:
     """The states that clients have saved.
 
     Args:
-        model: in its initial state.
+        model: the model in its initial state.
         bodies: maps a node to the number of its body.
     """
 
@@ -31,7 +31,7 @@ class BodyStates:
         self._saved[node.number, name] = self._model.data.qpos.copy()
 
     def load(self, node: SceneNode, name: str) -> None:
-        """Return these joints to a state.
+        """Return the joints of a node, and of all nodes inside it, to a saved state.
 
         Raises:
             UnsimulatedError: no state of that name was saved.
@@ -46,7 +46,7 @@ class BodyStates:
         for joint, saved in wanted.items():
             self._model.positions(joint)[:] = saved
             self._model.speeds(joint)[:] = 0.0
-        # The solver restarts too, so that the motion depends on the loaded state and not on earlier motion.
+        # Discard the solver's start values too, so that the motion does not depend on earlier motion.
         self._model.data.qacc_warmstart[:] = 0.0
         self._model.changed()
 

@@ -1,7 +1,8 @@
-"""The nodes of a model: its bodies as Solids, its joints, and its devices, for a supervisor.
+"""Make nodes from the bodies, joints and devices of a model, for a supervisor.
 
-The DEF of a body is its name. The body of the robot is a Robot, with all devices that are not on a joint. The
-DEF of a joint is its name too, with `_joint` appended if a body has the same name.
+A body becomes a Solid, whose DEF is the name of the body. The body of the robot becomes a Robot; it has all
+devices that are not on a joint. The DEF of a joint is the name of the joint. If a body has the same name,
+`_joint` is appended.
 """
 
 from __future__ import annotations
@@ -20,11 +21,12 @@ from palaestra_sim.world import Item, Node, Value, World
 from palaestra_sim.world.mjcf import Description
 from palaestra_sim.world.tokens import Tokens
 
+# The node types of joints, by mjtJoint; a free joint has no node.
 _JOINTS: Final = {
     1: "BallJoint",
     2: "SliderJoint",
     3: "HingeJoint",
-}  # keys: mjtJoint; a free joint has no node
+}
 _PARAMETERS: Final = {"HingeJoint": "HingeJointParameters", "SliderJoint": "JointParameters"}
 
 
@@ -34,7 +36,7 @@ class ModelTree:
 
     Attributes:
         scene: all nodes.
-        robot: its node.
+        robot: the node of the robot.
         bodies: maps a node to the number of its body.
         joints: maps a node to the number of its joint.
     """
@@ -48,9 +50,14 @@ class ModelTree:
 def grow(
     model: Model, description: Description, equipment: Equipment, body: int, basic_step_ms: int
 ) -> ModelTree:
-    """Return the nodes of a model, with their frames; `body` is the robot.
+    """Return the nodes of a model, with their frames.
 
-    The devices of the equipment get their nodes.
+    Args:
+        model: the model.
+        description: the names that the file gives to robot and devices.
+        equipment: the devices; their nodes are added to it.
+        body: the number of the robot's body.
+        basic_step_ms: the basic step in milliseconds.
     """
     builder = _Builder(model, description, equipment, body)
     scene = SceneTree(builder.world(basic_step_ms), description.source.name)
@@ -70,7 +77,7 @@ def grow(
 
 
 def _place(model: Model, tree: ModelTree) -> None:
-    """Give the bodies their frames, parents first."""
+    """Set the frames of all bodies; a parent comes before its children."""
     places: dict[int, BodyFrame] = {}
     for node, number in sorted(tree.bodies.items(), key=lambda pair: pair[1]):
         parent = places.get(int(model.model.body_parentid[number]))
@@ -78,10 +85,10 @@ def _place(model: Model, tree: ModelTree) -> None:
 
 
 class _Builder:
-    """Builds nodes; the span of each is a unique number, by which it is found in the tree.
+    """Builds the nodes; each node gets a unique number as its span, by which it is found in the tree later.
 
     Attributes:
-        kinds: maps that number to the object of the model that the node stands for.
+        kinds: for each number, the kind and the number or name of the model's object.
     """
 
     def __init__(self, model: Model, description: Description, equipment: Equipment, body: int) -> None:
@@ -113,7 +120,10 @@ class _Builder:
         return tuple(node for number in numbers for node in self._body(number))
 
     def _body(self, number: int) -> tuple[Node, ...]:
-        """Return a body as the end point of its last joint, preceded by its other joints."""
+        """Return the nodes of a body: its joints; the last joint has the body as its end point.
+
+        A body without joints is returned itself.
+        """
         name = self._model.model.body(number).name
         children = list(self._children(number))
         fields: dict[str, Value] = {"name": _value(name or f"body{number}")}

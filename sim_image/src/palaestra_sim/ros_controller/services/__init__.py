@@ -1,4 +1,5 @@
-"""The services of Webots' `ros` controller, one module per group, each a table of paths, types and handlers.
+"""The services of Webots' `ros` controller, with one module for each group of services.
 
-Handlers get a request with the type's fields as attributes and return the response's fields.
+Each module has a table of paths, types and handlers. A handler gets a request, whose attributes are the
+fields of its type, and returns the fields of the response.
 """

@@ -1,4 +1,4 @@
-"""Devices over ROS: the services of each, and the feeds that publish values after the device is enabled."""
+"""The services and topics of devices; a device publishes values after a client has enabled it."""
 
 from __future__ import annotations
 
@@ -26,17 +26,21 @@ from palaestra_sim.scene.nodes.types import type_number
 class Feed:
     """One topic of a device.
 
-    A period that differs from earlier ones adds a second publisher of the same topic, as in the controller;
-    the messages of the two are mixed.
+    If a client enables the device again with another period, the topic gets a second publisher, as in Webots'
+    controller. Subscribers then get the messages of both publishers.
 
     Attributes:
-        constants: the other fields, with the values that they have when the topic begins.
-        reading: the field of the value; "" for the last one.
-        many: whether the value is a sequence, with a message for each of its items.
+        path: the path of the topic, relative to the robot.
+        type_name: the message type.
+        template: the constant fields of the header.
+        constants: the other constant fields; their values are read when the topic begins.
+        source: the object that has the current value; None if the topic never has messages.
+        reading: the field with the value; "" means the last field.
+        many: whether the value is a sequence; each of its items is sent in a separate message.
         whole: whether the value is a mapping of all fields.
         stamped: whether the messages have a header.
-        publishers: by period in ms.
-        newest: the value that was sent last; None before the first one, and after the end.
+        publishers: the publishers, by period in ms.
+        newest: the value that was sent last; None before the first message, and after the topic has ended.
     """
 
     path: str
@@ -52,7 +56,7 @@ class Feed:
     newest: Any = None
 
     def begin(self, node: NodeInterface, period_ms: int) -> None:
-        """Start to publish every `period_ms`, in addition to the other periods."""
+        """Start to publish with the period `period_ms`, in addition to earlier periods."""
         if period_ms not in self.publishers:
             template = {**self.template, **self.constants}
             self.publishers[period_ms] = node.advertise(
@@ -67,9 +71,9 @@ class Feed:
         self.newest = None
 
     def publish(self, elapsed_ms: int) -> None:
-        """Send the value to the subscribers, by each publisher that is due.
+        """Send the value to the subscribers, once for each publisher that is due.
 
-        Without a subscriber the value is not read, because rendering an image takes time.
+        If the topic has no subscriber, the value is not read, because it takes time to render an image.
         """
         source = self.source
         if source is None:
@@ -92,18 +96,18 @@ class Feed:
 
 
 class Outlet:
-    """All topics of one device; its `enable` starts and stops them together.
+    """All topics of one device; its service `enable` starts and stops all of them.
 
     Args:
-        node: the node that publishes.
-        device_name: as in the world.
+        node: the ROS node that publishes the topics.
+        device_name: the name of the device in the world.
         topics: the topics of the device.
         accepts: returns whether the device accepts a period.
-        enabled: called after a change with the sampling period in ms; 0 means that the device is off.
-        prefix: the prefix of `enable` and `get_sampling_period`, below the device.
+        enabled: called after each change with the sampling period in ms; 0 means that the device is off.
+        prefix: a prefix of the paths `enable` and `get_sampling_period`, such as "recognition_".
 
     Attributes:
-        feeds: one for each topic.
+        feeds: a feed for each topic.
     """
 
     def __init__(
@@ -138,10 +142,12 @@ class Outlet:
         self._periods_ms: set[int] = set()
 
     def enable(self, period_ms: int, step_ms: int) -> bool:
-        """Publish every `period_ms`; 0 stops. Return whether the device accepts the period.
+        """Start to publish with the period `period_ms`, or stop if it is 0.
+
+        Return whether the device accepts the period.
 
         Raises:
-            UnsimulatedError: the device cannot start, for example a camera on a machine that cannot render.
+            UnsimulatedError: the device cannot start; for example, a camera on a machine that cannot render.
         """
         if period_ms == 0:
             self._periods_ms.clear()
@@ -158,7 +164,10 @@ class Outlet:
         return True
 
     def services(self, step_ms: Callable[[], int]) -> tuple[Service, ...]:
-        """Return `enable` and `get_sampling_period`; `step_ms()` is the controller's last step."""
+        """Return the services `enable` and `get_sampling_period`.
+
+        `step_ms` returns the duration of the controller's last step.
+        """
 
         def enable(request: Any) -> dict[str, Any]:
             return {"success": self.enable(request.value, step_ms())}
@@ -173,13 +182,16 @@ class Outlet:
 
 
 def stream_outlet(node: NodeInterface, device_name: str, stream: Stream) -> Outlet:
-    """Return the outlet of topics that have their own `enable`."""
+    """Return the outlet of those topics of a device that have a separate `enable` service."""
     accepts = never if stream.silent else whole_steps
     return Outlet(node, device_name, stream.topics, accepts, stream.enabled, stream.prefix)
 
 
 def device_services(kind: DeviceType[Any], device: Device, shaft: Shaft | None = None) -> tuple[Service, ...]:
-    """Return a device's services besides `enable` and `get_sampling_period`; `shaft` is its joint."""
+    """Return the services of a device, without `enable` and `get_sampling_period`.
+
+    `shaft` is the joint of the device, if it has one.
+    """
     rows: tuple[Row, ...] = (
         ("get_model", "get_string", lambda _: {"value": device.model}),
         ("get_name", "get_string", lambda _: {"value": device.name}),
@@ -189,7 +201,7 @@ def device_services(kind: DeviceType[Any], device: Device, shaft: Shaft | None =
 
 
 def services_below(path: str, rows: Iterable[Row]) -> tuple[Service, ...]:
-    """Return the services of a table, with their paths below `path`."""
+    """Return the services in `rows`, with paths below `path`."""
     return tuple(
         Service(f"{path}/{name}", f"webots_ros/{type_name}", handler) for name, type_name, handler in rows
     )

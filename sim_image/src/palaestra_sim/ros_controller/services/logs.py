@@ -1,7 +1,7 @@
-"""The log of a controller over ROS: `/rosout`, and the services with which rqt_logger_level sets its level.
+"""The ROS log of a controller: the topic `/rosout`, and the services with which tools set the log level.
 
-Every roscpp node has them. The simulator logs the requests that it refuses; the rest of roscpp's log would be
-about roscpp itself.
+Every roscpp node has this topic and these services; rqt_logger_level uses them. The simulator logs only the
+requests that it refuses. The other messages of roscpp's log are about roscpp itself.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ class NodeLog:
     """The log of one node.
 
     Args:
-        node: the node that logs.
+        node: the node in whose name messages are logged.
         clock: returns seconds of real time since 1970.
     """
 
@@ -59,7 +59,10 @@ class NodeLog:
         )
 
     def reporting(self, path: str, handler: Handler) -> Handler:
-        """Return a handler that logs its failures, and turns our errors into failures of the service."""
+        """Return a handler that also logs each failure of the service `path`.
+
+        A `SimError` becomes a `ServiceFailed`, so that the client gets the error text.
+        """
 
         def handle(request: Any) -> Any:
             try:

@@ -1,4 +1,4 @@
-"""Services under `robot/`, and those of the pseudo devices that every robot has."""
+"""The services under `robot/`, and services under `palaestra/` that Webots does not have."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from palaestra_sim.scene.robot import Robot
 
 Fields = dict[str, Any]
 
-_MOST_TEXTS: Final = 100  # maximum number of texts that wait for the controller
+_MOST_TEXTS: Final = 100  # maximum number of queued texts from the robot's window
 
 
 class RobotServices:
-    """The services of one robot about itself, except `time_step` and `get_device_list`."""
+    """The services of one robot, except `time_step` and those of its devices."""
 
     def __init__(self, host: Host, simulation: Backend, robot: Robot) -> None:
         self._host = host
@@ -68,7 +68,10 @@ class RobotServices:
         )
 
     def device_list(self) -> Service:
-        """Return the service that is advertised last: a client that finds it finds all services."""
+        """Return `get_device_list`, which is advertised last.
+
+        A client that waits for this service then finds all other services.
+        """
         names = list(self._robot.parts.devices.names)
         return Service("robot/get_device_list", "webots_ros/robot_get_device_list", lambda _: {"list": names})
 
@@ -76,7 +79,7 @@ class RobotServices:
         return {"value": self._from_window.popleft() if self._from_window else ""}
 
     def _send_as_window(self, request: Any) -> Fields:
-        """Queue a text for the controller, as the robot's window does in Webots."""
+        """Queue a text for the controller, as if the robot's window in Webots had sent it."""
         if len(self._from_window) == _MOST_TEXTS:
             return {"success": False}
         self._from_window.append(request.value)

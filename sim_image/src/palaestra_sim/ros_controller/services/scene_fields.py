@@ -1,9 +1,9 @@
-"""Services under `supervisor/field/`: read and write typed values by handle.
+"""Services under `supervisor/field/`: read and write the values of fields by handle.
 
-A write of a value that a field cannot hold returns success 1, as in the controller. If only this simulator
-would ignore a write, the call fails with the reason. A read of the wrong type returns 0 or "" where
-libController has such a value. It fails where libController has a null pointer (vectors, rotations, colors),
-which crashes the real controller.
+If a client writes a value that the field cannot hold, the call returns success 1, as in Webots' controller.
+If Webots would apply a write that this simulator cannot apply, the call fails with the reason. If a client
+reads a value of the wrong type, the result is 0 or "", as in libController. For vectors, rotations and colors
+libController returns a null pointer, which crashes Webots' controller; here the call fails.
 """
 
 from __future__ import annotations
@@ -22,7 +22,10 @@ Fields = dict[str, Any]
 
 
 class _Codec(NamedTuple):
-    """The conversion of a type's values to and from messages, and the value that stands for no value."""
+    """Converts the values of a field type to and from messages.
+
+    `absent` is the result of a read without a value; None if such a read fails.
+    """
 
     type: FieldType
     write: Callable[[Any], Any]
@@ -57,7 +60,7 @@ _CODECS: Final = {
 
 
 class FieldServices:
-    """The services of one supervisor that take a field's handle."""
+    """The services of one supervisor that take the handle of a field."""
 
     def __init__(self, handles: Handles) -> None:
         self._handles = handles

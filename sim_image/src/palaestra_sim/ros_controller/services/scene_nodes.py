@@ -1,7 +1,7 @@
-"""Services under `supervisor/node/`: a node's type, its position, and changes to it.
+"""Services under `supervisor/node/`: read the type and the pose of a node, and change the node.
 
-If the simulator does not support a request, such as forces in the stub, the call fails with the reason. It
-does not return success without an effect.
+If the simulator does not support a request, such as a force in the stub, the call fails with the reason. The
+call does not return success without an effect.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Fields = dict[str, Any]
 
 
 class NodeServices:
-    """The services of one supervisor that take a node's handle."""
+    """The services of one supervisor that take the handle of a node."""
 
     def __init__(self, host: Host, handles: Handles) -> None:
         self._host = host
@@ -119,9 +119,10 @@ class NodeServices:
         return {"orientation": _quaternion(_pose(self._node(request)))}
 
     def _get_pose(self, request: Any) -> Fields:
-        """Return the pose of `from_node` relative to `node`, swapped as in the controller.
+        """Return the pose of `from_node` relative to `node`.
 
-        Webots crashes for a `from_node` of 0; here the call fails.
+        The names suggest the opposite, but Webots' controller swaps the nodes in this way. If `from_node` is
+        0, Webots crashes; here the call fails.
         """
         node = _pose(self._node(request))
         other = _pose(self._handles.node(request.from_node))
@@ -136,7 +137,7 @@ class NodeServices:
         }
 
     def _get_center_of_mass(self, request: Any) -> Fields:
-        """Return the origin of the node, because nodes have no masses here."""
+        """Return the origin of the node; this service ignores masses."""
         return {"centerOfMass": _point(_place(self._node(request)).world_position)}
 
     def _get_static_balance(self, request: Any) -> Fields:
@@ -200,7 +201,7 @@ class NodeServices:
         return {"value": len(kinds_of(node)) if _has_fields(node, request) else -1}
 
     def _export_string(self, request: Any) -> Fields:
-        """Return the node's text in the world file."""
+        """Return the text of the node in the world file."""
         origin = self._node(request).origin
         if origin is None:
             return {"value": self._handles.tree.source.decode()}
@@ -241,7 +242,7 @@ class NodeServices:
 
 
 def _has_fields(node: SceneNode, request: Any) -> bool:
-    """Return whether a node has fields of the requested sort; only instances of PROTOs have inner fields."""
+    """Return whether a node has the requested fields; only an instance of a PROTO has inner fields."""
     return bool(node.proto_name) or not request.proto
 
 
@@ -251,7 +252,13 @@ def _pose(node: SceneNode) -> Pose:
 
 
 def _place(node: SceneNode) -> Frame:
-    """Return the frame of a node; in Webots a node without a frame crashes the controller."""
+    """Return the frame of a node.
+
+    Webots' controller crashes for a node without a frame.
+
+    Raises:
+        ServiceFailed: the node has no frame.
+    """
     if node.place is None:
         raise ServiceFailed(f"a {node.type_name} has no position; use a Pose, Solid or Robot")
     return node.place

@@ -1,6 +1,6 @@
-"""Services under `supervisor/`: the simulation as a whole, and the first handles of nodes.
+"""Services under `supervisor/`: they control the whole simulation, and return handles of nodes.
 
-Images and movies are saved if the simulator renders. Animations fail.
+Images and movies are saved if the simulator can render. A request for an animation fails.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _HEADSET: Final = "virtual_reality_headset"
 
 
 class SupervisorServices:
-    """The services of one supervisor that act on the whole simulation."""
+    """The services of one supervisor that control the whole simulation, or return handles of nodes."""
 
     def __init__(self, host: Host, handles: Handles, robot: Robot) -> None:
         self._host = host
@@ -121,7 +121,7 @@ class SupervisorServices:
         return {"value": self._handles.of(self._robot.parts.node)}
 
     def _get_from_def(self, request: Any) -> Fields:
-        """Find a DEF anywhere, or inside the instance of a PROTO."""
+        """Return the handle of the node with a DEF name, in the world or inside an instance of a PROTO."""
         within = self._handles.node(request.proto) if request.proto else None
         if within is not None and not within.proto_name:
             return {"node": 0}
