@@ -162,15 +162,15 @@ def test_a_rounded_timestep_makes_the_step_that_is_meant(timestep, step_ms):
 
 
 GROWING = [
-    ('<replicate count="1000000000"><geom size="1"/></replicate>', "<replicate> makes 1e+09"),
-    ('<replicate count="1000"><replicate count="1000"/></replicate>', "<replicate> makes 1e+06"),
-    ('<flexcomp type="grid" count="3000 3000 3000"/>', "<flexcomp> makes 2.7e+10"),
-    ('<composite count="3000 3000 1"/>', "<composite> makes 9e+06"),
-    ('<hfield nrow="100000" ncol="100000"/>', "<hfield> makes 1e+10"),
-    ('<texture builtin="flat" width="100000" height="100000"/>', "<texture> makes 1e+10"),
-    ('<camera resolution="100000 100000"/>', "<camera> makes 1e+10"),
-    ('<mesh builtin="supersphere" params="100000 1 1"/>', "<mesh> makes 1e+10"),
-    ('<size nuserdata="1000000000"/>', "<size> makes 1e+09"),
+    ('<replicate count="1000000000"><geom size="1"/></replicate>', "<replicate> has the size 1e+09"),
+    ('<replicate count="1000"><replicate count="1000"/></replicate>', "<replicate> has the size 1e+06"),
+    ('<flexcomp type="grid" count="3000 3000 3000"/>', "<flexcomp> has the size 2.7e+10"),
+    ('<composite count="3000 3000 1"/>', "<composite> has the size 9e+06"),
+    ('<hfield nrow="100000" ncol="100000"/>', "<hfield> has the size 1e+10"),
+    ('<texture builtin="flat" width="100000" height="100000"/>', "<texture> has the size 1e+10"),
+    ('<camera resolution="100000 100000"/>', "<camera> has the size 1e+10"),
+    ('<mesh builtin="supersphere" params="100000 1 1"/>', "<mesh> has the size 1e+10"),
+    ('<size nuserdata="1000000000"/>', "<size> has the size 1e+09"),
 ]
 
 
