@@ -84,7 +84,7 @@ def test_python_of_the_images_would_refuse_these_authorities(lenient, strict):
 
 
 def test_a_kubeconfig_reaches_a_server_whose_authority_lacks_extensions(lenient, tmp_path):
-    """kubectl accepts these authorities, so a user expects that `palaestra` does so too."""
+    """A user whose kubectl accepts these authorities expects that `palaestra` does so too."""
     lenient.script.calls = [reply(obj={"gitVersion": "v1.36.4"}), command(b"\x01hello", WORKED)]
     file = kubeconfig_of(tmp_path, lenient.address, **{"certificate-authority": str(lenient.authority)})
 

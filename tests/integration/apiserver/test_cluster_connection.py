@@ -76,7 +76,7 @@ def test_a_plugin_is_asked_for_a_token(rude, tmp_path):
 
 
 def test_certificates_may_stand_in_the_kubeconfig_itself(control_plane, tmp_path):
-    """kind and most clouds write kubeconfigs that contain the certificates."""
+    """Most clouds, and kind, write kubeconfigs that contain the certificates."""
     content = json.loads(control_plane.kubeconfig.read_text())
     for part in (content["clusters"][0]["cluster"], content["users"][0]["user"]):
         for field in [field for field in part if field != "server"]:

@@ -353,7 +353,7 @@ def test_a_pod_uses_the_proxy_of_the_environment(secure, tmp_path, monkeypatch):
 
 
 def test_a_proxy_of_the_environment_is_not_asked_for_this_machine(secure, tmp_path, monkeypatch):
-    """kubectl never uses a proxy for loopback addresses, and local test clusters have such addresses."""
+    """For loopback addresses, which local test clusters have, kubectl never uses a proxy."""
     monkeypatch.setenv("HTTPS_PROXY", "http://127.0.0.1:1")
 
     ask_all(
@@ -378,7 +378,7 @@ def test_a_server_may_have_an_address_of_ipv6(shown, authority, tmp_path):
 
 
 def test_a_server_without_a_scheme_is_https_where_there_are_settings_for_it(secure, tmp_path):
-    """kubectl completes such an address with https, so the client must do the same."""
+    """Like kubectl, the client must complete such an address with https."""
     server = secure.address.removeprefix("https://")
 
     ask_all(connect(written(tmp_path, server, {"token": "x"}, **{"certificate-authority": secure.ca})))

@@ -91,7 +91,7 @@ def test_no_process_of_it_outlives_a_killed_owner():
 
 
 def test_the_control_plane_of_a_run_ends_with_the_run_however_that_ends(tmp_path):
-    """pytest may be killed, and then no worker could end the control plane."""
+    """If pytest is killed, no worker can end the control plane."""
     folder = tmp_path / "plane"
     folder.mkdir()
     with ExitStack() as stack:
