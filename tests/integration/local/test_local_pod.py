@@ -199,7 +199,7 @@ def test_what_a_container_left_behind_ends_with_the_pod(stage):
 
 @pytest.mark.parametrize("lack", [None, errno.ENOSYS, errno.EPERM])
 def test_what_was_left_behind_is_killed_on_a_system_without_pidfd(lack, monkeypatch):
-    """pidfd is missing on old kernels (ENOSYS), behind seccomp filters (EPERM), and in some Pythons."""
+    """Old kernels (ENOSYS), seccomp filters (EPERM) and some builds of Python make pidfd unavailable."""
     if lack is None:
         monkeypatch.delattr(os, "pidfd_open")
     else:

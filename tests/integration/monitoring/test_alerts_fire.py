@@ -55,7 +55,7 @@ def folder(tmp_path):
 
 
 def test_the_alerts_are_rules_that_prometheus_reads_and_fire_and_clear_in_time():
-    """promtool simulates ten minutes in no time."""
+    """The rules take minutes to fire, and promtool simulates that time."""
     promtool = programs(PROGRAMS) / "promtool"
 
     for command in (["check", "rules", ALERTS], ["test", "rules", CASES]):
