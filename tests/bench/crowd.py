@@ -73,7 +73,7 @@ def renamed(template, name):
 
 
 def names(count):
-    """Return as many names of jobs as `count` says."""
+    """Return the names of `count` jobs."""
     return [f"job-{number:05d}" for number in range(count)]
 
 

@@ -92,9 +92,9 @@ def success_rate(run, episodes=EPISODES):
 
 
 def measure_baselines(scale=1.0):
-    """Return the success rates of two untrained policies on such episodes.
+    """Return the success rates of two untrained policies on the same episodes.
 
-    One drives at random; the other drives straight to the target.
+    The first policy drives at random, and the second one straight to the target.
     """
     with running() as (robot, scene, _):
         env = make(robot, scene, movements=MOVEMENTS)

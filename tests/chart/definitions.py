@@ -16,7 +16,7 @@ DOWNLOAD_S = 300
 def definitions(module: str, folder: str) -> Path:
     """Return a folder of a Go module, such as the folder of its CustomResourceDefinitions.
 
-    The module is downloaded only if `REQUIRED` is set, which forbids that tests are skipped.
+    The module is downloaded only if the variable PALAESTRA_REQUIRE_CLUSTER is 1.
 
     Raises:
         NoPrograms: Go or the module is missing.

@@ -85,7 +85,7 @@ def test_the_table_of_folders_names_every_folder_with_something_to_read():
 
 
 def test_every_path_that_contributing_names_is_there():
-    """New contributors follow its instructions; for a file that they create, only the folder must exist."""
+    """New contributors follow these instructions. Of a file that they create, only the folder must exist."""
     named = {whole or begun for whole, begun in PATH.findall(page("CONTRIBUTING.md"))}
 
     assert named >= NEW

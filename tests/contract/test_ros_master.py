@@ -80,7 +80,8 @@ class Oracle:
     def call(self, method, arguments):
         """Return code and value of the response, and the updates in sorted order."""
         self._sent = []
-        code, _, value = getattr(self._handler, method)(*copy.deepcopy(arguments))  # it changes them
+        # The method may change its arguments.
+        code, _, value = getattr(self._handler, method)(*copy.deepcopy(arguments))
         return code, plain(value), sorted(self._sent, key=repr)
 
 

@@ -58,7 +58,7 @@ class LongRun:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Stop to kill the operator, and delete both jobs."""
+        """Stop the thread that kills the operator, and delete both jobs."""
         self._ended.set()
         self._killer.join(END_S)
         self.namespace.delete()
@@ -120,7 +120,7 @@ def _pair() -> Object:
 
 
 def make_killable(namespace: Namespace) -> None:
-    """Change the operator's Deployment so that a test can send SIGKILL, as the kernel does without memory."""
+    """Change the operator's Deployment so that a test can end the operator with SIGKILL."""
     cluster = namespace.cluster
     cluster.patch("deployments", SYSTEM, OPERATOR, SHARED)
     cluster.rolled_out(SYSTEM, OPERATOR)

@@ -42,7 +42,7 @@ def alone(cluster):
     cluster.rolled_out(SYSTEM, OPERATOR)
 
 
-def test_an_operator_of_one_namespace_trains_there(alone, namespace):  # noqa: ARG001 - is put back
+def test_an_operator_of_one_namespace_trains_there(alone, namespace):  # noqa: ARG001 - it must scale
     """The release may create no ClusterRole, because a team may install it in its own namespace."""
     mode = ("--set=crds.install=false", f"--set=watchNamespaces={{{namespace.name}}}")
     helm("install", namespace.name, *mode, "--wait")

@@ -11,7 +11,7 @@ from tests.control_plane import shared
 from tests.control_plane.plane import ControlPlane
 from tests.integration.operator.cluster import Place
 
-RUN = shared.Run.of_this_process()  # created before the workers start, which inherit it
+RUN = shared.Run.of_this_process()  # created before pytest's workers, which inherit its environment
 
 
 @pytest.fixture(scope="session")

@@ -96,7 +96,7 @@ def test_a_kubeconfig_reaches_a_server_whose_authority_lacks_extensions(lenient,
 
 
 def test_a_pod_reaches_a_server_whose_authority_lacks_extensions(lenient, tmp_path, monkeypatch):
-    """Without this, the operator would never become ready in such a cluster."""
+    """If the client refused such an authority, the operator would never become ready in the cluster."""
     lenient.script.calls = [reply(obj={"gitVersion": "v1.36.4"})]
     (tmp_path / "ca.crt").write_bytes(lenient.authority.read_bytes())
     (tmp_path / "token").write_text("of-the-pod")

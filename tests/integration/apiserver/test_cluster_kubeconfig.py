@@ -165,7 +165,7 @@ def test_a_wrong_cluster_is_refused_in_one_sentence(tmp_path, cluster, fact):
 
 
 def test_a_tokens_file_may_end_with_a_newline(secure, tmp_path):
-    """`echo` adds a newline, which kubectl removes; the path is relative to the kubeconfig."""
+    """`echo` adds a newline, which kubectl removes. The path of the file is relative to the kubeconfig."""
     (tmp_path / "token").write_text("in-a-file\n")
     user = {"tokenFile": "token", "token": "older"}
 
@@ -175,7 +175,7 @@ def test_a_tokens_file_may_end_with_a_newline(secure, tmp_path):
 
 
 def test_a_user_may_have_a_password(secure, tmp_path):
-    """API servers no longer accept passwords, but a proxy before the server may."""
+    """API servers no longer accept passwords, but a proxy in front of an API server may accept them."""
     user = {"username": "me", "password": "p:w"}
 
     ask_all(connect(written(tmp_path, secure.address, user, **{"certificate-authority": secure.ca})))
@@ -214,7 +214,7 @@ def test_a_plugin_is_run_where_the_kubeconfig_lies_and_again_when_its_token_has_
 
 
 def test_a_plugin_may_give_a_certificate(authority, tmp_path):
-    """The logins of some companies issue certificates; this server requires one."""
+    """The login programs of some companies issue certificates. The server of this test requires one."""
     server, client = authority.server(["127.0.0.1"]), authority.client("me", "", tmp_path)
     asking = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     asking.load_cert_chain(server.certificate, server.key)

@@ -157,7 +157,7 @@ def test_a_forgotten_version_means_a_new_list_and_no_missed_deletion(follow, for
 
 
 def test_a_version_that_is_forgotten_again_and_again_does_not_become_a_storm(follow, rude):
-    """Some clients give up at the second 410, and others send 3,000 requests per second."""
+    """After repeated 410 errors, some clients give up, and others send 3,000 requests per second."""
     followed = follow()
     rude.script.watches = [refusal(410, "Expired")]
     followed.wait_reported("a", "b")
@@ -181,7 +181,7 @@ def test_trouble_that_lasts_is_met_with_patience(follow, rude, trouble):
 
 
 def test_an_event_that_was_cut_is_never_seen(follow):
-    """The half of an event must be dropped; the next watch brings the whole event."""
+    """The client must drop half of an event; the next watch brings the whole event."""
     followed = follow(stream(added("c", "11"), ends="broken"), stream(added("d", "12"), ends="silent"))
 
     followed.wait_reported("d")

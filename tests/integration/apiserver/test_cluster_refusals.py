@@ -185,7 +185,7 @@ def test_a_watch_that_ends_in_the_middle_of_an_event_did_not_end(rude, ends):
 
 
 def test_an_error_event_is_raised_as_what_it_is(rude):
-    """Without this, the cache would treat a Status as an object."""
+    """If no error were raised, the cache would store the Status as an object."""
     status = {"kind": "Status", "code": 500, "reason": "InternalError", "message": "etcd is gone"}
     rude.script.watches = [stream({"type": "ERROR", "object": status})]
 

@@ -118,7 +118,7 @@ def test_a_trial_prints_why_its_replica_waits(server, tmp_path, monkeypatch, cap
 
 @pytest.mark.parametrize(("phase", "code"), [("Succeeded", 0), ("Failed", 1)])
 def test_a_trial_that_cannot_be_deleted_for_now_is_reported_beside_its_verdict(tried, capsys, phase, code):
-    """That the API server restarts is not an error of the tested installation."""
+    """A short outage of the API server is no error of the tested installation."""
     assert tried(phase, refusal(503, "ServiceUnavailable")) == code
 
     assert "delete it by hand: `kubectl delete trainingjob -n robots trial-x7k2p`" in capsys.readouterr().out
@@ -223,7 +223,7 @@ def test_logs_of_a_container_that_is_not_there_lists_those_that_are(server, caps
     ],
 )
 def test_an_event_knows_the_container_that_it_is_about(server, path, container):
-    """The kubelet's message `Container created` does not name the container, so the event must."""
+    """The kubelet's message `Container created` lacks the container's name, which a user needs."""
     script, kubeconfig = server
     event = {
         "metadata": {"name": "a", "creationTimestamp": "2026-01-31T12:00:00Z"},

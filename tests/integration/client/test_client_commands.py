@@ -272,7 +272,7 @@ def test_a_job_that_has_ended_is_neither_suspended_nor_resumed(typed, place, tel
 
 
 def test_restart_refuses_a_job_that_has_lost_nothing(typed, place, tell):
-    """Otherwise the request would take effect at a later loss, and restart the run unasked."""
+    """A request that stays in the job would restart the run at a later loss, without the user's consent."""
     place.train("a")
     tell("a", "Running", replicas=[REPLICA])
 

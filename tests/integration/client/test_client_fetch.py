@@ -218,7 +218,7 @@ def test_a_copy_that_takes_too_long_says_so(scene):
 
 @pytest.mark.parametrize("code", [403, 503])
 def test_a_pod_that_cannot_be_deleted_spoils_no_copy(scene, code):
-    """The pod ends by itself, and a repeated command would fail because the folder exists."""
+    """The copy is complete and the pod ends by itself, so the command must not fail."""
     scene.deletion = refusal(code, "Refused")
 
     assert scene.fetch() == scene.into / "job" / "0"

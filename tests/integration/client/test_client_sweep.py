@@ -67,7 +67,7 @@ def test_trials_are_jobs_with_a_label_that_their_queue_runs(file, client, place,
 
 
 def test_the_job_of_a_pruned_trial_is_deleted(file, client, place, tell, tmp_path):
-    """The pods of a pruned trial would only take resources from the others."""
+    """The pods of a pruned trial would take resources from the other trials."""
     space = {"trainer.steps": {"low": 100, "high": 200}}
     sweep = load(file(random=space, trials=2, optuna={"startupTrials": 1}))
     search, journal = OptunaSearch(sweep, tmp_path), tmp_path / "optuna.journal"
@@ -101,7 +101,7 @@ def test_a_job_that_is_not_of_the_sweep_is_not_touched(file, client, place, tmp_
 
 
 def test_a_namespace_in_the_job_is_that_of_the_command(file, client):
-    """If the command looked in another namespace than its jobs', it would wait forever."""
+    """If the command looked for its jobs in another namespace, the command would wait forever."""
     [trial] = trials(
         load(file(job={**JOB, "metadata": {"name": "j", "namespace": "x"}}, matrix={"seed": [1]}))
     )

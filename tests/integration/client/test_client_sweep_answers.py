@@ -103,7 +103,7 @@ def test_a_sweep_refuses_an_api_server_that_does_not_answer_at_first(server, tri
 
 @pytest.mark.parametrize("answers", [[], [reply(obj={"metadata": NAMED})]], ids=["before", "meanwhile"])
 def test_a_trial_whose_job_somebody_deletes_can_be_pruned(server, trial, answers):
-    """The user and the sweep may both delete the job of an unpromising trial."""
+    """If a user has deleted the job already, the sweep must not fail when it deletes that job."""
     script, kubeconfig = server
     script.calls = [*answers, refusal(404, "NotFound")]
 

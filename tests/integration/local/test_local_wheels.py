@@ -70,7 +70,7 @@ def test_the_wheels_install_into_each_python(version, programs):
 
 
 def test_a_job_is_trained_with_the_newest_python(programs, tmp_path):
-    """A module that this Python no longer has is noticed only at run time; a warning announces a removal."""
+    """Only a run shows that a module was removed from this Python; a warning announces the next removal."""
     folder = programs(next(filter(wheels.python, reversed(VERSIONS))))
     (tmp_path / "job.yaml").write_text(yaml.safe_dump(JOB))
 
@@ -121,7 +121,7 @@ SCRIPTS = [
 
 
 def test_the_trainer_refuses_pythons_for_which_its_pytorch_has_no_wheel():
-    """With this bound, `pip` reports a wrong Python; otherwise it would report only a missing PyTorch."""
+    """With the bound in requires-python, `pip` reports a wrong Python instead of a missing PyTorch."""
     bounds = tomllib.loads((ROOT / "trainer/pyproject.toml").read_text())["project"]["requires-python"]
 
     lowest, above = re.fullmatch(r">=3\.(\d+),<3\.(\d+)", bounds).groups()

@@ -64,7 +64,7 @@ def test_the_alerts_are_rules_that_prometheus_reads_and_fire_and_clear_in_time()
 
 
 def test_no_alert_is_without_a_case_in_which_it_fires_and_one_in_which_it_does_not():
-    """An alert that never fires, or that always fires, would pass a test of only the other case."""
+    """With only one of the two cases, an alert that always fires, or never fires, could pass."""
     cases = [case for test in yaml.safe_load(CASES.read_text())["tests"] for case in test["alert_rule_test"]]
     names = {rule["alert"] for rule in alerts()}
 
@@ -97,7 +97,7 @@ def test_the_alerts_about_a_sick_run_fire_and_clear(tmp_path, folder, rules):
 
 
 def test_alerts_fire_without_a_leader_and_without_an_operator(folder, rules, place, start):
-    """The second operator waits for the first one's Lease, which ends as in a power failure."""
+    """The first operator ends as in a power failure, and the second one waits until its Lease expires."""
     first = start(elect=True)
     address(first)
     second = start(elect=True)

@@ -1,6 +1,6 @@
 """An operator that kills itself after N writes: `mortal.py N operator …`; with N = 0, it does not.
 
-It ends when the API server has executed the write, and before the operator can react to the response.
+The operator ends when the API server has executed the write, and before it can react to the response.
 """
 
 import os

@@ -34,7 +34,7 @@ def test_a_job_is_planned_from_its_worlds_and_not_from_their_digests(place, star
 
 
 def test_a_large_job_is_refused_by_what_it_holds_and_not_by_what_is_kept_of_it(place, start):
-    """Only the operator can check these fields, and it must read the large ones, which its cache drops."""
+    """Only the operator checks these fields, so it must read the large fields that its cache drops."""
     start()
 
     place.train(trainer={"algorithm": {"hyperparameters": {"x": [0] * 30_000}}})

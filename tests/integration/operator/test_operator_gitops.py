@@ -69,7 +69,7 @@ def test_helm_waits_until_the_job_trains(place, start, type_in):
 
 
 def test_helm_fails_at_once_for_a_job_that_lacks_its_world(place, start, type_in, values):
-    """Without this, Helm would report the release as deployed, although the job cannot start."""
+    """If Helm did not fail, it would report the release as deployed, although the job cannot start."""
     start()
     values(world_of("nowhere"))
 
@@ -87,7 +87,7 @@ def test_helm_fails_at_once_for_a_job_that_lacks_its_world(place, start, type_in
 
 
 def test_helm_waits_for_a_job_that_no_operator_has_seen(type_in, values):
-    """Without this, every release would succeed in a cluster without an operator."""
+    """If Helm did not wait, every release would succeed in a cluster without an operator."""
     values({"trainer": {"steps": 100}})
 
     code, output = type_in(UPGRADE.replace("15m", "3s"))

@@ -52,7 +52,7 @@ def test_a_process_returns_the_verdicts_on_several_worlds() -> None:
     ],
 )
 def test_a_world_over_its_budget_is_refused(budget: dict[str, int], size: int, words: str) -> None:
-    """The author learns from the message which field, limit and remedy the refusal concerns.
+    """The message must tell the author the field, the limit and the remedy.
 
     The worlds that were checked before keep their verdicts.
     """

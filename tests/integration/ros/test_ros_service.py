@@ -167,7 +167,7 @@ def test_when_patience_is_over_nobody_is_waited_for(service):
 
 
 def test_what_a_call_waited_for_its_answer_is_counted(service):
-    """With this counter, a run separates the time of its simulators from its own."""
+    """From this counter, a user learns how much of a run's time its simulators needed."""
     before = waited_s()
     with pytest.raises(SimulatorHung):
         service("never", deadline_s=0.2)(ask=True)

@@ -37,7 +37,7 @@ def test_a_script_of_one_s_own_trains_in_the_simulators_of_its_job_through_their
     said = output.splitlines()[-4:]
     assert "mean return" in said[0]
     assert said[0].endswith("over 2 episodes")
-    assert said[1].split() == ["steps", str(ROLLOUT)]  # the script reported this
+    assert said[1].split() == ["steps", str(ROLLOUT)]  # the script reported these steps
     assert said[2].split() == ["run", "directory", str(training.directory)]
     assert said[3].endswith(f"tensorboard --logdir {training.directory / 'tensorboard'}")
     assert [(it["name"], it["role"]) for it in status["simulators"]] == [("collect-0", "Collect")]

@@ -45,7 +45,7 @@ def test_the_environment_of_a_simulator_has_the_number_of_its_start(sidecar) -> 
 
 
 def test_a_simulator_lets_a_trainer_on_its_processor_go_on(sidecar, waits) -> None:
-    """With the normal policy, a request would wake the simulator, which would interrupt the trainer."""
+    """With the normal scheduling policy, a simulator that gets a request would interrupt the trainer."""
     assert os.sched_getscheduler(sidecar(waits).start().pid) == os.SCHED_BATCH
 
 

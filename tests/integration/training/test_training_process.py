@@ -46,7 +46,7 @@ def summary(folder):
 def test_a_run_survives_a_fault(write_job, play, tmp_path, algorithm, collectors, steps):
     """The run must complete all steps and report one fault.
 
-    In a rollout with two simulators, each step of one during the restart of the other has an invalid row.
+    While one of two simulators restarts, each step of the other adds an invalid row to the rollout.
     """
     job = write_job(algorithm=algorithm, collectors=collectors)
 

@@ -50,7 +50,7 @@ def ready(process):
 
 
 def test_it_runs_where_no_ros_is_installed(stub):
-    """The stub must run on a laptop without ROS; only the master is another program."""
+    """The stub must run on a laptop without ROS, where only a ROS master is needed as another program."""
     process = stub(program=(sys.executable, "-c", WITHOUT_ROS))
     get_time = ready(process)
 
