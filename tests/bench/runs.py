@@ -38,7 +38,7 @@ def measured(figures, scale):
 
 
 def recovery(run):
-    """Return the seconds from SIGKILL of the stub that collects to the next environment step."""
+    """Return the seconds from the SIGKILL of the collecting stub to the next environment step."""
     before = run.ask()["step"]
     stub = run.pid_of("palaestra-stub", "collect-0.wbt")
     killed = time.monotonic()
@@ -48,7 +48,7 @@ def recovery(run):
 
 
 def shutdown(run):
-    """Return the seconds from SIGTERM of the sidecar that collects to the end of it and its stub."""
+    """Return the seconds from the SIGTERM of the collecting sidecar to the end of sidecar and stub."""
     sidecar, stub = (run.pid_of(it, "sim-collect-0/") for it in ("palaestra-sidecar", "palaestra-stub"))
     asked = time.monotonic()
     os.kill(sidecar, signal.SIGTERM)

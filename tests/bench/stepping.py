@@ -26,7 +26,7 @@ TOPICS = [*(f"ir{number}" for number in range(1, 10)), "touch_sensor"]
 
 
 def measure(scale=1.0):
-    """Return the steps per second of both, and the median of the ratios of all rounds."""
+    """Return the steps per second with each client, and the median of the rounds' ratios."""
     with running() as (robot, _, _):
         pairs = [(rate_of_ours(robot, scale), rate_of_rospy(scale)) for _ in range(scaled(ROUNDS, scale))]
     return {
@@ -37,7 +37,7 @@ def measure(scale=1.0):
 
 
 def rate_of_ours(robot, scale):
-    """Return the steps per second of Palaestra's clients, without rospy on the simulator."""
+    """Return the steps per second of Palaestra's clients while rospy is not connected."""
     robot.connect()
     ways = itertools.cycle((1.0, -1.0))
     found = rate(lambda: step(robot, next(ways)), scaled(OURS, scale))
@@ -46,7 +46,7 @@ def rate_of_ours(robot, scale):
 
 
 def rate_of_rospy(scale):
-    """Return the steps per second of rospy, without Palaestra's clients on the simulator."""
+    """Return the steps per second of rospy while Palaestra's clients are not connected."""
     stepper = RospyStepper("robotino")
     found = rate(stepper.step, scaled(ROSPYS, scale))
     stepper.close()

@@ -84,7 +84,7 @@ BESIDE: dict[str, dict[str, Any]] = {
 
 
 def rows() -> list[tuple[str, ...]]:
-    """Return a few sets of paths; any two paths occur in them alone, together, and not at all.
+    """Return sets of paths. For any two paths, a set has both, a set has neither, and two sets have one each.
 
     The first of the n + 1 sets is empty. Each path is in n/2 of the other sets, rounded up. Two such halves
     overlap, and neither contains the other (Katona 1973).

@@ -40,7 +40,10 @@ def test_every_link_leads_to_a_file_and_every_anchor_to_a_heading(page):
 
 
 def test_every_address_outside_the_pages_leads_to_a_page_and_its_heading():
-    """Messages, alerts, fields and docstrings name pages; only records of an old release may be outdated."""
+    """Messages, alerts, fields and docstrings name pages.
+
+    Only records of an old release may name old pages.
+    """
     listed = subprocess.run(["git", "ls-files"], cwd=ROOT, check=True, capture_output=True, text=True).stdout
     texts = {
         name: (ROOT / name).read_text()

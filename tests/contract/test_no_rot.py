@@ -66,7 +66,7 @@ def test_every_package_is_in_the_table_of_modules(package):
 
 @pytest.mark.parametrize("file", [pytest.param(file, id=".".join(file.parts[-3:-1])) for file in LISTING])
 def test_a_package_that_lists_its_modules_lists_all(file):
-    """A new contributor opens the module that the list names, and would not find a missing one."""
+    """A new contributor looks for a module in this list, and would not find a module that it lacks."""
     items = re.findall(r"^- (.*)$", docstring(file), re.MULTILINE)
     listed = {name for item in items for name in re.findall(r"`([a-z_]+)`(?=[,:]| and )", item)}
     modules = {path.stem for path in file.parent.glob("*.py")} - {"__init__"}
@@ -76,7 +76,7 @@ def test_a_package_that_lists_its_modules_lists_all(file):
 
 
 def test_the_table_of_folders_names_every_folder_with_something_to_read():
-    """The table is for users; `tests/` and `tools/` are for people who change the project."""
+    """The table is for users, so it leaves out `tests/` and `tools/`."""
     listed = re.findall(r"^\| `([a-z_]+)/[^`]*`", page("README.md"), re.MULTILINE)
     tracked = subprocess.run(["git", "ls-files"], cwd=ROOT, check=True, capture_output=True, text=True).stdout
     folders = {name.partition("/")[0] for name in tracked.split() if "/" in name and not name.startswith(".")}
@@ -85,7 +85,7 @@ def test_the_table_of_folders_names_every_folder_with_something_to_read():
 
 
 def test_every_path_that_contributing_names_is_there():
-    """New contributors follow these instructions. Of a file that they create, only the folder must exist."""
+    """New contributors follow CONTRIBUTING.md. Of a file that they create, only the folder must exist."""
     named = {whole or begun for whole, begun in PATH.findall(page("CONTRIBUTING.md"))}
 
     assert named >= NEW

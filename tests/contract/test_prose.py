@@ -55,7 +55,7 @@ def test_no_reason_needs_a_second_reading(reason, tmp_path):
     ],
 )
 def test_a_planted_sentence_is_found(planted, name, text, tmp_path):
-    """A rule with a mistake would find nothing, and its test would always pass."""
+    """If a rule contained a mistake, it could find nothing, and every sentence would pass."""
     path = tmp_path / name
     path.write_text(text.format(planted))
 

@@ -104,7 +104,7 @@ def ours(api, method, arguments):
 
 @given(st.lists(CALLS, max_size=30))
 def test_any_sequence_of_calls_has_the_answers_and_updates_of_rosmaster(calls):
-    """ROS nodes rely on these responses, and ours were written against rosmaster."""
+    """ROS nodes were written for rosmaster, so they rely on its responses."""
     oracle, api = Oracle(), MasterApi(URI, os.getpid())
 
     for method, arguments in calls:

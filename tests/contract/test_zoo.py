@@ -44,7 +44,7 @@ def test_the_trainer_accepts_the_hyperparameters_of_a_converted_entry(algorithm)
 
 
 def test_no_word_that_lives_elsewhere_becomes_a_hyperparameter():
-    """These words belong to other fields of a job, and as hyperparameters the trainer would reject them."""
+    """These words belong to other fields of a job, and the trainer rejects them as hyperparameters."""
     words = "".join(f"  {word}: null\n" for word in ELSEWHERE if word not in {"n_timesteps", "policy"})
 
     written = load(convert(f"a-v0:\n  n_timesteps: 5\n  policy: MlpPolicy\n{words}", "sac.yml").text)

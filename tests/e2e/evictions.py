@@ -13,7 +13,7 @@ from tests.e2e.jobs import make_slow_job
 from tests.e2e.namespace import Namespace
 
 NAME = "drained"
-EVICTIONS = 3  # more evictions would only wait longer
+EVICTIONS = 3  # more evictions would only lengthen the test
 EVERY_STEPS = 100
 APART = 100
 STEPS = 1500

@@ -1,4 +1,4 @@
-"""Small TrainingJobs. Those that train request normal resources; those that only wait request little."""
+"""Small TrainingJobs. Jobs that train request normal resources, and jobs that only wait request few."""
 
 import copy
 from typing import Any

@@ -25,7 +25,7 @@ NAMESPACE = "robots"
 TYPED_S = 300
 MADE_S = 120
 
-_BESIDE_A_TRAINING = "controllerManager.manager.resources.requests.cpu=50m"  # on two cores
+_BESIDE_A_TRAINING = "controllerManager.manager.resources.requests.cpu=50m"  # fits on two cores
 _FROM_THE_MODULE = """
 helm() {
   [[ $2 != palaestra ]] || return 0 # tests/e2e/allowances.py has allowed the class already
@@ -44,7 +44,7 @@ class Kueue:
         self._chart = ""
 
     def taken(self) -> str:
-        """Return the reason why Kueue cannot be installed (it or the namespace already exists), or ""."""
+        """Return why Kueue cannot be installed (Kueue or the namespace already exists), or ""."""
         if self._kinds():
             return "this cluster has a Kueue of its own"
         there = self._cluster.get("namespaces", None, NAMESPACE) is not None

@@ -1,8 +1,8 @@
-"""A user who may write TrainingJobs, but create no pods, gains no other permission by TrainingJobs.
+"""A user who may write TrainingJobs but not create pods gains no further permission through TrainingJobs.
 
 The user has only the role in manifests/examples/platform/roles.yaml. tests/e2e/escalations.py lists every
-attempt with its possible gain, and these tests check the outcome. No pod has to run for that: every job is
-suspended, and the tests check the operator's objects.
+attempt with its possible gain, and these tests check the outcome. No pod has to run for this check: every job
+is suspended, and the tests check the operator's objects.
 """
 
 import itertools
@@ -183,7 +183,8 @@ def test_a_field_of_pods_is_none_of_a_trainingjob(train, planned, plain, attempt
 def test_what_nobody_has_opened_to_jobs_is_not_used(train, shared, attempt):
     """The operator holds the job even if the object is in the user's own namespace.
 
-    It also holds metadata of pods that only other controllers read, because these may grant permissions.
+    It also holds jobs with metadata of pods that only other controllers read, because such metadata may grant
+    permissions.
     """
     name = f"held-{(*HELD, *METADATA).index(attempt)}"
     train(authors(name, (attempt.path, attempt.value)))
@@ -283,7 +284,7 @@ def test_metadata_reaches_no_object_of_the_operator(planned, plain, shared):
 
 
 def test_a_job_of_somebody_else_is_left_alone(train, shared):
-    """The name of a TrainingJob can give its Job the name of another user's Job, which must not change."""
+    """By the name of a TrainingJob, its author must not get control of another user's Job."""
     theirs = shared.create("jobs", somebody_s("theirs-0"))
 
     train(authors("theirs", ("spec.suspend", False)))

@@ -75,7 +75,7 @@ def test_the_status_tells_where_each_replica_stands(long_run):
 
 @pytest.mark.after_the_long_run
 def test_every_replica_trains_to_the_end_though_the_operator_is_killed_ten_times(long_run):
-    """SIGKILL of the operator at random times does not affect the pods.
+    """If the operator is killed at random times, the pods of its jobs continue.
 
     Each replica has one pod, one attempt and a complete training.
     """

@@ -44,7 +44,7 @@ def mark(namespace, name, pod):
     [(suspend, "suspension"), (delete, "disruption"), (evict, "disruption"), (mark, "operator")],
 )
 def test_a_run_goes_on_from_its_checkpoint_after(interrupt, counted, namespace):
-    """At most one checkpoint interval is lost, and nothing if the trainer saves a checkpoint at its end."""
+    """A run loses at most one checkpoint interval, and no step if its trainer saves a last checkpoint."""
     namespace.apply(make_slow_job("amid", steps=STEPS, every_steps=EVERY_STEPS, backoffLimit=0))
     first, before = namespace.wait_for_step("amid", AMID)
 
@@ -83,7 +83,7 @@ def test_a_run_that_has_ended_is_prolonged_by_another_job(namespace):
 
 
 def test_a_run_whose_claim_is_deleted_waits_for_a_person(namespace):
-    """Without its claim, the run would restart at step 0 unnoticed; a person must set an annotation first."""
+    """Without its claim, the run would restart at step 0 unnoticed, so a person must allow the restart."""
     namespace.apply(make_slow_job("amid", steps=STEPS, every_steps=EVERY_STEPS))
     _, lost_at = namespace.wait_for_step("amid", AMID)
     namespace.patch("amid", suspend=True)

@@ -138,7 +138,7 @@ def test_waiting_counts_as_nothing_and_a_preemption_as_a_suspension(story):
 
 @pytest.mark.parametrize("name", NEVER)
 def test_why_a_job_is_never_admitted_is_in_its_status(name, robots):
-    """A user finds the message on the page, next to the remedy."""
+    """A user finds the message in docs/howto/queues.md, next to the remedy."""
     asked, queue, told = NEVER[name]
     trainer = ENDS | {"resources": {"requests": asked, "limits": asked}}
     robots.apply(tiny_job(name, trainer=trainer, scheduling={"queueName": queue}))

@@ -35,7 +35,7 @@ def pod(shared):
 
 @pytest.fixture(scope="session")
 def enforced(shared_listener, monitor):
-    """Whether the cluster enforces NetworkPolicies; the test is a policy that denies everything.
+    """Whether the cluster enforces NetworkPolicies; the fixture tries a policy that denies everything.
 
     Kind's own network enforces policies, but on a busy machine only after a while.
     """
@@ -80,7 +80,7 @@ def test_no_stranger_reaches_a_training_pod(pod, shared, make_namespace, monitor
 
 
 def test_the_policy_admits_operator_and_monitoring_and_nobody_else(pod, shared, tmp_path):
-    """The tool cyclonus evaluates the policy; it was written to test networks.
+    """The test evaluates the policy with cyclonus, which is a tool of other authors.
 
     An error in Palaestra's understanding of policies therefore cannot hide in this test.
     """

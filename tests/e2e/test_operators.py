@@ -44,7 +44,7 @@ def holder(cluster):
 
 
 def test_two_operators_at_once_make_no_second_pod(deployment, namespace, cluster, job):
-    """Unique names prevent duplicates, not locks: here three operators act without an election."""
+    """Unique names prevent duplicates even if three operators act without an election, as in this test."""
     cluster.patch("deployments", SYSTEM, OPERATOR, {"spec": {"replicas": 3}})
     change(cluster, deployment, "--no-leader-elect")
     assert len(operators(namespace)) == 3

@@ -1,4 +1,4 @@
-"""Limits of a namespace: if one refuses a job's pods, the status has a reason until the limit is removed."""
+"""Limits of a namespace: if a limit refuses a job's pods, the status shows it until the limit is removed."""
 
 from dataclasses import dataclass, field
 

@@ -17,7 +17,7 @@ TOKEN = "/var/run/secrets/kubernetes.io/serviceaccount/token"
 
 
 def test_a_pod_that_asks_for_more_is_refused_here(namespace):
-    """The namespace really enforces *restricted*; without this, the tests below would prove nothing."""
+    """If the namespace did not enforce *restricted*, the tests below would prove nothing."""
     pod = plain_pod("control")
     del pod["spec"]["securityContext"]["runAsNonRoot"]
 

@@ -13,7 +13,7 @@ ENOUGH = {"requests": {"cpu": "50m", "memory": "160Mi"}}
 
 
 def test_a_differential_robot_drives_among_boxes_by_its_own_program(namespace, job):
-    """The robot is an E-puck, as its world names it.
+    """The robot is an E-puck, and the job's own program drives it instead of a trainer.
 
     The program exits with 0 only if the robot has reached its goal.
     """

@@ -1,4 +1,4 @@
-"""A run without an attendant, in a cluster that evicts its pods repeatedly."""
+"""A run without supervision, in a cluster that evicts its pods repeatedly."""
 
 import pytest
 

@@ -1,6 +1,6 @@
 """Actions of a person in a namespace, after which an operator has used each of its permissions.
 
-The list consists of actions, not of permissions. So a permission that no action needs is found.
+The list consists of actions, and not of permissions, so that unnecessary permissions are found.
 """
 
 from palaestra.plan.job import QUEUE_LABEL

@@ -19,7 +19,7 @@ SHAPES = (
     (re.compile(r"\b127(\.\d+){3}\b"), "<address>"),  # a trainer listens at the first free address
     # A digest in the name of an object, made from a uid or a namespace.
     (re.compile(r"(?<=[-_])([0-9a-f]{10}|[0-9a-f]{8}|[0-9a-f]{6})\b"), "<digest>"),
-    (re.compile(r"(-\d+)-[a-z0-9]{5}\b"), r"\1-<pod>"),  # of the Job controller
+    (re.compile(r"(-\d+)-[a-z0-9]{5}\b"), r"\1-<pod>"),  # the Job controller's random suffix
 )
 NUMBER = re.compile(r"\d+(\.\d+)?")
 DROPPED = frozenset({"managedFields", "resourceVersion"})

@@ -1,4 +1,4 @@
-"""Conditions that hold after every run with any fault, about its end state, its pods and its owners."""
+"""Conditions about the end state, pods and owners of a run, which hold after any fault."""
 
 import threading
 from collections import Counter, defaultdict

@@ -1,4 +1,4 @@
-"""Plans: each disturbs one request of one workload with one fault. Pure: a number always means the same plan.
+"""Plans: each disturbs one request of one workload with one fault. A number always means the same plan.
 
 The plans of a workload are numbered. First each row of `ROWS` disturbs the first request of its kind, then
 the second, and so on. If a workload sends fewer requests, the plan disturbs nothing.

@@ -327,7 +327,7 @@ def test_a_proxy_that_refuses_is_named(secure, tmp_path):
 
 @pytest.mark.parametrize("scheme", ["http", "socks5"])
 def test_the_proxy_of_the_environment_is_used(secure, tmp_path, monkeypatch, scheme):
-    """A user in a company sets the variable, and the client must reach a cluster outside."""
+    """A user in a company sets HTTPS_PROXY, and the client must reach a cluster outside of the company."""
     with relaying(secure.port) as (address, notes):
         monkeypatch.setenv("HTTPS_PROXY", f"{scheme}://{address}")
         settings = {"certificate-authority": secure.ca, "tls-server-name": "localhost"}

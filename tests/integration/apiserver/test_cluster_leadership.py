@@ -264,8 +264,8 @@ class Absent:
 def test_no_change_is_forgotten_after_an_absence_of_any_length(control_plane, namespace, tmp_path):
     """When two thirds of the lease's duration have passed without a renewal, a leader writes nothing.
 
-    After the next renewal, it still leads. Its changes from that time were once lost, because neither a later
-    change nor a new term caused another attempt.
+    After the next renewal, the leader writes again, in the same term. Earlier versions lost the changes from
+    the time between, because neither a later change nor a new term caused another attempt.
     """
     absences = [Absent(control_plane, namespace, tmp_path, step * ABSENT_S / 30) for step in range(1, 41)]
 

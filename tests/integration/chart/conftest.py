@@ -25,7 +25,7 @@ Kubectl = Callable[..., str]
 def control_plane(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ControlPlane]:
     """Yield a control plane that only this folder uses.
 
-    Other tests could not run there: the tests delete the definition, and every TrainingJob with it.
+    Its tests delete the definition, and with it every TrainingJob, so other tests need another one.
     """
     with running(tmp_path_factory.mktemp("chart")) as plane:
         yield plane

@@ -1,4 +1,4 @@
-"""The guide for coding agents trains jobs from an empty folder, with exactly its commands."""
+"""The commands of the guide for coding agents train jobs in an empty folder, without any other command."""
 
 import json
 from importlib.resources import files

@@ -28,7 +28,7 @@ def started(folder, *options, stdin=subprocess.DEVNULL):
 
 
 def test_a_task_that_ships_is_tried_without_a_problem(tmp_path):
-    """The checkers of two libraries and our own accept the task; all parts of a step's time are reported."""
+    """The task must pass all checks, and the command must report the time of every part of a step."""
     process = started(tmp_path, "--episodes", "2", "--json")
     out, err = process.communicate(timeout=PATIENCE_S)
 

@@ -34,7 +34,7 @@ def start(control_plane: ControlPlane, installed: Api, place: Place, tmp_path: P
         election = "--leader-elect" if elect else "--no-leader-elect"
         if elect and not started:
             fcntl.flock(turn, fcntl.LOCK_EX)
-            with suppress(NotFound):  # else an earlier test's Lease would have to expire
+            with suppress(NotFound):  # otherwise an earlier test's Lease must first expire
                 installed.delete(LEASES, NAMESPACE, NAME)
         log = tmp_path / f"operator-{len(started)}.log"
         common = (f"--namespace={place.name}", election, *options)

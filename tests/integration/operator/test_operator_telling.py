@@ -69,7 +69,7 @@ def test_the_metrics_count_jobs_by_phase(place, start):
 
 
 def test_the_metrics_are_those_of_the_page(place, start):
-    """A user relies on the page: each metric family must exist with its type, and no other family."""
+    """A user relies on the page, so the operator must serve exactly its metric families, with their types."""
     operator = start()
     place.train()
     place.pods()

@@ -89,7 +89,7 @@ def test_a_check_ends_with_the_operator(tmp_path: Path) -> None:
 
 
 def test_another_tenant_does_not_wait_for_costly_worlds(installed: Api, place: Place, start: Start) -> None:
-    """Only the author of the costly worlds may have to wait.
+    """Only the author of the costly worlds may wait for their check.
 
     The operator checks these worlds one by one, and the status of their jobs shows it.
     """

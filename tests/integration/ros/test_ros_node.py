@@ -67,7 +67,7 @@ def slave_api(peer):
 
 
 def test_the_answer_header_tells_the_type(peer, dial):
-    """`rosservice type` reads the type from this header."""
+    """`rosservice type` reads the type from the header of the response."""
     _, header = dial(**service_header(peer, "double", "webots_ros/set_float"))
 
     assert header["type"] == "webots_ros/set_float"

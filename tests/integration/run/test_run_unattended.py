@@ -25,7 +25,7 @@ MANY = "crash:probability=0.02 wrong_value:topic=ir2/value,step=31 exit:step=47 
 
 
 def test_every_fault_that_the_stub_knows_has_its_line_in_the_table_of_what_follows():
-    """A user must find the consequences of every fault; other tests run the faults of both tables.
+    """The table of consequences must contain every fault of docs/reference/faults.md.
 
     This test compares only the faults' names, because the texts may differ.
     """
@@ -135,7 +135,7 @@ def test_restarts_of_simulators_leave_nothing_behind():
     """After many restarts, the trainer and the sidecars must hold no more resources than before."""
     with running(leaks.job()) as run:
         early, late = leaks.least(run, 3, 6), leaks.least(run, 12, 15)
-        if leaks.grown(early, late):  # leaked memory stays; that of a restart is freed later
+        if leaks.grown(early, late):  # a cleanup after a restart may be late
             late = leaks.least(run, 20, 40)
 
     assert leaks.grown(early, late) == []

@@ -102,7 +102,10 @@ class Sidecar:
         eventually(lambda: sum(text in line for line in list(self.lines)) >= times)
 
     def start(self):
-        """Start the simulator; return the state once it has printed `up` and the sidecar knows it."""
+        """Start the simulator, and return its state.
+
+        The method waits until the simulator has printed `up` and the sidecar has noticed that it runs.
+        """
         ups = self.lines.count("up") + 1
         self.request("/start")
         eventually(lambda: self.lines.count("up") >= ups and was_seen(self.state))

@@ -28,7 +28,7 @@ as_process_1 = pytest.mark.skipif(not namespaces_work(), reason="no pid namespac
 
 
 def test_a_simulator_takes_its_family_along(sidecar, family, left, eventually_true) -> None:
-    """A child that has left group, session, parent and environment must be found too."""
+    """A child process that has left the simulator's group and session, and lost its parent, must end too."""
     it = sidecar(family)
     it.start()
     eventually_true(lambda: len(left()) == 6)  # sidecar, reaper, simulator and its three children

@@ -31,7 +31,10 @@ class Two:
         return SimulatorState.from_json(json.loads(text))
 
     def start(self, above):
-        """Start one simulator; return the state once it has printed `up` and the sidecar knows it."""
+        """Start one simulator, and return its state.
+
+        The method waits until the simulator has printed `up` and the sidecar has noticed that it runs.
+        """
         line = {FIRST: "a: up", SECOND: "b: up"}[above]
         ups = self.it.lines.count(line) + 1
         self.it.request(f"{above}/start")

@@ -121,7 +121,7 @@ def _answers(url: str) -> bool:
 
 
 def test_mlflow_has_both_attempts_as_one_run_with_the_curves_of_tensorboard(server, interrupted_and_resumed):
-    """The client cannot store runs without a server."""
+    """MLflow's client cannot store runs without a server, so this test starts a server."""
     tracking = pytest.importorskip("mlflow.tracking", reason=INSTALL)
     run = interrupted_and_resumed("palaestra_trainer.trackers.mlflow:MLflow", uri=server)
 

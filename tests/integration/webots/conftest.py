@@ -42,7 +42,7 @@ class Setup:
 
 
 class Standing:
-    """A simulator that several tests share; it must end while other simulators with its names run."""
+    """A simulator that several tests share. It must end before another simulator with its names starts."""
 
     def __init__(self):
         self._simulator = None

@@ -75,7 +75,7 @@ def test_after_a_context_that_broke_the_outermost_one_pauses_still(arena):
 def test_a_simulator_that_was_started_stands_until_it_is_let_go(arena):
     """A started stub would run and a started Webots would not, so both are paused.
 
-    Code that works with one must work with the other.
+    Code that works with the stub must work with Webots too.
     """
     arena.webots()
 

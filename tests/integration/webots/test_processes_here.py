@@ -67,7 +67,7 @@ def test_a_killed_script_leaves_no_simulator(master):
 
 
 def test_a_killed_script_leaves_no_folder_of_a_world_with_other_names(master, tmp_path):
-    """A second simulator of a world runs a copy, and such copies would fill the disk."""
+    """A second simulator of a world runs a copy of the world file, and such copies would fill the disk."""
     del master
     code = (
         "import sys\n"

@@ -62,7 +62,7 @@ def test_the_newest_robot_of_a_name_is_connected_and_no_other(own_arena):
 
 @pytest.mark.parametrize("begin", [Webots.start, Webots.__enter__])
 def test_a_hung_simulator_is_restarted_when_it_is_to_be_started(own_arena, begin):
-    """The sidecar still reports it as ready, and would refuse a second start."""
+    """The sidecar still reports the hung simulator as ready, and would refuse a second start."""
     hung = own_arena.pid
     os.kill(hung, signal.SIGSTOP)
 
