@@ -30,13 +30,13 @@ def blocks(language, pages=PAGES):
 
 @pytest.mark.parametrize("text", blocks("python", [page for page in PAGES if page != ROOT / "README.md"]))
 def test_python_runs(text):
-    """A reader copies a block and runs it. README.md has no Python of its own."""
+    """A reader copies a block and runs it. README.md contains no Python block."""
     exec(compile(text, "<page>", "exec"), {})
 
 
 @pytest.mark.parametrize("text", blocks("yaml"))
 def test_whole_jobs_are_right(text):
-    """A reader copies a complete job; a part of a job is checked by the tests of its page."""
+    """A reader copies a complete job. The tests of each page check the parts of jobs on that page."""
     if "kind: TrainingJob" in text:
         palaestra.api.load(text, "page")
 

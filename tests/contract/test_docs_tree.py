@@ -76,7 +76,7 @@ LLMS = ROOT / "llms.txt"
 
 
 def test_the_list_for_language_models_has_every_page_and_leads_nowhere_else():
-    """A program that reads only llms.txt finds every page; https://llmstxt.org defines the form."""
+    """A program that reads only llms.txt must find every page. https://llmstxt.org defines the format."""
     text = LLMS.read_text()
     listed = {target for _, target in re.findall(r"^- \[(.+?)\]\((.+?)\): .+\.$", text, re.MULTILINE)}
 
@@ -134,7 +134,7 @@ SOURCES = [
 
 @pytest.mark.parametrize("message", quoted())
 def test_a_message_that_troubleshooting_explains_is_printed_by_a_program(message):
-    """People search for the message that they see; `…` stands for names, numbers and system messages."""
+    """People search for the message that they see. In the headings, `…` stands for names and numbers."""
     text = "\n".join(path.read_text() for path in SOURCES)
     joined = re.sub(r'"\s*f?"', "", text)  # long messages consist of several literals
     words = re.split(r"…|\(ModuleNotFoundError: No module named|Address already in use", message)

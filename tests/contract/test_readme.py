@@ -51,7 +51,7 @@ def test_the_script_for_a_notebook_is_the_facade_example():
 
 
 def test_the_lines_shown_are_of_words_that_the_programs_print():
-    """The lines come from a real run; after an event is renamed, the README must be renewed."""
+    """The lines come from a real run, so the README must be renewed after an event is renamed."""
     folders = (ROOT / "trainer/src", ROOT / "operator/src")
     sources = "".join(path.read_text() for folder in folders for path in folder.rglob("*.py"))
     lines = block("text").splitlines()

@@ -166,7 +166,7 @@ RECORDED = (
 
 
 def test_recorded_calls_have_the_same_answers_on_the_wire(rosmaster):
-    """Clients see codes, values and their types after XML-RPC; only the status messages differ."""
+    """Clients see codes, values and their types after XML-RPC, so only the status messages may differ."""
     with MasterServer(name="localhost") as master:
         for method, *arguments in RECORDED:
             assert answered(master.uri, method, arguments) == answered(rosmaster, method, arguments), method
@@ -188,7 +188,10 @@ TOOLS = (["rostopic", "list", "-v"], ["rosservice", "list"])
 
 
 def test_ros_command_lines_print_the_same_with_both_masters(rosmaster):
-    """People use these programs to debug; `rosnode` and `rosparam` send the same calls."""
+    """People use these programs to debug.
+
+    `rosnode` and `rosparam` need no test, because they send the same calls.
+    """
     calls = [RECORDED[0], RECORDED[1], RECORDED[2]]
     with MasterServer(name="localhost") as master:
         for uri in (master.uri, rosmaster):

@@ -67,7 +67,7 @@ def ran(program, folder, *arguments):
     sorted({each.name for name in PACKAGES for each in distribution(name).entry_points}),
 )
 def test_each_program_starts_or_names_the_files(program, folder):
-    """A program that runs users' code must name the files and stop; other programs must start."""
+    """A program that runs users' code must name the files and stop. Every other program must start."""
     code, out, err = ran(program, folder, "--help")
 
     if program in WITH_CODE_OF_USERS:

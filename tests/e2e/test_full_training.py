@@ -25,7 +25,7 @@ def ros_names(content):
 
 
 def test_every_robot_of_all_pods_has_a_ros_name_of_its_own(long_run):
-    """In a world with fixed ROS names, only one simulator can run; the paper names this limitation."""
+    """With fixed ROS names, only one simulator of a world can run, which the paper names as a limitation."""
     known = {named(pod): set() for pod in long_run.pods()}
     space = long_run.namespace
     generated = [name for each in space.select("configmaps", PAIR) for name in ros_names(each["data"])]

@@ -43,7 +43,7 @@ def member(archive, name):
 
 @pytest.mark.parametrize("name", MOST_MB)
 def test_an_image_holds_no_more_than_it_needs(name, archives):
-    """Every new node pulls the image; docs/decisions/0005 lists the measured sizes."""
+    """Every new node pulls the image, so a large image delays jobs. docs/decisions/0005 lists the sizes."""
     assert archives[name].stat().st_size / 1e6 < MOST_MB[name]
 
 

@@ -60,7 +60,7 @@ def test_two_operators_at_once_make_no_second_pod(deployment, namespace, cluster
 
 
 def test_another_operator_takes_over_when_the_leader_is_gone(deployment, namespace, cluster, job):  # noqa: ARG001 - is put back
-    """A killed leader keeps its Lease until it expires; a leader that is stopped releases the Lease."""
+    """A killed leader keeps its Lease until the Lease expires, but a stopped leader releases it at once."""
     make_killable(namespace)
     cluster.patch("deployments", SYSTEM, OPERATOR, {"spec": {"replicas": 2}})
     cluster.rolled_out(SYSTEM, OPERATOR)

@@ -211,7 +211,10 @@ def test_the_script_of_the_page_about_python_trains(namespace, tmp_path):
 @pytest.mark.comes_late  # after the long run, which kills the operator repeatedly
 @pytest.mark.timeout(900)
 def test_the_sweep_of_the_page_trains_in_the_cluster(namespace, tmp_path):
-    """The sweep compares two trials with two seeds each; the commands list the jobs and delete them."""
+    """The sweep compares two trials with two seeds each.
+
+    The page's commands list the jobs and delete them.
+    """
     [sweep] = blocks(SWEEPS, "yaml sweep")
     (tmp_path / "sweep.yaml").write_text(sweep)
     home = at_home(namespace, tmp_path)

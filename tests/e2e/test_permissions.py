@@ -58,7 +58,7 @@ def roles(namespace):
 
 
 def test_every_granted_right_is_used_and_no_other(used):
-    """An unused permission is a security risk; without a needed permission, a job waits forever."""
+    """An unused permission is a security risk, and without a needed permission a job waits forever."""
     assert (SYSTEM, OPERATOR) in accounts(used)
     for namespace, account in accounts(used):
         allowed = granted(roles(namespace), namespace, account)

@@ -140,7 +140,10 @@ def test_the_status_quotes_the_refusal(name, refused):
 
 @pytest.mark.usefixtures("classes", "one_place")
 def test_a_job_that_the_scheduler_preempts_gets_an_event_and_comes_back(namespace, job):
-    """The scheduler preempts by PriorityClass even without a queue; this is a disruption, not a failure."""
+    """Even without a queue, the scheduler preempts by PriorityClass.
+
+    The job must not count this as a failure.
+    """
     namespace.apply(job("everyday", script=WAITS_ONCE, simulator=IN_PLACE, backoffLimit=0))
     namespace.wait_for_pod("everyday")
 

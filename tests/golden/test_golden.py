@@ -40,7 +40,7 @@ def test_every_recorded_plan_has_its_example_or_case():
 
 @for_each("job", plans.cases)
 def test_a_case_says_what_it_shows_and_shows_it(job):
-    """The caption tells a reader what to look for; a case without a difference would show nothing."""
+    """The caption tells a reader what the case shows, so a case without a difference would be useless."""
     caption, _, fields = job.read_text().partition("\n")
 
     assert caption.startswith("# ")

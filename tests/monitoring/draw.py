@@ -1,6 +1,6 @@
 """Draw a dashboard as a picture, with its panels in their Grafana positions and data from Prometheus.
 
-The pictures are for the documentation. Their content comes from the dashboard's JSON; their style differs
+The pictures are for the documentation. Their content comes from the dashboard's JSON, but their style differs
 from Grafana's.
 """
 

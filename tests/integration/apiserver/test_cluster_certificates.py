@@ -71,7 +71,7 @@ def kubeconfig_of(path, address, **cluster):
 
 
 def test_python_of_the_images_would_refuse_these_authorities(lenient, strict):
-    """The images' Python rejects these authorities by default; otherwise the other tests prove nothing."""
+    """If the images' Python accepted these authorities by default, the other tests would prove nothing."""
     context = strict(cafile=lenient.authority)
     assert context.verify_flags & ssl.VERIFY_X509_STRICT
     host, port = lenient.address.removeprefix("https://").split(":")
@@ -169,7 +169,7 @@ def test_a_server_may_have_another_name_in_its_certificate(wrong, tmp_path):
 
 
 def test_an_unverified_server_is_warned_of_once(wrong, tmp_path, caplog):
-    """The user has set `insecure-skip-tls-verify`; other warnings would make this test fail."""
+    """The user has set `insecure-skip-tls-verify`, and needs only one warning about it."""
     address, _ = wrong["dates"]
     file = kubeconfig_of(tmp_path, address, **{"insecure-skip-tls-verify": True})
     api = connect(file)

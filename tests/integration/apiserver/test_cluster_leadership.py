@@ -140,7 +140,7 @@ def test_a_leader_that_was_frozen_knows_that_it_is_none_when_it_wakes(candidate)
 
 
 def test_a_leader_whose_lease_was_deleted_takes_it_again(candidate, real, namespace):
-    """A user may delete the lease; the operator must create it again."""
+    """A user may delete the lease, and the operator must then create a new one."""
     first = candidate("first")
     assert first.line() == "leads True"
 

@@ -97,7 +97,7 @@ def follow(rude):
 
 
 def test_what_is_listed_and_what_is_added_is_known(follow):
-    """The server makes no mistake here; the tests below change one response each."""
+    """In this test, the server makes no mistake. Each of the tests below changes one response."""
     followed = follow(stream(added("c", "11"), ends="silent"))
 
     followed.wait_reported("a", "b", "c")
@@ -124,7 +124,7 @@ def test_an_object_whose_label_changes_is_reported_for_the_old_label_too(follow)
 
 
 def test_a_watch_that_is_silent_for_too_long_is_given_up_and_continued(follow):
-    """A half-open connection looks alive forever; the next watch continues from the last version."""
+    """A half-open connection looks alive forever, so the next watch must continue from the last version."""
     followed = follow(stream(added("c", "11"), ends="silent"), stream(added("d", "12"), ends="silent"))
 
     followed.wait_reported("d")

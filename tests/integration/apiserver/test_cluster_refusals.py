@@ -70,7 +70,7 @@ def test_a_write_that_a_busy_server_turned_away_is_repeated_when_it_says(rude):
 
 
 def test_a_busy_server_that_asks_for_more_time_than_there_is_gets_it_from_the_queue(rude):
-    """A worker must not sleep for a minute; the queue retries the job later."""
+    """A worker must not sleep for a minute, because the queue can retry the job later."""
     rude.script.calls = [refusal(429, "TooManyRequests", Retry_After="60")]
     started = time.monotonic()
 

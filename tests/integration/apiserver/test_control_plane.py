@@ -79,7 +79,7 @@ def test_nothing_of_it_is_left_when_it_is_asked_to_end(end):
 
 
 def test_no_process_of_it_outlives_a_killed_owner():
-    """The owner may be killed at any time; here the API server has only just started."""
+    """The owner may be killed at any time. This test kills it just after the start of the API server."""
     with owner() as process:
         started = eventually(lambda: set((found := children(process.pid)).values()) >= FIRST and found)
         etcd = next(pid for pid, program in started.items() if program == "etcd")

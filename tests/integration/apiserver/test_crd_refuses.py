@@ -182,7 +182,7 @@ def test_suspending_a_queued_job_by_hand_is_refused(create):
 
 
 def test_a_driver_that_is_a_command_needs_one(create):
-    """With driver command, the API requires an image too; without a command, that image is useless."""
+    """The driver `command` starts the job's own program, so the job must name the program's command."""
     code, said = create(
         changed_job(spec__simulators__0__driver="command", spec__simulators__0__image="mine:1")
     )

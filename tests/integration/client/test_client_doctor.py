@@ -232,7 +232,7 @@ def test_a_quota_with_room_is_no_hindrance_and_a_spent_one_hides_what_follows(fo
 
 
 def test_something_that_drops_restart_policy_is_found_by_a_dry_run(found, place):
-    """An old mutating webhook drops the unknown field; a policy stands in for the webhook here."""
+    """An old mutating webhook drops the unknown field. In this test, a policy stands in for the webhook."""
     expression = 'JSONPatch{op: "remove", path: "/spec/initContainers/0/restartPolicy"}'
     rule = {"apiGroups": [""], "apiVersions": ["v1"], "operations": ["CREATE"], "resources": ["pods"]}
     only_here = {"matchLabels": {"kubernetes.io/metadata.name": place.name}}

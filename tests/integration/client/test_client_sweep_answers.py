@@ -46,7 +46,7 @@ def test_a_trial_whose_job_was_deleted_makes_room_for_the_next(server, trial):
 
 
 def test_a_sweep_reports_an_api_server_that_is_away_once_and_its_return(server):
-    """Without a report the command would seem to hang; a short outage is not worth a line."""
+    """Without a report, the command would seem to hang, but a short outage is not worth a line."""
     script, kubeconfig = server
     none = reply(obj={"metadata": {}, "items": []})
     away = [refusal(503, "ServiceUnavailable")] * (QUIET_LOOKS - 1)

@@ -340,7 +340,7 @@ def _read_to_the_end(terminal: int) -> bytes:
 
 
 def test_a_differential_robot_drives_by_its_own_program(desk):
-    """A foreign world has no ROS name, no --synchronize, other wheel names, and PROTOs as URLs."""
+    """Another project's world has no ROS name, no --synchronize, other wheel names, and PROTOs as URLs."""
     desk.write(
         DRIVE,
         simulators=[rover()],

@@ -42,7 +42,7 @@ def test_a_task_that_ships_is_tried_without_a_problem(tmp_path):
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGKILL, -signal.SIGKILL)])
 def test_a_try_that_is_ended_leaves_no_process(tmp_path, number, code):
-    """Ctrl-C leaves no temporary file either; after SIGKILL, the folder of temporary files stays."""
+    """Ctrl-C leaves no temporary file either, but SIGKILL leaves the folder of temporary files."""
     process = started(tmp_path, "--episodes", "9999")
     with process:
         for line in process.stdout:

@@ -15,7 +15,10 @@ WRITES = {"create", "patch", "apply", "delete"}
 
 
 def die_after(writes: int) -> None:
-    """Make every operator of this process kill it after this many writes, without Lease and events."""
+    """Make each operator of this process kill the process after `writes` writes.
+
+    Writes of the Lease and of events do not count.
+    """
     count, lock = 0, threading.Lock()
     told = Metrics.request
 

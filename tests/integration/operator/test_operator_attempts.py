@@ -126,7 +126,7 @@ def test_a_simulator_that_was_killed_for_its_memory_is_reported_with_its_limit(p
 
 
 def test_a_volume_that_cannot_be_mounted_is_reported(place, start):
-    """The status of the pod shows only that it starts; the cause is in an event of the pod."""
+    """The pod's status shows only that the pod starts, and only an event of the pod contains the cause."""
     start()
     place.train()
     [pod] = place.pods()
@@ -145,7 +145,7 @@ def marked(place, pod):
 
 
 def test_a_pod_that_no_kubelet_heals_is_evicted_and_counted_once(place, start):
-    """A new operator finds the annotation of a killed one and must evict the pod exactly once.
+    """A new operator finds the annotation of a killed operator and must evict the pod exactly once.
 
     The eviction is not a failure of the Job.
     """

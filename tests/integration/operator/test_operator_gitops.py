@@ -52,7 +52,7 @@ def only_job(place):
 
 
 def test_helm_waits_until_the_job_trains(place, start, type_in):
-    """A reader runs the page's commands unchanged; the test starts the pod as a kubelet."""
+    """A reader runs the page's commands unchanged, and the test starts the pod as a kubelet does."""
     start()
     with ThreadPoolExecutor(1) as threads:
         typed = threads.submit(type_in, TYPED)

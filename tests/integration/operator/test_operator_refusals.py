@@ -383,7 +383,7 @@ def test_what_kueue_does_to_a_job_is_never_undone(place, start):
 
 @pytest.mark.parametrize("field", ["seed", "replicas"])
 def test_the_api_server_refuses_to_change_a_running_job(field, place, start):
-    """A user prolongs a run with a new job; a change of this job would falsify its result."""
+    """A user prolongs a run with a new job, because a change of this job would falsify its result."""
     start()
     place.train()
     [pod] = place.pods()

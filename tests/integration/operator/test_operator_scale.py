@@ -124,7 +124,7 @@ def test_every_job_says_that_it_was_accepted(crowd, settled):
 
 
 def test_nothing_is_asked_in_a_minute_in_which_nothing_changes(crowd, settled):
-    """An idle operator must not load the API server; watches and the Lease are excluded.
+    """An idle operator must not load the API server, so it may send only watches and Lease requests.
 
     The operator's metrics and the audit log must agree.
     """
@@ -161,7 +161,7 @@ def test_one_that_follows_changes_nothing(crowd, settled, tmp_path):
 
 
 def test_the_figures_of_the_operator_can_be_measured(crowd, tmp_path):
-    """The functions of `make bench` must work; this test runs them on the existing control plane.
+    """The functions of `make bench` must work, so this test runs them on the existing control plane.
 
     At this small size, the numbers have no meaning.
     """

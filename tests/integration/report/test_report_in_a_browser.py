@@ -58,7 +58,10 @@ def run(name):
 
 @pytest.mark.skipif(PROGRAM is None, reason="chromium is not installed (apt-get install chromium)")
 def test_a_report_is_shown_without_an_error_or_a_request_and_fits_a_phone(tmp_path):
-    """Only a browser can show how a page renders; one test makes all checks, because its start is slow."""
+    """Only a browser can show how a page renders.
+
+    One test makes all checks, because a browser starts slowly.
+    """
     one, two = tmp_path / "one.html", tmp_path / "two.html"
     one.write_text(page([run("arena / 0")]))
     two.write_text(page([run("arena / 0"), run("arena / 1")]))

@@ -86,7 +86,10 @@ def modules(tmp_path, monkeypatch):
 @pytest.mark.usefixtures("modules")
 @pytest.mark.parametrize("variant", VARIANTS.values(), ids=VARIANTS)
 def test_an_interrupted_run_ends_as_one_that_was_not(tmp_path, variant):
-    """The signal arrives during an episode; world, experience, parameters and evaluations are compared."""
+    """The signal arrives during an episode.
+
+    The test compares world, experience, parameters and evaluations.
+    """
     whole, parts = (begun(tmp_path / name, variant.job) for name in ("whole", "parts"))
     with whole:
         code, output = whole.end()

@@ -65,7 +65,7 @@ def replaced():
 
 
 def test_a_crash_waits_for_no_start(replaced):
-    """The spare must already run, so that a crash costs almost no time; `make soak` measures it."""
+    """The spare must already run, so that a crash costs almost no time. `make soak` measures that time."""
     assert replaced.waited
 
 

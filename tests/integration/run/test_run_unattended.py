@@ -88,7 +88,7 @@ def lose_the_master(run):
 
 
 def test_a_run_whose_simulators_break_in_many_ways_succeeds():
-    """This run trains PPO; test_bench.py trains DQN with similar faults."""
+    """This run trains PPO, and test_bench.py trains DQN with similar faults."""
     found = kinds.play(MANY, LITTLE_PPO, "Succeeded")
 
     assert found["exit"] == 0
@@ -127,7 +127,7 @@ def test_a_lost_ros_master_costs_an_attempt_and_not_the_run(troubled):
 
 
 def test_a_damaged_checkpoint_is_noticed_and_the_one_before_is_used(troubled):
-    """The checksum of a file shows the damage; unit tests of the trainer damage the other files."""
+    """The checksum of a file shows the damage. Unit tests of the trainer damage the other files."""
     assert troubled.survived
 
 

@@ -32,7 +32,7 @@ def raw(address, text):
 
 
 def test_health_answers_whatever_the_simulator_does(sidecar, ends) -> None:
-    """The kubelet must not restart a healthy sidecar; the trainer restarts a failed simulator."""
+    """The kubelet must not restart a healthy sidecar, because the trainer restarts a failed simulator."""
     it = sidecar(ends("sys.exit(1)"))
     it.request("/start")
     it.until(SidecarState.FAILED)

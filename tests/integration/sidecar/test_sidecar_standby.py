@@ -82,7 +82,7 @@ def test_the_one_that_stands_by_keeps_no_clock(two, waits) -> None:
 
 
 def test_each_is_started_and_stopped_by_itself(two, waits) -> None:
-    """The trainer decides which simulator is in use; the sidecar treats both in the same way."""
+    """The trainer decides which simulator is in use, so the sidecar treats both in the same way."""
     it = two(waits)
 
     first, second = it.start(FIRST), it.start(SECOND)
@@ -174,7 +174,7 @@ def test_the_environment_of_a_simulator_has_its_slot(two) -> None:
 
 
 def test_the_metrics_tell_the_two_apart(two, waits) -> None:
-    """A label names the simulator; a sidecar with one simulator uses only one value of it."""
+    """A label names the simulator. For a sidecar with one simulator, the label always has the same value."""
     it = two(waits)
     it.start(SECOND)
 

@@ -19,7 +19,10 @@ def test_a_sidecar_begins_idle_and_starts_nothing_by_itself(sidecar, waits) -> N
 
 
 def test_a_life_that_goes_well(sidecar, waits) -> None:
-    """The requests are start, ready and stop, then the simulator ends; each response has the new state."""
+    """The requests are start, ready and stop, and then the simulator ends.
+
+    Each response has the new state.
+    """
     it = sidecar(waits)
 
     pid = it.start().pid

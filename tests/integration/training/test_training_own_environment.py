@@ -83,7 +83,7 @@ def test_a_wrong_environment_ends_the_run_with_2(train, arguments, seen, fact):
 
 
 def test_nan_from_an_own_environment_names_it_and_ends_the_run_with_81(train):
-    """The simulator works, so its restart would not help; the author must see which value is NaN."""
+    """The simulator works, so its restart would not help. The author must see which value is NaN."""
     code, log = train(seen="np.array([0.0, np.nan], np.float32)")
 
     assert code == 81, log

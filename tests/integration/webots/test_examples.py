@@ -36,7 +36,7 @@ def test_the_facade_example_drives_and_reads():
 
 
 def test_the_blocks_of_the_page_about_facades_are_one_script():
-    """A reader pastes the page's blocks, in order, into one script; it also starts the ROS master."""
+    """A reader pastes the page's blocks, in order, into one script, which also starts the ROS master."""
     page = (ROOT / "docs/howto/facades.md").read_text()
 
     result = carried_out("-c", "\n".join(blocks(page, "python with-a-simulator")))
@@ -56,7 +56,7 @@ def test_the_blocks_of_the_page_about_a_training_loop_are_one_script():
 
 
 def test_the_listings_of_the_paper_run_in_their_order():
-    """Here the simulator crashes after every 80 steps; in the paper, a person restarted it."""
+    """The simulator of this test crashes after every 80 steps. In the paper, a person restarted it."""
     result = carried_out(EXAMPLES / "paper.py", PALAESTRA_STUB_FAULTS="crash:step=80")
 
     assert result.stdout.count("simulator fault") >= 2
@@ -64,7 +64,7 @@ def test_the_listings_of_the_paper_run_in_their_order():
 
 
 def test_the_cells_of_the_first_notebook_can_be_carried_out_from_top_to_bottom(tmp_path):
-    """A user executes the cells in their order; `make e2e` does so in the notebook's pod.
+    """A user executes the cells in their order, as `make e2e` does in the notebook's pod.
 
     A new notebook must contain no results.
     """

@@ -21,7 +21,7 @@ START = Pose(-1.5, 0.0, 0.0)
     ],
 )
 def test_what_is_written_is_read_as_the_same_type(arena, node, field, value):
-    """A user passes only the names and the value; the supervisor finds handle, type and service."""
+    """A user passes only the names and the value, and the supervisor finds handle, type and service."""
     arena.scene.supervisor.set_field(node, field, value)
 
     found = arena.scene.supervisor.get_field(node, field)

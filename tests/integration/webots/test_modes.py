@@ -41,7 +41,7 @@ def test_a_step_while_paused_is_no_fault_of_the_simulator():
 
 
 def test_a_simulator_that_did_not_confirm_its_mode_is_not_taken_for_paused(start):
-    """The next step shows whether the simulator runs; if it fails, that is a fault of the simulator."""
+    """The next step shows whether the simulator runs. If that step fails, the simulator has a fault."""
     arena = start("--fault=wrong_shape:service=supervisor/simulation_set_mode,call=4")
     arena.webots.supervisor.set_mode(Mode.PAUSE)
     with pytest.raises(WrongData):

@@ -109,7 +109,7 @@ def test_the_headers_of_roscpp_have_the_md5_of_the_page(outcomes):
 
 @for_each("simulator, path", cases(lambda it: offered(it).services.keys() - STEPPED - FAILING[it]))
 def test_a_service_of_the_page_succeeds(outcomes, simulator, path):
-    """A user relies on the page; if earlier requests determine the response, its values are compared."""
+    """A user relies on the page. If earlier requests determine the response, the test compares its values."""
     answer = outcomes(simulator)["answers"][path]
 
     assert "failed" not in answer, answer

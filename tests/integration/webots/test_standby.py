@@ -95,7 +95,7 @@ def pair(master, tmp_path):
 
 
 def test_a_killed_simulator_is_replaced_by_the_one_that_stood_by(pair, capsys):
-    """The kernel also sends SIGKILL for too much memory; docs/explain/reliability.md has the times."""
+    """The kernel, too, sends SIGKILL, for too much memory. docs/explain/reliability.md lists the times."""
     it = pair().begin()
     os.kill(pid_of(it.first), signal.SIGKILL)
 

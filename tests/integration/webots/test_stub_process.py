@@ -119,7 +119,7 @@ def test_all_refusals_of_a_world_are_printed_and_the_last_line_sums_them_up(mast
 
 
 def test_a_second_one_of_the_same_name_takes_the_name(stub):
-    """By the rules of ROS 1, the older node must shut down; its simulation continues."""
+    """By the rules of ROS 1, the older node must shut down, but its simulation continues."""
     older = stub()
     ready(older)
     newer = stub()
