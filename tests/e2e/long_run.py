@@ -1,4 +1,4 @@
-"""A full training and a job of two replicas run while other tests do; their operator is killed repeatedly."""
+"""A full training and a job of two replicas, which run during other tests while their operator is killed."""
 
 import random
 import threading

@@ -63,7 +63,7 @@ def test_an_image_says_what_it_is_and_is_run_by_nobody(name, archives):
 
 @pytest.mark.after_the_kills
 def test_the_operator_s_image_is_of_this_release(namespace, cluster):
-    """A user copies the output of `palaestra --version` into a bug report, so it must name the release."""
+    """A user copies the output of `palaestra --version` into a bug report, so the output must be right."""
     cluster.rolled_out(SYSTEM, OPERATOR)
     pod, *_ = namespace.wait(lambda: operators(namespace))
 

@@ -1,6 +1,6 @@
 """Every command of the pages about installation and training in a cluster, on a real cluster.
 
-tests/e2e/test_kueue.py runs docs/howto/queues.md, because other tests of it need the page's queue too.
+tests/e2e/test_kueue.py runs docs/howto/queues.md, because its other tests need the page's queue too.
 """
 
 import os

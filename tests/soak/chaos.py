@@ -1,4 +1,4 @@
-"""A training with crashes, hangs and slow steps learns as much as one without them.
+"""A training with crashes, hangs and slow steps learns as much as a training without faults.
 
 The job is manifests/examples/chaos.yaml.
 """

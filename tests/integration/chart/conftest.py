@@ -25,7 +25,7 @@ Kubectl = Callable[..., str]
 def control_plane(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ControlPlane]:
     """Yield a control plane that only this folder uses.
 
-    Its tests delete the definition, and with it every TrainingJob, so other tests need another one.
+    Its tests delete the definition and thereby every TrainingJob, which would disturb all other tests.
     """
     with running(tmp_path_factory.mktemp("chart")) as plane:
         yield plane

@@ -99,7 +99,7 @@ def test_a_wait_prints_nothing_of_its_own(waited, capsys):
 
 
 def test_a_trial_prints_why_its_replica_waits(server, tmp_path, monkeypatch, capsys):
-    """Without this line, `helm test` with a wrong image printed nothing until its timeout."""
+    """Without a line about the replica, `helm test` with a wrong image printed nothing until its timeout."""
     monkeypatch.setattr("palaestra.smoke_test.PERIOD_S", 0.0)
     script, kubeconfig = server
     (tmp_path / "job.yaml").write_text(JOB)

@@ -149,7 +149,7 @@ def install(place, *, replicas=1, **container):
 
 
 def test_the_finding_about_an_operator_that_is_not_ready_names_its_image(found, place):
-    """A wrong image is a frequent cause, and the log of the operator shows others."""
+    """A wrong image is a frequent cause, and the log of the operator shows other causes."""
     install(place)
 
     findings = found()

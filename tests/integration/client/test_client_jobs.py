@@ -100,7 +100,7 @@ def test_what_a_job_is_fixed_on_cannot_be_applied_anew(client):
 
 
 def test_the_error_for_a_missing_job_shows_how_to_find_it(client):
-    """The usual cause is a wrong namespace, so the error names one command to search all."""
+    """The usual cause is a wrong namespace, so the error names a command that searches all namespaces."""
     for ask in (client.get, client.suspend, client.delete, client.events):
         with pytest.raises(
             NoSuchJob, match=f"job none: does not exist in namespace {client.namespace}; .* -A"

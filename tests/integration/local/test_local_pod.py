@@ -140,7 +140,7 @@ def test_an_init_container_that_is_no_sidecar_runs_to_its_end_first(stage):
 
 
 def test_an_init_container_that_fails_ends_the_pod(stage):
-    """The later containers need the result of this one."""
+    """The later containers need the result of the init container."""
     copy = stage.container("copy", "echo no space; exit 4", sidecar=False)
 
     with pytest.raises(StartFailed, match=r"copy ended with exit code 4: .*no space"):

@@ -139,8 +139,8 @@ def test_suspending_and_resuming_changes_the_job_and_nothing_else(place, start):
 def test_a_job_is_suspended_once_its_pod_has_ended_and_runs_in_no_dying_pod(place, start):
     """Otherwise a user's `kubectl wait` would return too early.
 
-    It would return for Suspended before the checkpoint is saved, and for Running while the old pod still
-    saves its checkpoint.
+    The command would return for Suspended before the checkpoint is saved, and for Running while the old pod
+    still saves its checkpoint.
     """
     start()
     place.train()

@@ -125,7 +125,7 @@ def test_the_words_of_kueue_are_in_the_status(place, start):
 
 @pytest.mark.usefixtures("kueue")
 def test_a_job_of_which_kueue_makes_no_workload_says_what_to_check(place, start):
-    """The namespace may lack a label that Kueue requires, and no object in the cluster shows it."""
+    """The namespace may lack a label that Kueue requires, and no object in the cluster shows this cause."""
     start()
     job_in_queue(place)
 

@@ -201,7 +201,7 @@ def like_openshift(place):
 
 @pytest.mark.usefixtures("like_openshift")
 def test_pods_run_where_the_cluster_chooses_their_user(place, start):
-    """Such a cluster refuses the fixed user of our images, so an installation must be able to omit it."""
+    """Such a cluster refuses the fixed user of our images, so an installation can leave this user out."""
     operator = start()
     place.train("named")
     eventually(lambda: RANGE in str(place.status("named").get("replicas", "")), 60)
@@ -235,7 +235,7 @@ def confined(place):
 def test_a_job_fits_a_namespace_with_limits_by_fields_of_its_own(place, start):
     """The author must be able to set resources for every container, including the ROS master.
 
-    If one container has none, the namespace refuses the pod forever.
+    If one container has no limits, the namespace refuses the pod forever.
     """
     confined(place)
     start()

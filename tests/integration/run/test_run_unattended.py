@@ -73,7 +73,7 @@ def troubled():
 def lose_the_master(run):
     """Kill the ROS master; return the trainer's exit code and the reason of the next attempt.
 
-    The runner is stopped until the trainer has ended, because it could otherwise restart the master in time.
+    The runner is stopped until the trainer has ended, because the runner could restart the master in time.
     """
     ends, attempts, trainer = len(kills.ENDED.findall(run.output())), len(run.attempts()), run.trainer()
     run.process.send_signal(signal.SIGSTOP)

@@ -1,4 +1,4 @@
-"""All processes of a simulator end with the simulator, and with the sidecar, in whatever way it ends."""
+"""All processes of a simulator end with the simulator or the sidecar, in whatever way either ends."""
 
 import http.client
 import os

@@ -174,7 +174,7 @@ def test_a_second_stop_brings_the_deadline_forward(sidecar, stubborn) -> None:
 
 
 def test_a_second_stop_does_not_put_the_deadline_off(sidecar, stubborn) -> None:
-    """The client that set the first deadline relies on it."""
+    """The client that set the first deadline relies on that deadline."""
     it = sidecar(stubborn)
     it.start()
     it.request("/stop", {"deadline_s": 0.2})

@@ -132,7 +132,7 @@ def test_a_stopped_simulator_is_noticed(train):
 
 
 def test_faults_leave_no_thread_no_descriptor_and_no_process(train):
-    """A week of training has thousands of faults, so even a small leak would end it."""
+    """A week of training has thousands of faults, so even a small leak would end the training."""
     trained = train()
     trained.break_by(signal.SIGKILL)
     trained.go_on()

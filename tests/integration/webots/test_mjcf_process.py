@@ -103,7 +103,7 @@ class TestAKeyframe:
         return named.replace("</mujoco>", '<keyframe><key name="home" ctrl="5"/></keyframe></mujoco>')
 
     def test_its_control_acts_until_the_first_command_after_a_reset(self, cartpole):
-        """If a reset set the control to 0, a robot would fall that its keyframe keeps upright."""
+        """If a reset set the control to 0, a robot that its keyframe keeps upright would fall."""
         lever = JointMotor("cartpole", "push", "force")
         lever.release()
         start = [cartpole.step() for _ in range(5)]

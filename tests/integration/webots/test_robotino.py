@@ -27,7 +27,7 @@ def test_it_drives_as_commanded(arena):
 
 @pytest.mark.parametrize("heading", [0.0, 1.0, -2.5, math.pi])
 def test_a_reset_puts_it_where_the_episode_begins(arena, heading):
-    """Heading 0 is included, because Webots refuses its quaternion."""
+    """Heading 0 is included, because Webots refuses the quaternion of this heading."""
     arena.scene.reset(1, Pose(0.2, -1.5, 2.0), (1.0, 0.0))
     arena.scene.reset(2, Pose(1.4, 0.1, heading), (0.0, 1.5))
 
