@@ -1,8 +1,13 @@
 """Execute a plan of the interface with a client of any library.
 
-A plan has four entries: `calls`, a list of [name, path, type, request]; `topics`, a type by path; `rounds`, a
-list of [path, type, request] that cause messages on topics; and `last`, calls that end the simulator. In a
-request, the string "@name" stands for the first value in the response to that call, e.g. the handle of a
+A plan has four entries:
+
+- `calls`: a list of [name, path, type, request]
+- `topics`: a type by path
+- `rounds`: a list of [path, type, request] that cause messages on topics
+- `last`: calls that end the simulator
+
+In a request, the string "@name" stands for the first value in the response to that call, e.g. the handle of a
 node.
 
 A client has three functions. `call(path, type, request)` returns the response as a dictionary, or {"failed":
