@@ -1,7 +1,7 @@
-"""Commands in a bare Debian 13, as an ordinary user, with folders of this machine in their places.
+"""Run commands as an ordinary user in a bare Debian 13 that sees some folders of this machine.
 
-The tree is the base of the images (`tests/cluster/base.sh`), where that has been made: no Python, no compiler
-and no package of ROS. It lies in a mount namespace that ends with the command.
+The root file system is the base of the images, which `tests/cluster/base.sh` makes. It contains no Python, no
+compiler and no package of ROS. It is mounted in a mount namespace that ends with the command.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ exec chroot --userspec=65534:65534 "$top" /usr/bin/env --chdir=/work HOME=/work 
 
 
 def lack() -> str | None:
-    """Return why there is no bare Debian here, or None."""
+    """Return the reason why no bare Debian can be mounted here, or None."""
     if _tree() is None:
         return f"the tree of Debian is not made; `{BASE}` makes it"
     with tempfile.TemporaryDirectory() as folder:
@@ -46,13 +46,13 @@ def lack() -> str | None:
 
 
 def command(words: Sequence[str | Path], work: Path, folders: Iterable[Path], interpreter: Path) -> list[str]:
-    """Return a command that runs another one there, in its folder `/work`.
+    """Return a command that runs `words` in the bare Debian, in its folder `/work`.
 
     Args:
-        words: of the other command.
-        work: the folder of this machine that is `/work`.
-        folders: that are at the same path there.
-        interpreter: a Python in one of them; the system's libraries that it needs come along.
+        words: the program and its arguments.
+        work: the folder of this machine that is mounted as `/work`.
+        folders: folders of this machine that are mounted at the same paths.
+        interpreter: a Python in one of `folders`; the system libraries that it needs are copied.
     """
     top = work.parent / "bare"
     top.mkdir()
@@ -69,7 +69,7 @@ def _tree() -> Path | None:
 
 
 def _libraries(interpreter: Path) -> list[str]:
-    """Return the libraries of the system that a Python's own modules need, and that are not glibc's."""
+    """Return the system libraries, except those of glibc, that a Python's extension modules need."""
     own = interpreter.resolve().parents[1]
     modules = own.glob("lib/python3.*/lib-dynload/*.so")
     shown = subprocess.run(["ldd", *modules], capture_output=True, text=True, timeout=60, check=True).stdout

@@ -1,4 +1,4 @@
-"""A headless Chromium that a test drives through its DevTools protocol; nothing of it outlives the test."""
+"""A headless Chromium that a test drives through its DevTools protocol and that ends with the test."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tests.waiting import eventually
 
 DEADLINE_S = 60.0
 PROGRAM = next((found for name in ("chromium", "google-chrome") if (found := shutil.which(name))), None)
-# It must not look for updates, accounts or anything else in the network.
+# The browser must not contact update servers, accounts or any other host.
 QUIET = (
     *("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"),
     *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
@@ -67,7 +67,7 @@ class Page:
         return result["result"].get("value")
 
     def show_as(self, *, width: int, scheme: str, height: int = 800) -> None:
-        """Set the size of the window, and the color scheme that the person prefers."""
+        """Set the window size and the preferred color scheme."""
         self.ask(
             "Emulation.setDeviceMetricsOverride",
             width=width,
@@ -94,7 +94,7 @@ class Page:
 
 @contextmanager
 def browser(folder: Path) -> Iterator[Page]:
-    """Yield the page of a new browser with a profile of its own."""
+    """Start a browser with a new profile in `folder`, and yield its page."""
     assert PROGRAM
     process = subprocess.Popen(
         [PROGRAM, *QUIET, f"--user-data-dir={folder}"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL

@@ -17,11 +17,11 @@ from xdist.scheduler import LoadFileScheduling
 from tests import skipped, surroundings
 from tests.control_plane.programs import REQUIRED, NoPrograms
 
-# Networks of this size learn faster on one thread than on several that wait for each other; torch reads it.
+# PyTorch reads this variable. Networks of this size train faster on one thread than on several.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
-# A property has no time limit, because machines are noisy; --durations shows slow tests.
+# Property tests have no deadline, because a busy machine slows them. `--durations` shows slow tests.
 settings.register_profile("explore", deadline=None, suppress_health_check=[HealthCheck.too_slow])
-# The examples are always the same, because a random one must not fail an unrelated change; a few are enough.
+# Every run draws the same examples, because a new random example must not fail an unrelated change.
 settings.register_profile("repeat", settings.get_profile("explore"), derandomize=True, max_examples=40)
 settings.load_profile("repeat")
 # Files that one worker runs one after another, by path prefix.
@@ -36,9 +36,9 @@ COMPILED = Path(__file__).parent / "__pycache__" / "compiled"  # shows that each
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Make tests independent of the place where they were started.
+    """Give a process that runs tests the signals, locale and limits of `tests.surroundings`.
 
-    A process that only waits for workers needs no change.
+    The controller of pytest-xdist runs no tests, so its settings stay as they are.
     """
     if hasattr(config, "workerinput") or not config.getoption("numprocesses", None):
         surroundings.settle()
@@ -46,10 +46,10 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)
 def pytest_collection() -> Generator[None]:
-    """Let one worker compile tests and libraries on a new clone, and the others read the result.
+    """Let one worker compile tests and libraries on a new clone, and let the others read the result.
 
-    Otherwise each of them compiles everything for a minute. Imported objects stay, so garbage collection is
-    off meanwhile.
+    Otherwise every worker compiles everything, which takes a minute. Garbage collection is off during the
+    imports, because imported objects stay.
     """
     with _compiled_by_one():
         gc.disable()
@@ -74,7 +74,7 @@ def _compiled_by_one() -> Iterator[None]:
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """Print the skipped tests and the command to run them in a line or two instead of hundreds."""
+    """Print one line for each reason to skip tests, instead of one line for each skipped test."""
     reports = terminalreporter.getreports("skipped")
     reasons = [report.longrepr[2].removeprefix("Skipped: ") for report in reports]
     if reasons:
@@ -96,7 +96,7 @@ class _ByFile(LoadFileScheduling):
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with the longest tests, so that no worker is left alone with one at the end."""
+    """Begin with the longest tests, so that no worker runs a long test after the others have finished."""
     items.sort(key=_minutes, reverse=True)
 
 
@@ -113,7 +113,7 @@ def pytest_runtest_setup() -> Generator[None]:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_call() -> Generator[None]:
-    """Skip it also if the test itself needs them."""
+    """Skip a test if its body needs programs of a cluster that are not built."""
     return (yield from _skipped_without_programs())
 
 

@@ -2,8 +2,9 @@
 
 `python -m tests.costs COMMAND…` runs a command and prints the processor seconds of each program that ran
 meanwhile. If the command is pytest with `-p tests.costs`, it also prints the seconds of each folder, file,
-fixture and test. Processes are sampled, so one that lives for less than the period is missing from the table;
-the last row is the difference from the kernel's own count.
+fixture and test. The program samples the table of processes, so it misses a process that ends within one
+sampling period. The row `not sampled` is the difference between the kernel's count and the sum of the
+samples.
 """
 
 import json
@@ -22,7 +23,7 @@ from typing import Any
 
 import pytest
 
-FOLDER = "PALAESTRA_COSTS"  # each pytest process writes a file there
+FOLDER = "PALAESTRA_COSTS"  # names the folder in which each pytest process writes a file
 PERIOD_S = 0.25
 ROWS = 60
 TICKS_PER_S = os.sysconf("SC_CLK_TCK")
@@ -30,7 +31,7 @@ OPTION = re.compile(r"^-")
 Record = dict[str, Any]
 
 
-# The measurements of the plugin in each pytest process.
+# The plugin measures the tests in each pytest process.
 
 
 class Spent:
@@ -75,7 +76,7 @@ def pytest_fixture_setup(fixturedef: pytest.FixtureDef[Any]) -> Generator[None]:
 
 
 def pytest_sessionfinish() -> None:
-    """Leave the measurements for the program that started pytest."""
+    """Write the measurements to a file for the program that started pytest."""
     if folder := os.environ.get(FOLDER):
         kinds = {"folder": folders, "file": files, "fixture": fixtures, "test": tests}
         content = {kind: spent.rows for kind, spent in kinds.items()}
@@ -91,7 +92,7 @@ def _clocks() -> tuple[float, float, float]:
     )
 
 
-# The measurements of the program around the command.
+# The program that runs the command measures the whole machine.
 
 
 class Sampler:
@@ -105,7 +106,7 @@ class Sampler:
         self._busy = 0.0
 
     def start(self) -> None:
-        """Begin; the time that processes have used before does not count."""
+        """Start sampling; processor time that processes used earlier is not counted."""
         self._before = {key: ticks for key, _, ticks in _processes()}
         self._busy = _busy_s()
         self._thread.start()
@@ -141,7 +142,7 @@ def _processes() -> Iterator[tuple[tuple[int, int], str, int]]:
 
 
 def _program(command: list[str]) -> str:
-    """Return the name of a program: for an interpreter, that of its script or module."""
+    """Return a program's name; for Python, return the name of its script or module."""
     name, *arguments = command
     base = Path(name).name
     if not base.startswith("python"):

@@ -1,4 +1,4 @@
-"""System calls that fail as on machines that a test cannot have."""
+"""Functions that raise errors of the operating system which a test cannot cause."""
 
 import os
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""The builder of TrainingJobs as data: a test names the fields that matter; others have defaults."""
+"""The builder of TrainingJobs as data. A test passes only the fields that it needs."""
 
 import copy
 from collections.abc import Mapping

@@ -1,7 +1,7 @@
 """`palaestra run` as a user types it, and functions to observe it for tests and measurements.
 
-Everything is real: ROS master, sidecars, stubs and trainer are processes of this machine. Tests use only what
-a user could use: the run directory, `/status`, and the table of processes.
+Everything is real: ROS master, sidecars, stubs and trainer are processes of this machine. Tests use only
+interfaces that a user has: the run directory, `/status`, and the table of processes.
 """
 
 import json
@@ -24,16 +24,16 @@ from tests.json_lines import whole_lines
 ROOT = Path(__file__).parents[1]
 EXAMPLES = ROOT / "manifests/examples"
 PALAESTRA = Path(sys.executable).with_name("palaestra")
-PATIENCE_S = 240.0  # long for runs that take seconds on an idle machine; below pytest's deadline
-REAPER = "reaper.py"  # its command line contains that of the simulator
-GONE_S = 10.0  # for the kernel to end killed processes
+PATIENCE_S = 240.0  # a run takes seconds on an idle machine; pytest's timeout is longer than this
+REAPER = "reaper.py"  # the reaper's command line contains the simulator's command line
+GONE_S = 10.0  # the longest time that the kernel needs to end killed processes
 LOOK_EVERY_S = 0.05  # a poll reads the run and all processes of the machine, which costs processor time
 FAULT = re.compile(r"simulator fault .*kind=(\w+)")
 STATUS_ADDRESS = re.compile(r"^statusAddress: (\S+)$", re.MULTILINE)
 
 
 class LocalRun:
-    """One `palaestra run` of a job, and its directory; as a context it ends with the block.
+    """One `palaestra run` of a job, and its directory; a `with` block starts and ends the run.
 
     Attributes:
         directory: the run directory of the job's only replica.
@@ -58,9 +58,9 @@ class LocalRun:
         self.stop()
 
     def start(self, *options):
-        """Start the run, or start it again after its end; its output is kept until the next start.
+        """Start the run, or start it again after its end; `output` returns the text since the last start.
 
-        It ends with the thread that starts it, however that thread ends.
+        The kernel terminates the runner when the thread that started it ends.
         """
         command = ["setpriv", "--pdeathsig=TERM", PALAESTRA, "run", self.file, "--dir", self.runs, *options]
         with self._output.open("w") as output:
@@ -72,7 +72,7 @@ class LocalRun:
         return self.process.wait(within_s), self.output()
 
     def stop(self):
-        """Interrupt the run as Ctrl-C does, and wait; a run that has ended stays as it is."""
+        """Interrupt the run as Ctrl-C does and wait for its end; do nothing if it has ended."""
         if self.process and self.process.poll() is None:
             self.process.send_signal(signal.SIGINT)
             self.process.wait(PATIENCE_S)
@@ -85,7 +85,7 @@ class LocalRun:
         """Return the first true value of `claim`.
 
         Raises:
-            AssertionError: `claim` had no true value in time, or before the runner's end.
+            AssertionError: `claim` returned no true value before the timeout or before the runner ended.
         """
         give_up = time.monotonic() + within_s
         while not (value := claim()):
@@ -97,7 +97,7 @@ class LocalRun:
         return value
 
     def status(self):
-        """Return the trainer's /status, or None if it does not respond."""
+        """Return the trainer's /status, or None if the trainer does not respond."""
         try:
             found = STATUS_ADDRESS.search((self.directory / "training.yaml").read_text())
             with urllib.request.urlopen(f"http://{found[1]}/status", timeout=5) as answer:
@@ -106,7 +106,7 @@ class LocalRun:
             return None
 
     def ask(self):
-        """Return the trainer's /status, as soon as it responds."""
+        """Wait until the trainer responds, and return its /status."""
         return self.until(self.status)
 
     def wait_for_step(self, step, within_s=PATIENCE_S):
@@ -136,14 +136,14 @@ class LocalRun:
         return [line["reason"] for line in self.lines("attempts.jsonl")]
 
     def checkpoints(self):
-        """Return the folders of its checkpoints, the newest last."""
+        """Return the folders of the run's checkpoints, the newest last."""
         found = (
             it for it in (self.directory / "checkpoints").glob("[0-9]*") if (it / "manifest.json").exists()
         )
         return sorted(found, key=lambda path: int(path.name))
 
     def log(self, container="trainer"):
-        """Return the log of a container, empty before it has one."""
+        """Return the log of a container, or an empty string before the container has a log."""
         path = self.directory / "logs" / f"{container}.log"
         return path.read_text(errors="replace") if path.exists() else ""
 
@@ -152,7 +152,7 @@ class LocalRun:
         return dict(Counter(FAULT.findall(self.log())))
 
     def counters(self):
-        """Return the counters over all attempts, from the newest checkpoint; empty without one."""
+        """Return the counters of all attempts from the newest checkpoint; empty if no checkpoint exists."""
         found = [json.loads((it / "manifest.json").read_text()) for it in self.checkpoints()[-1:]]
         return found[0]["counters"] if found else {}
 
@@ -161,7 +161,7 @@ class LocalRun:
         return list(below(self.process.pid))
 
     def pids(self, program, simulator=""):
-        """Return the processes of a program, or only those of a given simulator."""
+        """Return the ids of a program's processes, or only of those that serve a given simulator."""
         return [
             pid
             for pid, words in self.processes()
@@ -171,15 +171,15 @@ class LocalRun:
         ]
 
     def pid_of(self, program, simulator=""):
-        """Return the only process of a program, or the only one of a given simulator.
+        """Return the id of a program's only process, or of the only one that serves a given simulator.
 
-        A simulator that is being recycled is waited for.
+        The method waits while the simulator is recycled.
         """
         (pid,) = self.until(lambda: self.pids(program, simulator))
         return pid
 
     def trainer(self):
-        """Return the trainer's process as soon as it exists."""
+        """Wait for the trainer's process, and return its id."""
         return self.until(lambda: self.pids("palaestra-train"))[0]
 
 
@@ -215,7 +215,7 @@ def is_running(pid):
 
 
 def left_of(pids):
-    """Return those processes that do not end in time."""
+    """Return those of `pids` that still run after `GONE_S` seconds."""
     give_up = time.monotonic() + GONE_S
     while any(map(is_running, pids)) and time.monotonic() < give_up:
         time.sleep(0.05)
@@ -223,7 +223,7 @@ def left_of(pids):
 
 
 def send(pid, number):
-    """Send a signal to a process, which may have ended, and return whether it existed."""
+    """Send a signal to a process, and return whether the process existed."""
     try:
         os.kill(pid, number)
     except ProcessLookupError:

@@ -1,4 +1,4 @@
-"""The metrics in docs/reference/metrics.md as a reader sees them, and /metrics as Prometheus sees it."""
+"""The metrics that docs/reference/metrics.md documents, and the metrics that /metrics serves."""
 
 import re
 import subprocess
@@ -10,13 +10,13 @@ PAGE = Path(__file__).parents[1] / "docs/reference/metrics.md"
 
 
 def documented(program):
-    """Return the type of each family in a program's table of the page, by its name."""
+    """Return the type of each metric family that the page documents for a program, by name."""
     table = PAGE.read_text().partition(f"\n## The {program}\n")[2].partition("\n## ")[0]
     return dict(re.findall(r"^\| `(palaestra_\w+)` \| (\w+)", table, re.MULTILINE))
 
 
 def served(text):
-    """Return the type of each of our families in the text of /metrics, by its name."""
+    """Return the type of each `palaestra_` family in the text of /metrics, by name."""
     return dict(re.findall(r"^# TYPE (palaestra_\w+) (\w+)$", text, re.MULTILINE))
 
 

@@ -6,7 +6,7 @@ FENCED = re.compile(r"^```([^\n]+)\n(.*?)^```", re.DOTALL | re.MULTILINE)
 
 
 def fenced(page: str) -> list[tuple[str, str]]:
-    """Return every block of a page, as the text after its fence, e.g. `sh`, and its lines."""
+    """Return the info string (e.g. `sh`) and the content of every fenced block of a page."""
     return FENCED.findall(page)
 
 
@@ -17,18 +17,18 @@ def chapters(page: str) -> list[tuple[str, str]]:
 
 
 def blocks(page: str, kind: str) -> list[str]:
-    """Return the blocks whose fence has exactly the text `kind`."""
+    """Return the content of every fenced block whose info string equals `kind`."""
     return [text for found, text in fenced(page) if found == kind]
 
 
 def links(page: str) -> list[str]:
-    """Return the target of every link and picture of a page that is a path or an anchor, in its order."""
+    """Return, in order, the targets of links and pictures on a page that are paths or anchors."""
     prose = FENCED.sub("", page)
     return re.findall(r"(?:\]\(|src=\")(?!https?:)([^)\s\"]+)", prose)
 
 
 def anchors(page: str) -> set[str]:
-    """Return what may stand behind `#` in a link to a page: its headings, as GitHub and GitLab spell them."""
+    """Return the anchors of a page's headings, in the spelling of GitHub and GitLab."""
     headings = re.findall(r"^#{1,6} (.*)$", FENCED.sub("", page), re.MULTILINE)
     texts = (re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading) for heading in headings)
     return {re.sub(r"[^\w\- ]", "", text.strip().lower()).replace(" ", "-") for text in texts}

@@ -1,7 +1,7 @@
-"""The kinematics of the Robotino 3 in closed form, as in its sample controller.
+"""The kinematics of the Robotino 3 in closed form, as in the sample controller of Webots.
 
-Source: Webots, projects/robots/festo/robotino3/controllers/robotino3/base.c. Wheel 0 is at the rear, 1 front
-right, and 2 front left.
+Source: Webots, projects/robots/festo/robotino3/controllers/robotino3/base.c. Wheel 0 is at the rear, wheel 1
+at the front right, and wheel 2 at the front left.
 """
 
 import math

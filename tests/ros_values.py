@@ -1,4 +1,4 @@
-"""ROS messages with every kind of field, and values of any message, for hypothesis."""
+"""ROS messages with every type of field, and Hypothesis strategies for the values of any message."""
 
 import struct
 
@@ -53,7 +53,7 @@ find = MESSAGES.__getitem__
 
 
 def values(message, find_nested, *, whole=False):
-    """Return a strategy of mappings, the values of a message; fields may be absent unless it is `whole`."""
+    """Return a strategy for the values of a message, as mappings; with `whole`, no field is absent."""
     fields = {attribute(field): _values_of(field, find_nested, whole=whole) for field in message.fields}
     return st.fixed_dictionaries(fields) if whole else st.fixed_dictionaries({}, optional=fields)
 

@@ -1,4 +1,4 @@
-"""Worlds as simulations of the stub."""
+"""Simulations of world files with the physics of the stub."""
 
 from palaestra_sim.scene.mode import Mode
 from palaestra_sim.scene.simulation import Simulation

@@ -1,16 +1,15 @@
-"""The skipped tests of a run in few lines: how many they are, and the command that makes them run."""
+"""A summary of a run's skipped tests: their number, and the command that builds missing programs."""
 
 from collections import Counter
 from collections.abc import Iterable, Iterator
 
-BUILD = (
-    "tests/cluster/programs.sh"  # its arguments are programs; `control_plane.programs` names it in reasons
-)
+# `control_plane.programs` writes this command, followed by names of programs, into reasons to skip.
+BUILD = "tests/cluster/programs.sh"
 BUILDING = "builds them once, in 15 to 30 minutes"
 
 
 def lines(reasons: Iterable[str]) -> Iterator[str]:
-    """Yield one line for all tests without their cluster programs, and one for each other reason."""
+    """Yield one line for all tests that lack programs of a cluster, and one line for each other reason."""
     counts = Counter(reasons)
     programs = {
         reason: words.split() for reason in counts for words in [reason.partition(f"{BUILD} ")[2]] if words

@@ -1,4 +1,4 @@
-"""The same surroundings for all programs that tests start, however the tests themselves were started.
+"""The same signals, locale and limits for all programs that tests start, however pytest was started.
 
 A shell starts a command in the background of a script with SIGINT ignored, nohup ignores SIGHUP, and a user
 may have any locale, time zone, umask and limit of open files. Programs inherit all of these.
@@ -12,7 +12,7 @@ LOCALE = "C.UTF-8"
 TIME_ZONE = "UTC"
 UMASK = 0o022
 OPEN_FILES = 1024
-# These variables change the output of a program, or where it keeps its files.
+# These variables change the output of a program, or the folders in which the program keeps files.
 UNSET = (
     "COLUMNS", "FORCE_COLOR", "LANGUAGE", "LINES", "MAKEFLAGS", "MAKELEVEL", "MFLAGS", "NO_COLOR",
     "PYTHONDONTWRITEBYTECODE", "ROS_HOSTNAME", "ROS_IP", "ROS_MASTER_URI", "ROS_NAMESPACE", "ROS_LOG_DIR",

@@ -9,11 +9,11 @@ from typing import Any
 def for_each(names: str, rows: Callable[[], Iterable[Any]] | Iterable[Any]) -> Callable[..., Any]:
     """Call a test for each row, as `pytest.mark.parametrize` does, but as one test with one set-up.
 
-    All rows are tested, and the error contains those that fail. Rows share their fixtures, so no row may
-    change them.
+    A failing row does not stop the others, and the error lists every failing row. All rows share their
+    fixtures, so a row must not change a fixture.
 
     Args:
-        names: of the row's parameters, separated by commas.
+        names: the names of the row's parameters, separated by commas.
         rows: values, or tuples of them if there are several names; a function makes them when the test runs.
 
     Raises:
@@ -34,7 +34,7 @@ def for_each(names: str, rows: Callable[[], Iterable[Any]] | Iterable[Any]) -> C
                 values = row if len(keys) > 1 else (row,)
                 try:
                     test(**given, **dict(zip(keys, values, strict=True)))
-                except Exception as error:  # noqa: BLE001 - it is raised below, with those of other rows
+                except Exception as error:  # noqa: BLE001 - the errors of all rows are raised together below
                     error.add_note(f"{names}: {', '.join(map(str, values))}")
                     wrong.append(error)
             if wrong:

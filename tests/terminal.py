@@ -8,13 +8,13 @@ from pathlib import Path
 
 
 class Terminal:
-    """A shell in `folder`, with the rest of the environment as here.
+    """A shell in `folder` that inherits the environment of this process.
 
     Args:
-        folder: where commands are typed; also its HOME.
-        path: a folder whose programs come first.
-        before: commands at the beginning of each shell.
-        environment: more variables.
+        folder: the working directory of the commands, and their HOME.
+        path: a folder that precedes the others in PATH.
+        before: commands that every shell runs first.
+        environment: additional variables.
     """
 
     def __init__(self, folder: Path, *, path: object = "", before: str = "", **environment: str) -> None:
@@ -28,7 +28,7 @@ class Terminal:
         """Type commands up to the first one that fails, and return the exit code and all output.
 
         Raises:
-            subprocess.TimeoutExpired: they took longer than `within_s`, and were killed.
+            subprocess.TimeoutExpired: the commands took longer than `within_s`, and were killed.
         """
         with subprocess.Popen(
             ["bash", "-euc", self._before + text],
@@ -41,7 +41,7 @@ class Terminal:
         ) as shell:
             try:
                 printed, _ = shell.communicate(timeout=within_s)
-            finally:  # otherwise a program that takes too long would continue without its shell
+            finally:  # otherwise a program that exceeds the timeout would outlive its shell
                 with suppress(ProcessLookupError):
                     os.killpg(shell.pid, signal.SIGKILL)
         return shell.returncode, printed

@@ -14,7 +14,7 @@ HEAD = b"HTTP/1.0 200 OK\r\nContent-Type: application/json\r\n"
 
 
 class StatusServer:
-    """A server on a trainer's port, which runs until it is closed.
+    """The HTTP server of a trainer's status, which serves until `close`.
 
     Attributes:
         host: its address.
@@ -23,12 +23,12 @@ class StatusServer:
     def __init__(self, answer: Callable[[BinaryIO], object]) -> None:
         """Start the server.
 
-        For each request it calls `answer` in a separate thread, which writes head and body.
+        For each request, a separate thread calls `answer`, which writes head and body.
         """
 
         class Handler(http.server.BaseHTTPRequestHandler):
             def do_GET(self) -> None:
-                with suppress(OSError):  # an operator disconnects when it has enough
+                with suppress(OSError):  # an operator disconnects when it has read enough
                     answer(self.wfile)
 
             def log_message(self, *_: object) -> None:
@@ -66,6 +66,6 @@ def _at_a_free_address(
     handler: type[http.server.BaseHTTPRequestHandler],
 ) -> http.server.ThreadingHTTPServer:
     for last in range(1, 255):
-        with suppress(OSError):  # somebody else's tests may use the address
+        with suppress(OSError):  # another run of the tests may use the address
             return http.server.ThreadingHTTPServer((f"127.90.90.{last}", STATUS_PORT), handler)
     raise AssertionError(f"port {STATUS_PORT} is taken at every address")

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import Any
 
 DEADLINE_S = 30.0
-PACE_S = 0.05  # leave a polled API server time for its work
+PACE_S = 0.05  # a shorter pace would load an API server that is polled
 
 
 class TooLate(AssertionError):

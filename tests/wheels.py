@@ -1,7 +1,7 @@
-"""The three packages as wheels, and Pythons of this machine into which they are installed.
+"""Wheels of the three packages, and environments in which a Python of this machine has them installed.
 
-Tests use no network: dependencies come from uv's cache. `python -m tests.wheels` fills it, with one download
-for each Python (1 GB, most of it PyTorch).
+Tests use no network, because dependencies come from uv's cache. `python -m tests.wheels` fills the cache and
+downloads 1 GB for each Python, mostly PyTorch.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ COMMAND = "python -m tests.wheels"
 DEADLINE_S = 240
 _UV = Path(sys.executable).with_name("uv")
 _PACKAGES = ("operator", "sim_image", "trainer")
-# pyenv and uv keep their Pythons here; the one on the PATH may be a shim for another version.
+# pyenv and uv install Pythons in these folders. A Python on the PATH may be a shim for another version.
 _HOMES = (".pyenv/versions", ".local/share/uv/python")
 
 
 class Uncached(Exception):
-    """A package for that Python is not in uv's cache."""
+    """A package that the installation needs is not in uv's cache."""
 
 
 def built(folder: Path) -> list[Path]:
@@ -43,7 +43,7 @@ def install(wheels: list[Path], interpreter: Path, folder: Path, *, offline: boo
     """Make an environment with the wheels in a folder, and return the folder of its programs.
 
     Raises:
-        Uncached: offline, and something must be downloaded.
+        Uncached: `offline` is true, and a package must be downloaded.
     """
     quiet = [_UV, "--quiet", *(["--offline"] if offline else [])]
     environment = ["--python", folder]
@@ -51,7 +51,7 @@ def install(wheels: list[Path], interpreter: Path, folder: Path, *, offline: boo
         [*quiet, "venv", "--no-project", "--python", interpreter, folder], check=True, timeout=DEADLINE_S
     )
     done = subprocess.run(
-        # Links need no space, wherever the cache is.
+        # Symbolic links need no disk space, and they work across file systems.
         [*quiet, "pip", "install", "--link-mode", "symlink", *environment, *wheels],
         capture_output=True,
         text=True,

@@ -1,7 +1,7 @@
-"""Commands in this machine's file system without the packages of ROS, in a mount namespace of their own.
+"""Run commands in a mount namespace without Debian's packages of ROS.
 
-An overlay lies over /usr, so nothing is changed outside the namespace. In it, everything of Debian's packages
-of ROS is deleted. That is more than an import hook could hide: programs, libraries and definitions too.
+An overlay over /usr hides all files of these packages; nothing changes outside the namespace. Unlike an
+import hook, the overlay also hides programs, libraries and message definitions.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 
-# Of Debian's source packages. netifaces and defusedxml are there for ROS alone.
+# Prefixes of the names of Debian's source packages. Only ROS needs netifaces and defusedxml.
 _SOURCES = ("ros-", "netifaces", "defusedxml")
 _SCRIPT = """\
 set -e
@@ -28,7 +28,7 @@ exec "$@"
 
 
 def works(folder: Path) -> bool:
-    """Return whether this machine lets us make such a file system, in an empty folder."""
+    """Return whether this machine permits such a namespace; `folder` is an empty folder for the trial."""
     if not all(map(shutil.which, ("unshare", "dpkg-query"))):
         return False
     done = subprocess.run(command(["true"], folder), capture_output=True, timeout=60, check=False)
@@ -36,11 +36,12 @@ def works(folder: Path) -> bool:
 
 
 def command(words: Sequence[str | Path], folder: Path) -> list[str]:
-    """Return a command that runs another one without ROS.
+    """Return a command that runs `words` without ROS.
 
     Args:
-        words: of the other command.
-        folder: a folder outside of /usr for the overlay; what is written there lives as long as the command.
+        words: the program and its arguments.
+        folder: a folder outside of /usr for the overlay; files that the command writes to /usr end with
+            it.
     """
     top = folder / "overlay"
     top.mkdir(exist_ok=True)
@@ -48,13 +49,13 @@ def command(words: Sequence[str | Path], folder: Path) -> list[str]:
     paths.write_text("\n".join(_paths()))
     is_root = os.geteuid() == 0
     namespace = ("unshare", "--mount", *(() if is_root else ("--map-root-user",)), "--")
-    how = "" if is_root else "userxattr,"  # the attributes in which an overlay notes what is deleted
+    how = "" if is_root else "userxattr,"  # an unprivileged overlay marks deleted files in `user.` attributes
     return [*namespace, "sh", "-c", _SCRIPT, "sh", str(top), str(paths), how, *map(str, words)]
 
 
 @cache
 def _paths() -> list[str]:
-    """Return the files of the packages, and the folders that only they have."""
+    """Return the paths under /usr that belong only to packages of ROS."""
     form = "${binary:Package} ${source:Package}\n"
     listed = subprocess.run(
         ["dpkg-query", "--show", "--showformat", form], capture_output=True, text=True, check=True
@@ -67,7 +68,7 @@ def _paths() -> list[str]:
 
 
 def _held(packages: list[str]) -> list[str]:
-    """Return the paths in packages."""
+    """Return the paths that the packages installed."""
     if not packages:
         return []
     words = ["dpkg", "--listfiles", *packages]

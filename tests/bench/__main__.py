@@ -1,8 +1,8 @@
 """`make bench`: measure the promised figures and print them as JSON.
 
-Machines are noisy, so every figure is a ratio within one run, or is printed with the figure that it is
-compared with. Names as arguments select parts, e.g. `python -m tests.bench stepping parallel`. `--scale 0.1`
-does a tenth of each part, to test the part itself.
+The load of machines varies, so a figure is a ratio within one run, or is printed next to the figure to which
+it is compared. Arguments select parts by name, e.g. `python -m tests.bench stepping parallel`. `--scale 0.1`
+runs a tenth of each part, which tests that the part works.
 """
 
 import argparse
@@ -48,8 +48,8 @@ PARTS = {
 def main():
     """Print one JSON object per line: the part, its duration in seconds, and its figures."""
     parser = argparse.ArgumentParser(prog="tests.bench", description=__doc__.splitlines()[0])
-    parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)}; default: all")
-    parser.add_argument("--scale", type=float, default=1.0, help="share of the whole size (default: 1)")
+    parser.add_argument("parts", nargs="*", metavar="PART", help=f"from {', '.join(PARTS)}; default: all")
+    parser.add_argument("--scale", type=float, default=1.0, help="share of the full size (default: 1)")
     asked = parser.parse_args()
     chosen = asked.parts or list(PARTS)
     if unknown := [name for name in chosen if name not in PARTS]:

@@ -1,4 +1,4 @@
-"""Policies of one simulator in the other, and policies with cameras: the effect of MuJoCo on learning."""
+"""Policies that run in another simulator than in training, and policies that observe camera images."""
 
 import shutil
 import tempfile
@@ -15,7 +15,7 @@ CYLINDER_STEPS = 300_000
 def measure_transfer(scale=1.0):
     """Return the success of move-to-target's policies in both simulators, on the same episodes.
 
-    Below full scale, only the policy of MuJoCo is measured.
+    Below full scale, the function measures only the policy that was trained in MuJoCo.
     """
     homes = list(HOMES.items())[: scaled(len(HOMES), scale)]
     with tempfile.TemporaryDirectory() as folder:
@@ -28,7 +28,10 @@ def measure_transfer(scale=1.0):
 
 
 def measure_seeing(scale=1.0):
-    """Return the success of camera policies on an empty floor, and among cylinders with 1 and 3 frames."""
+    """Return the success rates of camera policies: on an empty floor, and among cylinders.
+
+    Among cylinders, one policy observes 1 frame and another 3 frames.
+    """
     variants = {
         "empty": {},
         "cylinders_1_frame": {"cylinders": True, "frames": 1},
@@ -39,7 +42,7 @@ def measure_seeing(scale=1.0):
 
 
 def moved(run, home, place):
-    """Return a copy of a run directory whose simulators have another driver."""
+    """Return a copy of a run directory in which the driver of the simulators is replaced."""
     copy = run.parent / f"in-{place}"
     shutil.copytree(run, copy)
     configuration = copy / "training.yaml"
@@ -49,7 +52,7 @@ def moved(run, home, place):
 
 
 def _see(scale, **options):
-    """Return the success of see-target's policy; with options, it trains for more steps."""
+    """Return the success rate of see-target's policy; a policy with options trains for more steps."""
     job = example("see-target")
     trainer = job["spec"]["trainer"]
     trainer["environment"]["options"].update(options)

@@ -1,4 +1,4 @@
-"""A stub of the built-in arena with its facades, for the measurements."""
+"""A stub with the built-in arena and the facades that control it, for measurements."""
 
 from contextlib import contextmanager
 

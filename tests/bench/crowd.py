@@ -1,4 +1,4 @@
-"""Many jobs at once, as bare Jobs, as the four objects of a plan, and as TrainingJobs."""
+"""Many jobs at once: as Jobs alone, as the four objects of a plan, or as TrainingJobs."""
 
 import json
 import time
@@ -20,7 +20,7 @@ CLIENTS = 8
 DEADLINE_S = 1200
 SILENCE_S = 10
 LOOK_EVERY_S = 0.5
-TEMPLATE = "planned-once"  # replaced by each job's own name
+TEMPLATE = "planned-once"  # stands for the name of each job
 
 
 def training_job(name, namespace):
@@ -36,7 +36,7 @@ def create_training_jobs(api, namespace, count):
 
 
 def create_all_objects(api, namespace, count):
-    """Create what the operator creates for that many jobs: four objects each, several jobs at a time."""
+    """Create the four objects that the operator creates for each job, for several jobs at a time."""
     template = planned(namespace)
 
     def create(name):
@@ -47,8 +47,8 @@ def create_all_objects(api, namespace, count):
 
 
 def create_bare_jobs(api, namespace, count):
-    """Create only the Jobs; their pods are made although the objects that they mount are missing."""
-    template = planned(namespace)[-1:]  # the Job is last, after the objects that its pods mount
+    """Create only the Jobs; Kubernetes creates their pods even though the mounted objects are missing."""
+    template = planned(namespace)[-1:]  # the plan ends with the Job, after the objects that its pods mount
     jobs = [obj for name in names(count) for obj in renamed(template, name)]
     in_parallel(lambda job: api.create(JOBS, job), jobs)
 
@@ -56,7 +56,7 @@ def create_bare_jobs(api, namespace, count):
 def planned(namespace):
     """Return the objects of one TrainingJob as text.
 
-    They have no owner and labels, so operators ignore them.
+    Owner and labels are removed, so that operators ignore the objects.
     """
     uid = "00000000-0000-0000-0000-000000000000"
     job = identified(validate(training_job(TEMPLATE, namespace)), uid)
@@ -73,36 +73,36 @@ def renamed(template, name):
 
 
 def names(count):
-    """Return the names of some jobs."""
+    """Return the names of `count` jobs."""
     return [f"job-{number:05d}" for number in range(count)]
 
 
 def in_parallel(do, items):
-    """Do something with each item, several at a time; raise the first error."""
+    """Call `do` with each item, several at a time; raise the first error."""
     with ThreadPoolExecutor(CLIENTS) as pool:
         list(pool.map(do, items))
 
 
 def wait_for_account(api, namespace):
-    """Return when a new namespace has its service account, without which it accepts no pods."""
+    """Wait until a new namespace has its service account, without which it accepts no pods."""
     wait_for_count(api, ACCOUNTS, namespace, 1)
 
 
 def wait_for_count(api, resource, namespace, count):
-    """Return when a kind has so many objects.
+    """Wait until a namespace contains `count` objects of a kind.
 
     Raises:
-        TooLate: this takes more than twenty minutes.
+            TooLate: the objects do not exist after twenty minutes.
     """
     eventually(lambda: len(api.list(resource.only_metadata(), namespace)) >= count, DEADLINE_S, LOOK_EVERY_S)
 
 
 def wait_for_silence(plane):
-    """Return after ten seconds in which the operator sent only watches and requests for the Lease."""
+    """Wait until, for ten seconds, the operator has sent only watches and requests for the Lease."""
 
     def silent():
         before = sum(each.counts for each in asked(plane))
-        time.sleep(SILENCE_S)  # the test waits for a period without requests
+        time.sleep(SILENCE_S)  # a period without requests
         return sum(each.counts for each in asked(plane)) == before
 
     eventually(silent, DEADLINE_S)

@@ -1,7 +1,7 @@
-"""Jobs whose worlds are costly to check, and the waiting time of another tenant's job meanwhile.
+"""Jobs whose worlds are costly to check, and how long another tenant's job waits meanwhile.
 
-The operator is a separate process with the permissions of an installation; the control plane is real and has
-no nodes. The memory is that of the operator together with the processes in which it checks worlds.
+The operator is a separate process with the permissions of an installation. The control plane is real but has
+no nodes. The measured memory includes the processes in which the operator checks worlds.
 """
 
 import math
@@ -21,19 +21,19 @@ from tests.integration.operator.installed import operator, wait_for
 
 ROOT = Path(__file__).parents[2]
 HOSTILE, OTHERS = 32, 5
-TENANTS = ("hostile-1", "hostile-2")  # as many as there are checks at a time
-MOST_BYTES = 899_900  # a job's worlds together; the operator refuses more
-MOST_BYTES_OF_ONE = 200_000  # one inline world
-LARGE_BYTES = 150_000  # a world of this size is also checked in a separate process
+TENANTS = ("hostile-1", "hostile-2")  # as many as the operator's checks at a time
+MOST_BYTES = 899_900  # of all worlds of a job; the operator refuses more
+MOST_BYTES_OF_ONE = 200_000  # of one inline world
+LARGE_BYTES = 150_000  # a world of this size, too, is checked in a separate process
 PERIOD_S = 0.1
 DEADLINE_S = 600
 HEADER = b"#VRML_SIM R2023b utf8\n"
 ROBOT = b'Robot{controller "ros"}'
-NODE = b"A{a 0}"  # the node that costs most memory per byte
+NODE = b"A{a 0}"  # no other node needs more memory per byte
 
 
 def measure(scale=1.0):
-    """Return the time to plan another tenant's jobs, alone and together with hostile ones, and the memory."""
+    """Return the times to plan another tenant's jobs, without and with hostile jobs, and the memory."""
     count, others = scaled(HOSTILE, scale), scaled(OTHERS, scale)
     with tempfile.TemporaryDirectory(prefix="palaestra-hostile-") as name, running(Path(name)) as plane:
         api = _installed(plane)
@@ -65,13 +65,13 @@ def measure(scale=1.0):
 
 
 def costly(size, number=0):
-    """Return a world of a size with the highest possible cost; `number` makes it unique."""
+    """Return a world of `size` bytes with the highest possible cost; worlds differ by `number`."""
     first = HEADER + b"# %d\n" % number + ROBOT
     return first + NODE * ((size - len(first)) // len(NODE))
 
 
 def with_world(size, number=0):
-    """Return the fields of a job with such worlds, of a total size; no two worlds are equal."""
+    """Return the spec of a job whose costly worlds have `size` bytes together; no two worlds are equal."""
     groups = math.ceil(size / MOST_BYTES_OF_ONE)
     worlds = [costly(size // groups, 100 * number + place).decode() for place in range(groups)]
     return {
@@ -84,7 +84,7 @@ def with_world(size, number=0):
 
 
 class _Watching:
-    """Samples the operator's memory and its probe during a block."""
+    """Samples the operator's memory and its health probe during a `with` block."""
 
     def __init__(self, running_operator):
         self._operator = running_operator
@@ -110,14 +110,14 @@ class _Watching:
 
 
 def _rss_mib(pid):
-    """Return the resident memory of a process and its children."""
+    """Return the resident memory, in MiB, of a process and its children."""
     children = [each for path in Path(f"/proc/{pid}/task").glob("*/children") for each in _read(path).split()]
     lines = [line for each in (pid, *children) for line in _read(Path(f"/proc/{each}/status")).splitlines()]
     return sum(int(line.split()[1]) for line in lines if line.startswith("VmRSS:")) / 1024
 
 
 def _read(path):
-    """Return the text of a file of /proc; "" if its process has ended."""
+    """Return the text of a file in /proc, or "" if its process has ended."""
     try:
         return path.read_text()
     except OSError:
@@ -125,7 +125,7 @@ def _read(path):
 
 
 def _seconds_to_plan(api, namespace, size, times):
-    """Return the longest of several times from the creation of a job to its batch/v1 Job."""
+    """Return the longest of several times, in seconds, from a job's creation to its batch/v1 Job."""
     longest = 0.0
     for number in range(times):
         name = f"job-{size}-{number}"
@@ -137,7 +137,7 @@ def _seconds_to_plan(api, namespace, size, times):
 
 
 def _installed(plane):
-    """Return an administrator's client of a control plane with Palaestra and the namespaces of tenants."""
+    """Install Palaestra, create the namespaces of tenants, and return an administrator's client."""
     done = plane.kubectl("apply", "--server-side", "-f", str(ROOT / "manifests" / "install.yaml"))
     assert done.returncode == 0, done.stderr
     plane.await_kinds("crd/trainingjobs.palaestra.dev")
@@ -149,7 +149,7 @@ def _installed(plane):
 
 
 def _create_hostile(api, number):
-    """Create a job with worlds of the largest size; every second job has a single world, in a ConfigMap."""
+    """Create a job with worlds of the largest size; every second job reads one world from a ConfigMap."""
     name, namespace = f"job-{number}", TENANTS[number // 2 % len(TENANTS)]
     if number % 2:
         return _create(api, namespace, name, with_world(MOST_BYTES, number))
@@ -171,7 +171,7 @@ def _create(api, namespace, name, spec):
 
 
 def _planned(api):
-    """Return the number of hostile jobs that have their batch/v1 Job."""
+    """Return the number of hostile jobs for which a batch/v1 Job exists."""
     return sum(len(_names(api, namespace)) for namespace in TENANTS)
 
 

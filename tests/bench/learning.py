@@ -1,4 +1,4 @@
-"""The success of the examples' policies by training seed, on episodes by which no policy was chosen."""
+"""The success rates of the examples' policies by training seed, on episodes that chose no policy."""
 
 import json
 import subprocess
@@ -27,7 +27,7 @@ EVAL = Path(sys.executable).with_name("palaestra-eval")
 
 
 def measure(scale=1.0):
-    """Return the success of both tasks by seed, and that of two policies without training."""
+    """Return the success rates of both tasks by seed, and of two policies without training."""
     trained = by_seed("move-to-target", SEEDS, scale)
     navigating = by_seed("navigate", NAVIGATE_SEEDS, scale)
     return {
@@ -40,7 +40,7 @@ def measure(scale=1.0):
 
 
 def measure_sparse(scale=1.0):
-    """Return the success of sparse-reward for each training seed."""
+    """Return the success rate of sparse-reward by training seed."""
     trained = by_seed("sparse-reward", SPARSE_SEEDS, scale)
     return {"success": trained, "seeds_at_50": sum(rate >= 0.5 for rate in trained.values())}
 
@@ -48,7 +48,7 @@ def measure_sparse(scale=1.0):
 def by_seed(name, seeds, scale):
     """Return the success rate of an example's policy by training seed.
 
-    Below full scale, of the first seeds.
+    Below full scale, only the first seeds are used.
     """
     return {str(seed): train_and_measure(name, seed, scale) for seed in seeds[: scaled(len(seeds), scale)]}
 
@@ -62,7 +62,7 @@ def train_and_measure(name, seed, scale=1.0):
 
 
 def shortened(job, scale):
-    """Return a job with a share of its steps; below full scale it evaluates only at its end."""
+    """Return a job with a share of its steps; below full scale, the job evaluates only at its end."""
     if scale < 1:
         trainer = job["spec"]["trainer"]
         trainer["steps"] = scaled(trainer["steps"], scale, LEAST_STEPS)
@@ -72,7 +72,7 @@ def shortened(job, scale):
 
 
 def train(job, folder):
-    """Return the directory, inside `folder`, of the finished run of a job."""
+    """Run a job in `folder`, and return the directory of the finished run."""
     file = folder / "job.yaml"
     file.write_text(yaml.safe_dump(job))
     subprocess.run(
@@ -85,14 +85,17 @@ def train(job, folder):
 
 
 def success_rate(run, episodes=EPISODES):
-    """Return the success rate of the policy of a run directory, on fresh episodes."""
+    """Return the success rate, on fresh episodes, of a run's policy."""
     command = [EVAL, run, f"--episodes={episodes}", f"--seeds={STREAM}"]
     result = subprocess.run(command, check=True, capture_output=True, text=True)
     return json.loads(result.stdout)["success_rate"]
 
 
 def measure_baselines(scale=1.0):
-    """Return the success rates of random driving and of driving straight to the target, on such episodes."""
+    """Return the success rates of two untrained policies on the same episodes.
+
+    The first policy drives at random, and the second one straight to the target.
+    """
     with running() as (robot, scene, _):
         env = make(robot, scene, movements=MOVEMENTS)
         seeds = list(episode_seeds(SEEDS[0], STREAM, scaled(EPISODES, scale)))

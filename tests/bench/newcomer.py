@@ -1,4 +1,4 @@
-"""A new user's first minutes: from a clone to the trained policy, with nothing cached."""
+"""The first minutes of a new user: from a clone to a trained policy, without caches."""
 
 import os
 import subprocess
@@ -11,10 +11,9 @@ CACHES = {"PALAESTRA_CACHE", "PIP_CACHE_DIR", "UV_CACHE_DIR", "VIRTUAL_ENV", "XD
 
 
 def measure(scale=1.0):
-    """Return the seconds of the installation, and of everything up to the end of `make run`.
+    """Return the seconds of the installation, and the seconds until `make run` has ended.
 
-    At scale 0, the test only shows that the clone's commands can be run, because an installation takes
-    minutes.
+    An installation takes minutes. So at scale 0, only `make help` runs in the clone.
     """
     install, train = ("setup", "run") if scale else ("help", "help")
     with tempfile.TemporaryDirectory() as folder:
@@ -30,7 +29,7 @@ def measure(scale=1.0):
 
 
 def make(verb, clone, home):
-    """Run a make target of the clone as on a machine without caches."""
+    """Run a make target of the clone in an environment without caches."""
     kept = {name: value for name, value in os.environ.items() if name not in CACHES}
     subprocess.run(
         ["make", verb], cwd=clone, env={**kept, "HOME": home}, check=True, stdout=subprocess.DEVNULL

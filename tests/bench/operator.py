@@ -1,7 +1,7 @@
 """The costs of the operator: time and processor for many jobs, requests for one job, memory, idle requests.
 
-The control plane has no nodes, so only the API server, the Job controller and the operator run. A client that
-creates the same objects is measured on the same control plane.
+The control plane has no nodes, so only the API server, the Job controller and the operator run. For
+comparison, a client creates the same objects in the same control plane.
 """
 
 import os
@@ -25,7 +25,10 @@ TICKS_A_SECOND = os.sysconf("SC_CLK_TCK")
 
 
 def measure(scale=1.0):
-    """Return the figures of many jobs at both speeds of the Job controller, of one job, and of memory."""
+    """Return the figures of many jobs, of one job, and of memory.
+
+    Many jobs are measured at both request rates of the Job controller.
+    """
     return {
         "jobs": scaled(JOBS, scale),
         "default_rate": measure_crowd(None, scale),
@@ -36,15 +39,16 @@ def measure(scale=1.0):
 
 
 def measure_crowd(requests_per_s, scale):
-    """Return the figures of many jobs on a separate control plane."""
+    """Return the figures of many jobs; they run in a separate control plane."""
     with cluster(requests_per_s) as (plane, api, folder):
         return figures_of_a_crowd(plane, api, folder, scaled(JOBS, scale), QUIET_S)
 
 
 def figures_of_a_crowd(plane, api, folder, count, quiet_s):
-    """Return the seconds until that many pods exist.
+    """Return the seconds until `count` pods exist, and the operator's cost.
 
-    They are measured for bare Jobs, for a client and for the operator, with its cost.
+    The seconds are measured three times: for Jobs alone, for a client that creates all objects, and for the
+    operator.
     """
     bare_s = seconds_to_pods(api, "bare", crowd.create_bare_jobs, count)
     client_s = seconds_to_pods(api, "client", crowd.create_all_objects, count)
@@ -54,7 +58,7 @@ def figures_of_a_crowd(plane, api, folder, count, quiet_s):
         crowd.wait_for_silence(plane)
         spent = cpu_seconds(running_operator) - spent
         before = requests(plane)
-        time.sleep(quiet_s)  # no request may arrive in this time
+        time.sleep(quiet_s)  # idle time, in which no request may arrive
         return {
             "bare_jobs_s": round(bare_s, 1),
             "client_s": round(client_s, 1),
@@ -68,7 +72,10 @@ def figures_of_a_crowd(plane, api, folder, count, quiet_s):
 
 
 def measure_one_job():
-    """Return the requests to the API server for one job that trains for ten seconds, from creation to end."""
+    """Return the requests to the API server for one job, from its creation to its end.
+
+    The job trains for ten seconds.
+    """
     with cluster(None) as (plane, api, folder), operator(plane, folder / "operator.log"):
         crowd.wait_for_silence(plane)
         return single.requests_of_one_job(plane, api)
@@ -76,7 +83,7 @@ def measure_one_job():
 
 @contextmanager
 def cluster(requests_per_s):
-    """Run a control plane with Palaestra installed; yield it, an administrator's client and a folder."""
+    """Run a control plane with Palaestra; yield the plane, an administrator's client and a folder."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "plane").mkdir()
@@ -91,7 +98,7 @@ def cluster(requests_per_s):
 
 
 def seconds_to_pods(api, namespace, create, count):
-    """Return the seconds from the first object that `create` makes in a new namespace to the last pod."""
+    """Return the seconds from the first object that `create` creates, in a new namespace, to the last pod."""
     api.create(NAMESPACES, {"apiVersion": "v1", "kind": "Namespace", "metadata": {"name": namespace}})
     crowd.wait_for_account(api, namespace)
     began = time.monotonic()
@@ -107,7 +114,7 @@ def cpu_seconds(installed):
 
 
 def requests(plane):
-    """Return the number of requests that operators have sent, except watches and those for the Lease."""
+    """Return the number of requests of all operators, except watches and requests for the Lease."""
     return sum(each.counts for each in asked(plane))
 
 

@@ -1,7 +1,7 @@
-"""The operator's memory: idle, with large jobs, and with many.
+"""The operator's memory when idle, with large jobs, and with many jobs.
 
-The operator is a separate process, as in a pod, with the permissions of an installation and the environment
-of its image. The control plane is real and has no nodes: pods stay Pending, and nothing else happens.
+The operator is a separate process with the permissions of an installation and the environment of its image.
+The control plane is real but has no nodes, so all pods stay Pending.
 """
 
 import re
@@ -23,14 +23,14 @@ from tests.integration.operator.installed import asked, operator, wait_for
 ROOT = Path(__file__).parents[2]
 NAMESPACE = "crowd"
 LARGE, PLANNED, FINISHED = 400, 1_000, 10_000
-GROUPS, CHARACTERS = 5, 180_000  # inline worlds: 900,000 characters, the most that an API server accepts
+GROUPS, CHARACTERS = 5, 180_000  # 900,000 characters in total, the most that an API server accepts
 SETTLED_S, SETTLES_S = 5, 1200
 MIB = 1 << 20
 THEN = "2026-01-01T00:00:00Z"
 
 
 def measure(scale=1.0):
-    """Return resident memory in MiB: `rss` is the current value, and `peak` the largest so far."""
+    """Return resident memory in MiB: `rss` is the current value, and `peak` the maximum so far."""
     refused, planned_jobs, ended = (scaled(count, scale) for count in (LARGE, PLANNED, FINISHED))
     with crowd("large") as (plane, api):
         idle = started(plane)
@@ -51,7 +51,7 @@ def measure(scale=1.0):
 
 @contextmanager
 def crowd(name):
-    """Run a control plane with Palaestra installed, and a namespace for many jobs."""
+    """Run a control plane with Palaestra and a namespace for many jobs; yield the plane and a client."""
     with tempfile.TemporaryDirectory(prefix=f"palaestra-{name}-") as folder, running(Path(folder)) as plane:
         done = plane.kubectl("apply", "--server-side", "-f", str(ROOT / "manifests" / "install.yaml"))
         assert done.returncode == 0, done.stderr
@@ -64,17 +64,20 @@ def crowd(name):
 
 
 def started(plane):
-    """Start an operator with the existing objects, and return its memory when it is idle."""
+    """Start an operator, and return its memory after it has processed all existing objects."""
     began = time.monotonic()
     with operator(plane, plane.folder / "operator.log", in_a_pod=True) as running_operator:
         settle(plane, running_operator)
         found = memory(running_operator.process.pid) | {"seconds": round(time.monotonic() - began)}
-        running_operator.end()  # releases the Lease, so that the next one leads at once
+        running_operator.end()  # releases the Lease, so that the next operator leads at once
     return found
 
 
 def beside_planned(plane, api, count):
-    """Return the memory of an operator that planned jobs as they came, and of one that started later."""
+    """Return the memory of two operators.
+
+    The first one planned the jobs when they were created; the second one started later.
+    """
     with operator(plane, plane.folder / "operator.log", in_a_pod=True) as running_operator:
         create(api, (small_job(number) for number in range(count)))
         wait_for(lambda: jobs(api) == count, SETTLES_S, lambda: jobs(api))
@@ -90,7 +93,7 @@ def jobs(api):
 
 
 def settle(plane, running_operator):
-    """Return when an operator leads and has sent only watches and Lease requests for some seconds."""
+    """Wait until an operator leads and, for some seconds, has sent only watches and Lease requests."""
 
     def leads():
         with urllib.request.urlopen(
@@ -100,7 +103,7 @@ def settle(plane, running_operator):
 
     def quiet():
         before = sum(each.counts for each in asked(plane))
-        time.sleep(SETTLED_S)  # no request may arrive in this time
+        time.sleep(SETTLED_S)  # a period in which no request may arrive
         return sum(each.counts for each in asked(plane)) == before
 
     wait_for(leads, SETTLES_S, lambda: asked(plane)[-5:])
@@ -121,7 +124,7 @@ def create(api, made):
 
 
 def create_finished(api, count):
-    """Create TrainingJobs that have succeeded before any operator saw them."""
+    """Create TrainingJobs whose status reports success before any operator runs."""
     status = {"status": finished_status()}
 
     def end(job):
@@ -140,7 +143,7 @@ def small_job(number):
 def large_job(number):
     """Return a TrainingJob with inline worlds of the largest size that an API server accepts.
 
-    None is valid.
+    All worlds are invalid.
     """
     groups = [
         {
@@ -154,7 +157,7 @@ def large_job(number):
 
 
 def finished_status():
-    """Return the status of a job whose one replica has succeeded."""
+    """Return the status of a job whose only replica has succeeded."""
     told = {"reason": "Succeeded", "message": "the trainer has finished"}
     conditions = [
         {"type": kind, "status": "True", "lastTransitionTime": THEN, "observedGeneration": 1, **told}

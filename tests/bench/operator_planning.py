@@ -1,4 +1,7 @@
-"""The operator's time for a plan of a large job, whose worlds are checked once and stored once per group."""
+"""The time that the operator needs to plan a large job.
+
+Each world is checked once, and is stored once per group.
+"""
 
 import json
 import time
@@ -10,7 +13,7 @@ from tests.bench.sizes import scaled
 from tests.jobs import make_job
 
 REPLICAS = 30
-SIMULATORS = 17  # in one replica: 16 collect, and one evaluates
+SIMULATORS = 17  # in one replica: 16 that collect, and one that evaluates
 WORLD_BYTES = 45_000
 UID = "0d1f3e5a-7c2b-4d68-9a40-c3b2a1908f7e"
 POST = """DEF POST_{0} Solid {{
@@ -35,7 +38,7 @@ POST = """DEF POST_{0} Solid {{
 
 
 def measure(scale=1.0):
-    """Return the processor seconds to plan all replicas, to plan one, and to check the world once."""
+    """Return the processor seconds to plan all replicas, to plan one replica, and to check the world."""
     text = world()
     replicas = scaled(REPLICAS, scale)
     job = identified(validate(request(text, replicas)), UID)
@@ -53,14 +56,14 @@ def measure(scale=1.0):
 
 
 def world():
-    """Return the arena with so many posts that it is large."""
+    """Return the arena with enough posts to make the file large."""
     text = builtin("arena").decode()
     posts = (WORLD_BYTES - len(text)) // len(POST.format(10)) + 1
     return text + "".join(POST.format(number) for number in range(posts))
 
 
 def request(text, replicas):
-    """Return the TrainingJob."""
+    """Return a large TrainingJob with this world."""
     groups = (("collect", "Collect", SIMULATORS - 1), ("evaluate", "Evaluate", 1))
     simulators = [
         {"name": name, "role": role, "count": count, "world": {"inline": text}}
@@ -70,12 +73,12 @@ def request(text, replicas):
 
 
 def cpu_s(work, rounds=3):
-    """Return the processor seconds of some work, the minimum of several rounds."""
+    """Return the processor seconds of `work`: the minimum of several rounds."""
     return round(min(one_round_s(work) for _ in range(rounds)), 3)
 
 
 def one_round_s(work):
-    """Return the processor seconds of some work."""
+    """Return the processor seconds of one call of `work`."""
     began = time.process_time()
     work()
     return time.process_time() - began

@@ -1,4 +1,7 @@
-"""Simulators step at the same time: four that sleep 3 ms a step are compared with one, round by round."""
+"""Four simulators that step in parallel, compared with one simulator in each round.
+
+Each simulator sleeps for 3 ms in each step.
+"""
 
 import itertools
 import statistics
@@ -18,7 +21,7 @@ from tests.bench.stepping import rate
 ROUNDS = 15
 STEPS = 200
 SLEEP_MS = 3
-# Every wheel changes direction at every step, so that every command has to be sent.
+# Every wheel changes direction at every step, because an equal command would not be sent.
 MOVEMENTS = ("TURN_LEFT", "TURN_RIGHT")
 ARENA = Path(__file__).parents[2] / "sim_image/src/palaestra_sim/worlds/arena.wbt"
 
@@ -52,30 +55,30 @@ class Member:
         self.resets = 0
 
     def start(self):
-        """Do nothing, because it already runs."""
+        """Do nothing, because the simulator already runs."""
 
     def due(self, episodes=1):
-        """Return None, because it is only used for a short time."""
+        """Return None, because a short measurement needs no restart."""
 
     def abandon(self):
-        """Do nothing, because it is never restarted."""
+        """Do nothing, because the simulator is never restarted."""
 
     def stop(self):
-        """Do nothing, because its owner stops it."""
+        """Do nothing, because the exit stack stops the simulator."""
 
     def restart(self):
-        """Raise an error: a fault would spoil the measurement."""
+        """Raise an error, because a restart would spoil the measurement."""
         raise RuntimeError(f"{self.name} broke")
 
     def pause(self):
-        """Do nothing, because it is always busy."""
+        """Do nothing, because the simulator is always busy."""
 
     def unpause(self):
-        """Do nothing, because it already runs."""
+        """Do nothing, because the simulator is never paused."""
 
 
 def started(stack, name):
-    """Return a member with a running simulator of its own name, until `stack` is closed."""
+    """Return a member whose simulator, with a name of its own, runs until `stack` is closed."""
     world = Path(stack.enter_context(tempfile.TemporaryDirectory())) / f"{name}.wbt"
     world.write_bytes(ARENA.read_bytes().replace(b"--name=robotino", f"--name={name}".encode()))
     robot, scene, _ = stack.enter_context(running(f"--step-sleep-ms={SLEEP_MS}", world=world, name=name))

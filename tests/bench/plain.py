@@ -1,8 +1,8 @@
 """The cost of simulators, ROS and restarts: `make run` compared with plain Stable-Baselines3.
 
-Plain training runs the same task in one process without a simulator: `fake_arena` computes the task, and SB3
-evaluates the policy. Steps, hyperparameters, evaluations and the episodes of the confirmation are those of
-the example.
+Plain training runs the same task in one process without a simulator: `fake_arena` simulates the task, and SB3
+evaluates the policy. Steps, hyperparameters, evaluations and confirmation episodes are equal to the
+example's.
 """
 
 import json
@@ -32,7 +32,7 @@ LEAST_STEPS = 300
 
 
 def measure(scale=1.0):
-    """Return the seconds of both, one after the other, and their ratio."""
+    """Return the seconds of both trainings, which run one after the other, and the ratio."""
     plain_s = seconds_of([sys.executable, "-m", "tests.bench.plain", str(scale)])
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "job.yaml"
@@ -65,7 +65,7 @@ def seconds_of(command):
 
 
 def train(spec):
-    """Train and evaluate as the job's `spec` says, in this process."""
+    """Train and evaluate the job with this `spec` in this process."""
     torch.set_num_threads(1)  # the trainer does this too
     trainer = spec["trainer"]
     evaluation, hyperparameters = trainer["evaluation"], trainer["algorithm"]["hyperparameters"]

@@ -1,4 +1,4 @@
-"""Complete local runs: the time to continue after a kill or to end a sidecar, and the memory."""
+"""Complete local runs: the time to resume after a kill, the time to end a sidecar, and the memory."""
 
 import os
 import re
@@ -16,29 +16,29 @@ PROGRAMS = ("palaestra-train", "palaestra-stub", "palaestra-sidecar", REAPER, "p
 
 
 def measure_recovery(scale=1.0):
-    """Return `recovery` of a run that learns."""
+    """Return the result of `recovery` for a run that trains."""
     return measured(recovery, scale)
 
 
 def measure_shutdown(scale=1.0):
-    """Return `shutdown` of a run that learns."""
+    """Return the result of `shutdown` for a run that trains."""
     return measured(shutdown, scale)
 
 
 def measure_memory(scale=1.0):
-    """Return `memory` of a run that learns."""
+    """Return the result of `memory` for a run that trains."""
     return measured(memory, scale)
 
 
 def measured(figures, scale):
-    """Return the figures of a run of move-to-target after some steps."""
+    """Start a run of move-to-target, and return the result of `figures` after some steps."""
     with running(example("move-to-target")) as run:
         run.wait_for_step(scaled(WARM_STEPS, scale), PATIENCE_S)
         return figures(run)
 
 
 def recovery(run):
-    """Return the seconds from SIGKILL of the collecting stub to the next environment step."""
+    """Return the seconds from the SIGKILL of the collecting stub to the next environment step."""
     before = run.ask()["step"]
     stub = run.pid_of("palaestra-stub", "collect-0.wbt")
     killed = time.monotonic()
@@ -48,7 +48,7 @@ def recovery(run):
 
 
 def shutdown(run):
-    """Return the seconds from SIGTERM of the collecting sidecar to its end and to that of its stub."""
+    """Return the seconds from the SIGTERM of the collecting sidecar to the end of sidecar and stub."""
     sidecar, stub = (run.pid_of(it, "sim-collect-0/") for it in ("palaestra-sidecar", "palaestra-stub"))
     asked = time.monotonic()
     os.kill(sidecar, signal.SIGTERM)
@@ -57,7 +57,7 @@ def shutdown(run):
 
 
 def memory(run):
-    """Return the resident megabytes of a run's processes, the largest of each kind."""
+    """Return the resident memory of a run's programs in megabytes, the maximum for each program."""
     return {f"{program}_mb": max(map(resident_mb, run.pids(program))) for program in PROGRAMS}
 
 

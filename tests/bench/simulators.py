@@ -1,6 +1,6 @@
-"""The stub and MuJoCo compared: start, steps, pictures and memory.
+"""The stub and MuJoCo compared: start, steps, images and memory.
 
-Every second step has a picture, so one client measures steps with and without pictures in turns.
+Every second step renders an image, so one client measures steps with and without images in turns.
 """
 
 import contextlib
@@ -32,7 +32,7 @@ CAMERA = 'Camera {{ translation 0.1 0 0.25 name "eye" width {} height {} fieldOf
 
 
 def measure(scale=1.0):
-    """Return the figures of each simulator, times in ms and memory in MiB."""
+    """Return the figures of each simulator: times in ms, and memory in MiB."""
     ensure_master()
     steps, boxes = scaled(STEPS, scale), scaled(BOXES, scale)
     found = {simulator: plain(simulator, steps) for simulator in SIMULATORS}
@@ -43,7 +43,7 @@ def measure(scale=1.0):
 
 
 def plain(simulator, steps):
-    """Return start, step and memory in the built-in arena."""
+    """Return the time of a start, the time of a step, and the memory, in the built-in arena."""
     with running(simulator, builtin("arena").decode()) as (process, start_s):
         with stepping() as step:
             spent = [step() for _ in range(steps)]
@@ -51,7 +51,7 @@ def plain(simulator, steps):
 
 
 def pictures(width, height, steps):
-    """Return the duration of steps with and without a picture, until the picture has arrived."""
+    """Return the times of steps without an image, and of steps until their image has arrived."""
     world = re.sub(
         r"(DEF ROBOTINO Robot \{.*?children \[)",
         lambda found: f"{found[1]} {CAMERA.format(width, height)}",
@@ -83,7 +83,7 @@ def pictures(width, height, steps):
 
 
 def beside_boxes(count, steps):
-    """Return the duration of a step in a world with many crates."""
+    """Return the time of a step, and the memory, in a world with many crates."""
     places = itertools.islice(itertools.product(range(20), range(20)), count)
     crates = "\n".join(
         f'Solid {{ translation {3 + x} {y} 0.1 name "{x} {y}" physics Physics {{ density -1 mass 1 }}'
@@ -98,7 +98,7 @@ def beside_boxes(count, steps):
 
 @contextlib.contextmanager
 def running(simulator, world):
-    """Run a simulator; yield its process, and the seconds until its first response."""
+    """Run a simulator; yield its process and the seconds until its first response."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "bench.wbt")
         path.write_text(world)
@@ -113,7 +113,7 @@ def running(simulator, world):
 
 
 def wait_for_answer():
-    """Return when the simulator responds."""
+    """Wait until the simulator responds."""
     end = time.monotonic() + DEADLINE_S
     while True:
         try:
@@ -127,7 +127,7 @@ def wait_for_answer():
 
 
 def call(path, type_name, **fields):
-    """Return the response of a service that is called once."""
+    """Call a service once, and return the response."""
     service = RosService(f"/{ROBOT}/{path}", f"webots_ros/{type_name}")
     try:
         return service(**fields)
@@ -137,7 +137,7 @@ def call(path, type_name, **fields):
 
 @contextlib.contextmanager
 def stepping():
-    """Yield a function that makes one step and returns its duration in seconds."""
+    """Yield a function that steps once and returns the step's duration in seconds."""
     time_step = RosService(f"/{ROBOT}/robot/time_step", "webots_ros/set_int")
 
     def step():
@@ -152,7 +152,7 @@ def stepping():
 
 
 def processor_s(process):
-    """Return the processor time of a process; other programs hardly affect it."""
+    """Return the processor time of a process, which other programs hardly affect."""
     return int(Path(f"/proc/{process.pid}/schedstat").read_text().split()[0]) / 1e9
 
 

@@ -1,4 +1,4 @@
-"""One TrainingJob from creation to end, and the operator's requests to the API server meanwhile."""
+"""The operator's requests to the API server for one TrainingJob, from its creation to its end."""
 
 import time
 
@@ -12,7 +12,7 @@ TRAINS_S = 10
 
 
 def requests_of_one_job(plane, api):
-    """Return reads, writes and events until the pod exists, and until the job has succeeded."""
+    """Return the numbers of reads, writes and events: until the pod exists, and until the job succeeds."""
     place = Place(api)
     crowd.wait_for_account(api, place.name)
     before = len(asked(plane))
@@ -38,7 +38,7 @@ def counted(requests):
 
 
 def training():
-    """Serve the status of a trainer with a hundred steps per second, and yield its address."""
+    """Serve the status of a trainer that makes a hundred steps per second, and yield the address."""
     began = time.monotonic()
 
     def status():

@@ -1,4 +1,4 @@
-"""The size of a measurement at a scale: all of it at 1, and the least that runs its code at 0."""
+"""The size of a measurement at a scale: the full size at 1, and the smallest useful size at 0."""
 
 
 def scaled(whole: int, scale: float, least: int = 1) -> int:

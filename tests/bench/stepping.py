@@ -1,6 +1,6 @@
-"""Environment steps over ROS, Palaestra's clients and rospy's in turns.
+"""Environment steps over ROS, by Palaestra's clients and by rospy in turns.
 
-One step has three wheel commands, one time_step, nine distances, the bumper and the position.
+One step consists of three wheel commands, one time_step, nine distances, the bumper and the position.
 """
 
 import itertools
@@ -26,7 +26,7 @@ TOPICS = [*(f"ir{number}" for number in range(1, 10)), "touch_sensor"]
 
 
 def measure(scale=1.0):
-    """Return the steps per second of both, and their ratio round by round."""
+    """Return the steps per second with each client, and the median of the rounds' ratios."""
     with running() as (robot, _, _):
         pairs = [(rate_of_ours(robot, scale), rate_of_rospy(scale)) for _ in range(scaled(ROUNDS, scale))]
     return {
@@ -37,7 +37,7 @@ def measure(scale=1.0):
 
 
 def rate_of_ours(robot, scale):
-    """Return the steps per second of Palaestra's clients, alone on the simulator."""
+    """Return the steps per second of Palaestra's clients while rospy is not connected."""
     robot.connect()
     ways = itertools.cycle((1.0, -1.0))
     found = rate(lambda: step(robot, next(ways)), scaled(OURS, scale))
@@ -46,7 +46,7 @@ def rate_of_ours(robot, scale):
 
 
 def rate_of_rospy(scale):
-    """Return the steps per second of rospy, alone on the simulator."""
+    """Return the steps per second of rospy while Palaestra's clients are not connected."""
     stepper = RospyStepper("robotino")
     found = rate(stepper.step, scaled(ROSPYS, scale))
     stepper.close()
@@ -62,14 +62,17 @@ def rate(step_once, count):
 
 
 def step(robot, way):
-    """Take one step of Palaestra's client; `way` turns every wheel, because an equal command is not sent."""
+    """Take one step with Palaestra's client.
+
+    `way` changes every wheel's direction, because the client does not send an equal command.
+    """
     robot.drive(way * 0.3, way * 0.1, way * 0.5)
     robot.advance()
     robot.pose()
 
 
 class RospyStepper:
-    """The same step as a rospy program takes it, with a proxy per service and a subscriber per topic."""
+    """Takes the same step as a rospy program does, with a proxy per service and a subscriber per topic."""
 
     def __init__(self, name):
         self._calls = [
@@ -94,12 +97,12 @@ class RospyStepper:
         self._position(node=self._node.value.node)
         for _ in TOPICS:
             if not self._arrived.acquire(timeout=5):
-                raise TimeoutError("a sensor stays silent")
+                raise TimeoutError("a sensor published no message within 5 s")
 
     def close(self):
-        """Unsubscribe, and wait until the simulator has noticed.
+        """Unsubscribe, and wait until the simulator has closed the connections.
 
-        The next stepper has the same name.
+        The next `RospyStepper` uses the same node name.
         """
         for subscriber in self._subscribers:
             subscriber.unregister()
@@ -107,7 +110,7 @@ class RospyStepper:
         self._publisher("close")()
 
     def _connected(self):
-        """Return the topics that the simulator sends to this node; rospy counts a connection too early."""
+        """Return the topics on which the simulator sends to this node; rospy counts connections too early."""
         links = self._publisher.getBusInfo(rospy.get_name())[2]
         return {topic for _, subscriber, _, _, topic, _ in links if subscriber == rospy.get_name()}
 
@@ -116,7 +119,7 @@ class RospyStepper:
 
 
 def proxy(name, type_name):
-    """Return rospy's proxy of a webots_ros service, not persistent, as most programs use it."""
+    """Return rospy's proxy of a webots_ros service; like most programs, it opens a connection per call."""
     type_ = service_type(f"webots_ros/{type_name}")
     service = type(
         type_name,

@@ -1,4 +1,4 @@
-"""What a viewer costs the steps of a simulator: the same steps, watched and not watched, in turns."""
+"""The effect of a viewer on a simulator's steps: equal rounds with and without a viewer, in turns."""
 
 import os
 import select
@@ -15,13 +15,13 @@ from tests.bench.arena import running
 from tests.bench.sizes import scaled
 from tests.local_run import ROOT
 
-ROUNDS = 60  # many short rounds, because the load by other programs changes
+ROUNDS = 60  # many short rounds, because the load of the machine varies
 STEPS = 400
 PER_SECOND = 30.0  # the rate at which the page requests scenes
 
 
 def measure(scale=1.0):
-    """Return the steps per second of both, and the share that watching leaves, round by round."""
+    """Return the steps per second with and without a viewer, and the median of the rounds' ratios."""
     with running() as (robot, _, launcher), viewing(launcher.address.removeprefix("http://")) as viewer:
         robot.connect()
         pairs = [(stepped(robot, STEPS), watched(robot, STEPS, viewer)) for _ in range(scaled(ROUNDS, scale))]
@@ -35,10 +35,13 @@ def measure(scale=1.0):
 
 @contextmanager
 def viewing(address):
-    """Yield a viewer, which is another process as a page is, and watches only while it is told to."""
+    """Start a viewer and yield it; like a page, it is a separate process.
+
+    The viewer requests scenes only between the commands `1` and `0`.
+    """
     command = [sys.executable, "-m", "tests.bench.watched", address]
     with subprocess.Popen(command, cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as viewer:
-        viewer.stdout.readline()  # it has started
+        viewer.stdout.readline()  # the viewer has started
         yield viewer
         viewer.stdin.close()
         if viewer.wait(30.0):
@@ -65,7 +68,10 @@ def stepped(robot, steps):
 
 
 def watch(address):
-    """Ask for the newest state as often as a page does, while told to, until standard input closes."""
+    """Between the commands `1` and `0`, request the newest state as often as a page does.
+
+    The function returns when standard input closes.
+    """
     sys.stdout.write("watches\n")
     sys.stdout.flush()
     asks = False

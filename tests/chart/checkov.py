@@ -1,7 +1,7 @@
-"""checkov in an environment of its own, because it pins older libraries than the project's.
+"""checkov in an environment of its own, because checkov pins older libraries than the project.
 
-The first call installs the packages of checkov.lock (`make lock` writes it) into the project's cache. A scan
-opens no connection.
+The first call installs the packages of checkov.lock, which `make lock` writes, into the project's cache. A
+scan opens no connection.
 """
 
 import hashlib
@@ -20,11 +20,11 @@ from tools.images import cache
 LOCK = Path(__file__).with_name("checkov.lock")
 UV = Path(sys.executable).with_name("uv")
 INSTALL_S, SCAN_S = 240, 60
-KEPT = 2  # environments; another checkout may have another lock
+KEPT = 2  # number of environments in the cache; another checkout may have another lock file
 
 
 class Finding(NamedTuple):
-    """checkov's finding about an object, by the name of its check, such as CKV_K8S_11."""
+    """A check that failed, such as CKV_K8S_11, and the object for which it failed."""
 
     check: str
     kind: str
@@ -32,7 +32,7 @@ class Finding(NamedTuple):
 
 
 def findings(manifests: Mapping[str, str]) -> dict[str, set[Finding]]:
-    """Return checkov's findings in objects as YAML, by the given names.
+    """Return checkov's findings by the name of the manifest; a manifest is YAML text.
 
     Raises:
         CalledProcessError: checkov failed or could not be installed.
@@ -54,7 +54,10 @@ def findings(manifests: Mapping[str, str]) -> dict[str, set[Finding]]:
 
 
 def _environment() -> Path:
-    """Return the environment. Create it atomically if it is missing: another process may do the same."""
+    """Return the environment, and create it if it is missing.
+
+    The creation is atomic, because another process may create the same environment.
+    """
     made = cache.folder() / f"checkov-{hashlib.sha256(LOCK.read_bytes()).hexdigest()[:12]}"
     made.parent.mkdir(parents=True, exist_ok=True)
     if not made.is_dir():

@@ -1,4 +1,4 @@
-"""CustomResourceDefinitions that the chart uses, from those projects' Go modules."""
+"""CustomResourceDefinitions of other projects that the chart uses, from the Go modules of these projects."""
 
 import json
 import os
@@ -14,9 +14,9 @@ DOWNLOAD_S = 300
 
 
 def definitions(module: str, folder: str) -> Path:
-    """Return a folder of a Go module, such as that of its CustomResourceDefinitions.
+    """Return a folder of a Go module, such as the folder of its CustomResourceDefinitions.
 
-    Nothing is downloaded unless the tests are required to run.
+    The module is downloaded only if the variable PALAESTRA_REQUIRE_CLUSTER is 1.
 
     Raises:
         NoPrograms: Go or the module is missing.
@@ -40,7 +40,7 @@ def definitions(module: str, folder: str) -> Path:
 
 
 def kinds_of_prometheus() -> list[str]:
-    """Return kubectl's options for the definitions of the Prometheus Operator's kinds that the chart uses.
+    """Return kubectl's options for those definitions of the Prometheus Operator that the chart uses.
 
     Raises:
         NoPrograms: Go or the module is missing.

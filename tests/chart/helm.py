@@ -18,11 +18,11 @@ Object = dict[str, Any]
 
 
 class HelmRefused(Exception):
-    """Helm's error message."""
+    """Helm failed; the text is its error message."""
 
 
 def helm(*arguments: str, sent: str = "", **environment: str) -> str:
-    """Run Helm with `sent` as its standard input, and return its output; the limit is 60 s.
+    """Run Helm with `sent` as standard input, and return the output; the timeout is 60 s.
 
     Raises:
         NoPrograms: Helm is not built.
@@ -44,12 +44,12 @@ def helm(*arguments: str, sent: str = "", **environment: str) -> str:
 
 
 def rendered(values: Object | None = None, *options: str) -> str:
-    """Return all objects of the chart with some values, as YAML."""
+    """Return all objects of the chart with these values, as YAML."""
     where = (RELEASE, str(CHART), f"--namespace={NAMESPACE}")
     chosen = yaml.safe_dump(values or {})
     return helm("template", *where, "--values=-", *options, sent=chosen)
 
 
 def objects(values: Object | None = None) -> list[Object]:
-    """Return all objects of the chart with some values."""
+    """Return all objects of the chart with these values."""
     return [each for each in yaml.safe_load_all(rendered(values)) if each]

@@ -1,4 +1,4 @@
-"""The ways to install the chart that docs/howto/install.md describes, as values."""
+"""The chart's values for each kind of installation in docs/howto/install.md."""
 
 from typing import Any
 
@@ -56,7 +56,7 @@ MODES: dict[str, Values] = {
 
 
 def merged(*parts: Values) -> Values:
-    """Return all values merged; a later part wins."""
+    """Return all values merged; a later part overrides an earlier one."""
     whole: Values = {}
     for part in parts:
         for key, value in part.items():

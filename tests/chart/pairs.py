@@ -1,4 +1,4 @@
-"""Sets of values in which each pair of choices occurs, because no template may rely on a default."""
+"""Sets of values that contain every pair of values, so that no template relies on a default."""
 
 from collections.abc import Iterable
 from itertools import combinations
@@ -12,7 +12,7 @@ RESOURCES = {"requests": {"cpu": "1"}, "limits": {"memory": "1Gi"}}
 SPREAD = {"maxSkew": 1, "topologyKey": "zone", "whenUnsatisfiable": "DoNotSchedule"}
 LABELS = {"example.com/team": "robots"}
 
-# For each value of the chart, a setting other than its default.
+# For each value of the chart, a value other than its default.
 OTHERS: dict[str, Any] = {
     "images.registry": "registry.example.com:5000/robots",
     "images.pullPolicy": "Never",
@@ -75,7 +75,7 @@ OTHERS: dict[str, Any] = {
     "jupyter.existingClaim": "notes",
     "jupyter.resources": RESOURCES,
 }
-# For a value of the chart, the other values that the schema requires with it.
+# For some values of the chart, the other values that the schema then requires.
 BESIDE: dict[str, dict[str, Any]] = {
     "operator.leaderElection": {"operator.replicas": 1},
     "tensorboard.enabled": {"tensorboard.existingClaim": "runs"},
@@ -84,9 +84,9 @@ BESIDE: dict[str, dict[str, Any]] = {
 
 
 def rows() -> list[tuple[str, ...]]:
-    """Return a few sets of paths. For any two paths, some sets have each alone, both, and neither.
+    """Return sets of paths. For any two paths, a set has both, a set has neither, and two sets have one each.
 
-    The first of n + 1 rows is empty, and each path is in n/2 of the others, rounded up: two such halves
+    The first of the n + 1 sets is empty. Each path is in n/2 of the other sets, rounded up. Two such halves
     overlap, and neither contains the other (Katona 1973).
     """
     n = next(odd for odd in range(1, 99, 2) if comb(odd, odd // 2 + 1) >= len(OTHERS))
@@ -95,7 +95,7 @@ def rows() -> list[tuple[str, ...]]:
 
 
 def together(row: Iterable[str]) -> Values:
-    """Return other values than the defaults for some paths, and the values that these require."""
+    """Return values other than the defaults for these paths, and the values that they require."""
     chosen = {path: OTHERS[path] for path in row}
     for path in tuple(chosen):
         chosen |= BESIDE.get(path, {})

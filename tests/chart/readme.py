@@ -1,6 +1,6 @@
-"""The chart's README: an introduction, and a table generated from values.yaml.
+"""The chart's README: an introduction, and a table that is generated from values.yaml.
 
-In values.yaml each value has a comment, which belongs to the key on the line below it.
+In values.yaml, a comment describes the key on the next line.
 """
 
 import json
@@ -17,7 +17,7 @@ MARK = "<!-- generated from values.yaml by `make golden` -->\n"
 
 
 class Value(NamedTuple):
-    """A value: its dotted path, its default, and its description ("" if it has no comment)."""
+    """A value of the chart: dotted path, default, and description, which is "" without a comment."""
 
     path: str
     default: Any
@@ -25,13 +25,13 @@ class Value(NamedTuple):
 
 
 def values(source: str) -> Iterator[Value]:
-    """Yield every value of a values.yaml, in the order of the file."""
+    """Yield every value of a values.yaml file in the file's order."""
     lines = source.splitlines()
     yield from _values(yaml.compose(source), (), lines)
 
 
 def text() -> str:
-    """Return the README as it should be: the unchanged introduction and a newly generated table."""
+    """Return the README with the present introduction and a new table."""
     introduction, _, _ = PATH.read_text().partition(MARK)
     rows = [
         f"| `{value.path}` | `{json.dumps(value.default)}` | {value.sentence} |"

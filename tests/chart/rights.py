@@ -1,4 +1,4 @@
-"""Permissions: the grants of roles to a service account, and its uses in an API server's audit log. Pure."""
+"""Permissions of service accounts: those that roles grant, and those that an audit log contains. Pure."""
 
 import json
 from collections.abc import Iterable, Iterator, Mapping
@@ -12,7 +12,7 @@ ACCOUNT = "system:serviceaccount:"
 
 
 class Right(NamedTuple):
-    """One verb on a kind of objects, or on a part of them such as `trainingjobs/status`."""
+    """A verb on a kind of objects, or on a subresource such as `trainingjobs/status`."""
 
     group: str
     resource: str
@@ -20,7 +20,7 @@ class Right(NamedTuple):
 
 
 class Use(NamedTuple):
-    """A request of a service account, and whether it was allowed; `reason` names the binding that did so."""
+    """A request of a service account, and whether it was allowed; `reason` names the binding."""
 
     namespace: str
     account: str
@@ -30,7 +30,7 @@ class Use(NamedTuple):
 
 
 def granted(objects: Iterable[Object], namespace: str, account: str) -> set[Right]:
-    """Return everything that the bindings among some objects grant to a service account."""
+    """Return all permissions that the bindings among `objects` grant to a service account."""
     found = list(objects)
     roles = {_key(each["kind"], each, each["metadata"]["name"]): each for each in found if "rules" in each}
     subject = {"kind": "ServiceAccount", "name": account, "namespace": namespace}
@@ -43,7 +43,7 @@ def granted(objects: Iterable[Object], namespace: str, account: str) -> set[Righ
 
 
 def held(role: Object) -> set[Right]:
-    """Return everything that a role grants."""
+    """Return all permissions that a role grants."""
     return {
         Right(group, resource, verb)
         for rule in role["rules"]
@@ -54,7 +54,7 @@ def held(role: Object) -> set[Right]:
 
 
 def uses(log: str, since: str = "") -> Iterator[Use]:
-    """Yield the requests of service accounts since a time, in ISO 8601 and UTC; discovery is left out."""
+    """Yield the requests of service accounts since a time (ISO 8601, UTC), without discovery requests."""
     for line in log.splitlines():
         with suppress(json.JSONDecodeError):  # the last line may be incomplete
             entry = json.loads(line)
@@ -71,12 +71,12 @@ def _uses(entry: Object) -> Iterator[Use]:
     resource = "/".join(filter(None, (target["resource"], target.get("subresource"))))
     verbs = [entry["verb"]]
     if entry["verb"] == "patch" and entry.get("responseStatus", {}).get("code") == CREATED:
-        verbs.append("create")  # an API server checks both verbs if a new object is applied
+        verbs.append("create")  # to apply a new object, a client needs both verbs
     for verb in verbs:
         right = Right(target.get("apiGroup", ""), resource, verb)
         yield Use(namespace, account, right, allowed, notes.get("authorization.k8s.io/reason", ""))
 
 
 def _key(kind: str, beside: Object, name: str) -> tuple[str, str | None, str]:
-    """Return the key of a role; a Role is in the namespace of its binding."""
+    """Return the key of a role; a Role has the namespace of its binding."""
     return kind, beside["metadata"].get("namespace") if kind == "Role" else None, name

@@ -1,7 +1,7 @@
 """Write container images as OCI archives from plain files, without a container engine.
 
-An image has one layer with programs and their dependencies. The same files give the same bytes: no time and
-no owner is included, so an archive can be cached under a key of its content.
+An image has one layer, which contains programs and their dependencies. The same files give the same bytes,
+because the archive contains no times and owners. So an archive can be cached under a hash of its content.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ SEARCH_PATH = "PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Image:
-    """The content of an image: full name with tag, program, files and links by path, user and group."""
+    """An image: full name with tag, program to start, files and links by path, and user and group."""
 
     name: str
     entrypoint: str

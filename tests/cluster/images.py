@@ -1,8 +1,8 @@
-"""Write the images that come with a node: the control plane, kube-proxy, CoreDNS, volumes.
+"""Write the images of a node's own pods: the control plane, kube-proxy, CoreDNS and volumes.
 
-python3 -m tests.cluster.images PROGRAMS TREE OUT writes one OCI archive each into OUT, from the folder of
-built programs and the node's Debian tree. It uses only the standard library, because it runs before anything
-is installed.
+python3 -m tests.cluster.images PROGRAMS TREE OUT writes one OCI archive per image into OUT. PROGRAMS is the
+folder of built programs, and TREE is the node's Debian tree. The program uses only the standard library,
+because it runs before any package is installed.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from tests.cluster.archive import Image, write_archive
 
 PAUSE = "registry.k8s.io/pause:3.10.2"
 HELPER = "palaestra.dev/busybox:1.37.0"
-# iptables chooses its command by the name under which it is called
+# The program iptables reads its command from the name under which it is called.
 IPTABLES = (
     "iptables",
     "iptables-save",
@@ -44,7 +44,7 @@ def version_of(module: str, package: str) -> str:
 
 
 def single_programs(programs: Path) -> list[Image]:
-    """Return the images that contain one static program of `programs` and nothing else."""
+    """Return the images that each contain only one static program of `programs`."""
     kubernetes = version_of("kubernetes", "k8s.io/kubernetes")
     etcd = version_of("etcd", "go.etcd.io/etcd/server/v3").removeprefix("v")
     coredns = version_of("coredns", "github.com/coredns/coredns")
@@ -59,13 +59,13 @@ def single_programs(programs: Path) -> list[Image]:
 
 
 def kube_proxy(programs: Path, tree: Path) -> Image:
-    """Return kube-proxy's image, with the programs iptables and nft and their libraries from `tree`."""
+    """Return kube-proxy's image, with iptables, nft and their libraries from `tree`."""
     extensions = sorted((tree / "usr/lib/x86_64-linux-gnu/xtables").glob("*.so"))
     called = [tree / "usr/sbin/xtables-nft-multi", tree / "usr/sbin/nft"]
     programs_and_extensions = [*called, *(path for path in extensions if not path.is_symlink())]
     files = {_place(path, tree): path for path in programs_and_extensions}
-    # The extensions' own libraries (libm) are included: without them, Services with two endpoints sometimes
-    # fail.
+    # The libraries of the extensions (libm) are needed too: without them, Services with two endpoints
+    # sometimes fail.
     for library in set(chain.from_iterable(_libraries(path, tree) for path in programs_and_extensions)):
         files[PurePosixPath(library.lstrip("/"))] = _resolved(library, tree)
     links = {_place(path, tree): str(path.readlink()) for path in extensions if path.is_symlink()}
@@ -76,7 +76,7 @@ def kube_proxy(programs: Path, tree: Path) -> Image:
 
 
 def helper(tree: Path) -> Image:
-    """Return the image of the pods that create and remove the folders of volumes: one busybox."""
+    """Return the image of the pods that create and remove the folders of volumes; it contains one busybox."""
     links = {PurePosixPath("bin", command): "busybox" for command in HELPER_COMMANDS}
     files = {PurePosixPath("bin/busybox"): tree / "usr/bin/busybox"}
     return Image(name=HELPER, entrypoint="/bin/sh", files=files, links=links)
@@ -93,13 +93,13 @@ def _place(path: Path, tree: Path) -> PurePosixPath:
 
 def _libraries(path: Path, tree: Path) -> set[str]:
     command = ["chroot", str(tree), "ldd", f"/{_place(path, tree)}"]
-    # ldd exits with 1 for a static program.
+    # For a static program, ldd exits with 1.
     listing = subprocess.run(command, check=False, capture_output=True, text=True).stdout
     return set(re.findall(r"(/\S+)", listing)) - {f"/{_place(path, tree)}:"}
 
 
 def _resolved(library: str, tree: Path) -> Path:
-    """Return the file in `tree` for a library's absolute path; links are resolved inside the tree."""
+    """Return the file in `tree` of a library's absolute path, with links resolved inside the tree."""
     command = ["chroot", str(tree), "realpath", library]
     inside = subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()
     return tree / inside.lstrip("/")

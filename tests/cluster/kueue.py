@@ -1,7 +1,7 @@
-"""Write the image of Kueue's manager as its project ships it, and put its name into the chart.
+"""Write the image of Kueue's manager like the image that its project releases, and name it in the chart.
 
-python3 -m tests.cluster.kueue PROGRAM VALUES OUT writes an OCI archive from the built program, and the
-chart's values.yaml again. It uses only the standard library.
+python3 -m tests.cluster.kueue PROGRAM VALUES OUT writes an OCI archive of the built program, and rewrites the
+chart's values.yaml. It uses only the standard library.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ REPOSITORY = "registry.k8s.io/kueue/kueue"
 
 
 def version() -> str:
-    """Return the version of Kueue that is built here, such as "v0.19.1"."""
+    """Return the version of Kueue that the tests build, such as "v0.19.1"."""
     return version_of("kueue", "sigs.k8s.io/kueue")
 
 
 def manager(program: Path) -> Image:
-    """Return the image; Kueue's chart runs `/manager` in it and refuses to run it as root."""
+    """Return the manager's image; Kueue's chart runs `/manager` in it as a user other than root."""
     return Image(
         name=f"{REPOSITORY}:{version()}",
         entrypoint="/manager",
@@ -34,8 +34,8 @@ def manager(program: Path) -> Image:
 def released(values: str) -> str:
     """Return the chart's values.yaml with the image of `manager`, as in the released chart.
 
-    The module's chart names a staging image with the policy Always, so a node would not use the image that
-    was loaded onto it. The manager's image is the first one below `controllerManager`.
+    The module's chart names a staging image with the pull policy Always, so a node would not use the loaded
+    image. The manager's image is the first one below `controllerManager`.
 
     Raises:
         LookupError: the file has no such image.

@@ -1,6 +1,6 @@
-"""Sentences that a hurried reader must read twice, found by rules in docs, sources and configuration.
+"""Find sentences that a reader must read twice, by rules, in docs, sources and configuration.
 
-Pure: text in, findings out. `RULES` is the list of rules; code, quotes, tables, headings and questions are
+Pure: text in, findings out. `RULES` is the list of rules. Code, quotes, tables, headings and questions are
 exempt. `python -m tests.contract.prose PATH...` prints the findings.
 """
 
@@ -31,7 +31,7 @@ class Sentence:
 
     @property
     def is_question(self) -> bool:
-        """Whether it ends in a question mark, which exempts it."""
+        """Whether the sentence ends in a question mark; such a sentence is exempt."""
         return self.text.rstrip(")\"'”*").endswith("?")
 
 
@@ -49,7 +49,7 @@ class Finding:
 
 
 def contains(pattern: str) -> Callable[[str], bool]:
-    """Return a check for a pattern, in any case."""
+    """Return a function that checks whether a text contains a pattern, in any case."""
     compiled = re.compile(pattern, re.IGNORECASE)
     return lambda text: compiled.search(text) is not None
 
@@ -71,7 +71,7 @@ RULES: dict[str, Callable[[str], bool]] = {
 
 
 def findings(path: Path) -> list[Finding]:
-    """Return the findings of the rules in a file, in the order of its lines."""
+    """Return the findings in a file, in the order of its lines."""
     return [
         Finding(path=path, line=sentence.line, rule=rule, text=sentence.text)
         for sentence in sentences(path)
@@ -82,7 +82,7 @@ def findings(path: Path) -> list[Finding]:
 
 
 def sentences(path: Path) -> Iterator[Sentence]:
-    """Yield the sentences of running text in a file, by the type in its name."""
+    """Yield the sentences of running text in a file; the suffix of the name selects the reader."""
     text = path.read_text()
     paragraphs = READERS.get(path.suffix, of_comments)(text)
     for line, paragraph in paragraphs:
@@ -94,7 +94,7 @@ Paragraph = tuple[int, str]
 
 
 def of_markdown(text: str) -> Iterator[Paragraph]:
-    """Yield paragraphs and list items without code, tables, headings, quotes and link addresses."""
+    """Yield paragraphs and list items, without code, tables, headings, quotes and link addresses."""
     text = re.sub(r"^(```|~~~).*?^\1[^\n]*$", blank, text, flags=re.MULTILINE | re.DOTALL)
     text = re.sub(r"<!--.*?-->", blank, text, flags=re.DOTALL)
     exempt = re.compile(r"\s*([#|>├└│]|!\[|<|---)")
@@ -103,7 +103,7 @@ def of_markdown(text: str) -> Iterator[Paragraph]:
 
 
 def of_lines(lines: Iterable[Paragraph]) -> Iterator[Paragraph]:
-    """Yield paragraphs; an empty line ends one, and so does a line that begins an item or a field."""
+    """Yield paragraphs, which end at an empty line, or before a line that begins an item or a field."""
     begins = re.compile(r"\s*([-*]|\d+\.)\s+|\s*[\w.`*\[\]/]+( \([^)]*\))?: +(?=\S)")
     start, held = 0, ""
     for number, line in [*lines, (0, "")]:
@@ -143,7 +143,7 @@ def of_docstring(line: int, text: str) -> Iterator[Paragraph]:
 
 
 def without_blocks(docstring: str) -> str:
-    """Return a docstring in which blocks of code or tables, indented after an empty line, are blank."""
+    """Return a docstring in which indented blocks after an empty line (code, tables) are blank."""
     lines = docstring.split("\n")
     margin = min((indent(line) for line in lines[1:] if line.strip()), default=0)
     kept, inside = lines[:1], False
@@ -160,7 +160,7 @@ def indent(line: str) -> int:
 
 
 def of_comments(text: str) -> Iterator[Paragraph]:
-    """Yield comments; consecutive full lines are one comment, and a comment after code is another."""
+    """Yield comments. Consecutive lines of comments are one paragraph; a comment after code is its own."""
     found = [(number, without_code(comment)) for number, comment in comments(text)]
     sources = text.split("\n")
     full = {number: comment for number, comment in found if sources[number - 1].lstrip().startswith("#")}
@@ -169,7 +169,7 @@ def of_comments(text: str) -> Iterator[Paragraph]:
 
 
 def comments(text: str) -> Iterator[Paragraph]:
-    """Yield the comments of Python, or of any text in which a line with `#` at its beginning is one."""
+    """Yield the comments of Python code; in any other text, a comment is a line that begins with `#`."""
     try:
         tokens = list(tokenize.generate_tokens(io.StringIO(text).readline))
     except (tokenize.TokenError, SyntaxError):
@@ -187,19 +187,19 @@ READERS: dict[str, Callable[[str], Iterator[Paragraph]]] = {".md": of_markdown, 
 
 
 def piece(node: ast.expr) -> str:
-    """Return a part of an f-string as text; a value counts as one word."""
+    """Return a part of an f-string as text, in which a value is one word."""
     return str(node.value) if isinstance(node, ast.Constant) else "x"
 
 
 def without_code(text: str) -> str:
-    """Return text with code as one word, without quotes, and with links as their text."""
+    """Return a text in which code is one word, quotes are one word, and links are their text."""
     text = re.sub(r"`[^`]*`", "X", text)  # a capital, since it may begin a sentence
     text = re.sub(r"[\"“][^\"”]*[\"”]", "x", text)
     return re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", text)
 
 
 def blank(match: re.Match[str]) -> str:
-    """Return as many empty lines as the match has."""
+    """Return as many newlines as the match contains."""
     return "\n" * match[0].count("\n")
 
 
@@ -214,7 +214,7 @@ def main() -> None:
 
 
 def files(paths: Iterable[Path]) -> Iterator[Path]:
-    """Yield files, and the files of folders that have a suffix of text."""
+    """Yield the given files, and the text files in the given folders."""
     for path in paths:
         if path.is_dir():
             yield from sorted(

@@ -1,4 +1,4 @@
-"""A checkout is the same on every machine."""
+"""A checkout has the same bytes on every machine."""
 
 import subprocess
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A class name has one meaning in the repository, so that a search for it leads to one place."""
+"""A class name has one meaning in the repository, so that a search for the name finds one class."""
 
 import ast
 from collections import defaultdict
@@ -7,7 +7,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 SOURCES = ("operator/src", "trainer/src", "sim_image/src")
 
-FIELD = "a part of a job: as its author writes it, and as the trainer reads it from training.yaml"
+FIELD = "a field of a job: as its author writes it, and as the trainer reads it from training.yaml"
 DEVICE = "a device of Webots: its facade in the trainer, and its simulation"
 ALLOWED_TWICE = {
     **dict.fromkeys(("Algorithm", "Callback", "Checkpoint", "Evaluation", "Normalize"), FIELD),

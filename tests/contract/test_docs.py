@@ -1,4 +1,4 @@
-"""The examples on the pages work when they are typed."""
+"""The examples on the pages of the documentation work as written."""
 
 import re
 from pathlib import Path
@@ -19,7 +19,7 @@ PAGES = sorted(
 
 
 def blocks(language, pages=PAGES):
-    """Return every block of a language, with its page."""
+    """Return every block of a language on the pages, as parameters that are named after the page."""
     return [
         pytest.param(text, id=f"{page.relative_to(ROOT).with_suffix('')}-{number}")
         for page in pages
@@ -30,20 +30,20 @@ def blocks(language, pages=PAGES):
 
 @pytest.mark.parametrize("text", blocks("python", [page for page in PAGES if page != ROOT / "README.md"]))
 def test_python_runs(text):
-    """The README has no block of Python; that of a notebook is in examples/, with its own test."""
+    """A reader copies a block and runs it. README.md contains no Python block."""
     exec(compile(text, "<page>", "exec"), {})
 
 
 @pytest.mark.parametrize("text", blocks("yaml"))
 def test_whole_jobs_are_right(text):
-    """Parts of a job are checked where they are explained; complete ones must load."""
+    """A reader copies a complete job. The tests of each page check the parts of jobs on that page."""
     if "kind: TrainingJob" in text:
         palaestra.api.load(text, "page")
 
 
 @pytest.mark.parametrize("text", blocks("console"))
 def test_every_verb_that_is_typed_exists(text):
-    """`make help` and the pages must agree."""
+    """A reader types the command, so the Makefile must have its target."""
     makefile = (ROOT / "Makefile").read_text()
 
     verbs = re.findall(r"^make (\w+)", text, re.MULTILINE)

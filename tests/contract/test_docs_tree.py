@@ -1,4 +1,4 @@
-"""Each page of docs/ is reached from docs/README.md and says for whom it is; each address exists."""
+"""A reader reaches each page of docs/ from docs/README.md, and no link of a page is broken."""
 
 import re
 import subprocess
@@ -12,7 +12,7 @@ from tests.pages import anchors, chapters, links
 
 DOCS = ROOT / "docs"
 ENTRY = DOCS / "README.md"
-RECORDS = set(DOCS.glob("decisions/0*.md"))  # decision records have a form of their own
+RECORDS = set(DOCS.glob("decisions/0*.md"))  # decision records have a different form
 FIRST = re.compile(
     r"# [^\n]+\n\n(This page is for [^\n]+\. (?:At its end you (?:have|can|know) |Look up )[^\n]+\.)\n"
 )
@@ -22,12 +22,12 @@ TROUBLE = (DOCS / "howto/troubleshooting.md").read_text()
 
 
 def named(page):
-    """Return the pages that a page links to."""
+    """Return the pages to which a page links."""
     return {(page.parent / link.partition("#")[0]).resolve() for link in links(page.read_text())}
 
 
 def missing(page, target):
-    """Return whether a link or an address of a page leads nowhere."""
+    """Return whether the file or the heading of a link is missing."""
     path, _, anchor = target.partition("#")
     file = (page.parent / path).resolve() if path else page
     return not file.exists() or bool(anchor and anchor not in anchors(file.read_text()))
@@ -35,12 +35,15 @@ def missing(page, target):
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_every_link_leads_to_a_file_and_every_anchor_to_a_heading(page):
-    """A page that was renamed or split takes its readers along."""
+    """After a page is renamed or split, its readers must still find the text."""
     assert [target for target in links(page.read_text()) if missing(page, target)] == []
 
 
 def test_every_address_outside_the_pages_leads_to_a_page_and_its_heading():
-    """Messages, alerts, fields and docstrings name pages; files of an old release keep theirs."""
+    """Messages, alerts, fields and docstrings name pages.
+
+    Only records of an old release may name old pages.
+    """
     listed = subprocess.run(["git", "ls-files"], cwd=ROOT, check=True, capture_output=True, text=True).stdout
     texts = {
         name: (ROOT / name).read_text()
@@ -57,7 +60,7 @@ def test_every_address_outside_the_pages_leads_to_a_page_and_its_heading():
 
 
 def test_every_page_is_reached_from_the_entry():
-    """A page that nobody finds is not documentation."""
+    """A reader who starts at docs/README.md must find every page."""
     reached, front = set(), {ENTRY}
     while front:
         reached |= front
@@ -73,7 +76,7 @@ LLMS = ROOT / "llms.txt"
 
 
 def test_the_list_for_language_models_has_every_page_and_leads_nowhere_else():
-    """A program that reads only this list finds everything, in the form of https://llmstxt.org."""
+    """A program that reads only llms.txt must find every page. https://llmstxt.org defines the format."""
     text = LLMS.read_text()
     listed = {target for _, target in re.findall(r"^- \[(.+?)\]\((.+?)\): .+\.$", text, re.MULTILINE)}
 
@@ -87,7 +90,7 @@ def test_the_list_for_language_models_has_every_page_and_leads_nowhere_else():
 
 @pytest.mark.parametrize("door", DOORS)
 def test_a_door_leads_along_three_to_five_pages(door):
-    """A path in reading order; a list of everything is what the reader came from."""
+    """A new reader wants a short path in reading order, not a list of all pages."""
     text = dict(chapters(ENTRY.read_text()))[door]
 
     assert re.findall(r"^(\d)\. \[.+\]\(.+\): .+\.$", text, re.MULTILINE) == [
@@ -102,12 +105,12 @@ def test_a_door_leads_along_three_to_five_pages(door):
     ids=lambda page: str(page.relative_to(DOCS)),
 )
 def test_a_page_begins_with_whom_it_is_for_and_what_they_take_away(page):
-    """One line decides whether to read on."""
+    """From the first line a reader decides whether to read the page."""
     assert FIRST.match(page.read_text())
 
 
 def test_the_list_of_decisions_has_them_all_with_their_titles():
-    """A decision that is missing in the list is taken again."""
+    """Contributors read the list, and would discuss a missing decision again."""
     page = (DOCS / "decisions/README.md").read_text()
     titles = {path.name: re.sub(r"^# \d+[.:] ", "", path.read_text().partition("\n")[0]) for path in RECORDS}
 
@@ -115,7 +118,7 @@ def test_the_list_of_decisions_has_them_all_with_their_titles():
 
 
 def quoted():
-    """Return the messages of Palaestra in the headings of the page about troubles on a laptop."""
+    """Return Palaestra's messages in the headings of the troubleshooting page about laptops."""
     text = dict(chapters(TROUBLE))["On a laptop"]
     headings = re.findall(r"^### (`+) ?(.+?) ?\1", text, re.MULTILINE)
     return [message for _, message in headings if message not in OF_OTHERS]
@@ -131,16 +134,16 @@ SOURCES = [
 
 @pytest.mark.parametrize("message", quoted())
 def test_a_message_that_troubleshooting_explains_is_printed_by_a_program(message):
-    """People search for what they see; `…` stands for names, numbers and what the system adds."""
+    """People search for the message that they see. In the headings, `…` stands for names and numbers."""
     text = "\n".join(path.read_text() for path in SOURCES)
-    joined = re.sub(r'"\s*f?"', "", text)  # a long message is several literals
+    joined = re.sub(r'"\s*f?"', "", text)  # long messages consist of several literals
     words = re.split(r"…|\(ModuleNotFoundError: No module named|Address already in use", message)
 
     assert [part for part in words if part.strip(" :;).`") and part.strip(" :;).") not in joined] == []
 
 
 def test_troubleshooting_names_only_reasons_that_there_are():
-    """A reason that was renamed would be searched for in vain."""
+    """Users search the page for a reason that they see in a status, so an old name would not help."""
     rows = re.findall(r"^\| (`[A-Z]\w+`(?:, `[A-Z]\w+`)*) \|", TROUBLE, re.MULTILINE)
     reasons = {reason for row in rows for reason in re.findall(r"\w+", row)}
 

@@ -1,4 +1,4 @@
-"""The operator's loop is as short as its page claims, and builds no object."""
+"""The operator's loop is as short as the documentation claims, and creates no object itself."""
 
 import ast
 import inspect
@@ -13,12 +13,12 @@ SOURCES = sorted(Path(palaestra.operator.__file__).parent.glob("*.py"))
 
 
 def test_the_loop_is_read_in_one_screen():
-    """A cluster administrator must be able to predict what the operator does next."""
+    """A cluster administrator must be able to predict the operator's next action from one screen of code."""
     assert len(inspect.getsource(Controller.reconcile).splitlines()) <= MOST_LINES
 
 
 def test_the_operator_makes_no_object():
-    """The operator applies decisions; if it called functions of the plan, two places would make objects."""
+    """Only the plan creates objects. If the operator created some too, two modules would have to agree."""
     taken = {
         (node.module, each.name)
         for source in SOURCES
@@ -32,7 +32,7 @@ def test_the_operator_makes_no_object():
 
 
 def test_a_look_observes_once():
-    """When every question about a job read all its objects again, a reconcile cost three times as much."""
+    """A reconcile that read all objects of a job again for each decision cost three times as much."""
     calls = [
         (source.name, ast.unparse(node.func))
         for source in SOURCES
@@ -47,5 +47,5 @@ def test_a_look_observes_once():
 
 
 def test_the_loop_writes_the_status_in_one_place():
-    """A second write would need its own rules about conflicts and about events that follow it."""
+    """A second write would need rules of its own about conflicts and about the events after it."""
     assert inspect.getsource(Controller).count("self._reporting.report(") == 1

@@ -1,4 +1,4 @@
-"""Drawings and lists match the code: error trees, modules, folders."""
+"""Drawings and lists in the documentation match the code: error trees, modules and folders."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ REASON = re.compile(r"# (noqa: [A-Z0-9, ]+ - |type: ignore\[[a-z-]+\](  # noqa: 
 BROAD = re.compile(r" *except(:| [^#]*\b(Base)?Exception\b)")
 MOST_LINES = 400
 PATH = re.compile(
-    r"`((?:[\w.-]+/)+[\w.-]+\.\w+)`"  # a separate word with a file suffix
+    r"`((?:[\w.-]+/)+[\w.-]+\.\w+)`"  # in backticks, with a file suffix
     r"|(?<![\w/.~-])((?:operator|trainer|sim_image|tests|docs|manifests|charts|tools)/[\w./-]*[\w/])"
 )
 NEW = {"sim_image/src/palaestra_sim/scene/devices/gps.py", "tests/integration/webots/test_gps.py"}
@@ -45,7 +45,7 @@ BRANCH = re.compile(r"^(?P<indent>[│ ]*)[├└]── (?P<name>\w+)")
 
 @pytest.mark.parametrize("package", sorted(set(PACKAGES) - {"palaestra_protocol"}))
 def test_the_drawn_error_tree_is_that_of_the_classes(package):
-    """A caller uses the drawing to choose which error to catch."""
+    """A caller reads the drawing to decide which error to catch."""
     folder = PACKAGES[package]
     drawing = ast.get_docstring(ast.parse((folder / "errors.py").read_text()))
 
@@ -56,7 +56,7 @@ def test_the_drawn_error_tree_is_that_of_the_classes(package):
 
 @pytest.mark.parametrize("package", PACKAGES)
 def test_every_package_is_in_the_table_of_modules(package):
-    """A new contributor finds the module for a change there."""
+    """A new contributor looks in this table for the module to change."""
     listed = set(re.findall(rf"^\| `{package}\.([a-z_.]+)` \|", page("docs/architecture.md"), re.MULTILINE))
     rooms = {it.parent.name for it in PACKAGES[package].glob("*/__init__.py")}
 
@@ -66,7 +66,7 @@ def test_every_package_is_in_the_table_of_modules(package):
 
 @pytest.mark.parametrize("file", [pytest.param(file, id=".".join(file.parts[-3:-1])) for file in LISTING])
 def test_a_package_that_lists_its_modules_lists_all(file):
-    """A new contributor opens the module that the list names, and never finds one that it leaves out."""
+    """A new contributor looks for a module in this list, and would not find a module that it lacks."""
     items = re.findall(r"^- (.*)$", docstring(file), re.MULTILINE)
     listed = {name for item in items for name in re.findall(r"`([a-z_]+)`(?=[,:]| and )", item)}
     modules = {path.stem for path in file.parent.glob("*.py")} - {"__init__"}
@@ -76,7 +76,7 @@ def test_a_package_that_lists_its_modules_lists_all(file):
 
 
 def test_the_table_of_folders_names_every_folder_with_something_to_read():
-    """`tests/` and `tools/` are for people who change the project."""
+    """The table is for users, so it leaves out `tests/` and `tools/`."""
     listed = re.findall(r"^\| `([a-z_]+)/[^`]*`", page("README.md"), re.MULTILINE)
     tracked = subprocess.run(["git", "ls-files"], cwd=ROOT, check=True, capture_output=True, text=True).stdout
     folders = {name.partition("/")[0] for name in tracked.split() if "/" in name and not name.startswith(".")}
@@ -85,7 +85,7 @@ def test_the_table_of_folders_names_every_folder_with_something_to_read():
 
 
 def test_every_path_that_contributing_names_is_there():
-    """New contributors follow its walkthroughs; for a file that they create, the folder must exist."""
+    """New contributors follow CONTRIBUTING.md. Of a file that they create, only the folder must exist."""
     named = {whole or begun for whole, begun in PATH.findall(page("CONTRIBUTING.md"))}
 
     assert named >= NEW
@@ -94,7 +94,7 @@ def test_every_path_that_contributing_names_is_there():
 
 
 def test_the_lines_around_a_change_in_contributing_are_those_of_its_file():
-    """These lines show where a new line belongs."""
+    """From the lines around a change, a contributor sees where to insert the new line."""
     around = [
         (path, line[1:])
         for path, change in CHANGE.findall(page("CONTRIBUTING.md"))
@@ -107,7 +107,7 @@ def test_the_lines_around_a_change_in_contributing_are_those_of_its_file():
 
 
 def test_rules_are_ignored_rarely_and_for_a_reason():
-    """An ignore also hides the next mistake of its kind, so each needs a reason, and there must be few."""
+    """An ignore comment also hides later mistakes, so each one needs a reason, and few are allowed."""
     sources = [path for folder in PACKAGES.values() for path in folder.rglob("*.py")]
     ignores = [line for path in sources for line in path.read_text().splitlines() if IGNORE.search(line)]
 
@@ -116,7 +116,7 @@ def test_rules_are_ignored_rarely_and_for_a_reason():
 
 
 def test_broad_excepts_are_rare_and_have_a_reason():
-    """They also catch our own mistakes, so each has a comment: why is a narrower one not enough?"""
+    """A broad `except` also catches our own mistakes, so its comment must justify it."""
     lines = [line for folder in PACKAGES.values() for file in folder.rglob("*.py") for line in read(file)]
     broad = [line for line in lines if BROAD.match(line)]
 
@@ -125,7 +125,7 @@ def test_broad_excepts_are_rare_and_have_a_reason():
 
 
 def test_a_module_fits_into_a_head():
-    """A longer module has parts that a reader would look for under another name."""
+    """A reader would look for some content of a longer module under another name."""
     files = [file for folder in PACKAGES.values() for file in folder.rglob("*.py")]
 
     assert [file.name for file in files if len(read(file)) > MOST_LINES] == []
@@ -137,7 +137,7 @@ def read(file):
 
 
 def tree(drawing):
-    """Return the root of a drawing, and each child's parent."""
+    """Return the root of a drawn tree, and the parent of each other class."""
     lines = drawing.splitlines()
     first = next(number for number, line in enumerate(lines) if BRANCH.match(line.lstrip() or " "))
     root = lines[first - 1].split()[0]
@@ -152,7 +152,7 @@ def tree(drawing):
 
 
 def bases_of_classes(folder):
-    """Return the names of the base classes of each class in a folder's modules."""
+    """Return the names of the base classes of each class in the modules of a folder."""
     modules = [ast.parse(path.read_text()) for path in folder.rglob("*.py")]
     classes = [node for module in modules for node in ast.walk(module) if isinstance(node, ast.ClassDef)]
     return {node.name: [ast.unparse(base).rpartition(".")[2] for base in node.bases] for node in classes}

@@ -1,7 +1,7 @@
-"""The programs of today read what 0.1.0 wrote.
+"""The current programs read the files that release 0.1.0 wrote.
 
-The records are in tests/fixtures/0.1.0. A field that a later release adds is absent unless it is set. So the
-record of a job that uses nothing newer has the fields of 0.1.0, and no others.
+The records are in tests/fixtures/0.1.0. A field that a later release adds is written only if it is set. So
+the record of a job without newer features has only the fields of 0.1.0.
 """
 
 import json
@@ -30,12 +30,12 @@ TRAININGS = sorted(OLD.glob("training/*.yaml"))
 
 
 def name_of(path):
-    """Return the name of a record in a test's id."""
+    """Return the name of a record, for the id of a test."""
     return path.stem
 
 
 def fields(value, path=""):
-    """Return the paths of all fields of a document; those of a list's items together."""
+    """Return the paths of all fields of a document; all items of a list share one path."""
     if isinstance(value, dict):
         return {path}.union(*(fields(item, f"{path}.{key}") for key, item in value.items()))
     if isinstance(value, list):
@@ -44,14 +44,14 @@ def fields(value, path=""):
 
 
 def named(path):
-    """Return the fields of a training.yaml, without what a job's author chose."""
+    """Return the fields of a training.yaml, except those whose names the job's author chooses."""
     free = re.compile(r"^\.(algorithm\.hyperparameters|environment\.options)\.")
     return {each for each in fields(path) if not free.match(each)}
 
 
 @pytest.mark.parametrize("path", JOBS, ids=name_of)
 def test_a_job_in_a_cluster_is_looked_after_as_before(path):
-    """The operator was upgraded while it ran, or after its end."""
+    """A new operator must continue jobs that the old operator started or ended."""
     recorded = json.loads(path.read_text())
 
     job = accept(recorded)
@@ -63,7 +63,7 @@ def test_a_job_in_a_cluster_is_looked_after_as_before(path):
 
 @pytest.mark.parametrize("path", JOBS, ids=name_of)
 def test_a_job_in_a_cluster_is_shown_as_before(path):
-    """The command line was upgraded before the operator."""
+    """A user may upgrade the command line before the operator."""
     recorded = json.loads(path.read_text())
     now = datetime(2026, 11, 23, 5, tzinfo=UTC)
 
@@ -75,19 +75,19 @@ def test_a_job_in_a_cluster_is_shown_as_before(path):
 
 @pytest.mark.parametrize("path", JOBS, ids=name_of)
 def test_a_status_that_uses_nothing_new_has_no_new_field(path):
-    """A cluster whose definition is that of 0.1.0 drops a field that it does not know."""
+    """In a cluster with the definition of 0.1.0, the API server drops unknown fields."""
     recorded = json.loads(path.read_text())
 
     written = as_data(accept(recorded))
 
     known = set().union(*(fields(json.loads(each.read_text())["status"]) for each in JOBS))
-    assert fields(written["status"]) <= known  # each release leaves out lists that are empty
+    assert fields(written["status"]) <= known  # empty lists are not written
     assert fields(written["spec"]) == fields(recorded["spec"])
 
 
 @pytest.mark.parametrize("path", TRAININGS, ids=name_of)
 def test_a_training_yaml_is_read_as_it_was(path):
-    """A pod of the old operator restarts its trainer, whose image is newer."""
+    """After an upgrade of the image, a restarted trainer reads the training.yaml of the old operator."""
     recorded = yaml.safe_load(path.read_text())
 
     read = trainer.load(path)
@@ -98,7 +98,7 @@ def test_a_training_yaml_is_read_as_it_was(path):
 
 @pytest.mark.parametrize("path", TRAININGS, ids=name_of)
 def test_a_training_yaml_of_a_job_that_uses_nothing_new_has_no_new_field(path):
-    """A job's own trainer image of 0.1.0 logs a field that it does not know."""
+    """A job may name a trainer image of 0.1.0, which logs a warning for each unknown field."""
     example, layout = path.stem.rsplit(".", 1)
     job = identified(load((OLD / "jobs" / f"{example}.yaml").read_text()), UID)
     images = Images.of_release("0.0.0")
@@ -113,7 +113,7 @@ def test_a_training_yaml_of_a_job_that_uses_nothing_new_has_no_new_field(path):
 
 
 def test_an_answer_of_status_is_read_and_has_the_same_fields():
-    """Operator and trainer are of different releases while an upgrade runs."""
+    """During an upgrade, an operator and a trainer of different releases communicate."""
     recorded = json.loads((OLD / "trainer-status.json").read_text())
 
     read = TrainerStatus.from_json(recorded)
@@ -123,7 +123,7 @@ def test_an_answer_of_status_is_read_and_has_the_same_fields():
 
 
 def test_a_last_word_is_read_and_has_the_same_fields():
-    """A termination message is all that is left of a pod."""
+    """After the end of a pod, its termination message is all that the operator can read."""
     recorded = (OLD / "interrupted" / "termination.json").read_text()
 
     read = Termination.from_message(recorded)
@@ -137,7 +137,7 @@ def test_a_last_word_is_read_and_has_the_same_fields():
     [(TrainerStatus, "trainer-status.json"), (Termination, "interrupted/termination.json")],
 )
 def test_what_a_newer_trainer_reports_besides_is_ignored(kind, record):
-    """A newer trainer may run in a job that names its own image."""
+    """A job that names its own image may have a newer trainer, which reports fields unknown here."""
     known = json.loads((OLD / record).read_text())
     checkpointed = (known["last_checkpoint"] or {}) | {"of_tomorrow": 1}
 
@@ -151,7 +151,7 @@ def test_what_a_newer_trainer_reports_besides_is_ignored(kind, record):
 
 @pytest.mark.parametrize("run", ["interrupted", "finished"])
 def test_a_run_directory_belongs_to_the_same_job_as_before(run):
-    """The same file, given to a newer `palaestra run`."""
+    """A user resumes an old run with the same job file and a newer `palaestra run`."""
     recorded = yaml.safe_load((OLD / run / run_directory.RECORD).read_text())
 
     now = run_directory.record_of(validate(recorded))
@@ -161,7 +161,7 @@ def test_a_run_directory_belongs_to_the_same_job_as_before(run):
 
 
 def test_a_finished_run_is_known_to_be_finished():
-    """It is reported from its record, and nothing is started."""
+    """`palaestra run` must report the recorded outcome and start no process."""
     outcome = RunOutcome.of(OLD / "finished")
 
     assert outcome is not None
@@ -169,7 +169,7 @@ def test_a_finished_run_is_known_to_be_finished():
 
 
 def test_a_checkpoint_of_two_collectors_is_whole_and_of_the_same_run():
-    """A newer trainer continues from it."""
+    """A newer trainer must be able to resume from this checkpoint."""
     directory = RunDirectory(OLD / "interrupted")
 
     found = checkpoint.newest(directory.checkpoints)
@@ -180,7 +180,7 @@ def test_a_checkpoint_of_two_collectors_is_whole_and_of_the_same_run():
 
 
 def test_what_a_trainer_writes_of_such_a_run_has_no_new_field():
-    """An older `palaestra-eval` reads its training.yaml, and an older trainer its checkpoints."""
+    """An older `palaestra-eval` reads the training.yaml, and an older trainer reads the checkpoints."""
     directory = RunDirectory(OLD / "interrupted")
     configuration = trainer.load(directory.configuration)
     recorded = checkpoint.newest(directory.checkpoints).manifest

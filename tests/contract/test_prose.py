@@ -1,4 +1,4 @@
-"""Every sentence for readers follows the rules of `tests.contract.prose`."""
+"""Every sentence for readers obeys the rules of `tests.contract.prose`."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ PAGES = ("docs", "README.md", "CONTRIBUTING.md", "SECURITY.md", "CHANGELOG.md", 
 
 @pytest.mark.parametrize("place", [*SOURCES, *PAGES])
 def test_no_sentence_needs_a_second_reading(place):
-    """Docstrings, comments and messages are read as often as pages, by people in a hurry."""
+    """People in a hurry read docstrings, comments and messages as often as pages."""
     found = [finding for path in files([ROOT / place]) for finding in findings(path)]
 
     assert not found, "\n".join(map(str, found))
@@ -24,7 +24,7 @@ def test_no_sentence_needs_a_second_reading(place):
 
 @pytest.mark.parametrize("reason", ROWS)
 def test_no_reason_needs_a_second_reading(reason, tmp_path):
-    """Each reason is a table cell in docs/reference/reasons.md, which the rules for pages exempt."""
+    """Each reason is a cell of a table in docs/reference/reasons.md, and the rules for pages skip tables."""
     page = tmp_path / "row.md"
     row = ROWS[reason]
     page.write_text(f"{row.meaning}\n\n{row.remedy}\n")
@@ -55,7 +55,7 @@ def test_no_reason_needs_a_second_reading(reason, tmp_path):
     ],
 )
 def test_a_planted_sentence_is_found(planted, name, text, tmp_path):
-    """A rule that never finds anything would pass for ever."""
+    """If a rule contained a mistake, it could find nothing, and every sentence would pass."""
     path = tmp_path / name
     path.write_text(text.format(planted))
 
@@ -63,7 +63,7 @@ def test_a_planted_sentence_is_found(planted, name, text, tmp_path):
 
 
 def test_tables_and_code_in_a_docstring_are_no_sentences(tmp_path):
-    """Markdown treats an indented block after an empty line as code; a list of arguments is prose."""
+    """In Markdown, an indented block after an empty line is code; a list of arguments is prose."""
     path = tmp_path / "blocks.py"
     path.write_text(
         '"""Return a table.\n\n    What is    a cell\n\n    Who leads  another\n\n'

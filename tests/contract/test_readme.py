@@ -1,4 +1,4 @@
-"""The examples of the README and of the first pages match the project."""
+"""The examples in the README and on the first pages match the project."""
 
 import re
 from pathlib import Path
@@ -15,7 +15,7 @@ NOTEBOOK = (ROOT / "docs/start/notebook.md").read_text()
 FIGURES = "".join((ROOT / f"docs/explain/{name}.md").read_text() for name in ("reliability", "tasks"))
 
 
-# As `palaestra.local.progress_line` writes it.
+# The format of `palaestra.local.progress_line`.
 PROGRESS = re.compile(
     r"step [\d,]+ of [\d,]+ · \d+ % \(\d+ to \d+\) of \d+ episodes · \d+ steps/s · "
     r"\d+ faults? · \d+ (s|min) left"
@@ -23,12 +23,12 @@ PROGRESS = re.compile(
 
 
 def block(language):
-    """Return the first block of a language."""
+    """Return the README's first block of a language."""
     return blocks(README, language)[0].removesuffix("\n")
 
 
 def test_the_first_command_stands_within_25_lines():
-    """A new reader decides in one screen."""
+    """A new reader decides within one screen whether to try the project."""
     lines = README.splitlines()
 
     assert any(line.startswith("make run") for line in lines[:25])
@@ -36,7 +36,7 @@ def test_the_first_command_stands_within_25_lines():
 
 
 def test_the_job_shown_is_the_minimal_example():
-    """The tests of the examples run it too."""
+    """The tests of the examples run this job, so the README shows a job that works."""
     text = (ROOT / "manifests/examples/minimal.yaml").read_text().rstrip()
 
     assert block("yaml") == text
@@ -44,14 +44,14 @@ def test_the_job_shown_is_the_minimal_example():
 
 
 def test_the_script_for_a_notebook_is_the_facade_example():
-    """That example has its own test."""
+    """The example has a test of its own, so the page shows a script that works."""
     [script] = blocks(NOTEBOOK, "python with-a-simulator")
 
     assert (ROOT / "examples/facade.py").read_text().endswith(script)
 
 
 def test_the_lines_shown_are_of_words_that_the_programs_print():
-    """They are from a real run, so no line has an event that was renamed since."""
+    """The lines come from a real run, so the README must be renewed after an event is renamed."""
     folders = (ROOT / "trainer/src", ROOT / "operator/src")
     sources = "".join(path.read_text() for folder in folders for path in folder.rglob("*.py"))
     lines = block("text").splitlines()
@@ -66,7 +66,7 @@ def test_the_lines_shown_are_of_words_that_the_programs_print():
 
 
 def test_every_figure_comes_with_the_command_that_measures_it():
-    """The figure is also on the page that has the measurement."""
+    """A reader can repeat the measurement, and finds the same figure on the page about it."""
     bullets = re.findall(r"^- \*\*It .+`python -m (tests\.\w+ \w+)`$", README, re.MULTILINE)
 
     assert [command for command in bullets if f"`python -m {command}`" not in FIGURES] == []
@@ -76,7 +76,7 @@ def test_every_figure_comes_with_the_command_that_measures_it():
 
 
 def test_the_citation_names_the_paper_as_the_readme_does():
-    """Tools read the file, people the README."""
+    """Tools read CITATION.cff and people read the README, so both must name the same paper."""
     cited = yaml.safe_load((ROOT / "CITATION.cff").read_text())
     paper = cited["preferred-citation"]
     chart = yaml.safe_load((ROOT / "charts/palaestra/Chart.yaml").read_text())
@@ -87,7 +87,7 @@ def test_the_citation_names_the_paper_as_the_readme_does():
 
 
 def test_what_is_typed_for_a_cluster_fits_together():
-    """The order is cluster, operator, job and end: each line needs the results of those before it."""
+    """A reader types the lines in this order, and each line needs the results of the earlier ones."""
     (shown,) = (block for block in blocks(CLUSTER, "console") if block.startswith("make cluster "))
     cluster, operator, job, end = (line.partition("#")[0].split() for line in shown.splitlines())
 
@@ -101,7 +101,7 @@ def test_what_is_typed_for_a_cluster_fits_together():
 
 
 def test_every_verb_of_the_makefile_is_documented():
-    """`make help` prints the text after `##`."""
+    """`make help` prints the text after `##`, so a target without the text would be missing there."""
     makefile = (ROOT / "Makefile").read_text()
     verbs = re.search(r"^\.PHONY: (.*)$", makefile, re.MULTILINE)[1].split()
 

@@ -1,4 +1,4 @@
-"""Palaestra's codecs and digests are compared with those of ROS itself, genpy and genmsg."""
+"""Palaestra's codecs and digests agree with the libraries genpy and genmsg of ROS."""
 
 import io
 from functools import cache
@@ -28,13 +28,13 @@ TYPES = {
 
 @cache
 def classes(name):
-    """Return genpy's classes of a message and its nested messages, by name."""
+    """Return genpy's classes for a message and its nested messages, by name."""
     message, find = TYPES[name]
     return genpy.dynamic.generate_dynamic(name, digests.full_text(find, message))
 
 
 def instance(name, type_, values):
-    """Return genpy's object for the type `name`, or for a message nested in it."""
+    """Return genpy's object with these values, for the type `name` or for a message nested in it."""
     if type_ in ("time", "duration"):
         made = {"time": genpy.Time, "duration": genpy.Duration}[type_]()
         for field, value in values.items():
@@ -54,7 +54,7 @@ def instance(name, type_, values):
 
 
 def plain(value):
-    """Return a decoded value, of either library, in a form that Python compares."""
+    """Return a decoded value of either library in a form that Python can compare."""
     if isinstance(value, bytes | str):
         return value
     names = getattr(value, "_fields", getattr(value, "__slots__", None))
@@ -67,7 +67,7 @@ def plain(value):
 @settings(max_examples=10)
 @given(data=st.data())
 def test_bytes_and_values_are_those_of_genpy(name, data):
-    """Clients with rospy read and write the same bytes."""
+    """A client with rospy must be able to read our bytes, and we must be able to read its bytes."""
     message, find = TYPES[name]
     codec = codec_of(message, find)
     values = data.draw(ros_values.values(message, find))
@@ -83,7 +83,7 @@ def test_bytes_and_values_are_those_of_genpy(name, data):
 
 @for_each("name", sorted(TYPES))
 def test_md5_and_text_are_those_of_genmsg(name):
-    """A subscriber compares the md5 sum; rosbag and rostopic read the text."""
+    """A subscriber compares the md5 sum, and rosbag and rostopic read the text of the definition."""
     message, find = TYPES[name]
     context = genmsg.MsgContext.create_default()
     for nested in (*ros_values.TEXTS, *NAMES):
@@ -98,7 +98,7 @@ def test_md5_and_text_are_those_of_genmsg(name):
 
 @pytest.mark.parametrize("value", [-1, 2**8, 1.5, "1", None])
 def test_what_genpy_refuses_for_a_number_we_refuse(value):
-    """A wrapped or rounded command would move the robot somewhere else."""
+    """A number that is wrapped or rounded would move the robot to a wrong place."""
     name = "webots_ros/field_set_boolRequest"
     message, find = TYPES[name]
 

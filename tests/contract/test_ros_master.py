@@ -1,4 +1,4 @@
-"""Our ROS master against rosmaster, the one of ROS itself: equal answers and updates for equal calls."""
+"""For equal calls, our ROS master gives the same responses and updates as rosmaster, the master of ROS."""
 
 import copy
 import logging
@@ -58,17 +58,17 @@ CALLS = st.one_of(
 
 
 class Oracle:
-    """rosmaster's own handler; it records what its threads would send."""
+    """rosmaster's handler; it records the updates that rosmaster's threads would send."""
 
     def __init__(self):
         self._handler = ROSMasterHandler()
-        self._handler._shutdown()  # its threads
+        self._handler._shutdown()  # stops its threads
         self._handler.uri = URI
         self._handler.thread_pool = self._handler.reg_manager.thread_pool = self
         self._sent = []
 
     def queue_task(self, _marker, task, arguments):
-        """Take an update, as rosmaster's thread pool does."""
+        """Record an update; rosmaster calls this method of its thread pool."""
         match task.__name__, arguments:
             case "publisher_update_task", (uri, topic, uris):
                 self._sent.append((uri, "publisherUpdate", topic, uris))
@@ -78,14 +78,15 @@ class Oracle:
                 self._sent.append((uri, "shutdown", node, ""))
 
     def call(self, method, arguments):
-        """Return code and value of the answer, and the updates in any order."""
+        """Return code and value of the response, and the updates in sorted order."""
         self._sent = []
-        code, _, value = getattr(self._handler, method)(*copy.deepcopy(arguments))  # it changes parameters
+        # The method may change its arguments.
+        code, _, value = getattr(self._handler, method)(*copy.deepcopy(arguments))
         return code, plain(value), sorted(self._sent, key=repr)
 
 
 def plain(value):
-    """Return a value as it comes out of XML-RPC."""
+    """Return a value as XML-RPC returns it."""
     match value:
         case list() | tuple():
             return [plain(item) for item in value]
@@ -95,7 +96,7 @@ def plain(value):
 
 
 def ours(api, method, arguments):
-    """Return what `Oracle.call` returns, of our API."""
+    """Return the same values as `Oracle.call`, from our API."""
     answer, updates = api.call(method, arguments)
     sent = [(it.uri, it.method, it.subject, "" if it.method == "shutdown" else it.value) for it in updates]
     return answer.code, plain(answer.value), sorted(sent, key=repr)
@@ -103,7 +104,7 @@ def ours(api, method, arguments):
 
 @given(st.lists(CALLS, max_size=30))
 def test_any_sequence_of_calls_has_the_answers_and_updates_of_rosmaster(calls):
-    """Programs of others rely on them, and our own were written against rosmaster."""
+    """ROS nodes were written for rosmaster, so they rely on its responses."""
     oracle, api = Oracle(), MasterApi(URI, os.getpid())
 
     for method, arguments in calls:
@@ -112,7 +113,7 @@ def test_any_sequence_of_calls_has_the_answers_and_updates_of_rosmaster(calls):
 
 @pytest.fixture(scope="module")
 def rosmaster(tmp_path_factory):
-    """The URI of rosmaster as a process."""
+    """Start rosmaster as a process, and yield its URI."""
     program = (
         "import os, sys, threading; from rosmaster.master import Master\n"
         "os.environ['ROS_HOSTNAME'] = 'localhost'; master = Master(0); master.start()\n"
@@ -122,7 +123,7 @@ def rosmaster(tmp_path_factory):
         [sys.executable, "-c", program],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,  # rosmaster logs a traceback for each node that does not respond
+        stderr=subprocess.DEVNULL,  # rosmaster logs a traceback for each node without a response
         text=True,
         env={**os.environ, "ROS_LOG_DIR": str(tmp_path_factory.mktemp("log"))},
     )
@@ -165,14 +166,14 @@ RECORDED = (
 
 
 def test_recorded_calls_have_the_same_answers_on_the_wire(rosmaster):
-    """Codes, values and their types after XML-RPC; the texts for people are our own."""
+    """Clients see codes, values and their types after XML-RPC, so only the status messages may differ."""
     with MasterServer(name="localhost") as master:
         for method, *arguments in RECORDED:
             assert answered(master.uri, method, arguments) == answered(rosmaster, method, arguments), method
 
 
 def answered(uri, method, arguments):
-    """Return code and value of an answer, "fault" for a fault, and a list for several answers."""
+    """Return code and value of a response, "fault" for a fault, or a list for several responses."""
     try:
         with xmlrpc.client.ServerProxy(uri) as proxy:
             answer = getattr(proxy, method)(*arguments)
@@ -187,13 +188,16 @@ TOOLS = (["rostopic", "list", "-v"], ["rosservice", "list"])
 
 
 def test_ros_command_lines_print_the_same_with_both_masters(rosmaster):
-    """`rosnode` and `rosparam` ask the same calls."""
+    """People use these programs to debug.
+
+    `rosnode` and `rosparam` need no test, because they send the same calls.
+    """
     calls = [RECORDED[0], RECORDED[1], RECORDED[2]]
     with MasterServer(name="localhost") as master:
         for uri in (master.uri, rosmaster):
             for method, *arguments in calls:
                 answered(uri, method, arguments)
-        # All at once, because each takes a second to start.
+        # The programs run at the same time, because each needs a second to start.
         started = [(printing(tool, master.uri), printing(tool, rosmaster)) for tool in TOOLS]
         printed = [[process.communicate(timeout=60)[0] for process in pair] for pair in started]
 
@@ -203,7 +207,7 @@ def test_ros_command_lines_print_the_same_with_both_masters(rosmaster):
 
 
 def printing(tool, uri):
-    """Start one of ROS's programs."""
+    """Start one of ROS's command line programs."""
     environment = {**os.environ, "ROS_MASTER_URI": uri}
     return subprocess.Popen(tool, env=environment, stdout=subprocess.PIPE, text=True)
 
@@ -232,7 +236,7 @@ print(rospy.is_shutdown(), flush=True)
 
 
 def test_rospy_works_with_our_master_and_ends_when_a_node_takes_its_name(tmp_path):
-    """The test uses topics, parameters, and `shutdown` from the master, as with rosmaster."""
+    """A rospy node uses topics and parameters, and obeys the master's `shutdown`, as with rosmaster."""
     with MasterServer(name="localhost") as master:
         environment = {
             "ROS_MASTER_URI": master.uri,
@@ -259,4 +263,4 @@ def test_rospy_works_with_our_master_and_ends_when_a_node_takes_its_name(tmp_pat
     assert parameters == "[1, 2.5, 'text'] /listener/given False\n"
     assert topics.startswith("['hello'] [[")
     assert "['/chat', 'std_msgs/String']" in topics
-    assert ended.endswith("True\n")  # after the reason, which rospy prints
+    assert ended.endswith("True\n")  # rospy prints a reason before it

@@ -1,4 +1,4 @@
-"""The ROS types must equal those of webots_ros, or no other node can talk to Palaestra."""
+"""The ROS types equal those of webots_ros, because other nodes reject different types."""
 
 import json
 from pathlib import Path
@@ -16,7 +16,7 @@ MESSAGES, SERVICES = type_names()
 
 @for_each("name", sorted(MD5))
 def test_every_type_of_webots_ros_has_its_md5(name):
-    """Nodes compare the md5 sum of a definition before the first byte of data."""
+    """Before the first byte of data, two nodes compare the md5 sums of their definitions."""
     type_ = message_type(name) if name in MESSAGES else service_type(name)
 
     assert type_.md5 == MD5[name]
@@ -24,7 +24,7 @@ def test_every_type_of_webots_ros_has_its_md5(name):
 
 @for_each("name", MESSAGES)
 def test_an_empty_message_survives_the_wire(name):
-    """ROS sends zero, empty or False for fields that are not set."""
+    """For a field that is not set, ROS sends zero, an empty value or False."""
     codec = message_type(name).codec
 
     assert codec.encode({}) == codec.encode({})
@@ -33,7 +33,7 @@ def test_an_empty_message_survives_the_wire(name):
 
 @for_each("name", SERVICES)
 def test_request_and_response_of_every_service_survive_the_wire(name):
-    """A service whose types cannot be decoded would fail only in its first call."""
+    """An error in the types of a service would otherwise appear only at the first call."""
     type_ = service_type(name)
 
     for codec in (type_.request, type_.response):
@@ -42,7 +42,7 @@ def test_request_and_response_of_every_service_survive_the_wire(name):
 
 
 def test_fields_are_named_as_in_the_definition():
-    """Handlers and facades use these names."""
+    """The simulators' handlers and the trainer's facades use these names."""
     codec = service_type("webots_ros/field_set_vec3f").request
 
     request = codec.decode(codec.encode({"field": 7, "index": -1, "value": {"x": 1.5, "z": -2.0}}))
@@ -51,13 +51,13 @@ def test_fields_are_named_as_in_the_definition():
 
 
 def test_a_field_that_python_reserves_gets_an_underscore():
-    """The library genpy does the same: `from` cannot be an attribute."""
+    """The library genpy does the same, because `from` cannot be the name of an attribute."""
     codec = service_type("webots_ros/node_set_visibility").request
 
     assert codec.decode(codec.encode({"from_": 3})).from_ == 3
 
 
 def test_bytes_of_another_length_are_refused():
-    """A node of another version must not be misread as zeros."""
+    """The message of a node with another definition must not be read as zeros."""
     with pytest.raises(ValueError, match="3 bytes for 4"):
         service_type("webots_ros/set_int").request.decode(b"abc")

@@ -1,4 +1,4 @@
-"""Programs start next to a user's files that have the names of modules of Python and of dependencies."""
+"""Programs start in a folder whose files have the names of modules of Python and of dependencies."""
 
 import os
 import subprocess
@@ -30,12 +30,12 @@ NEEDED = (
     "mujoco",
     "PIL",
 )
-# If one of these is shadowed, Python itself does not start, because it needs them to decode text and to
-# compile. So no program of Palaestra can refuse them.
+# If one of these modules is shadowed, Python itself does not start, because it needs them to decode text and
+# to compile. So Palaestra's programs cannot report these files.
 UNAVOIDABLE = {"encodings", "__future__"}
 
 
-# The library imports these to detect the operating system.
+# The standard library imports these modules to detect the operating system.
 OF_WINDOWS = {"msvcrt", "nt", "winreg", "_winapi"}
 
 
@@ -50,7 +50,7 @@ def folder(tmp_path_factory):
 
 
 def ran(program, folder, *arguments):
-    """Run a program with a folder on PYTHONPATH, and return its exit code and output."""
+    """Run a program with a folder on PYTHONPATH, and return exit code, output and errors."""
     done = subprocess.run(
         [Path(sys.executable).with_name(program), *arguments],
         env={**os.environ, "PYTHONPATH": str(folder)},
@@ -67,7 +67,7 @@ def ran(program, folder, *arguments):
     sorted({each.name for name in PACKAGES for each in distribution(name).entry_points}),
 )
 def test_each_program_starts_or_names_the_files(program, folder):
-    """A program that runs users' code cannot start; the others import such a folder last."""
+    """A program that runs users' code must name the files and stop. Every other program must start."""
     code, out, err = ran(program, folder, "--help")
 
     if program in WITH_CODE_OF_USERS:
@@ -81,7 +81,7 @@ def test_each_program_starts_or_names_the_files(program, folder):
 @pytest.mark.parametrize("name", ["re", "fnmatch", "msvcrt", "queue"])
 @pytest.mark.parametrize("program", ["palaestra", "palaestra-train"])
 def test_a_module_that_is_harmless_by_itself_is_found_too(program, name, tmp_path):
-    """Python imports some of them at its start without an error, and keeps them in imported modules."""
+    """Python imports some modules at its start, so a harmless copy is loaded before our check runs."""
     (tmp_path / f"{name}.py").write_text("x = 1\n")
     arguments = ("plan", JOB) if program == "palaestra" else ("--help",)
 
@@ -95,7 +95,7 @@ def test_a_module_that_is_harmless_by_itself_is_found_too(program, name, tmp_pat
 
 
 def test_a_local_run_names_every_file_before_anything_starts(folder, tmp_path):
-    """Otherwise the simulators would start and the trainer would not."""
+    """Otherwise the simulators would start, and only then the trainer would fail."""
     code, _, err = ran("palaestra", folder, "run", JOB, "--dir", tmp_path / "runs")
 
     assert code == 2
@@ -105,7 +105,7 @@ def test_a_local_run_names_every_file_before_anything_starts(folder, tmp_path):
 
 
 def test_a_script_or_notebook_beside_such_a_file_gets_its_name(tmp_path):
-    """The first import raises this error, before NumPy and PyTorch fail with an unrelated one."""
+    """The user must see this error, and not an unrelated one from NumPy or PyTorch."""
     (tmp_path / "queue.py").write_text("waypoints = []\n")
 
     done = subprocess.run(

@@ -1,4 +1,4 @@
-"""`make test` on a machine on which no program of a cluster was built, such as a new user's."""
+"""`make test` on a machine without the programs of a cluster, such as a new user's machine."""
 
 import os
 import re
@@ -13,14 +13,14 @@ DEADLINE_S = 200
 
 
 TESTS = (
-    "tests/integration/monitoring/test_alerts_fire.py",  # the test itself needs them
-    "tests/integration/monitoring/test_dashboards_answer.py",  # a fixture needs them
-    "tests/unit/chart/test_chart_values.py",  # a function that it calls needs them
+    "tests/integration/monitoring/test_alerts_fire.py",  # the test itself needs programs
+    "tests/integration/monitoring/test_dashboards_answer.py",  # a fixture needs programs
+    "tests/unit/chart/test_chart_values.py",  # a function that the test calls needs programs
 )
 
 
 def test_what_needs_programs_that_nobody_built_is_skipped_in_one_line_with_the_command(tmp_path):
-    """Hundreds of lines would hide how much is not tested, and which command changes that."""
+    """Hundreds of lines would hide how many tests were skipped, and which command builds the programs."""
     surroundings = {name: value for name, value in os.environ.items() if name != REQUIRED}
     done = subprocess.run(
         [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *TESTS],

@@ -1,7 +1,7 @@
-"""Each program on a system other than Linux: one sentence where it needs Linux, never a traceback.
+"""Programs on a system other than Linux: if a program needs Linux, it prints one sentence and no traceback.
 
-The system is pretended: another `sys.platform`, and for Windows also the modules and functions that its
-Python lacks.
+The tests only simulate the system: they change `sys.platform`, and remove the modules and functions that
+Python does not have on Windows.
 """
 
 import subprocess
@@ -19,8 +19,8 @@ PROGRAMS = {
         "scripts"
     ].items()
 }
-# Modules of the standard library that choose their content at import are imported before the test pretends
-# to be on another system.
+# Some modules of the standard library choose their content at import. They are imported before the test
+# changes the system.
 PRETEND = """
 import sys, asyncio, ctypes, multiprocessing, os, select, signal, socket, urllib.request, uuid
 system, target, *sys.argv = sys.argv[1:]
@@ -45,7 +45,7 @@ JOB = "manifests/examples/tiny.yaml"
 
 
 def on(system, program, *arguments):
-    """Return exit code, output and lines of errors of a program on a pretended system."""
+    """Return exit code, output and lines of errors of a program on a simulated system."""
     done = subprocess.run(
         [sys.executable, "-c", PRETEND, system, PROGRAMS[program], program, *arguments],
         cwd=ROOT,
@@ -72,7 +72,7 @@ def on(system, program, *arguments):
     ids=" ".join,
 )
 def test_a_program_that_needs_linux_says_so_in_one_sentence(system, typed):
-    """People try it where they are; a traceback about prctl or fcntl would not say what to do."""
+    """A user who tries a program on such a system must read the remedy, not a traceback about fcntl."""
     code, out, errors = on(system, *typed)
 
     assert (code, out) == (2, "")
@@ -86,14 +86,14 @@ def test_a_program_that_needs_linux_says_so_in_one_sentence(system, typed):
     "arguments", [["explain", "trainer.steps"], ["plan", JOB], ["get", "--kubeconfig=none"]]
 )
 def test_commands_that_start_nothing_work_on_a_mac(arguments):
-    """Many people have their cluster's kubeconfig on one."""
+    """Many users control a cluster from a Mac."""
     code, _, errors = on("darwin", "palaestra", *arguments)
 
     assert (code, errors) == (0, []) or (code == 2 and errors[0].startswith("none: "))
 
 
 def test_the_master_runs_on_every_system():
-    """The master needs nothing but Python."""
+    """The ROS master uses only portable parts of Python, so it must start everywhere."""
     code, out, errors = on("darwin", "palaestra-ros-master", "--help")
 
     assert (code, errors) == (0, [])

@@ -1,4 +1,4 @@
-"""The trainer accepts the jobs that the command writes from files of RL-Baselines3-Zoo."""
+"""The trainer accepts the jobs that `palaestra from-zoo` writes from files of RL-Baselines3-Zoo."""
 
 import pytest
 import yaml
@@ -27,7 +27,7 @@ a-v0:
 
 
 def test_classes_have_the_short_names_that_the_trainer_knows():
-    """Another name would be refused, or would mean another class."""
+    """The trainer rejects an unknown name, and would use a wrong class for a wrong name."""
     known = {name for names in CLASSES.values() for name in names}
 
     assert set().union(*SHORT.values()) == known
@@ -37,14 +37,14 @@ def test_classes_have_the_short_names_that_the_trainer_knows():
     "algorithm", ["dqn", "sac", "td3", "ddpg", "qrdqn", "tqc", "crossq", "ppo", "a2c", "trpo"]
 )
 def test_the_trainer_accepts_the_hyperparameters_of_a_converted_entry(algorithm):
-    """Every file of Zoo has a schedule and classes of PyTorch."""
+    """Files of Zoo contain schedules and PyTorch classes, which the command must convert."""
     written = load(convert(FILE, f"{algorithm}.yml", env="a-v0").text).spec.trainer.algorithm
 
     assert check(Algorithm(name=written.name, hyperparameters=written.hyperparameters, policy=written.policy))
 
 
 def test_no_word_that_lives_elsewhere_becomes_a_hyperparameter():
-    """The trainer would refuse the job that the command has written."""
+    """These words belong to other fields of a job, and the trainer rejects them as hyperparameters."""
     words = "".join(f"  {word}: null\n" for word in ELSEWHERE if word not in {"n_timesteps", "policy"})
 
     written = load(convert(f"a-v0:\n  n_timesteps: 5\n  policy: MlpPolicy\n{words}", "sac.yml").text)
@@ -53,7 +53,7 @@ def test_no_word_that_lives_elsewhere_becomes_a_hyperparameter():
 
 
 def test_the_written_job_can_be_planned(tmp_path, capsys):
-    """A person's next command is `palaestra plan` or `palaestra run`."""
+    """After the conversion, a user runs `palaestra plan` or `palaestra run` with the job."""
     (tmp_path / "ppo.yml").write_text(FILE)
     out = tmp_path / "job.yaml"
 
@@ -64,7 +64,7 @@ def test_the_written_job_can_be_planned(tmp_path, capsys):
 
 
 def test_an_existing_file_is_not_replaced(tmp_path, capsys):
-    """Its owner may have edited the job."""
+    """A user may have edited the existing file, so the command must not overwrite it."""
     (tmp_path / "ppo.yml").write_text(FILE)
 
     assert main(["from-zoo", str(tmp_path / "ppo.yml"), "--out", str(tmp_path / "ppo.yml")]) == 2

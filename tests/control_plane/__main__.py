@@ -1,7 +1,7 @@
 """Run a control plane without nodes until Ctrl-C: `python -m tests.control_plane`.
 
-It prints the path of its administrator's kubeconfig when it is ready, and builds its programs if they are
-missing.
+The program builds the programs of the control plane if they are missing. When the control plane is ready, the
+program prints the path of an administrator's kubeconfig.
 """
 
 import os
@@ -17,10 +17,10 @@ ENDS = {signal.SIGINT, signal.SIGTERM}
 
 
 def main() -> int:
-    """Run it; it ends with its terminal."""
+    """Run the control plane until SIGINT or SIGTERM."""
     os.environ[REQUIRED] = "1"
     with tempfile.TemporaryDirectory(prefix="control-plane-") as folder, running(Path(folder)) as plane:
-        signal.pthread_sigmask(signal.SIG_BLOCK, ENDS)  # not earlier, because the programs would inherit it
+        signal.pthread_sigmask(signal.SIG_BLOCK, ENDS)  # not earlier: child programs inherit a blocked signal
         sys.stdout.write(f"export KUBECONFIG={plane.kubeconfig}\n")
         sys.stdout.flush()
         signal.sigwait(ENDS)

@@ -1,4 +1,4 @@
-"""Keys and certificates of one control plane, made by openssl and valid for a day."""
+"""Keys and certificates of one control plane; openssl creates them, valid for one day."""
 
 import subprocess
 from collections.abc import Iterable
@@ -19,28 +19,28 @@ class Pair:
 
 @dataclass(frozen=True, slots=True)
 class Authority:
-    """The certificate authority of the server and its clients; its own files are in `folder`."""
+    """The certificate authority of the server and of its clients; `folder` contains its files."""
 
     folder: Path
 
     @classmethod
     def create(cls, folder: Path, *extensions: str) -> "Authority":
-        """Make the authority's own key and certificate in an existing folder."""
+        """Create the authority's key and certificate in an existing folder."""
         authority, subject = cls(folder), ("-subj", "/CN=control-plane")
         _openssl("req", "-x509", "-new", *CURVE, *DAY, *subject, *_added(extensions), *_files(authority.pair))
         return authority
 
     @property
     def pair(self) -> Pair:
-        """The authority's own certificate and key."""
+        """The certificate and the key of the authority itself."""
         return Pair(certificate=self.folder / "ca.crt", key=self.folder / "ca.key")
 
     def server(self, addresses: Iterable[str]) -> Pair:
-        """Make the certificate of a server with these IP addresses."""
+        """Create the certificate of a server with these IP addresses."""
         return self._issue(self.folder / "server", "/CN=kube-apiserver", _named(addresses))
 
     def bare_server(self, addresses: Iterable[str], days: int) -> Pair:
-        """Make the certificate of a server without key identifiers; with -1 days it has expired."""
+        """Create a server's certificate without key identifiers; with `days=-1`, it has expired."""
         pair, request, extensions = (self.folder / name for name in ("bare", "request", "extensions"))
         found = _pair(pair)
         no_identifiers = "subjectKeyIdentifier=none\nauthorityKeyIdentifier=none\n"
@@ -53,12 +53,12 @@ class Authority:
         return found
 
     def client(self, user: str, group: str, folder: Path) -> Pair:
-        """Make a user's certificate in a folder; an empty group adds no group."""
+        """Create a user's certificate in a folder; with an empty `group`, the user is in no group."""
         subject = f"/O={group}/CN={user}" if group else f"/CN={user}"
         return self._issue(folder / user.replace(":", "-"), subject, "extendedKeyUsage=clientAuth")
 
     def signing_key(self) -> Path:
-        """Make the key that signs the tokens of service accounts."""
+        """Create the key that signs the tokens of service accounts."""
         path = self.folder / "service-accounts.key"
         _openssl("genrsa", "-out", str(path), "2048")
         return path

@@ -1,4 +1,4 @@
-"""Install Palaestra on a control plane without nodes: everything in install.yaml except the Deployment."""
+"""Install Palaestra on a control plane without nodes: all objects of install.yaml except the Deployment."""
 
 from palaestra.cluster import Api, Resource, connect
 from tests.chart.installation import installed
@@ -8,7 +8,7 @@ from tests.waiting import eventually
 
 UNNAMESPACED = {"Namespace", "ClusterRole", "ClusterRoleBinding"}
 PLURALS = {"NetworkPolicy": "networkpolicies"}
-ELSEWHERE = {"Deployment", "CustomResourceDefinition"}  # operators are processes; the plane defines the kinds
+ELSEWHERE = {"Deployment", "CustomResourceDefinition"}  # tests define the kinds and run operators
 
 
 def install(plane: ControlPlane) -> Api:

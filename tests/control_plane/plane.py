@@ -1,8 +1,8 @@
 """A control plane without nodes: etcd, kube-apiserver and kube-controller-manager as processes.
 
-It starts in seconds and behaves like a cluster except for running pods: it validates, stores, watches,
-collects garbage and turns Jobs into pods. Everything listens only on the loopback, and no program of it
-connects to anything else. The processes end with their parent, however that ends (pdeathsig).
+It starts in seconds and behaves like a cluster that runs no pods: it validates, stores and watches objects,
+collects garbage, and creates the pods of Jobs. All its programs listen and connect only on the loopback
+interface. The processes end with their parent process, even after SIGKILL (pdeathsig).
 """
 
 import json
@@ -27,27 +27,27 @@ from tests.json_lines import whole_lines
 from tests.waiting import eventually
 
 ADDRESS = LOOPBACK
-SERVICES = "198.19.0.0/24"  # a range for benchmarks, to which no route leads
-# Each of the other controllers would watch a few kinds and send more requests, for nothing.
+SERVICES = "198.19.0.0/24"  # a range for benchmarks, which no network routes
+# No test needs the other controllers; each of them would watch a few kinds and send requests.
 CONTROLLERS = (
     "job-controller",
     "garbage-collector-controller",
     "namespace-controller",
-    "serviceaccount-controller",  # a namespace without an account accepts no pods
+    "serviceaccount-controller",  # without a service account, a namespace accepts no pods
     "resourcequota-controller",
     "clusterrole-aggregation-controller",  # adds other kinds to `edit` and `view`
     "persistentvolumeclaim-protection-controller",  # releases claims that the API server protects
 )
 START_DEADLINE_S = 60
 STOP_DEADLINE_S = 10
-# Garbage collection would be a tenth of the work, and a plane lives only for minutes.
+# The programs run only for minutes, and Go's garbage collection would take a tenth of their processor time.
 RARELY = {"GOGC": "400"}
 AUDIT = {
     "apiVersion": "audit.k8s.io/v1",
     "kind": "Policy",
     "omitStages": ["RequestReceived"],
     "rules": [
-        # For Secrets, responses are recorded too: a request does not show whether it reads their content.
+        # For Secrets, the log contains responses too: a request does not show whether it reads their content.
         {
             "level": "RequestResponse",
             "userGroups": ["system:serviceaccounts"],
@@ -67,13 +67,13 @@ class ControlPlane:
     """A running control plane.
 
     Attributes:
-        folder: certificates, logs and data; the caller that made the folder removes it.
-        port: of the API server, on 127.0.0.1.
+        folder: certificates, logs and data; the caller created the folder and removes it.
+        port: the port of the API server on 127.0.0.1.
         authority: signs the certificates of clients.
-        kubeconfig: that of an administrator.
+        kubeconfig: the kubeconfig of an administrator.
         binaries: the folder of the programs.
-        clients: the folder for users' certificates and kubeconfigs; each process that uses the plane has its
-            own.
+        clients: the folder for users' certificates and kubeconfigs; each process that uses the control plane
+        has a folder of its own.
     """
 
     folder: Path
@@ -90,19 +90,20 @@ class ControlPlane:
 
     @property
     def audit_log(self) -> Path:
-        """One line of JSON for each request, with user, verb and object."""
+        """The audit log: one line of JSON for each request, with user, verb and object."""
         return self.folder / "audit.log"
 
     def audit(self, about: str = "") -> list[dict[str, Any]]:
-        """Return the recorded requests in order, without an incomplete last line.
+        """Return the logged requests in order, without an incomplete last line.
 
         Args:
-            about: only entries that contain this text, such as a namespace, because all tests share the log.
+            about: returns only entries that contain this text, e.g. a namespace, because all tests share the
+            log.
         """
         return whole_lines(self.audit_log, about)
 
     def kubectl(self, *arguments: str, sent: str = "") -> "subprocess.CompletedProcess[str]":
-        """Run kubectl as the administrator, with `sent` as its standard input; the limit is 60 s."""
+        """Run kubectl as the administrator, with `sent` as standard input; the timeout is 60 s."""
         return subprocess.run(
             [str(self.binaries / "kubectl"), f"--cache-dir={self.folder / 'cache'}", *arguments],
             env={"KUBECONFIG": str(self.kubeconfig)},
@@ -114,13 +115,14 @@ class ControlPlane:
         )
 
     def await_kinds(self, *kinds: str) -> None:
-        """Return when CustomResourceDefinitions, named as for kubectl, are established and discovered.
+        """Wait until CustomResourceDefinitions, named as for kubectl, are established and discovered.
 
-        kubectl fails at once for one that has no condition yet. It also caches for hours a discovery that
-        lacks it, and `kubectl get CATEGORY` trusts that; `kubectl api-resources` refreshes it.
+        `kubectl wait` fails at once while a definition has no condition. kubectl also caches a discovery
+        without the definition for hours, and `kubectl get CATEGORY` uses this cache; `kubectl api-resources`
+        refreshes it.
 
         Raises:
-            TooLate: one of them is not ready within 30 s.
+            TooLate: a definition is not ready within 30 s.
         """
         wait = ("wait", "--for=condition=Established", "--timeout=10s", *kinds)
         eventually(lambda: self.kubectl(*wait).returncode == 0)
@@ -141,14 +143,14 @@ def running(
 
     Args:
         folder: an existing empty folder.
-        kinds: a file of definitions that exist before the controllers start; the garbage collector looks for
-            new kinds only every 30 s.
-        requests_per_s: the limit of each controller; None is Kubernetes' own default.
+        kinds: a file of definitions that exist before the controllers start, because the garbage collector
+        looks for new kinds only every 30 s.
+        requests_per_s: the request rate of each controller; None means the default of Kubernetes.
 
     Raises:
         NoPrograms: the programs are not built.
-        DidNotStart: one of them was not ready in 60 s, or the definitions are refused.
-        TooLate: the definitions are not served within 30 s.
+        DidNotStart: a program was not ready within 60 s, or the API server refused the definitions.
+        TooLate: the API server does not serve the definitions within 30 s.
     """
     authority = Authority.create(folder)
     with ExitStack() as processes:
@@ -242,7 +244,7 @@ def _controllers(plane: ControlPlane, requests_per_s: int | None) -> list[str]:
 def started(folder: Path, command: list[str]) -> Iterator["subprocess.Popen[bytes]"]:
     """Run a program until the block ends, with its log in `folder`.
 
-    It ends with this process at the latest.
+    The program ends at the latest with this process.
     """
     if not shutil.which("setpriv"):
         raise DidNotStart(
@@ -277,7 +279,7 @@ def _wait_ready(plane: ControlPlane, api_server: "subprocess.Popen[bytes]") -> N
             answer = urllib.request.urlopen(f"{plane.server}/readyz", context=context, timeout=5)
             answer.close()
             return
-        threading.Event().wait(0.1)  # a port without a listener has no event
+        threading.Event().wait(0.1)  # no event announces that a port has a listener
     log = (plane.folder / "kube-apiserver.log").read_text(errors="replace")[-3000:]
     raise DidNotStart(f"kube-apiserver: not ready in {START_DEADLINE_S} s; its log ends with\n{log}")
 

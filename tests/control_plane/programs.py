@@ -9,19 +9,19 @@ SCRIPTS = Path(__file__).parents[1] / "cluster"
 PROGRAMS = ("etcd", "kube-apiserver", "kube-controller-manager", "kubectl")
 REQUIRED = "PALAESTRA_REQUIRE_CLUSTER"
 BUILD_DEADLINE_S = 1800
-MISSING = 3  # the exit code of programs.sh --built if one is missing
+MISSING = 3  # the exit code of `programs.sh --built` if a program is missing
 
 
 class NoPrograms(Exception):
-    """The programs are missing; the message has the command that builds them."""
+    """Programs of a cluster are missing; the message contains the command that builds them."""
 
 
 @cache
 def programs(names: tuple[str, ...] = PROGRAMS) -> Path:
-    """Return the folder with the programs, and build them if they are required and missing.
+    """Return the folder with the programs; build missing programs if PALAESTRA_REQUIRE_CLUSTER is 1.
 
     Raises:
-        NoPrograms: they are not built and PALAESTRA_REQUIRE_CLUSTER is not 1, or the build failed.
+        NoPrograms: a program is missing and may not be built, or the build failed.
     """
     command = f"tests/cluster/programs.sh {' '.join(names)}"
     wanted = names if os.environ.get(REQUIRED) == "1" else ("--built", *names)

@@ -1,9 +1,9 @@
-"""One control plane for all pytest processes of a run, which the first process that needs it starts.
+"""One control plane for all pytest processes of a run; the first process that needs it starts it.
 
-A separate process runs it, `python -m tests.control_plane.shared FOLDER OWNER`, with Palaestra installed. It
-ends and removes the folder when `end` is called, or when the process OWNER, which is pytest itself, has ended
-in any way. Tests are separated by namespaces. A test that stops a control plane, fills it or changes its
-definition of TrainingJobs has its own (`plane.running`).
+The control plane, with Palaestra installed, runs in a separate process: `python -m tests.control_plane.shared
+FOLDER OWNER`. This process ends and removes the folder after a call of `end`, or when the process OWNER
+(pytest) has ended in any way. Each test has its own namespace. A test that stops a control plane, fills it or
+changes the definition of TrainingJobs starts a control plane of its own (`plane.running`).
 """
 
 import fcntl
@@ -28,24 +28,24 @@ from tests.control_plane.programs import programs
 
 ROOT = Path(__file__).parents[2]
 KINDS = ROOT / "manifests" / "crd.yaml"
-# This is the limit of each controller. With Kubernetes' default, the controllers of a process share 20, and
-# the tests of four processes would wait.
+# The request rate of each controller. By default, all controllers share 20 requests per second, so the tests
+# of four processes would wait.
 REQUESTS_PER_S = 200
 ENDS_S = 30.0
-VARIABLE = "PALAESTRA_TESTS_CONTROL_PLANE"  # the process and the folder of the run
-ADDRESS = "plane.json"  # written when the control plane is ready
+VARIABLE = "PALAESTRA_TESTS_CONTROL_PLANE"  # contains the process and the folder of the run
+ADDRESS = "plane.json"  # this file is written when the control plane is ready
 
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """One run of pytest: its process, and the folder of its control plane, which may not exist."""
+    """One run of pytest: its process, and the folder of its control plane, which may not exist yet."""
 
     owner: int
     folder: Path
 
     @classmethod
     def of_this_process(cls) -> Self:
-        """Return the run of this worker process, or begin a run that its workers inherit."""
+        """Return the run of this worker process, or start a run that worker processes inherit."""
         owner, _, folder = os.environ.get(VARIABLE, "").partition(":")
         if owner == str(os.getppid()):
             return cls(os.getppid(), Path(folder))
@@ -55,15 +55,15 @@ class Run:
 
 
 def joined(run: Run, clients: Path) -> ControlPlane:
-    """Return the control plane of a run, and start it if no process has.
+    """Return the control plane of a run; start it if no process has started it.
 
     Args:
-        run: the same for all processes of the run.
+        run: the same value in all processes of the run.
         clients: an existing folder of this process, see `ControlPlane`.
 
     Raises:
         NoPrograms: the programs are not built.
-        DidNotStart: it did not start.
+        DidNotStart: the control plane did not start.
     """
     binaries = programs()
     run.folder.mkdir(exist_ok=True)
@@ -84,7 +84,7 @@ def joined(run: Run, clients: Path) -> ControlPlane:
 
 
 def end(run: Run) -> None:
-    """End the control plane of a run that this process began, and wait for its processes."""
+    """End the control plane of a run that this process started, and wait for the end of its processes."""
     address = run.folder / ADDRESS
     if run.owner != os.getpid() or not address.exists():
         return
@@ -95,9 +95,9 @@ def end(run: Run) -> None:
 
 
 def _start(run: Run) -> None:
-    """Start the process that runs it, without waiting for its end.
+    """Start the process that runs the control plane, and return when the control plane is ready.
 
-    It may outlive this process, but not the owner.
+    The process may outlive this process, but not the owner of the run.
     """
     command = [sys.executable, "-m", "tests.control_plane.shared", str(run.folder), str(run.owner)]
     ready, written = os.pipe()
@@ -111,11 +111,11 @@ def _start(run: Run) -> None:
                 (os.POSIX_SPAWN_DUP2, written, 1),
                 (os.POSIX_SPAWN_DUP2, log.fileno(), 2),
             ],
-            setsid=True,  # Ctrl-C ends it with the tests, not before
+            setsid=True,  # Ctrl-C reaches the tests first, which then end the control plane
         )
         os.close(written)
         with os.fdopen(ready) as lines:
-            if not lines.readline():  # it has ended and removed its folder; all its waits have deadlines
+            if not lines.readline():  # the process has ended; all its waits have timeouts
                 log.seek(0)
                 raise DidNotStart(log.read()[-3000:])
 
@@ -139,7 +139,7 @@ def main(folder: Path, owner: int) -> int:
 
 
 def _leave(*_: object) -> None:
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)  # a second signal would cut the cleanup short
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)  # a second signal must not interrupt the cleanup
     raise SystemExit(0)
 
 

@@ -1,10 +1,10 @@
-"""The permissions for jobs in the tests' installation; by default, manifests/install.yaml allows nothing."""
+"""The permissions that the tests' installation gives to jobs; manifests/install.yaml gives none."""
 
 from tests.e2e.cluster import Cluster
 from tests.e2e.namespace import OPERATOR, SYSTEM
 
 MISSING, LIMITED, URGENT = "palaestra-e2e-missing", "palaestra-e2e-limited", "palaestra-e2e-urgent"
-OF_THE_PAGE = "urgent"  # used in docs/howto/queues.md
+OF_THE_PAGE = "urgent"  # the priority class of docs/howto/queues.md
 OPTIONS = tuple(f"--allow-priority-class={name}" for name in (MISSING, LIMITED, URGENT, OF_THE_PAGE))
 
 

@@ -1,4 +1,4 @@
-"""Pods that send requests to other pods, from wherever a test puts them."""
+"""Pods from which a test sends requests to other pods, in a namespace and with labels of its choice."""
 
 from importlib.metadata import version
 
@@ -24,7 +24,7 @@ ThreadingHTTPServer(("", 9090), SimpleHTTPRequestHandler).serve_forever()
 
 
 def plain_pod(name: str, labels: dict[str, str] | None = None, **container: object) -> Object:
-    """Return a pod of one small container that sleeps and meets *restricted*."""
+    """Return a pod with one small container that sleeps. The pod satisfies the *restricted* standard."""
     return {
         "apiVersion": "v1",
         "kind": "Pod",
@@ -48,7 +48,7 @@ def plain_pod(name: str, labels: dict[str, str] | None = None, **container: obje
 
 
 class Asker:
-    """A pod that runs until its namespace is deleted; `labels` are its own."""
+    """A pod with these `labels` from which a test sends requests; it runs until its namespace is deleted."""
 
     def __init__(self, namespace: Namespace, name: str, labels: dict[str, str] | None = None) -> None:
         self.namespace, self.name, self.labels = namespace, name, labels or {}

@@ -1,6 +1,7 @@
-"""The API server's record of the service accounts' requests.
+"""The API server's audit log of the requests of service accounts.
 
-tests/cluster/audit-policy.yaml determines the record; the kubelet shows its node's logs to administrators.
+tests/cluster/audit-policy.yaml determines which requests are logged. The kubelet serves the log of its node
+to administrators.
 """
 
 import os
@@ -18,7 +19,7 @@ BEGUN = datetime.now(UTC).isoformat()  # modules are imported before the first t
 def recorded(cluster: Cluster) -> list[Use]:
     """Return all requests of service accounts since the tests began.
 
-    A cluster that somebody else made may have no record; the test is then skipped.
+    A cluster that these tests did not create may write no audit log; the test is then skipped.
     """
     nodes = [node["metadata"]["name"] for node in cluster.select("nodes", None)]
     logs = [cluster.kubectl("get", "--raw", LOG.format(node=node)) for node in nodes]

@@ -1,8 +1,8 @@
-"""Tests that mostly wait run in their own threads, at the same time as others.
+"""Tests that mostly wait run in threads of their own, at the same time as other tests.
 
-A test with the mark `beside` starts early, when the first test of its group in the order begins
-(tests/e2e/conftest.py), in its own namespace. Its turn waits for its end, and has its result. It may request
-`namespace`, `job` and `tmp_path`, and its own parameters.
+A test with the mark `beside` starts early, in its own namespace: it starts when the first test of its group
+begins (tests/e2e/conftest.py). When pytest calls the test later, the call waits for the thread and raises its
+error. The test may request `namespace`, `job` and `tmp_path`, and its own parameters.
 """
 
 import threading
@@ -27,7 +27,7 @@ END_S = 1200.0
 
 
 class Beside(Generic[T]):
-    """Calls `act` in a thread, which ends with this process at the latest."""
+    """Calls `act` in a thread; the thread is a daemon, so it ends with this process at the latest."""
 
     def __init__(self, act: Callable[[], T]) -> None:
         self._result: Future[T] = Future()
@@ -40,14 +40,14 @@ class Beside(Generic[T]):
     def _tell(self, act: Callable[[], T]) -> None:
         try:
             self._result.set_result(act())
-        except BaseException as error:  # noqa: BLE001 - the caller of `result` gets it
+        except BaseException as error:  # noqa: BLE001 - `result` raises the error in its caller
             self._result.set_exception(error)
 
 
 class Stories:
     """The tests with the mark `beside`, each with a namespace.
 
-    A namespace is deleted here if its test never starts.
+    `__exit__` deletes the namespaces of tests that have started but that pytest never called.
     """
 
     def __init__(self, cluster: Cluster, folders: pytest.TempPathFactory) -> None:
@@ -58,31 +58,32 @@ class Stories:
         self._room = threading.BoundedSemaphore(AT_ONCE)
 
     def __enter__(self) -> Self:
-        """Start nothing yet."""
+        """Return the tests; `begin` starts them."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Delete the namespaces that no test has taken, with everything that runs in them."""
+        """Delete the namespaces that no caller has taken, with everything that runs in them."""
         for namespace in self._namespaces.values():
             namespace.delete()
 
     def begin(self, items: Iterable[pytest.Item]) -> None:
-        """Start those of these tests that have the mark and have not begun."""
+        """Start those of these tests that have the mark and have not started."""
         for item in items:
             if item.get_closest_marker(BESIDE) and item.nodeid not in self._begun:
                 assert isinstance(item, pytest.Function)
                 namespace = Namespace(self._cluster, unique(item.name))
                 self._namespaces[item.nodeid] = namespace
-                # Here, because two threads that ask pytest first get two roots, and an error.
+                # `mktemp` is called here, because two threads that call it first create two roots, which is
+                # an error.
                 folder = self._folders.mktemp(BESIDE)
                 self._begun[item.nodeid] = Beside(partial(self._call, item, namespace, folder))
 
     def take(self, item: pytest.Item) -> Namespace | None:
-        """Return the namespace of a test that has begun, which the caller must delete, or None."""
+        """Return the namespace of a test that has started, or None; the caller must delete the namespace."""
         return self._namespaces.pop(item.nodeid, None)
 
     def end(self, item: pytest.Item) -> bool:
-        """Wait for the end of a test and raise its error; return False if it has not begun."""
+        """Wait for the end of a test and raise its error; return False if the test has not started."""
         story = self._begun.get(item.nodeid)
         if story:
             story.result()

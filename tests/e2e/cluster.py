@@ -1,7 +1,7 @@
-"""A Kubernetes cluster as a user reaches it, by the API server's own JSON and kubectl.
+"""A Kubernetes cluster as a user reaches it, through kubectl and the JSON of the API server.
 
-Palaestra's own client is not used, so that a mistake in it cannot hide itself. One `kubectl proxy` serves all
-requests, because it knows every way to log in that a kubeconfig can have.
+The tests do not use Palaestra's own client, because the client's errors would then hide themselves. One
+`kubectl proxy` serves all requests, because kubectl supports every login method of a kubeconfig.
 """
 
 import json
@@ -25,14 +25,14 @@ GROUPS = {
     "rolebindings": "apis/rbac.authorization.k8s.io/v1",
     "trainingjobs": "apis/palaestra.dev/v1alpha1",
     "workloads": "apis/kueue.x-k8s.io/v1beta2",
-}  # every other kind here is in the core group
+}  # the other kinds that tests use are in the core group
 REQUEST_S = 30
 COMMAND_S = 60
 ROLLOUT_S = 120
 
 
 class Refused(Exception):
-    """The API server's refusal: `code` of HTTP, `reason` in one word, `message` in a sentence."""
+    """The API server refused a request: HTTP status `code`, `reason` in one word, `message` in a sentence."""
 
     def __init__(self, code: int, status: Object) -> None:
         self.code = code
@@ -42,7 +42,7 @@ class Refused(Exception):
 
 
 class Cluster:
-    """A cluster that `kubectl` reaches with `options`, while this context is entered."""
+    """A cluster that `kubectl` reaches with `options`; requests work inside a `with` block."""
 
     def __init__(self, kubectl: str, *options: str) -> None:
         self._kubectl = (kubectl, *options)
@@ -50,8 +50,8 @@ class Cluster:
         self._address = ""
 
     def __enter__(self) -> Self:
-        """Begin to serve the API on a port of the loopback."""
-        # Only this object ends it: Ctrl-C must leave it to the cleanup.
+        """Start to serve the API on a port of the loopback interface."""
+        # The proxy has a session of its own, because Ctrl-C must not end it before the cleanup.
         self._proxy = subprocess.Popen(
             ["setpriv", "--pdeathsig=TERM", *self._kubectl, "proxy", "--port=0"],
             stdout=subprocess.PIPE,
@@ -73,7 +73,7 @@ class Cluster:
         self._proxy.stdout.close()
 
     def acting_as(self, user: str, group: str) -> Self:
-        """Return the cluster as another user sees it, to be entered."""
+        """Return the same cluster with the permissions of another user; enter it before use."""
         return type(self)(self._kubectl[0], f"--as={user}", f"--as-group={group}")
 
     def get(self, kind: str, namespace: str | None, name: str) -> Object | None:
@@ -86,7 +86,7 @@ class Cluster:
             raise
 
     def select(self, kind: str, namespace: str | None, labels: str = "") -> list[Object]:
-        """Return the objects of a kind, by a label selector."""
+        """Return the objects of a kind that match a label selector."""
         items: list[Object] = self.request("GET", f"{path(kind, namespace)}?labelSelector={labels}")["items"]
         return items
 
@@ -122,7 +122,7 @@ class Cluster:
         """Return the API server's response.
 
         Raises:
-            Refused: it refused the request.
+                Refused: the API server refused the request.
         """
         kind = "application/merge-patch+json" if method == "PATCH" else "application/json"
         body = None if content is None else json.dumps(content).encode()
@@ -138,14 +138,14 @@ class Cluster:
                 raise Refused(error.code, _status(error.read())) from None
 
     def kubectl(self, *arguments: str, within_s: float = COMMAND_S) -> str:
-        """Run kubectl and return its output, whatever its exit code is."""
+        """Run kubectl and return its output, even if kubectl fails."""
         ended = subprocess.run(
             [*self._kubectl, *arguments], capture_output=True, text=True, timeout=within_s, check=False
         )
         return ended.stdout + ended.stderr
 
     def rolled_out(self, namespace: str, deployment: str) -> None:
-        """Wait until a Deployment is rolled out; a failure shows later."""
+        """Wait until a Deployment is rolled out; a timeout raises no error here."""
         wait = f"--timeout={ROLLOUT_S}s"
         self.kubectl(
             "rollout", "status", f"deploy/{deployment}", "-n", namespace, wait, within_s=ROLLOUT_S + 10
@@ -155,7 +155,7 @@ class Cluster:
         """Run a command in a container, and return its standard output.
 
         Raises:
-            CommandFailed: its exit code is not 0, or it could not be run.
+                CommandFailed: the command's exit code is not 0, or kubectl could not run the command.
         """
         ended = subprocess.run(
             [*self._kubectl, "exec", "-n", namespace, pod, "-c", container, "--", *command],
@@ -175,7 +175,7 @@ class CommandFailed(Exception):
 
 
 def path(kind: str, namespace: str | None, name: str = "") -> str:
-    """Return the path of a kind, or of an object of it, at the API server."""
+    """Return the API server's path for a kind, or for one object of the kind."""
     parts = [GROUPS.get(kind, "api/v1"), *(["namespaces", namespace] if namespace else []), kind]
     return "/".join([*parts, name] if name else parts)
 

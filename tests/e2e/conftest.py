@@ -1,9 +1,9 @@
 """Fixtures of the end-to-end tests: the cluster, a namespace for each test, small jobs, one long run.
 
-`make e2e` starts a cluster, installs Palaestra in it and runs these tests; without one they are skipped. They
-run in groups: those that look at the middle of the long run, then most tests, then those of LATE. The long
-run continues meanwhile until a test looks at its end. Tests that mostly wait run at the same time as their
-own group.
+`make e2e` starts a cluster, installs Palaestra in it and runs these tests. Without a cluster, the tests are
+skipped. They run in groups: first the tests that need the long run unfinished, then most tests, then the
+groups of LATE. The long run continues meanwhile until a test waits for its end. Tests that mostly wait run at
+the same time as the other tests of their group.
 """
 
 import os
@@ -21,7 +21,7 @@ from tests.e2e.jobs import tiny_job
 from tests.e2e.long_run import LongRun
 from tests.e2e.namespace import Namespace, unique
 
-CHOSEN = "PALAESTRA_E2E"  # set to confirm that the cluster of $KUBECONFIG is for tests
+CHOSEN = "PALAESTRA_E2E"  # set by a person who confirms that the cluster of $KUBECONFIG is for tests
 MONITORING = "monitoring"  # the operator's --monitoring-namespace
 BEGIN_FIRST = ("long_run", "evictions", "always_interrupted")
 LATE = {  # marks, in the order of their groups
@@ -43,7 +43,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Sort them; in a group, the tests that run at the same time as others come last."""
+    """Sort tests by group; in each group, the tests that run at the same time as others come last."""
     items.sort(key=lambda item: (_place(item), item.get_closest_marker(BESIDE) is not None))
 
 
@@ -54,7 +54,7 @@ def _place(item: pytest.Item) -> int:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> bool | None:
-    """Wait for a test that has started early, instead of calling it."""
+    """If a test has started early, wait for its end instead of calling it."""
     stories = pyfuncitem.funcargs["stories"]
     assert isinstance(stories, Stories)
     return stories.end(pyfuncitem) or None
@@ -85,21 +85,21 @@ def cluster() -> Iterator[Cluster]:
 
 @pytest.fixture(scope="session")
 def begun(request: pytest.FixtureRequest) -> dict[str, object]:
-    """Start the long fixtures before all tests, if a test uses them, and return them by name."""
+    """Start the long fixtures that any test requests, before all tests, and return them by name."""
     looked_at = {name for item in request.session.items for name in getattr(item, "fixturenames", ())}
     return {name: request.getfixturevalue(name) for name in BEGIN_FIRST if name in looked_at}
 
 
 @pytest.fixture(scope="session")
 def stories(cluster: Cluster, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stories]:
-    """The tests that run at the same time as others."""
+    """The tests that run in threads, at the same time as others."""
     with Stories(cluster, tmp_path_factory) as told:
         yield told
 
 
 @pytest.fixture(autouse=True)
 def in_order(begun: dict[str, object], stories: Stories, request: pytest.FixtureRequest) -> None:
-    """With the first test of a group, start those of the group that run at the same time."""
+    """When the first test of a group begins, start the group's tests that run in threads."""
     place = _place(request.node)
     if place > 0 and isinstance(run := begun.get("long_run"), LongRun):
         run.wait_for_kills()
@@ -108,7 +108,7 @@ def in_order(begun: dict[str, object], stories: Stories, request: pytest.Fixture
 
 @pytest.fixture(scope="session")
 def long_run(cluster: Cluster) -> Iterator[LongRun]:
-    """The full training move-to-target and a job of two replicas, while their operator is killed."""
+    """The full training move-to-target and a job of two replicas; their operator is killed repeatedly."""
     with LongRun(Namespace(cluster, unique("move-to-target"))) as run:
         yield run
 
@@ -132,7 +132,7 @@ def always_interrupted(cluster: Cluster) -> Iterator[Namespace]:
 
 @pytest.fixture(scope="module")
 def shared(cluster: Cluster, request: pytest.FixtureRequest) -> Iterator[Namespace]:
-    """A namespace for all tests of a module, whose jobs wait at the same time."""
+    """A namespace for all tests of a module, so that their jobs wait at the same time."""
     made = Namespace(cluster, unique(request.path.stem.removeprefix("test_")))
     yield made
     made.delete()
@@ -140,7 +140,7 @@ def shared(cluster: Cluster, request: pytest.FixtureRequest) -> Iterator[Namespa
 
 @pytest.fixture
 def namespace(cluster: Cluster, stories: Stories, request: pytest.FixtureRequest) -> Iterator[Namespace]:
-    """A namespace of the test, which enforces *restricted*."""
+    """The namespace of the test; it enforces the *restricted* standard."""
     made = stories.take(request.node) or Namespace(cluster, unique(request.node.name))
     yield made
     made.delete()
@@ -148,7 +148,7 @@ def namespace(cluster: Cluster, stories: Stories, request: pytest.FixtureRequest
 
 @pytest.fixture(scope="session")
 def make_namespace(cluster: Cluster) -> Iterator[Callable[[str], Namespace]]:
-    """Return a function that makes further namespaces, which stay until all tests have ended."""
+    """Return a function that creates namespaces; they are deleted after all tests."""
     made = []
 
     def make(name: str) -> Namespace:
@@ -162,7 +162,7 @@ def make_namespace(cluster: Cluster) -> Iterator[Callable[[str], Namespace]]:
 
 @pytest.fixture(scope="session")
 def monitor(cluster: Cluster) -> Iterator[Asker]:
-    """A pod in the namespace that collects metrics; an existing namespace stays."""
+    """A pod in the namespace that collects metrics; an existing namespace is not deleted."""
     there = cluster.get("namespaces", None, MONITORING) is not None
     place = Namespace(cluster, MONITORING, there=there)
     name = unique("monitor")
@@ -174,5 +174,5 @@ def monitor(cluster: Cluster) -> Iterator[Asker]:
 
 @pytest.fixture
 def job() -> Callable[..., Object]:
-    """Return the builder of small TrainingJobs; a test sets the fields that matter."""
+    """Return the builder of small TrainingJobs; a test passes only the fields that it needs."""
     return tiny_job

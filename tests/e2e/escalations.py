@@ -1,6 +1,6 @@
-"""Attempts of a user who may write TrainingJobs but create no pods, each with its possible gain.
+"""Requests and TrainingJobs by which a user who may not create pods could gain permissions.
 
-This module has only data: tests/e2e/test_escalations.py tests the outcomes.
+This module contains only data. tests/e2e/test_escalations.py tests the outcomes.
 """
 
 import copy
@@ -20,9 +20,10 @@ HOST = [{"name": "node", "hostPath": {"path": "/"}}]
 
 
 class Request(NamedTuple):
-    """A request for other objects.
+    """A request for an object other than a TrainingJob.
 
-    `where` is relative to the API's root, `{namespace}` is the author's own.
+    `where` is relative to the API's root, and `{namespace}` in it is the user's own namespace. `gain` is what
+    the user would gain.
     """
 
     name: str
@@ -33,7 +34,10 @@ class Request(NamedTuple):
 
 
 class Field(NamedTuple):
-    """A field of a TrainingJob, by a path such as `spec.simulators.0.name`, and the expected message."""
+    """A field of a TrainingJob at a path such as `spec.simulators.0.name`, and the expected message.
+
+    `gain` is what the user would gain if the field had its effect.
+    """
 
     name: str
     gain: str
@@ -42,33 +46,33 @@ class Field(NamedTuple):
     told: str = ""
 
 
-# The author's roles refuse these.
+# RBAC denies these requests to the user.
 REQUESTS = (
     Request(
         "a pod",
-        "Runs as whatever its maker likes.",
+        "Runs with any privileges.",
         "POST",
         f"{CORE}/pods",
         {"metadata": {"name": "own"}, "spec": POD},
     ),
     Request(
         "a Job",
-        "Makes pods as well.",
+        "Creates pods with any privileges.",
         "POST",
         f"{BATCH}/jobs",
         {"metadata": {"name": "own"}, "spec": {"template": {"spec": POD | {"restartPolicy": "Never"}}}},
     ),
     Request(
         "a TrainingJob elsewhere",
-        "Uses another's quota.",
+        "Uses another team's quota.",
         "POST",
         "apis/palaestra.dev/v1alpha1/namespaces/default/trainingjobs",
         tiny_job("own"),
     ),
-    Request("a secret by name", "Holds another's password.", "GET", f"{CORE}/secrets/words", None),
+    Request("a secret by name", "Reads another user's password.", "GET", f"{CORE}/secrets/words", None),
     Request(
         "a container in a pod that runs",
-        "Acts as the pod.",
+        "Acts with the pod's permissions.",
         "PATCH",
         f"{CORE}/pods/any/ephemeralcontainers",
         {"spec": {"ephemeralContainers": [{"name": "own", "image": "i"}]}},
@@ -82,7 +86,7 @@ REQUESTS = (
     ),
     Request(
         "the right to read secrets",
-        "Lets jobs use them.",
+        "Lets jobs use every secret.",
         "POST",
         f"{RBAC}/rolebindings",
         {"metadata": {"name": "own"}, "roleRef": SECRETS, "subjects": [OPERATOR]},
@@ -96,14 +100,14 @@ REQUESTS = (
     ),
     Request(
         "a status by hand",
-        "Says that a run succeeded, or was never begun.",
+        "Reports that a run succeeded or never began.",
         "PATCH",
         f"{JOBS}/plain/status",
         {"status": {"phase": "Succeeded"}},
     ),
     Request(
         "the mark that stops a replica",
-        "Ends another's training.",
+        "Ends another user's training.",
         "PATCH",
         f"{BATCH}/jobs/plain-0",
         {
@@ -113,53 +117,53 @@ REQUESTS = (
     ),
 )
 
-# The definition of a TrainingJob refuses these.
+# The schema of a TrainingJob rejects these fields.
 REFUSED = (
     Field(
         "the cluster's own priority",
-        "Pushes everybody else's pods off their nodes.",
+        "Evicts the pods of all other users.",
         "spec.scheduling.priorityClassName",
         "system-node-critical",
         "classes that begin with system- are for the cluster's own components",
     ),
     Field(
         "a control plane's taint",
-        "Runs where the cluster's own credentials are near.",
+        "Runs on nodes that hold the cluster's credentials.",
         "spec.scheduling.tolerations",
         [{"key": "node-role.kubernetes.io/control-plane", "operator": "Exists"}],
         "is a taint that reserves nodes for the cluster's own components",
     ),
     Field(
         "every taint",
-        "That of a control plane is among them.",
+        "Tolerates the taints of control planes too.",
         "spec.scheduling.tolerations",
         [{"operator": "Exists"}],
         "spec.scheduling.tolerations[0].key: Required value",
     ),
     Field(
         "the label of an app",
-        "A Service sends the app's requests here, a NetworkPolicy lets this pod in.",
+        "A Service sends the app's requests to this pod, and a NetworkPolicy admits the pod.",
         "spec.scheduling.podLabels",
         {"app": "database"},
         "use a key such as example.com/team",
     ),
     Field(
         "the name of an app",
-        "As above, by the usual label.",
+        "The same gain, by the recommended label.",
         "spec.scheduling.podLabels",
         {"app.kubernetes.io/name": "database"},
         "use a key such as example.com/team",
     ),
     Field(
         "an operator's label",
-        "Trainers of all namespaces let an operator in.",
+        "Trainers of all namespaces accept connections from an operator.",
         "spec.scheduling.podLabels",
         {"palaestra.dev/operator": "true"},
         "Palaestra sets the keys of",
     ),
     Field(
         "Kueue's label",
-        "Goes past the queue, or takes another's quota.",
+        "Bypasses the queue, or uses another team's quota.",
         "spec.scheduling.podLabels",
         {"kueue.x-k8s.io/queue-name": "theirs"},
         "Palaestra sets the keys of",
@@ -173,84 +177,84 @@ REFUSED = (
     ),
     Field(
         "a claim elsewhere",
-        "Writes on another's volume.",
+        "Writes to another namespace's volume.",
         "spec.storage.existingClaim",
         "other/kept",
         "spec.storage.existingClaim",
     ),
     Field(
         "a ConfigMap elsewhere",
-        "Reads another's configuration.",
+        "Reads another namespace's configuration.",
         "spec.simulators.0.world",
         {"configMap": {"name": "../other/config", "key": "w"}},
         "world.configMap.name",
     ),
     Field(
         "a pull secret elsewhere",
-        "Pulls another's images.",
+        "Pulls images with another namespace's credentials.",
         "spec.imagePullSecrets",
         [{"name": "other/registry"}],
         "spec.imagePullSecrets[0].name",
     ),
     Field(
         "a run outside of the volume's folders",
-        "Reads another's run.",
+        "Reads the files of another run.",
         "spec.storage",
         {"existingClaim": "kept", "resumeFrom": "../other"},
         "spec.storage.resumeFrom",
     ),
     Field(
         "a name that ends a node of a world",
-        "Writes the world's text.",
+        "Adds text to the world file.",
         "spec.simulators.0.name",
         'a" } Robot { name "b',
         "spec.simulators[0].name",
     ),
     Field(
         "a name with a second line",
-        "Writes a line of training.yaml.",
+        "Adds a line to training.yaml.",
         "spec.simulators.0.name",
         "a\nb",
         "spec.simulators[0].name",
     ),
     Field(
         "a password in an address",
-        "Everybody who may read TrainingJobs reads it.",
+        "Shows the password to every reader of TrainingJobs.",
         "spec.trainer.env",
         [{"name": "MLFLOW_TRACKING_URI", "value": "http://me:secret@tracking.example.com"}],
         "contains a password in an address",
     ),
     Field(
         "a master elsewhere",
-        "The operator's settings of a trainer are its own.",
+        "Replaces a variable that the operator sets.",
         "spec.trainer.env",
         [{"name": "ROS_MASTER_URI", "value": "http://other"}],
         "Palaestra sets the variables",
     ),
 )
 
-# A TrainingJob has no such field: a strict client gets an error, otherwise the field is dropped.
+# A TrainingJob has no such field: a strict client gets an error, and for other clients the field is dropped.
 UNKNOWN = (
-    Field("a folder of the node", "Reads and writes the node.", "spec.trainer.volumes", HOST),
+    Field("a folder of the node", "Reads and writes the node's files.", "spec.trainer.volumes", HOST),
     Field(
         "a privileged container",
-        "Is the node.",
+        "Has root permissions on the node.",
         "spec.trainer.securityContext",
         {"privileged": True, "runAsUser": 0},
     ),
+    Field("the node's network", "Reads the node's network traffic.", "spec.scheduling.hostNetwork", True),
     Field(
-        "the node's network", "Listens to what only the node may hear.", "spec.scheduling.hostNetwork", True
+        "a service account", "Sends requests with the account's rights.", "spec.serviceAccountName", "default"
     ),
-    Field("a service account", "Asks the API server with its rights.", "spec.serviceAccountName", "default"),
     Field(
         "a node by name",
-        "Goes past the scheduler, taints and quotas of nodes.",
+        "Bypasses the scheduler, and the taints and quotas of nodes.",
         "spec.scheduling.nodeName",
         "palaestra-control-plane",
     ),
     Field(
         "a whole pod",
-        "All of the above at once.",
+        "Combines all of the above.",
         "spec.template",
         {"spec": {**POD, "hostPID": True, "volumes": HOST}},
     ),
@@ -259,8 +263,8 @@ UNKNOWN = (
 _APART = "spec.scheduling.affinity"
 _REQUIRED = "requiredDuringSchedulingIgnoredDuringExecution"
 
-# These are accepted as requests but held: nobody has opened the named objects or allowed the requested
-# fields.
+# The API server accepts these TrainingJobs, but the operator holds them, because no administrator has opened
+# the named objects to jobs or allowed the requested fields.
 HELD = (
     Field(
         "a cluster of its own",
@@ -282,7 +286,7 @@ HELD = (
     ),
     Field(
         "a priority",
-        "Pushes pods of others off their nodes.",
+        "Evicts the pods of other users.",
         "spec.scheduling.priorityClassName",
         "production",
         "SchedulingNotAllowed",
@@ -296,42 +300,42 @@ HELD = (
     ),
     Field(
         "nodes of another team",
-        "A taint reserves them.",
+        "Uses nodes that a taint reserves.",
         "spec.scheduling.tolerations",
         [{"key": "dedicated", "operator": "Exists"}],
         "SchedulingNotAllowed",
     ),
     Field(
         "a secret of this namespace",
-        "Its value would be in the pod's environment.",
+        "Reads the secret's value in the pod's environment.",
         "spec.trainer.env",
         [{"name": "WORD", "secretKeyRef": {"name": "words", "key": "word"}}],
         "SecretNotForJobs",
     ),
     Field(
         "a pull secret of this namespace",
-        "Its images would run, and be read.",
+        "Runs private images, and reads their content.",
         "spec.imagePullSecrets",
         [{"name": "words"}],
         "SecretNotForJobs",
     ),
     Field(
         "a ConfigMap of this namespace",
-        "Its text would be in the replica's.",
+        "Reads the ConfigMap's text in the replica's ConfigMap.",
         "spec.simulators.0.world",
         {"configMap": {"name": "settings", "key": "text"}},
         "ConfigMapNotForJobs",
     ),
     Field(
         "a claim of this namespace",
-        "Its files would be in the pod.",
+        "Reads the claim's files in the pod.",
         "spec.storage",
         {"existingClaim": "kept"},
         "ClaimNotForJobs",
     ),
     Field(
         "a file of the node in a world",
-        "Its text would be in the simulator.",
+        "Reads the file's text in the simulator.",
         "spec.simulators.0.world",
         {"inline": '#VRML_SIM R2023b utf8\nEXTERNPROTO "../../etc/shadow.proto"\nWorldInfo {}\n'},
         "WorldInvalid",
@@ -341,7 +345,8 @@ HELD = (
 _LABELS = "spec.scheduling.podLabels"
 _ANNOTATIONS = "spec.scheduling.podAnnotations"
 
-# These are accepted as requests but held: this installation allows no labels and annotations of pods.
+# The API server accepts these TrainingJobs, but the operator holds them, because this installation allows no
+# labels and annotations of pods.
 METADATA = tuple(
     Field(name, gain, path, {key: value}, "PodMetadataNotAllowed")
     for name, gain, path, key, value in (
@@ -382,42 +387,42 @@ METADATA = tuple(
         ),
         (
             "more bandwidth",
-            "The bandwidth plugin takes it from others.",
+            "The bandwidth plugin takes the bandwidth from other pods.",
             _ANNOTATIONS,
             "kubernetes.io/egress-bandwidth",
             "100G",
         ),
         (
             "a container of Vault's",
-            "Its injector adds an agent that logs in.",
+            "Vault's injector adds an agent that logs in.",
             _ANNOTATIONS,
             "vault.hashicorp.com/agent-inject",
             "true",
         ),
         (
             "a secret of Vault's",
-            "Its agent writes it into the pod.",
+            "Vault's agent writes the secret into the pod.",
             _ANNOTATIONS,
             "vault.hashicorp.com/agent-inject-secret-admin",
             "secret/admin",
         ),
         (
             "a volume of Istio's proxy",
-            "Its injector mounts a folder of the node.",
+            "Istio's injector mounts a folder of the node.",
             _ANNOTATIONS,
             "sidecar.istio.io/userVolume",
             '{"node": {"hostPath": {"path": "/"}}}',
         ),
         (
             "an image of Istio's proxy",
-            "Its injector adds a container with capabilities, from any image.",
+            "Istio's injector adds a container with capabilities, from any image.",
             _ANNOTATIONS,
             "sidecar.istio.io/proxyImage",
             "mine:1",
         ),
         (
             "Istio's proxy",
-            "The pod has an identity in the mesh.",
+            "The pod gets an identity in the mesh.",
             _LABELS,
             "sidecar.istio.io/inject",
             "true",
@@ -438,7 +443,7 @@ METADATA = tuple(
         ),
         (
             "an app's label under a domain",
-            "A policy of somebody else that selects by it lets the pod in.",
+            "Another team's policy that selects this label admits the pod.",
             _LABELS,
             "example.com/app",
             "database",
@@ -448,7 +453,7 @@ METADATA = tuple(
 
 
 def authors(name: str, *fields: tuple[str, Any]) -> Object:
-    """Return a TrainingJob with fields set by path; it is suspended, because nothing has to run."""
+    """Return a suspended TrainingJob with fields set by path; the tests need no running pod."""
     job = tiny_job(name, script="exit 0", suspend=True)
     for path, value in fields:
         *above, last = path.split(".")

@@ -1,7 +1,7 @@
-"""A training whose pod is evicted repeatedly, at the same time as other tests.
+"""A training whose pod is evicted repeatedly, while other tests run.
 
-For more than a minute it only waits: Kubernetes waits 10 s before the second pod of a Job, and twice as long
-before each further one.
+Kubernetes waits 10 s before it creates the second pod of a Job, and doubles the delay for each further pod.
+So this training waits for more than a minute in total.
 """
 
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from tests.e2e.jobs import make_slow_job
 from tests.e2e.namespace import Namespace
 
 NAME = "drained"
-EVICTIONS = 3  # more evictions would only wait longer
+EVICTIONS = 3  # more evictions would only lengthen the test
 EVERY_STEPS = 100
 APART = 100
 STEPS = 1500
@@ -22,7 +22,7 @@ NEXT_POD_S = 600.0
 
 @dataclass(frozen=True)
 class Evicted:
-    """The result: the step `seen` before each eviction, the run's `attempts`, and its `last` pod."""
+    """The steps `seen` before each eviction, the `attempts` of the run, and the name of the `last` pod."""
 
     seen: list[int]
     attempts: list[Object]
@@ -30,7 +30,7 @@ class Evicted:
 
 
 class Evictions:
-    """The evicted job and its `namespace`."""
+    """The training that is evicted, and its `namespace`."""
 
     def __init__(self, namespace: Namespace) -> None:
         self.namespace = namespace
@@ -42,7 +42,7 @@ class Evictions:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Delete the job; an eviction that waits for a pod then finds none."""
+        """Delete the namespace; an eviction that still waits for a pod then fails."""
         self.namespace.delete()
 
     def result(self) -> Evicted:
@@ -55,7 +55,7 @@ class Evictions:
         return Evicted(seen, self.namespace.in_run(last, "attempts.jsonl"), last)
 
     def _evict(self, step: int) -> int:
-        """Evict the pod past a step, as a drain of its node does, and return the observed step."""
+        """Evict the pod after it has passed a step, as a drain of its node does; return the observed step."""
         space = self.namespace
         pod, seen = space.wait_for_step(NAME, step, NEXT_POD_S)
         space.cluster.evict(space.name, pod)

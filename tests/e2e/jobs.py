@@ -1,4 +1,4 @@
-"""Small TrainingJobs: those that train need normal resources, and those that only wait fit next to others."""
+"""Small TrainingJobs. Jobs that train request normal resources, and jobs that only wait request few."""
 
 import copy
 from typing import Any
@@ -8,7 +8,7 @@ from tests.jobs import example
 
 WAIT = "trap exit TERM; sleep 3600 & wait"
 LITTLE = {"requests": {"cpu": "5m", "memory": "48Mi"}}
-# Steps that take time but no processor.
+# A simulator whose steps take time but no processor time.
 SLOW = {
     "name": "collect",
     "role": "Collect",
@@ -19,7 +19,7 @@ SMALL = {"requests": {"cpu": "60m", "memory": "400Mi"}}
 
 
 def make_claim(name: str, **metadata: Any) -> Object:
-    """Return a claim that belongs to no job."""
+    """Return a PersistentVolumeClaim that belongs to no job."""
     spec = {"accessModes": ["ReadWriteOnce"], "resources": {"requests": {"storage": "64Mi"}}}
     return {"metadata": {"name": name, **metadata}, "spec": spec}
 
@@ -27,8 +27,9 @@ def make_claim(name: str, **metadata: Any) -> Object:
 def tiny_job(name: str = "tiny", *, script: str = "", simulator: Object | None = None, **spec: Any) -> Object:
     """Return manifests/examples/tiny.yaml with another `name` and these fields of its spec.
 
-    `script` is bash that replaces the training, with one simulator only. `simulator` has fields of the first
-    group of simulators; a given `trainer` is merged into the example's.
+    `script` is bash code that replaces the training; the job then has one simulator only. `simulator`
+    contains fields of the first group of simulators. A `trainer` in `spec` is merged into the example's
+    trainer.
     """
     job = example("tiny")
     job["metadata"]["name"] = name
@@ -48,9 +49,10 @@ def tiny_job(name: str = "tiny", *, script: str = "", simulator: Object | None =
 
 
 def make_slow_job(name: str, *, steps: int, every_steps: int, **spec: Any) -> Object:
-    """Return a training of at most 25 steps per second, so that it still runs after all checks.
+    """Return a training of at most 25 steps per second, which still runs when a test makes its checks.
 
-    This holds however busy the machine is, and the job leaves room for others.
+    The simulator's latency limits the rate, so the rate is the same on any machine. The job requests few
+    resources.
     """
     trainer = {
         "steps": steps,

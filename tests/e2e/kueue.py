@@ -1,7 +1,7 @@
-"""Kueue in the cluster, as in docs/howto/queues.md: the page's commands are run, and undone at the end.
+"""Kueue in the cluster, installed by the commands of docs/howto/queues.md and removed by them at the end.
 
 The page takes chart and image from a registry. Here Kueue's Go module provides both (tests/cluster/kueue.sh).
-The image has its registry name, so a cluster that reaches the registry can pull it as well.
+The image keeps its registry name, so a cluster that reaches the registry can pull the image as well.
 """
 
 import os
@@ -25,7 +25,7 @@ NAMESPACE = "robots"
 TYPED_S = 300
 MADE_S = 120
 
-_BESIDE_A_TRAINING = "controllerManager.manager.resources.requests.cpu=50m"  # on two cores
+_BESIDE_A_TRAINING = "controllerManager.manager.resources.requests.cpu=50m"  # fits on two cores
 _FROM_THE_MODULE = """
 helm() {
   [[ $2 != palaestra ]] || return 0 # tests/e2e/allowances.py has allowed the class already
@@ -36,7 +36,7 @@ helm() {
 
 
 class Kueue:
-    """Kueue, and the queue and namespace of the page; commands are typed in `folder`."""
+    """Kueue with the queue and the namespace of the page; commands run in `folder`."""
 
     def __init__(self, cluster: Cluster, folder: Path) -> None:
         self._cluster = cluster
@@ -44,7 +44,7 @@ class Kueue:
         self._chart = ""
 
     def taken(self) -> str:
-        """Return the existing Kueue or namespace that conflicts, or ""."""
+        """Return why Kueue cannot be installed (Kueue or the namespace already exists), or ""."""
         if self._kinds():
             return "this cluster has a Kueue of its own"
         there = self._cluster.get("namespaces", None, NAMESPACE) is not None
@@ -62,7 +62,7 @@ class Kueue:
         return Namespace(self._cluster, NAMESPACE, there=True)
 
     def remove(self) -> None:
-        """Run the last section, whatever exists, and check that nothing is left."""
+        """Run the page's last section even if its commands fail, and check that no object is left."""
         said = [self._type("-uc", block) for block in blocks(UNDOING, "sh")]
         assert self.taken() == "", "".join(each.stdout + each.stderr for each in said)
 
@@ -78,7 +78,7 @@ class Kueue:
 
 
 def scheduling(priority: str | None = None) -> Object:
-    """Return the `scheduling` that the page gives a job, with a priority class or without."""
+    """Return the `scheduling` field of the page's job that has this priority class, or none."""
     specs: list[Object] = [yaml.safe_load(block).get("spec", {}) for block in blocks(DOING, "yaml")]
     found: list[Object] = [spec["scheduling"] for spec in specs if "scheduling" in spec]
     return next(each for each in found if each.get("priorityClassName") == priority)
@@ -119,7 +119,7 @@ def words(found: Object, kind: str) -> str:
 
 
 def leave_room_for_one(space: Namespace, job: str) -> None:
-    """Lower the quota of the queue to the size of a TrainingJob, after that job is admitted."""
+    """Lower the quota of the queue to the usage of a TrainingJob, once Kueue has admitted the job."""
     admission = space.wait(lambda: workload(space, job).get("status", {}).get("admission"))
     (pods,) = admission["podSetAssignments"]
     queue = space.cluster.get("clusterqueues", None, QUEUE)
@@ -131,7 +131,7 @@ def leave_room_for_one(space: Namespace, job: str) -> None:
 
 
 def change_queue(space: Namespace, **spec: Any) -> None:
-    """Change fields of the ClusterQueue, and wait until Kueue uses them."""
+    """Change fields of the ClusterQueue, and wait until Kueue has processed the change."""
     changed = space.cluster.patch("clusterqueues", None, QUEUE, {"spec": spec})
     generation = changed["metadata"]["generation"]
     space.wait(lambda: _looked_at(space.cluster.get("clusterqueues", None, QUEUE)) == generation)

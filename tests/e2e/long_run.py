@@ -1,4 +1,4 @@
-"""A full training and one of two replicas run at the same time as other tests; their operator is killed."""
+"""A full training and a job of two replicas, which run during other tests while their operator is killed."""
 
 import random
 import threading
@@ -11,23 +11,25 @@ from tests.e2e.namespace import LONG_S, OPERATOR, SYSTEM, Namespace, named, trai
 from tests.jobs import example
 
 NAME, STEPS = "move-to-target", 30_000
-# Its steps take time but no processor, so that it runs until the last kill on the fastest machine.
+# Each step of the pair waits without using the processor, so the pair trains past the last kill on any
+# machine.
 PAIR, PAIR_STEPS = "pair", 3_000
 TENTH_OF_A_SECOND = [{"name": "PALAESTRA_STUB_FAULTS", "value": "slow:latency_ms=100"}]
 REPLICAS = 2
 KILLS = 10
 SEED = 20
-# The gaps between two kills alternate. One is long enough for an operator to lead again, 15 s after the last
-# renewal; in the other it has only just started. Together they are shorter than the pair's training.
+# Long and short gaps between two kills alternate. After a long gap, a new operator leads again (15 s after
+# the last renewal of the lease). After a short gap, the new operator has only just started. The sum of the
+# gaps is shorter than the pair's training.
 GAPS_S = ((26.0, 36.0), (4.0, 10.0))
 END_S = 900.0
-EVALUATED_EVERY = 10_000  # with more evaluations, these take a third of the training's time
-# The requests are so small that other pods fit next to it and come first if processors are short.
+EVALUATED_EVERY = 10_000  # more evaluations would take a third of the training's time
+# The requests are small, so that other pods fit on the node and get processor time first.
 SIMULATOR = {"requests": {"cpu": "1m", "memory": "160Mi"}}
 TRAINER = {"requests": {"cpu": "1m", "memory": "768Mi"}, "limits": {"cpu": "1", "memory": "2Gi"}}
 
-# The operator is process 1 of its container, which no signal from inside can kill unless the pod shares its
-# process namespace.
+# The operator is process 1 of its container. The kernel lets no process of the container kill process 1,
+# unless the containers of the pod share a process namespace.
 SHARED = {"spec": {"template": {"spec": {"shareProcessNamespace": True}}}}
 KILL = """
 import os, pathlib, signal
@@ -39,7 +41,7 @@ for entry in pathlib.Path("/proc").glob("[0-9]*"):
 
 
 class LongRun:
-    """Both jobs, their `namespace`, and `kills`, the times at which their operator was killed."""
+    """Both jobs, their `namespace`, and `kills`, the times at which the operator was killed."""
 
     def __init__(self, namespace: Namespace) -> None:
         self.namespace = namespace
@@ -48,7 +50,7 @@ class LongRun:
         self._killer = threading.Thread(target=self._kill_again_and_again, daemon=True)
 
     def __enter__(self) -> Self:
-        """Start the trainings and the kills at the same time."""
+        """Start both trainings, and start to kill the operator."""
         make_killable(self.namespace)
         self.namespace.apply(_full())
         self.namespace.apply(_pair())
@@ -56,13 +58,13 @@ class LongRun:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """End both jobs."""
+        """Stop the thread that kills the operator, and delete both jobs."""
         self._ended.set()
         self._killer.join(END_S)
         self.namespace.delete()
 
     def pods(self) -> list[Object]:
-        """Return the pods of the pair when both train."""
+        """Wait until both replicas of the pair train, and return their pods."""
         space = self.namespace
 
         def training() -> list[Object]:
@@ -77,7 +79,7 @@ class LongRun:
         self._killer.join(END_S)
 
     def end(self, name: str) -> Object:
-        """Return the last status of one of the jobs."""
+        """Wait for the end of a job and for the last kill, and return the job's status."""
         self.namespace.wait_for_end(name, END_S)
         self.wait_for_kills()
         return self.namespace.status(name)
@@ -99,7 +101,7 @@ def _full() -> Object:
     job["spec"]["trainer"]["resources"] = TRAINER
     evaluation = job["spec"]["trainer"]["evaluation"]
     evaluation["everySteps"] = EVALUATED_EVERY
-    del evaluation["stopAtSuccessRate"]  # the operator is killed until the last step
+    del evaluation["stopAtSuccessRate"]  # the training must reach its last step
     return job
 
 
@@ -118,7 +120,7 @@ def _pair() -> Object:
 
 
 def make_killable(namespace: Namespace) -> None:
-    """Prepare the operator so that a test can kill it as a node without memory does."""
+    """Change the operator's Deployment so that a test can end the operator with SIGKILL."""
     cluster = namespace.cluster
     cluster.patch("deployments", SYSTEM, OPERATOR, SHARED)
     cluster.rolled_out(SYSTEM, OPERATOR)
@@ -131,16 +133,16 @@ def operators(namespace: Namespace) -> list[Object]:
 
 
 def kill_operator(namespace: Namespace, pod: str = "") -> bool:
-    """Kill an operator with SIGKILL and replace it by a new one; return whether one existed.
+    """Send SIGKILL to an operator and delete its pod; return whether an operator ran.
 
-    The pod is deleted too: a container that is killed often is restarted only minutes later.
+    A new pod starts at once, but Kubernetes restarts a container that ended often only after minutes.
     """
     chosen = pod or next((named(each) for each in operators(namespace)), "")
     if not chosen:
         return False
     try:
         namespace.cluster.execute(SYSTEM, chosen, "operator", "python3", "-c", KILL)
-    except CommandFailed:  # it has already ended, or is not up yet
+    except CommandFailed:  # the operator has ended, or has not started yet
         return False
     namespace.cluster.delete("pods", SYSTEM, chosen, grace_s=0)
     return True

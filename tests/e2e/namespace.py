@@ -18,9 +18,9 @@ OPERATOR = "palaestra-operator"
 SYSTEM = "palaestra-system"
 RESTRICTED = {"pod-security.kubernetes.io/enforce": "restricted"}
 LOOK_EVERY_S = 0.5
-# These are for waits of 10 s and for a tiny training, on a busy machine whose operator is killed repeatedly.
-# A pod may wait until the pods of other tests leave room on the only node, which takes five minutes on a slow
-# machine.
+# SHORT_S is for waits of 10 s and LONG_S for a tiny training, on a busy machine whose operator is killed
+# repeatedly. A pod may wait for five minutes on a slow machine until other tests' pods have left the only
+# node.
 SHORT_S, LONG_S = 180.0, 900.0
 NO_RESTARTS = dict.fromkeys(("trainer", "simulator", "disruption", "suspension", "operator"), 0)
 JOB = "palaestra.dev/job"
@@ -52,7 +52,7 @@ class Namespace:
             cluster.create("namespaces", {"metadata": {"name": name, "labels": RESTRICTED}})
 
     def delete(self) -> None:
-        """Start to delete it with everything in it."""
+        """Start to delete the namespace with everything in it."""
         self.cluster.delete("namespaces", None, self.name)
 
     def apply(self, job: Object) -> Object:
@@ -69,7 +69,7 @@ class Namespace:
         return self.cluster.get(kind, self.name, name)
 
     def select(self, kind: str, job: str = "") -> list[Object]:
-        """Return the objects of a kind, of one TrainingJob or all."""
+        """Return the objects of a kind: those of one TrainingJob, or all in the namespace."""
         return self.cluster.select(kind, self.name, f"{JOB}={job}" if job else "")
 
     def patch(self, name: str, **spec: Any) -> Object:
@@ -83,12 +83,12 @@ class Namespace:
         return status
 
     def replica(self, name: str, index: int = 0) -> Object:
-        """Return the status of a replica, empty before it exists."""
+        """Return the status of a replica, or an empty object before the replica exists."""
         replicas = self.status(name).get("replicas", [])
         return next((each for each in replicas if each["index"] == index), {})
 
     def condition(self, name: str, kind: str) -> Object:
-        """Return a condition of a TrainingJob, empty before it exists."""
+        """Return a condition of a TrainingJob, or an empty object before the condition exists."""
         conditions = self.status(name).get("conditions", [])
         return next((each for each in conditions if each["type"] == kind), {})
 
@@ -97,7 +97,7 @@ class Namespace:
         return self.condition(name, kind).get("status") == "True"
 
     def reasons(self, name: str) -> set[str]:
-        """Return all reasons of its true conditions and of its replicas."""
+        """Return the reasons of a TrainingJob's true conditions and of its replicas."""
         status = self.status(name)
         conditions = [each for each in status.get("conditions", []) if each["status"] == "True"]
         return {each["reason"] for each in [*conditions, *status.get("replicas", [])] if each.get("reason")}
@@ -108,7 +108,7 @@ class Namespace:
         return [pod for pod in found if not live or runs(pod)]
 
     def pods_made(self, name: str) -> int:
-        """Return the number of pods that the Job controller reports to have made for a TrainingJob's Jobs."""
+        """Return how many pods the Job controller's events report for a TrainingJob's Jobs."""
         made = [
             each
             for each in self.select("events")
@@ -132,7 +132,7 @@ class Namespace:
         return self.cluster.execute(self.name, pod, container, *command)
 
     def fetch(self, pod: str, address: str, *, container: str = "trainer") -> str:
-        """Return the response of an address to a container of a pod."""
+        """Return the response that a container of a pod gets from an address."""
         return self.execute(pod, "python3", "-c", ASK, address, container=container)
 
     def trainer_status(self, pod: str) -> Object:
@@ -144,7 +144,7 @@ class Namespace:
         return status
 
     def ros_nodes(self, pod: str) -> set[str]:
-        """Return the node names at a pod's ROS master."""
+        """Return the names of the nodes that are registered at a pod's ROS master."""
         return set(json.loads(self.execute(pod, "python3", "-c", ROS_NODES)))
 
     def in_run(self, pod: str, name: str) -> list[Object]:
@@ -156,7 +156,7 @@ class Namespace:
         """Return the first true value of `claim`.
 
         Raises:
-            NeverHeld: it was not true in time.
+                NeverHeld: `claim` returned no true value in time.
         """
         try:
             return eventually(claim, within_s, LOOK_EVERY_S)
@@ -177,7 +177,7 @@ class Namespace:
         return self.wait(lambda: next((named(pod) for pod in self.pods(name) if trains(pod)), ""), within_s)
 
     def wait_for_step(self, name: str, step: int, within_s: float = LONG_S) -> tuple[str, int]:
-        """Wait until the only pod's trainer has passed a step, and return the pod's name and step."""
+        """Wait until the only pod's trainer has passed a step; return the pod's name and the current step."""
 
         def passed() -> tuple[str, int] | None:
             told = {named(pod): self.trainer_status(named(pod)) for pod in self.pods(name) if trains(pod)}
@@ -187,7 +187,7 @@ class Namespace:
         return self.wait(passed, within_s)
 
     def dump(self) -> str:
-        """Return the information for a person who looks for the cause of a failed wait."""
+        """Return the objects, events and logs in which a person finds the cause of a failed wait."""
         parts = [
             yaml.safe_dump(_plain(self.select("trainingjobs"))),
             yaml.safe_dump(_plain(self.select("jobs"))),
@@ -225,7 +225,7 @@ def trains(pod: Object) -> bool:
 
 
 def statuses(content: Object) -> list[Object]:
-    """Return the statuses of all containers of a pod, in order; other objects have none."""
+    """Return the statuses of all containers of a pod, in order, or an empty list for another object."""
     status = content.get("status", {})
     return [*status.get("initContainerStatuses", []), *status.get("containerStatuses", [])]
 
@@ -235,7 +235,7 @@ def _if_so(replica: Object, reason: str) -> Object:
 
 
 def _plain(objects: list[Object]) -> list[Object]:
-    """Return objects without fields for servers, and without those that the pods show as well."""
+    """Return objects without managed fields and pod templates, which only lengthen the output."""
     for each in objects:
         each["metadata"].pop("managedFields", None)
         each["spec"].pop("template", None)

@@ -1,7 +1,8 @@
 """Build a user's own image from one of the release's images: python -m tests.e2e.own_image FOLDER NAME.
 
-FOLDER has the Dockerfile. The program prints the path of the archive, which is written next to FOLDER. It is
-a separate process, because the lock of the image store works only in a main thread.
+FOLDER contains the Dockerfile. The program writes an archive next to FOLDER and prints the path of the
+archive. Tests run the program as a process of its own, because the lock of the image store works only in a
+main thread.
 """
 
 import os
@@ -38,7 +39,7 @@ def main() -> None:
 
 
 def archives() -> dict[str, Path]:
-    """Return the archives by image; the operator's has two tags, and the last one is used."""
+    """Return the archive of each image; for the operator, which has two tags, return the last archive."""
     lines = Path(os.environ[ARCHIVES]).read_text().splitlines()
     return {name: Path(archive) for name, _, archive in (line.partition("=") for line in lines)}
 

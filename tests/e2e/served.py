@@ -1,4 +1,4 @@
-"""Pages that a release of the chart serves to a browser: TensorBoard, and notebooks with a token."""
+"""Pages that a release of the chart serves to browsers: TensorBoard, and notebooks behind a token."""
 
 import base64
 import json
@@ -20,7 +20,7 @@ print(json.dumps(codes))
 
 
 def page_of(cluster: Cluster, namespace: str, deployment: str, port: int) -> str:
-    """Return the first page of a server that other pods cannot reach, as `kubectl port-forward` would."""
+    """Return the first page of a server that listens only inside its pod, as `kubectl port-forward` does."""
     fetch = (
         f"from urllib.request import urlopen; print(urlopen('http://127.0.0.1:{port}', timeout=30).read())"
     )
@@ -28,7 +28,7 @@ def page_of(cluster: Cluster, namespace: str, deployment: str, port: int) -> str
 
 
 def inside(cluster: Cluster, namespace: str, deployment: str, *command: str) -> str:
-    """Return the whole output of a command in a pod of a Deployment of the release."""
+    """Run a command in a pod of one of the release's Deployments, and return all of its output."""
     return cluster.kubectl("exec", "-n", namespace, f"deploy/{deployment}", "--", *command)
 
 
@@ -40,9 +40,9 @@ def token_of(cluster: Cluster, secret: str) -> str:
 
 
 def assert_notebooks_are_served_to_who_has_the_token(cluster: Cluster, right: str) -> None:
-    """Without the token, the server serves only the API version and the login page.
+    """Assert that, without the token, the server serves only the API version and the login page.
 
-    The kubelet's probe requests the API version.
+    The kubelet's probe requests the API version, so that path needs no token.
     """
 
     def codes(token: str) -> dict[str, int]:
@@ -57,7 +57,7 @@ def assert_notebooks_are_served_to_who_has_the_token(cluster: Cluster, right: st
 
 
 def assert_the_first_notebook_drives_a_robot(cluster: Cluster) -> None:
-    """The pod has a kernel as the browser uses it, a simulator, a ROS master and no permissions."""
+    """Assert that the first notebook runs in its pod, and that the pod has no credentials of the cluster."""
     look = (
         "touch /usr/written; ls /var/run/secrets/kubernetes.io; jupyter execute --inplace first-steps.ipynb"
     )

@@ -1,6 +1,6 @@
 """A release of the chart for one namespace, while the cluster's operator is scaled to 0.
 
-The release for the whole cluster is that of docs/howto/install.md, which tests/e2e/test_pages.py runs.
+tests/e2e/test_pages.py runs docs/howto/install.md, which installs the release for a whole cluster.
 """
 
 import os
@@ -35,15 +35,15 @@ def helm(verb, namespace, *options):
 
 @pytest.fixture
 def alone(cluster):
-    """Scale the cluster's operator to 0, so that only another operator can act."""
+    """Scale the cluster's operator to 0, so that only the operator of the test's release acts."""
     cluster.patch("deployments", SYSTEM, OPERATOR, {"spec": {"replicas": 0}})
     yield
     cluster.patch("deployments", SYSTEM, OPERATOR, {"spec": {"replicas": 1}})
     cluster.rolled_out(SYSTEM, OPERATOR)
 
 
-def test_an_operator_of_one_namespace_trains_there(alone, namespace):  # noqa: ARG001 - is put back
-    """The release has only Roles, and everything is in that namespace."""
+def test_an_operator_of_one_namespace_trains_there(alone, namespace):  # noqa: ARG001 - it must scale
+    """The release may create no ClusterRole, because a team may install it in its own namespace."""
     mode = ("--set=crds.install=false", f"--set=watchNamespaces={{{namespace.name}}}")
     helm("install", namespace.name, *mode, "--wait")
 

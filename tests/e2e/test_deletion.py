@@ -1,4 +1,4 @@
-"""Deleted TrainingJobs, and TrainingJobs whose objects were deleted: what remains."""
+"""What remains after a TrainingJob is deleted, or after objects of a TrainingJob are deleted."""
 
 import pytest
 
@@ -16,7 +16,7 @@ def _pending(namespace, name):
 
 
 def _starting(namespace, name):
-    """Return whether a pod and its bound volume exist: an unbound claim is deleted with its job."""
+    """Return whether a pod exists and its volume is bound; an unbound claim is deleted with its job."""
     claims = namespace.select("persistentvolumeclaims", name)
     bound = [claim["status"].get("phase") == "Bound" for claim in claims]
     return namespace.pods(name) and namespace.status(name).get("phase") and bound == [True]
@@ -46,12 +46,12 @@ PHASES = {
     "succeeded": (_succeeded, {"script": "exit 0"}),
     "failed": (_failed, {"script": "exit 2"}),
 }
-UNUSED = {"pending", "suspended"}  # their pods got no node, so the claims were never bound
+UNUSED = {"pending", "suspended"}  # the pods of these jobs got no node, so their claims were never bound
 
 
 @pytest.mark.parametrize("phase", PHASES)
 def test_deleted_while_it_is(phase, namespace, job):
-    """Only a volume that a pod has used may remain, and nothing of Palaestra may delay the deletion."""
+    """Only a volume that a pod has used may remain, and no finalizer may delay the deletion."""
     reached, spec = PHASES[phase]
     uid = namespace.apply(job(phase, **spec))["metadata"]["uid"]
     namespace.wait(lambda: reached(namespace, phase), LONG_S)
@@ -59,7 +59,7 @@ def test_deleted_while_it_is(phase, namespace, job):
 
     namespace.cluster.delete("trainingjobs", namespace.name, phase)
 
-    # A pod whose script got SIGTERM before it set its trap stays for its whole grace period of 60 s.
+    # A pod that receives SIGTERM before its script sets the trap runs for its whole grace period of 60 s.
     namespace.wait(lambda: not any(_left(namespace, kind, phase) for kind in GONE), LONG_S)
     kept = [] if phase in UNUSED else [f"{phase}-0-{uid}"]
     namespace.wait(
@@ -74,7 +74,7 @@ def _left(namespace, kind, name):
 
 
 def test_a_new_job_of_the_same_name_leaves_the_old_volume_alone(namespace, job):
-    """The claim's name has the job's uid, so a run is never resumed by accident."""
+    """The name of the claim contains the job's uid, so the new job does not resume the old job's run."""
     leaves = "touch /var/lib/palaestra/mark"
     finds = "test -w /var/lib/palaestra && test ! -e /var/lib/palaestra/mark"
     namespace.apply(job("again", script=leaves, backoffLimit=0))
@@ -92,7 +92,7 @@ def test_a_new_job_of_the_same_name_leaves_the_old_volume_alone(namespace, job):
 
 
 def test_a_claim_that_is_not_to_be_kept_goes_with_its_job(namespace, job):
-    """`retain: Delete` sets an owner reference."""
+    """With `retain: Delete`, the claim has an owner reference, so the user has no volume to clean up."""
     namespace.apply(job("forgets", script="exit 0", storage={"retain": "Delete"}))
     assert namespace.wait_for_end("forgets", LONG_S) == "Succeeded"
     assert len(namespace.select("persistentvolumeclaims", "forgets")) == 1
@@ -103,13 +103,14 @@ def test_a_claim_that_is_not_to_be_kept_goes_with_its_job(namespace, job):
 
 
 def test_a_finished_replica_whose_job_is_deleted_is_not_trained_again(namespace, job):
-    """A replica is terminal when its status says so, whatever is deleted."""
+    """The status is the record of the end, so a deleted Job must not start the training again."""
     namespace.apply(job("done", script="exit 0"))
     assert namespace.wait_for_end("done", LONG_S) == "Succeeded"
     namespace.cluster.delete("jobs", namespace.name, "done-0")
     namespace.wait(lambda: namespace.select("pods", "done") == [] and not namespace.select("jobs", "done"))
 
-    # After this change and the whole life of another job, the operator has reconciled everything.
+    # After this change and the whole life of another job, the operator has certainly reconciled the first
+    # job.
     namespace.patch("done", ttlSecondsAfterFinished=100_000)
     namespace.apply(job("later", script="exit 0"))
     assert namespace.wait_for_end("later", LONG_S) == "Succeeded"
@@ -120,7 +121,7 @@ def test_a_finished_replica_whose_job_is_deleted_is_not_trained_again(namespace,
 
 
 def test_a_job_is_deleted_when_its_time_is_over(namespace, job):
-    """`ttlSecondsAfterFinished` deletes the TrainingJob and all its objects except the volume."""
+    """`ttlSecondsAfterFinished` deletes the TrainingJob and all its objects, but the results must remain."""
     namespace.apply(job("short", script="exit 0", ttlSecondsAfterFinished=3))
 
     namespace.wait(lambda: namespace.get("trainingjobs", "short") is None, LONG_S)

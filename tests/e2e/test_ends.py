@@ -1,4 +1,4 @@
-"""The operator evaluates a trainer's end by each row of the podFailurePolicy, and sets the status."""
+"""The operator maps a trainer's exit code by each rule of the podFailurePolicy, and sets the status."""
 
 import pytest
 
@@ -9,11 +9,11 @@ pytestmark = pytest.mark.timeout(1200)
 INTERRUPTED_ONCE = (
     "test -e $PALAESTRA_RUN/seen && exit 0; mkdir -p $PALAESTRA_RUN; touch $PALAESTRA_RUN/seen; exit 75"
 )
-# Each attempt adds a line to those that earlier attempts left in the run directory, and prints them all.
+# Each attempt appends a line to a file in the run directory, and prints the lines of all attempts.
 FAILS = (
     "mkdir -p $PALAESTRA_RUN; echo $PALAESTRA_POD_UID >>$PALAESTRA_RUN/pods; cat $PALAESTRA_RUN/pods; exit 70"
 )
-MOST_IGNORED = 10  # more pods without a step are not tolerated
+MOST_IGNORED = 10  # the operator accepts no more pods without a step
 GIVEN_UP = {
     "refuses": (2, "ConfigurationRefused"),
     "spent": (80, "SimulatorBudgetSpent"),
@@ -24,9 +24,9 @@ GIVEN_UP = {
 @pytest.mark.beside
 @pytest.mark.parametrize("name", GIVEN_UP)
 def test_a_trainer_that_says_so_is_not_tried_again(name, namespace, job):
-    """A second pod would only end in the same way.
+    """A second pod would end in the same way.
 
-    This holds after a wrong configuration, a spent restart budget or a divergence.
+    The exit codes report a wrong configuration, a spent restart budget and a divergence.
     """
     code, reason = GIVEN_UP[name]
 
@@ -41,7 +41,7 @@ def test_a_trainer_that_says_so_is_not_tried_again(name, namespace, job):
 @pytest.mark.beside
 @pytest.mark.after_the_kills
 def test_an_unexpected_end_is_tried_as_often_as_backoff_limit_says(namespace, job):
-    """With a limit of n, n failures are retried, so n + 1 pods are made, which are attempts 1 to n + 1."""
+    """With `backoffLimit: 2`, two failures are retried, so the run has three pods and three attempts."""
     namespace.apply(job("fails", script=FAILS, backoffLimit=2))
 
     assert namespace.wait_for_end("fails", LONG_S) == "Failed"
@@ -63,7 +63,7 @@ def test_an_unexpected_end_is_tried_as_often_as_backoff_limit_says(namespace, jo
 
 @pytest.mark.beside
 def test_a_stalled_trainer_counts_against_the_limit(namespace, job):
-    """The run is retried, but not if the limit is 0."""
+    """With a limit of 0, a stalled run has no retry, because a stall is a failure of the trainer."""
     namespace.apply(job("stalls", script="exit 82", backoffLimit=0))
 
     assert namespace.wait_for_end("stalls", LONG_S) == "Failed"
@@ -72,9 +72,9 @@ def test_a_stalled_trainer_counts_against_the_limit(namespace, job):
 
 @pytest.mark.beside
 def test_an_interrupted_trainer_is_tried_again_and_not_counted(namespace, job):
-    """The exit code is 75 after a checkpoint.
+    """The trainer exits with 75 after it has saved a checkpoint, so the run can resume.
 
-    Even with a backoffLimit of 0 the run resumes, on the same volume.
+    An interruption is not a failure: the run resumes on the same volume even if `backoffLimit` is 0.
     """
     namespace.apply(job("interrupted", script=INTERRUPTED_ONCE, backoffLimit=0))
 
@@ -86,7 +86,7 @@ def test_an_interrupted_trainer_is_tried_again_and_not_counted(namespace, job):
 @pytest.mark.comes_late
 @pytest.mark.timeout(900)
 def test_a_trainer_that_is_always_interrupted_is_stopped(always_interrupted):
-    """Kubernetes does not limit pods whose failure is ignored, so the operator does."""
+    """Kubernetes sets no limit for pods whose failure is ignored, so the operator must stop them."""
     space = always_interrupted
 
     assert space.wait_for_end("always", 800) == "Failed"

@@ -1,8 +1,8 @@
-"""A user may write TrainingJobs but create no pods, and must gain no other permission by them.
+"""A user who may write TrainingJobs but not create pods gains no further permission through TrainingJobs.
 
-The user has only the role in manifests/examples/platform/roles.yaml. Each attempt is in
-tests/e2e/escalations.py with its possible gain; these tests check the outcome. Nothing has to run for that:
-every job is suspended, and the operator's objects are checked.
+The user has only the role in manifests/examples/platform/roles.yaml. tests/e2e/escalations.py lists every
+attempt with its possible gain, and these tests check the outcome. No pod has to run for this check: every job
+is suspended, and the tests check the operator's objects.
 """
 
 import itertools
@@ -37,7 +37,7 @@ TEXTS = (
 
 
 def each(attempts):
-    """Run a test with every attempt, by name."""
+    """Run a test with each attempt, and name the test after the attempt."""
     return pytest.mark.parametrize("attempt", attempts, ids=[attempt.name for attempt in attempts])
 
 
@@ -75,7 +75,7 @@ class Made(NamedTuple):
 
 @pytest.fixture(scope="module")
 def author(cluster, shared):
-    """The cluster as seen by a user who may write TrainingJobs in the shared namespace."""
+    """The cluster as a user who may write TrainingJobs in the shared namespace sees it."""
     there = cluster.get("clusterroles", None, NAME) is not None
     if not there:
         cluster.create("clusterroles", ROLE)
@@ -90,7 +90,7 @@ def author(cluster, shared):
 
 @pytest.fixture(scope="module")
 def train(author, shared):
-    """Create a TrainingJob as the author; `strict` refuses unknown fields."""
+    """Return a function that creates a TrainingJob as the user; with `strict`, unknown fields are errors."""
 
     def create(job, *, strict=True):
         options = "?fieldValidation=Strict" if strict else "?fieldValidation=Ignore"
@@ -101,7 +101,7 @@ def train(author, shared):
 
 @pytest.fixture(scope="module")
 def planned(train, shared):
-    """Create a TrainingJob as the author, and return the operator's objects for it."""
+    """Return a function that creates a TrainingJob as the user and returns the operator's objects for it."""
 
     def make(job, *, strict=True):
         name = train(job, strict=strict)["metadata"]["name"]
@@ -114,17 +114,17 @@ def planned(train, shared):
 
 @pytest.fixture(scope="module")
 def plain(planned):
-    """The objects of a normal job."""
+    """The operator's objects for a job without special fields."""
     return planned(authors("plain"))
 
 
 def nothing_is_left_to_see(planned):
-    """Return when the operator has planned a job that was created after everything else."""
+    """Wait until the operator has planned a job that is newer than all others of the test."""
     planned(authors(f"later-{next(numbers)}"))
 
 
 def unnamed(made):
-    """Return the spec of the pods without the names that differ between two jobs."""
+    """Return the spec of the pods with the names that depend on the job replaced."""
     text = yaml.safe_dump(made.template["spec"])
     for name in (
         made.owner["metadata"]["uid"],
@@ -136,7 +136,7 @@ def unnamed(made):
 
 
 def test_the_author_trains(plain, author, shared):
-    """This is the control: without it, a missing permission could explain every refusal below."""
+    """The user can create a normal job, so a missing permission does not explain the refusals below."""
     assert plain.job["spec"]["suspend"] is True
     assert author.get("trainingjobs", shared.name, "plain")
 
@@ -144,7 +144,7 @@ def test_the_author_trains(plain, author, shared):
 @each(REQUESTS)
 @pytest.mark.usefixtures("plain")
 def test_a_request_past_the_trainingjob_is_forbidden(author, shared, attempt):
-    """The role grants only TrainingJobs, and not their status."""
+    """The role grants only TrainingJobs, without their status, so RBAC denies every other request."""
     with pytest.raises(Refused) as refused:
         author.request(attempt.method, attempt.where.format(namespace=shared.name), attempt.content)
 
@@ -154,7 +154,7 @@ def test_a_request_past_the_trainingjob_is_forbidden(author, shared, attempt):
 
 @each(REFUSED)
 def test_a_value_that_would_open_something_is_refused(train, shared, attempt):
-    """The API server refuses it with the field, before any object is made."""
+    """The API server rejects the TrainingJob and names the field, so no object is created."""
     name = f"refused-{REFUSED.index(attempt)}"
 
     with pytest.raises(Refused) as refused:
@@ -167,7 +167,7 @@ def test_a_value_that_would_open_something_is_refused(train, shared, attempt):
 
 @each(UNKNOWN)
 def test_a_field_of_pods_is_none_of_a_trainingjob(train, planned, plain, attempt):
-    """A client that is not strict drops the field; the pods are those of any job."""
+    """If a client is not strict, the API server drops the field, and the pods are those of a normal job."""
     name = f"unknown-{UNKNOWN.index(attempt)}"
     job = authors(name, (attempt.path, attempt.value))
 
@@ -181,7 +181,11 @@ def test_a_field_of_pods_is_none_of_a_trainingjob(train, planned, plain, attempt
 
 @each((*HELD, *METADATA))
 def test_what_nobody_has_opened_to_jobs_is_not_used(train, shared, attempt):
-    """This holds even in the author's own namespace, and for a text that only other controllers use."""
+    """The operator holds the job even if the object is in the user's own namespace.
+
+    It also holds jobs with metadata of pods that only other controllers read, because such metadata may grant
+    permissions.
+    """
     name = f"held-{(*HELD, *METADATA).index(attempt)}"
     train(authors(name, (attempt.path, attempt.value)))
 
@@ -196,7 +200,7 @@ def test_what_nobody_has_opened_to_jobs_is_not_used(train, shared, attempt):
     [("spec.trainer.image", "mine:1"), ("spec.storage.existingClaim", "kept"), ("spec.managedBy", "a.b/c")],
 )
 def test_what_was_accepted_is_not_exchanged(author, shared, plain, field, value):
-    """Otherwise an object that was checked could be replaced afterwards."""
+    """The operator checks these fields once, so a user must not replace the object after the check."""
     changed = authors("plain", (field, value))
 
     with pytest.raises(Refused, match="cannot be changed") as refused:
@@ -207,7 +211,7 @@ def test_what_was_accepted_is_not_exchanged(author, shared, plain, field, value)
 
 
 def test_an_affinity_holds_nothing_but_an_affinity(planned, plain):
-    """The affinity is passed on unchanged, so it might have an effect elsewhere."""
+    """The operator copies the affinity into the pod, so other pod fields inside it must be dropped."""
     pod = {"hostNetwork": True, "nodeName": "palaestra-control-plane", "containers": []}
 
     made = planned(authors("reaches-out", ("spec.scheduling.affinity", pod)))
@@ -216,7 +220,7 @@ def test_an_affinity_holds_nothing_but_an_affinity(planned, plain):
 
 
 def test_a_node_selector_goes_past_no_taint(planned, plain):
-    """A job may select the control plane's node, but does not tolerate its taint."""
+    """A job may select the node of the control plane, but its pods do not tolerate that node's taint."""
     selector = {"node-role.kubernetes.io/control-plane": ""}
 
     made = planned(authors("on-masters", ("spec.scheduling.nodeSelector", selector)))
@@ -226,7 +230,7 @@ def test_a_node_selector_goes_past_no_taint(planned, plain):
 
 
 def test_strings_stay_strings(planned, plain):
-    """This holds whatever they mean to YAML, to a shell or to a template."""
+    """A text that is code for YAML, a shell or a template must reach the pod as plain text."""
     numbered = dict(enumerate(TEXTS))
     made = planned(
         authors(
@@ -238,7 +242,7 @@ def test_strings_stay_strings(planned, plain):
         )
     )
 
-    kept = [text.replace("$", "$$") for text in TEXTS]  # a kubelet reads two of them as one
+    kept = [text.replace("$", "$$") for text in TEXTS]  # a kubelet replaces `$$` by `$`
     environment = {variable["name"]: variable.get("value") for variable in made.trainer["env"]}
     assert {f"TEXT_{n}": text for n, text in enumerate(kept)}.items() <= environment.items()
     assert len(environment) == len(made.trainer["env"]) == len(plain.trainer["env"]) + len(TEXTS)
@@ -253,7 +257,7 @@ def test_strings_stay_strings(planned, plain):
 
 
 def test_metadata_reaches_no_object_of_the_operator(planned, plain, shared):
-    """A stop mark, an owner or a label would be trusted on the operator's own objects."""
+    """The operator trusts stop marks, owners and labels on its own objects, so a user must not set them."""
     job = authors("decorated")
     settings = shared.get("configmaps", "settings")["metadata"]
     stranger = {"apiVersion": "v1", "kind": "ConfigMap", "name": "settings", "uid": settings["uid"]}
@@ -280,7 +284,7 @@ def test_metadata_reaches_no_object_of_the_operator(planned, plain, shared):
 
 
 def test_a_job_of_somebody_else_is_left_alone(train, shared):
-    """A TrainingJob's name may give its Job the name of somebody else's."""
+    """By the name of a TrainingJob, its author must not get control of another user's Job."""
     theirs = shared.create("jobs", somebody_s("theirs-0"))
 
     train(authors("theirs", ("spec.suspend", False)))
@@ -303,10 +307,10 @@ def held(author, planned, shared):
 
 @pytest.mark.usefixtures("held")
 def test_a_finalizer_brings_a_deleted_job_no_more_pods(planned, shared):
-    """This holds however long its author keeps it.
+    """A user could otherwise run pods for a deleted job for as long as the finalizer stays.
 
-    The operator watches TrainingJobs and Jobs separately: the first deletion must reach it before the second,
-    or it replaces the Job once.
+    The operator watches TrainingJobs and Jobs separately. It must receive the first deletion before the
+    second, or it creates the Job again once.
     """
     nothing_is_left_to_see(planned)
     shared.cluster.delete("jobs", shared.name, "held-0")
@@ -316,7 +320,7 @@ def test_a_finalizer_brings_a_deleted_job_no_more_pods(planned, shared):
 
 
 def test_a_job_of_another_controller_is_not_planned(train, planned, shared):
-    """A user gains nothing by naming another controller."""
+    """The operator creates no objects for a job whose `managedBy` names another controller."""
     train(authors("spoofed", ("spec.managedBy", "example.com/other")))
     nothing_is_left_to_see(planned)
 

@@ -1,4 +1,4 @@
-"""move-to-target from `kubectl apply` to a policy, as in the README, and a job of two replicas."""
+"""The training move-to-target from `kubectl apply` to a policy, and a job with two replicas."""
 
 import json
 from datetime import datetime
@@ -25,7 +25,7 @@ def ros_names(content):
 
 
 def test_every_robot_of_all_pods_has_a_ros_name_of_its_own(long_run):
-    """A world with fixed names allows only one simulator, which is the limitation that the paper names."""
+    """With fixed ROS names, only one simulator of a world can run, which the paper names as a limitation."""
     known = {named(pod): set() for pod in long_run.pods()}
     space = long_run.namespace
     generated = [name for each in space.select("configmaps", PAIR) for name in ros_names(each["data"])]
@@ -36,14 +36,14 @@ def test_every_robot_of_all_pods_has_a_ros_name_of_its_own(long_run):
             names.update(node for node in space.ros_nodes(pod) if "robotino" in node)
         return sum(map(len, known.values())) >= len(generated)
 
-    space.wait(all_known, LONG_S)  # each is restarted between two episodes, so perhaps not all at once
+    space.wait(all_known, LONG_S)  # a simulator restarts between episodes, so not all names exist at once
     first, second = known.values()
     assert first.isdisjoint(second)
     assert first | second == set(generated)
 
 
 def test_metrics_are_scraped_from_every_trainer_and_sidecar(long_run, monitor):
-    """The monitoring namespace requests the ports that the pods name, over the pods' network."""
+    """Prometheus in the monitoring namespace must reach every metrics port over the pod network."""
     for pod in long_run.pods():
         containers = [*pod["spec"]["initContainers"], *pod["spec"]["containers"]]
         ports = {p["name"]: p["containerPort"] for each in containers for p in each.get("ports", [])}
@@ -56,7 +56,7 @@ def test_metrics_are_scraped_from_every_trainer_and_sidecar(long_run, monitor):
 
 
 def test_the_status_tells_where_each_replica_stands(long_run):
-    """The operator polls the trainers over the pods' network, although it is killed meanwhile."""
+    """The operator polls the trainers over the pod network, while the test kills the operator repeatedly."""
     long_run.pods()
     space = long_run.namespace
 
@@ -75,9 +75,9 @@ def test_the_status_tells_where_each_replica_stands(long_run):
 
 @pytest.mark.after_the_long_run
 def test_every_replica_trains_to_the_end_though_the_operator_is_killed_ten_times(long_run):
-    """SIGKILL at random times does not affect the pods.
+    """If the operator is killed at random times, the pods of its jobs continue.
 
-    Each replica has one pod and the same end.
+    Each replica has one pod, one attempt and a complete training.
     """
     ends = {name: long_run.end(name) for name in (NAME, PAIR)}
     space = long_run.namespace
@@ -102,7 +102,7 @@ def test_every_replica_trains_to_the_end_though_the_operator_is_killed_ten_times
 
 @pytest.mark.after_the_long_run
 def test_the_last_word_of_a_trainer_is_in_its_pod(long_run):
-    """The final result does not depend on a poll in time."""
+    """The trainer writes its result as the termination message, so the operator needs no poll at the end."""
     long_run.end(PAIR)
 
     for pod in long_run.namespace.pods(PAIR, live=False):
@@ -114,7 +114,7 @@ def test_the_last_word_of_a_trainer_is_in_its_pod(long_run):
 @pytest.mark.after_the_long_run
 @pytest.mark.parametrize(("name", "replicas", "steps"), [(NAME, "1/1", "30000"), (PAIR, "2/2", "3000")])
 def test_kubectl_shows_a_job_in_one_line(long_run, name, replicas, steps):
-    """A person first looks for status, reason, replicas, step and success."""
+    """A person looks first at status, reason, replicas, step and success, so one line must show them."""
     status = long_run.end(name)
     cluster, space = long_run.namespace.cluster, long_run.namespace
 
@@ -127,7 +127,7 @@ def test_kubectl_shows_a_job_in_one_line(long_run, name, replicas, steps):
 
 @pytest.mark.after_the_long_run
 def test_what_was_run_stands_in_the_config_maps(long_run):
-    """Anyone can read the resolved job and the source worlds of a replica, also after its end."""
+    """After the end of a run, a person must still be able to read its resolved job and its worlds."""
     long_run.end(PAIR)
     contents = long_run.namespace.select("configmaps", PAIR)
 

@@ -21,7 +21,7 @@ NOBODY = "65532:65532"
 
 @pytest.fixture(scope="module")
 def archives():
-    """Archives by image."""
+    """Return the path of each image's archive, by the name of the image."""
     if ARCHIVES not in os.environ:
         pytest.skip("nobody says where the images' archives are; `make e2e` does")
     return built()
@@ -43,13 +43,13 @@ def member(archive, name):
 
 @pytest.mark.parametrize("name", MOST_MB)
 def test_an_image_holds_no_more_than_it_needs(name, archives):
-    """Every node pulls it, and so does each new node; docs/decisions/0005 has the measured sizes."""
+    """Every new node pulls the image, so a large image delays jobs. docs/decisions/0005 lists the sizes."""
     assert archives[name].stat().st_size / 1e6 < MOST_MB[name]
 
 
 @pytest.mark.parametrize("name", MOST_MB)
 def test_an_image_says_what_it_is_and_is_run_by_nobody(name, archives):
-    """`runAsNonRoot` admits it although no pod names a user."""
+    """The image names a user other than root, so `runAsNonRoot` admits a pod that names no user."""
     config = configuration(archives[name])
 
     assert config["User"] == NOBODY
@@ -63,7 +63,7 @@ def test_an_image_says_what_it_is_and_is_run_by_nobody(name, archives):
 
 @pytest.mark.after_the_kills
 def test_the_operator_s_image_is_of_this_release(namespace, cluster):
-    """A bug report must name the release."""
+    """A user copies the output of `palaestra --version` into a bug report, so the output must be right."""
     cluster.rolled_out(SYSTEM, OPERATOR)
     pod, *_ = namespace.wait(lambda: operators(namespace))
 

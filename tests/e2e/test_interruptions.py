@@ -1,4 +1,4 @@
-"""An interrupted run resumes from its last checkpoint, whatever the cause of the interruption."""
+"""A run resumes from its last checkpoint after an interruption of any cause."""
 
 import pytest
 
@@ -13,7 +13,7 @@ AMID = 150
 
 
 def suspend(namespace, name, pod):
-    """Suspend the job, check that its phase is Suspended after its pod has ended, and resume it."""
+    """Suspend a job, check that the phase is Suspended after the pod has ended, and resume the job."""
     namespace.patch(name, suspend=True)
     namespace.wait(lambda: namespace.holds(name, "Suspended"))
     left = namespace.get("pods", pod)
@@ -22,7 +22,7 @@ def suspend(namespace, name, pod):
     namespace.patch(name, suspend=False)
 
 
-def delete(namespace, name, pod):  # noqa: ARG001 - each interruption is called alike
+def delete(namespace, name, pod):  # noqa: ARG001 - all interruptions have the same parameters
     """Delete the pod, as a person does."""
     namespace.cluster.delete("pods", namespace.name, pod)
 
@@ -33,7 +33,7 @@ def evict(namespace, name, pod):  # noqa: ARG001
 
 
 def mark(namespace, name, pod):
-    """Write the mark of an operator that was killed before it evicted the pod."""
+    """Set the annotation that an operator leaves if it is killed before it evicts the pod."""
     uid = namespace.get("pods", pod)["metadata"]["uid"]
     annotations = {"palaestra.dev/replaced": f"1 {uid} Stalled: it stands still"}
     namespace.cluster.patch("jobs", namespace.name, f"{name}-0", {"metadata": {"annotations": annotations}})
@@ -44,7 +44,7 @@ def mark(namespace, name, pod):
     [(suspend, "suspension"), (delete, "disruption"), (evict, "disruption"), (mark, "operator")],
 )
 def test_a_run_goes_on_from_its_checkpoint_after(interrupt, counted, namespace):
-    """A checkpoint is written at the end, so nothing is lost; without it, at most one interval is lost."""
+    """A run loses at most one checkpoint interval, and no step if its trainer saves a last checkpoint."""
     namespace.apply(make_slow_job("amid", steps=STEPS, every_steps=EVERY_STEPS, backoffLimit=0))
     first, before = namespace.wait_for_step("amid", AMID)
 
@@ -66,7 +66,7 @@ def test_a_run_goes_on_from_its_checkpoint_after(interrupt, counted, namespace):
 
 
 def test_a_run_that_has_ended_is_prolonged_by_another_job(namespace):
-    """Both name one claim, and the second continues to its own total."""
+    """A user trains longer with a second job that names the claim and the run of the first job."""
     namespace.create("persistentvolumeclaims", make_claim("runs", labels={"palaestra.dev/for-jobs": "true"}))
     storage = {"existingClaim": "runs"}
     namespace.apply(make_slow_job("first", steps=300, every_steps=EVERY_STEPS, storage=storage))
@@ -83,7 +83,7 @@ def test_a_run_that_has_ended_is_prolonged_by_another_job(namespace):
 
 
 def test_a_run_whose_claim_is_deleted_waits_for_a_person(namespace):
-    """Otherwise it would silently train from step 0 again; a new value of the annotation gives the run up."""
+    """Without its claim, the run would restart at step 0 unnoticed, so a person must allow the restart."""
     namespace.apply(make_slow_job("amid", steps=STEPS, every_steps=EVERY_STEPS))
     _, lost_at = namespace.wait_for_step("amid", AMID)
     namespace.patch("amid", suspend=True)

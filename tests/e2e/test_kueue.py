@@ -1,4 +1,4 @@
-"""docs/howto/queues.md on the real cluster with a real Kueue: jobs are admitted and preempted."""
+"""docs/howto/queues.md on the real cluster with a real Kueue, which admits and preempts jobs."""
 
 import os
 from dataclasses import dataclass
@@ -26,10 +26,10 @@ pytestmark = [pytest.mark.changes_the_cluster, pytest.mark.timeout(900), pytest.
 EVERY_STEPS = 100
 AMID = 150
 TRAINING = {"steps": 2000, "checkpoint": {"everySteps": EVERY_STEPS}, "evaluation": {"everySteps": 0}}
-# It is as large as a training, but ends at once.
+# This trainer requests as much as a training, but ends at once.
 ENDS = {"command": ["bash", "-c", "exit 0"], "evaluation": {"everySteps": 0}}
 SHORT = "insufficient unused quota for"
-# The reasons why a job is never admitted, with Kueue's message.
+# Jobs that Kueue never admits: requests, queue, and Kueue's message.
 NEVER = {
     "nowhere": ({}, "nowhere", "LocalQueue nowhere doesn't exist"),
     "device": (
@@ -43,16 +43,16 @@ NEVER = {
 
 @dataclass(frozen=True)
 class Story:
-    """The observed states of three jobs in a queue with room for one.
+    """The observed states of three jobs in a queue whose quota fits one job.
 
     Attributes:
-        waited: the replica of `patient` while `everyday` was admitted.
-        short: the message of its status at that time.
-        at: the step of `everyday` when `urgent` came.
-        preempted: the replica of `everyday` after that.
-        why: Kueue's message at that time.
-        attempts: the lines of the run's attempts.jsonl, when `everyday` was admitted again.
-        ends: the replicas at their ends, by job.
+            waited: the status of `patient`'s replica while `everyday` was admitted.
+            short: the message in that status.
+            at: the step of `everyday` when `urgent` was created.
+            preempted: the status of `everyday`'s replica after the preemption.
+            why: Kueue's message about the preemption.
+            attempts: the lines of attempts.jsonl after `everyday` was admitted again.
+            ends: the last status of each job's replica, by job.
     """
 
     waited: Object
@@ -66,7 +66,7 @@ class Story:
 
 @pytest.fixture(scope="module")
 def robots(cluster, tmp_path_factory):
-    """The namespace of the page, with Kueue and the queue; all of it is removed at the end."""
+    """The namespace of the page, with Kueue and the queue; the fixture removes everything at the end."""
     kueue = Kueue(cluster, tmp_path_factory.mktemp("queues"))
     if taken := kueue.taken():
         (pytest.skip if os.environ.get("PALAESTRA_CLUSTER") == "existing" else pytest.fail)(taken)
@@ -98,7 +98,7 @@ def story(robots):
 
 
 def test_a_job_that_has_no_room_waits_and_its_status_has_the_words_of_kueue(story):
-    """The message names the missing resource; its reader needs no permission to read Workloads."""
+    """The message names the missing resource, so a user needs no permission to read Workloads."""
     assert story.waited["phase"] == "Suspended"
     assert story.short.startswith("waits in queue trainings for Kueue: ")
     assert SHORT in story.short
@@ -106,7 +106,7 @@ def test_a_job_that_has_no_room_waits_and_its_status_has_the_words_of_kueue(stor
 
 
 def test_an_urgent_job_takes_the_place_of_one_that_trains(story, robots):
-    """The job's status reports the preemption by its queue; the Workload has Kueue's reason."""
+    """The status of the preempted job names the queue, and its Workload contains Kueue's reason."""
     last = story.preempted["lastAttempt"]
 
     assert story.preempted["phase"] == "Suspended"
@@ -117,7 +117,7 @@ def test_an_urgent_job_takes_the_place_of_one_that_trains(story, robots):
 
 
 def test_a_preempted_job_goes_on_from_its_checkpoint_when_there_is_room(story):
-    """The checkpoint is written at the end, so nothing is lost; it works with a backoffLimit of 0."""
+    """The trainer saves a checkpoint before it ends, so even with `backoffLimit: 0` no step is lost."""
     resumed_at = int(story.attempts[1]["reason"].removeprefix("resumed at step "))
 
     assert len(story.attempts) == 2
@@ -126,7 +126,7 @@ def test_a_preempted_job_goes_on_from_its_checkpoint_when_there_is_room(story):
 
 
 def test_waiting_counts_as_nothing_and_a_preemption_as_a_suspension(story):
-    """Kueue causes both, and neither is a failure."""
+    """Kueue causes the wait and the preemption, and neither is a failure of the job."""
     assert story.ends["everyday"]["restarts"] == {**NO_RESTARTS, "suspension": 1}
     assert story.ends["patient"]["restarts"] == story.ends["urgent"]["restarts"] == NO_RESTARTS
     assert {name: end["attempt"] for name, end in story.ends.items()} == {
@@ -138,7 +138,7 @@ def test_waiting_counts_as_nothing_and_a_preemption_as_a_suspension(story):
 
 @pytest.mark.parametrize("name", NEVER)
 def test_why_a_job_is_never_admitted_is_in_its_status(name, robots):
-    """The page has the messages and the remedies."""
+    """A user finds the message in docs/howto/queues.md, next to the remedy."""
     asked, queue, told = NEVER[name]
     trainer = ENDS | {"resources": {"requests": asked, "limits": asked}}
     robots.apply(tiny_job(name, trainer=trainer, scheduling={"queueName": queue}))
@@ -149,7 +149,10 @@ def test_why_a_job_is_never_admitted_is_in_its_status(name, robots):
 
 
 def test_a_default_queue_is_that_of_jobs_that_name_none(robots):
-    """Kueue suspends a job whose spec does not. If the operator resumed it, the two would fight over pods."""
+    """Kueue suspends the Job of a TrainingJob that names no queue.
+
+    If the operator resumed the Job, both controllers would start and stop its pods in turn.
+    """
     default = {"apiVersion": VERSION, "kind": "LocalQueue", "spec": {"clusterQueue": QUEUE}}
     robots.create("localqueues", {**default, "metadata": {"name": "default"}})
     change_queue(robots, stopPolicy="Hold")

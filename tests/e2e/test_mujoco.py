@@ -1,4 +1,4 @@
-"""Jobs with `driver: mujoco`: trainings, and the abilities of the simulator's image in a pod."""
+"""Jobs with `driver: mujoco`: two trainings, and an image that renders in a pod."""
 
 import io
 import zipfile
@@ -13,7 +13,7 @@ from tests.jobs import example
 
 pytestmark = pytest.mark.timeout(900)
 
-# Slow steps, so that the simulator still runs when its environment is read.
+# The steps are slow, so that the simulator still runs when a test reads its environment.
 SLOW = [{"name": "PALAESTRA_STUB_FAULTS", "value": "slow:latency_ms=40"}]
 SIMULATORS = [
     {"name": "collect", "role": "Collect", "driver": "mujoco", "env": SLOW},
@@ -26,7 +26,8 @@ TRAINER = {
 }
 SEEING_STEPS = 256
 COLORS = 3
-# This reads the environment of the simulator; the program itself also has its name in its command line.
+# The script prints the environment of the simulator. Only the first words are compared, because the script's
+# own command line contains the simulator's name too.
 ENVIRONMENT = """
 from pathlib import Path
 for process in Path("/proc").glob("[0-9]*"):
@@ -53,7 +54,7 @@ print("red" if red > 2 * max(green, blue) else (red, green, blue))
 
 
 def test_a_policy_is_trained_in_mujoco(namespace, job):
-    """It uses the release's image and one thread, because the simulators of a node share its cores."""
+    """The simulator of the release's image draws on one thread, because simulators share a node's cores."""
     namespace.apply(job("mujoco", simulators=SIMULATORS, trainer=TRAINER))
     pod = namespace.wait_for_pod("mujoco")
 
@@ -86,7 +87,7 @@ def seeing():
 
 
 def test_a_policy_is_trained_on_what_a_camera_sees(namespace, seeing, tmp_path):
-    """Its observations are pictures of 64 x 48 pixels, which Mesa draws on the simulator's own thread."""
+    """Each observation contains an image of 64 x 48 pixels. Mesa draws it on the simulator's own thread."""
     namespace.apply(seeing)
     pod = namespace.wait_for_pod("see-target")
 
@@ -106,7 +107,7 @@ def test_a_policy_is_trained_on_what_a_camera_sees(namespace, seeing, tmp_path):
 
 @pytest.mark.beside
 def test_the_image_of_mujoco_draws_without_a_screen(namespace, job):
-    """It runs as a user without permissions, on a read-only file system, and without a GPU."""
+    """The container has no GPU, no root permissions and a read-only file system, and must still render."""
     namespace.apply(job("draws", script=WAIT, simulator={"driver": "mujoco"}))
     pod = namespace.wait_for_pod("draws")
 

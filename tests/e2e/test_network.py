@@ -1,4 +1,7 @@
-"""Access to the ports of a training pod: tested if the cluster enforces policies, and always computed."""
+"""Access to the ports of a training pod, tried in the cluster and computed by cyclonus.
+
+The tests that connect are skipped if the cluster enforces no NetworkPolicies.
+"""
 
 import json
 import os
@@ -18,23 +21,23 @@ STATUS, HEALTH, CONTROL, MASTER = 9090, 7200, 7100, 11311
 OPEN = {STATUS, HEALTH, HEALTH + 31}
 CLOSED = {CONTROL, MASTER, HEALTH - 1, HEALTH + 100}
 VERDICT = re.compile(r"IS ALLOWED\?\s*\|\s*(TRUE|FALSE)")
-STOCK = os.environ.get("PALAESTRA_CLUSTER") == "stock"  # kind's own network, which enforces policies
-ANSWERS = f"python3 -c '{LISTEN}' & {WAIT}"  # serves the port for metrics and status instead of the trainer
+STOCK = os.environ.get("PALAESTRA_CLUSTER") == "stock"  # kind's own network enforces policies
+ANSWERS = f"python3 -c '{LISTEN}' & {WAIT}"  # stands in for the trainer's port of metrics and status
 DENY_ALL = {"metadata": {"name": "deny"}, "spec": {"podSelector": {}, "policyTypes": ["Ingress"]}}
 
 
 @pytest.fixture(scope="module")
 def pod(shared):
-    """A pod in training, in a namespace with a NetworkPolicy."""
+    """A pod whose trainer runs, in a namespace with a NetworkPolicy."""
     shared.apply(tiny_job("guarded", script=ANSWERS))
     return shared.get("pods", shared.wait_for_pod("guarded", LONG_S))
 
 
 @pytest.fixture(scope="session")
 def enforced(shared_listener, monitor):
-    """Whether the cluster enforces NetworkPolicies, tested with a policy that denies everything.
+    """Whether the cluster enforces NetworkPolicies; the fixture tries a policy that denies everything.
 
-    Kind's own network must do so, but on a busy machine only after a while.
+    Kind's own network enforces policies, but on a busy machine only after a while.
     """
     space, listener = shared_listener
     space.wait(lambda: monitor.reaches(listener, STATUS))
@@ -49,7 +52,7 @@ def enforced(shared_listener, monitor):
 
 @pytest.fixture(scope="session")
 def shared_listener(make_namespace):
-    """A pod that listens, alone in a namespace."""
+    """A pod that listens on a port, in a namespace without other pods."""
     space = make_namespace("control")
     space.create("pods", plain_pod("listens", command=["python3", "-c", LISTEN]))
     space.wait(lambda: trains(space.get("pods", "listens")))
@@ -57,14 +60,14 @@ def shared_listener(make_namespace):
 
 
 def test_ros_and_control_are_on_loopback_and_metrics_are_not(pod, shared, monitor):
-    """ROS 1 has no authentication, so nobody outside may reach it, whatever the cluster's network does."""
+    """ROS 1 has no authentication, so its ports must be closed even in a cluster without NetworkPolicies."""
     shared.wait(lambda: monitor.reaches(pod, HEALTH))
     assert not monitor.reaches(pod, CONTROL)
     assert not monitor.reaches(pod, MASTER)
 
 
 def test_no_stranger_reaches_a_training_pod(pod, shared, make_namespace, monitor, enforced):
-    """This includes other namespaces and another pod in this one, even with the operator's label."""
+    """Neither a pod of the same namespace nor a pod with the operator's label elsewhere may connect."""
     if not enforced:
         pytest.skip("this cluster's network enforces no NetworkPolicy: the control pod was reached")
     beside = Asker(shared, "beside")
@@ -77,9 +80,9 @@ def test_no_stranger_reaches_a_training_pod(pod, shared, make_namespace, monitor
 
 
 def test_the_policy_admits_operator_and_monitoring_and_nobody_else(pod, shared, tmp_path):
-    """The tool cyclonus evaluates the policy.
+    """The test evaluates the policy with cyclonus, which is a tool of other authors.
 
-    This tool was written to test networks, and is independent of Palaestra.
+    An error in Palaestra's understanding of policies therefore cannot hide in this test.
     """
     labels = shared.cluster.get("deployments", SYSTEM, OPERATOR)["spec"]["template"]["metadata"]["labels"]
     admitted = [peer(SYSTEM, labels), peer("monitoring", {}), peer("monitoring", {"any": "thing"})]
@@ -102,7 +105,7 @@ def test_the_policy_admits_operator_and_monitoring_and_nobody_else(pod, shared, 
 
 @pytest.mark.beside
 def test_a_job_may_close_the_way_out(namespace, job, tmp_path):
-    """With `egress: Closed` the pods can connect to nobody; who can connect to them does not change."""
+    """With `egress: Closed` the pods can open no connection, but Prometheus can still connect to them."""
     namespace.apply(job("closed", script=WAIT, network={"egress": "Closed"}))
     closed = namespace.get("pods", namespace.wait_for_pod("closed", LONG_S))
     inside = peer(namespace.name, closed["metadata"]["labels"])
@@ -131,7 +134,7 @@ def traffic(source, destination, port):
 
 
 def evaluate(namespace, folder, asked):
-    """Return for each connection whether the namespace's policies at the API server allow it."""
+    """Return, for each connection, whether the NetworkPolicies of the namespace allow it."""
     cyclonus = shutil.which("cyclonus")
     assert cyclonus, "cyclonus is not on the PATH; `tests/cluster/programs.sh cyclonus` builds it"
     policies = namespace.select("networkpolicies")

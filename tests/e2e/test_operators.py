@@ -1,4 +1,4 @@
-"""Operators start and stop: two at once, a leader that is gone, another release."""
+"""Operators start and stop: several at once, a successor of a killed leader, and an upgrade."""
 
 import copy
 import os
@@ -30,7 +30,7 @@ def deployment(cluster):
 
 
 def change(cluster, deployment, *options, **container):
-    """Give the operator more options, and change other fields of its container."""
+    """Add options to the operator's command, and set other fields of its container."""
     wanted = copy.deepcopy(deployment["spec"]["template"]["spec"]["containers"][0]) | container
     wanted["command"] = [*wanted["command"], *options]
     cluster.patch("deployments", SYSTEM, OPERATOR, {"spec": {"template": {"spec": {"containers": [wanted]}}}})
@@ -44,7 +44,7 @@ def holder(cluster):
 
 
 def test_two_operators_at_once_make_no_second_pod(deployment, namespace, cluster, job):
-    """Names ensure safety, not locks: three operators act at once here, without an election."""
+    """Unique names prevent duplicates even if three operators act without an election, as in this test."""
     cluster.patch("deployments", SYSTEM, OPERATOR, {"spec": {"replicas": 3}})
     change(cluster, deployment, "--no-leader-elect")
     assert len(operators(namespace)) == 3
@@ -60,7 +60,7 @@ def test_two_operators_at_once_make_no_second_pod(deployment, namespace, cluster
 
 
 def test_another_operator_takes_over_when_the_leader_is_gone(deployment, namespace, cluster, job):  # noqa: ARG001 - is put back
-    """If the leader is killed, its Lease must expire first; if it is stopped, it releases the Lease."""
+    """A killed leader keeps its Lease until the Lease expires, but a stopped leader releases it at once."""
     make_killable(namespace)
     cluster.patch("deployments", SYSTEM, OPERATOR, {"spec": {"replicas": 2}})
     cluster.rolled_out(SYSTEM, OPERATOR)
@@ -82,7 +82,7 @@ def _leader(namespace):
 
 
 def test_an_upgrade_of_the_operator_touches_no_running_pod(deployment, namespace, cluster, job):
-    """Objects are made once; defaults are those of the release that accepted the job."""
+    """The new operator keeps existing objects, and uses the defaults of the release that accepted the job."""
     namespace.apply(job("stays", script=WAIT))
     namespace.wait_for_pod("stays", LONG_S)
     namespace.wait(lambda: namespace.status("stays").get("phase") == "Running")
@@ -98,9 +98,9 @@ def test_an_upgrade_of_the_operator_touches_no_running_pod(deployment, namespace
 
 
 def fingerprint(namespace, kind):
-    """Return UID and generation of the objects of the job, and the containers of a pod.
+    """Return uid, generation and containers of the job's objects.
 
-    If nobody changes the objects, nothing of it changes.
+    The result changes if a controller updates an object or if a container restarts.
     """
     found = namespace.select(kind, "stays")
     return {
@@ -109,5 +109,5 @@ def fingerprint(namespace, kind):
 
 
 def containers(content):
-    """Return id and restarts of each container in an object's status."""
+    """Return the id and the restart count of each container in an object's status."""
     return [(each.get("containerID"), each["restartCount"]) for each in statuses(content)]

@@ -1,4 +1,4 @@
-"""docs/start/your-environment.md on a cluster: an environment in a user's image, in the pod of a job."""
+"""docs/start/your-environment.md in a cluster: a job runs an environment that a user's image contains."""
 
 import os
 import subprocess
@@ -18,7 +18,7 @@ pytestmark = pytest.mark.timeout(1200)
 PAGE = dict(fenced((ROOT / "docs/start/your-environment.md").read_text()))
 IMAGE = "corridor:1"
 BUILD_S, LOAD_S = 600, 300
-# One rollout and one episode; the page's laptop part, in tests/integration/run, learns the task.
+# One rollout and one episode. tests/integration/run tests that the page's environment can be learned.
 SHORT = {
     "steps": 256,
     "evaluation": {"everySteps": 256, "episodes": 1, "confirmEpisodes": 2},
@@ -45,10 +45,10 @@ def image(cluster, tmp_path_factory):
 
 
 def test_an_environment_in_an_image_of_its_own_trains_in_a_restricted_pod(namespace, image):
-    """Only the image can contain the module: the pod has no other file of the user's."""
+    """The pod has no other file of the user, so the trainer must import the environment from the image."""
     job = yaml.safe_load(PAGE["yaml job.yaml"])
     job["spec"]["trainer"] |= {"image": image, **SHORT}
-    job["spec"]["simulators"][0] |= SLOW  # so that the pod still exists when it is checked
+    job["spec"]["simulators"][0] |= SLOW  # the pod must still exist when the test checks it
     namespace.apply(job)
     pod = namespace.wait_for_pod("corridor", LONG_S)
 

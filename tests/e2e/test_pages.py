@@ -1,6 +1,6 @@
-"""Pages about installing and training in a cluster, on the real cluster: every command unchanged.
+"""Every command of the pages about installation and training in a cluster, on a real cluster.
 
-tests/e2e/test_kueue.py runs docs/howto/queues.md, because it needs that page's cluster for longer.
+tests/e2e/test_kueue.py runs docs/howto/queues.md, because its other tests need the page's queue too.
 """
 
 import os
@@ -37,9 +37,9 @@ FIRST = (ROOT / "docs/start/cluster.md").read_text()
 PYTHON = (ROOT / "docs/howto/python.md").read_text()
 SWEEPS = (ROOT / "docs/howto/sweeps.md").read_text()
 LAB = "lab"  # the namespace of the runs that TensorBoard shows
-NAMESPACES = (LAB, "robots", "drones")  # on the page, besides that of the operator
+NAMESPACES = (LAB, "robots", "drones")  # of the page, in addition to the operator's namespace
 TENSORBOARD = "palaestra-tensorboard"
-# The Deployments after the commands of each chapter of install.md, with their replicas.
+# The Deployments that exist after the commands of each chapter of install.md, with their replicas.
 PROMISED = {
     "Install": {OPERATOR: 1},
     "More than one operator": {OPERATOR: 2},
@@ -71,7 +71,7 @@ def terminal(tmp_path):
 
 @pytest.fixture
 def untouched(cluster, terminal):
-    """Prepare the cluster as the page expects it, without Palaestra; everything is restored at the end."""
+    """Prepare a cluster without Palaestra, as the page expects it, and restore everything at the end."""
     if there := [name for name in NAMESPACES if cluster.get("namespaces", None, name) is not None]:
         (pytest.skip if os.environ.get("PALAESTRA_CLUSTER") == "existing" else pytest.fail)(
             f"this cluster has the namespaces {there} already"
@@ -104,12 +104,12 @@ def running(cluster):
 
 
 def deployments(cluster):
-    """Return the Deployments that the page makes, with their namespaces."""
+    """Return the Deployments that the page creates, with their namespaces."""
     return [(each, place) for place in (SYSTEM, LAB) for each in cluster.select("deployments", place)]
 
 
 class Stays:
-    """A job that runs while its operator is upgraded and removed."""
+    """A job that runs while the operator is upgraded and removed."""
 
     def __init__(self, namespace):
         self._namespace = namespace
@@ -119,7 +119,7 @@ class Stays:
         self._before = self._seen()
 
     def assert_nothing_has_touched_it(self):
-        """Neither its pod nor its other objects may have changed."""
+        """Assert that the pod and the other objects of the job are unchanged."""
         assert self._seen() == self._before
         assert self._namespace.status("stays")["phase"] == "Running"
 
@@ -131,7 +131,7 @@ class Stays:
 @pytest.mark.timeout(1800)
 @pytest.mark.usefixtures("untouched")
 def test_every_command_of_the_installation_works_and_touches_no_job_that_runs(terminal, cluster, namespace):
-    """A command that works alone can fail after others: values stay, and pods lack an image or a volume."""
+    """A command that works alone may fail after the others, because a release keeps its earlier values."""
     seen, stays = {}, None
     for heading, text in chapters(INSTALL):
         commands = blocks(text, "sh")
@@ -152,7 +152,7 @@ def test_every_command_of_the_installation_works_and_touches_no_job_that_runs(te
 
 
 def assert_all_is_served(cluster):
-    """The pods that the page has installed must serve everything."""
+    """Assert that TensorBoard and the notebooks, as installed by the page, respond."""
     assert "TensorBoard" in page_of(cluster, LAB, TENSORBOARD, 6006)
     assert_a_run_is_shown_by_the_name_of_its_job(Namespace(cluster, LAB, there=True))
     assert_notebooks_are_served_to_who_has_the_token(cluster, token_of(cluster, "notebooks"))
@@ -160,7 +160,7 @@ def assert_all_is_served(cluster):
 
 
 def assert_a_run_is_shown_by_the_name_of_its_job(lab):
-    """A job with the page's `storage` trains, and TensorBoard shows its run by the documented name."""
+    """Assert that TensorBoard shows the run of a job with the page's `storage` by its documented name."""
     specs = [yaml.safe_load(block).get("spec", {}) for block in blocks(INSTALL, "yaml")]
     [storage] = [spec["storage"] for spec in specs if "storage" in spec]
     uid = lab.apply(tiny_job("shown", storage=storage))["metadata"]["uid"]
@@ -171,7 +171,7 @@ def assert_a_run_is_shown_by_the_name_of_its_job(lab):
 
 
 def at_home(namespace, folder):
-    """Return a terminal whose kubeconfig has the namespace, with the operator running."""
+    """Wait for the operator, and return a terminal whose kubeconfig selects the namespace."""
     namespace.cluster.rolled_out(SYSTEM, OPERATOR)
     Terminal(folder).type_in("kubectl config view --raw --flatten >config", READY_S)
     home = checkout(folder, KUBECONFIG=str(folder / "config"))
@@ -180,10 +180,10 @@ def at_home(namespace, folder):
 
 
 @pytest.mark.beside
-@pytest.mark.comes_late  # after the long run, whose operator is killed again and again
+@pytest.mark.comes_late  # after the long run, which kills the operator repeatedly
 @pytest.mark.timeout(900)
 def test_every_command_of_the_first_job_works(namespace, tmp_path):
-    """The commands lead from an empty namespace to a policy on this machine and a deleted job."""
+    """A reader starts with an empty namespace, fetches a policy, and deletes the job at the end."""
     [session] = blocks(FIRST, "sh")
 
     printed = at_home(namespace, tmp_path).type_in(session, SESSION_S)
@@ -194,10 +194,10 @@ def test_every_command_of_the_first_job_works(namespace, tmp_path):
 
 
 @pytest.mark.beside
-@pytest.mark.comes_late  # after the long run, whose operator is killed again and again
+@pytest.mark.comes_late  # after the long run, which kills the operator repeatedly
 @pytest.mark.timeout(900)
 def test_the_script_of_the_page_about_python_trains(namespace, tmp_path):
-    """The script does the same from Python, with the job of the examples."""
+    """A reader copies the script and runs it with the example job, without a change."""
     [script] = blocks(PYTHON, "python with-a-cluster")
     (tmp_path / "train.py").write_text(script)
 
@@ -208,10 +208,13 @@ def test_the_script_of_the_page_about_python_trains(namespace, tmp_path):
 
 
 @pytest.mark.beside
-@pytest.mark.comes_late  # after the long run, whose operator is killed again and again
+@pytest.mark.comes_late  # after the long run, which kills the operator repeatedly
 @pytest.mark.timeout(900)
 def test_the_sweep_of_the_page_trains_in_the_cluster(namespace, tmp_path):
-    """Two trials with two seeds each are compared, listed by their label and deleted."""
+    """The sweep compares two trials with two seeds each.
+
+    The page's commands list the jobs and delete them.
+    """
     [sweep] = blocks(SWEEPS, "yaml sweep")
     (tmp_path / "sweep.yaml").write_text(sweep)
     home = at_home(namespace, tmp_path)

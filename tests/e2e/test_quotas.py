@@ -1,4 +1,4 @@
-"""Limits of a namespace: a refusal sets a reason in the status, which is removed with the limit."""
+"""Limits of a namespace: if a limit refuses a job's pods, the status shows it until the limit is removed."""
 
 from dataclasses import dataclass, field
 
@@ -12,7 +12,7 @@ from tests.e2e.namespace import LONG_S, Namespace, named
 pytestmark = [pytest.mark.after_the_kills, pytest.mark.timeout(1200)]
 
 OF_LIMITED = {"matchExpressions": [{"scopeName": "PriorityClass", "operator": "In", "values": [LIMITED]}]}
-PLACE = "palaestra.dev/place"  # an extended resource; the node has one
+PLACE = "palaestra.dev/place"  # an extended resource, of which the node has one unit
 IN_PLACE = {"resources": {"requests": {**LITTLE["requests"], PLACE: "1"}, "limits": {PLACE: "1"}}}
 WAITS_ONCE = (
     "test -e $PALAESTRA_RUN/seen && exit 0; mkdir -p $PALAESTRA_RUN; touch $PALAESTRA_RUN/seen;"
@@ -22,7 +22,7 @@ WAITS_ONCE = (
 
 @dataclass(frozen=True)
 class Refusal:
-    """An object that refuses a job's needs, with its message; `scheduling` is the job's."""
+    """An object that makes Kubernetes refuse a job's pods, with the message and the job's `scheduling`."""
 
     kind: str
     spec: Object
@@ -30,7 +30,7 @@ class Refusal:
     scheduling: Object = field(default_factory=dict)
 
     def begin(self, place: Namespace) -> None:
-        """Add the object, so that nothing can be made in a namespace."""
+        """Create the object, so that the namespace refuses the job's pods."""
         place.create(self.kind, {"metadata": {"name": "none"}, "spec": self.spec})
 
     def end(self, place: Namespace) -> None:
@@ -39,18 +39,18 @@ class Refusal:
 
 
 class NoSuchClass(Refusal):
-    """A PriorityClass that does not exist before the end."""
+    """A PriorityClass that is missing until `end` creates it."""
 
     def begin(self, place: Namespace) -> None:
         """Do nothing."""
 
     def end(self, place: Namespace) -> None:
-        """Create it."""
+        """Create the PriorityClass."""
         place.cluster.create(self.kind, priority_class(MISSING))
 
 
 def priority_class(name: str, preemption: str = "Never") -> Object:
-    """Return a PriorityClass above the default; on a full node, one that preempts ends other tests' pods."""
+    """Return a PriorityClass above the default; with preemption, it may end other tests' pods."""
     return {
         "metadata": {"name": name},
         "value": 1000,
@@ -60,12 +60,12 @@ def priority_class(name: str, preemption: str = "Never") -> Object:
 
 
 def at_least(**quantities: str) -> Object:
-    """Return a LimitRange for containers that request at least this."""
+    """Return a LimitRange whose containers must request at least these quantities."""
     return {"limits": [{"type": "Container", "min": quantities}]}
 
 
 def claims_of(most: str) -> Object:
-    """Return a LimitRange for claims that request at most this."""
+    """Return a LimitRange whose claims may request at most this size."""
     return {"limits": [{"type": "PersistentVolumeClaim", "max": {"storage": most}}]}
 
 
@@ -89,7 +89,7 @@ REFUSALS = {
 
 @pytest.fixture(scope="module")
 def classes(cluster):
-    """Create PriorityClasses; the missing one is deleted too."""
+    """Create PriorityClasses; delete them at the end, together with the one that a test creates."""
     cluster.create("priorityclasses", priority_class(LIMITED))
     cluster.create("priorityclasses", priority_class(URGENT, "PreemptLowerPriority"))
     yield
@@ -98,8 +98,8 @@ def classes(cluster):
 
 
 @pytest.fixture(scope="module")
-def places(make_namespace, classes):  # noqa: ARG001 - is there
-    """A namespace for each refusal, each with a waiting job, so that all wait at the same time."""
+def places(make_namespace, classes):  # noqa: ARG001 - it must exist
+    """A namespace with a waiting job for each refusal, so that all jobs wait at the same time."""
     made = {name: make_namespace(f"refuses-{name}") for name in REFUSALS}
     for name, place in made.items():
         REFUSALS[name].begin(place)
@@ -109,7 +109,7 @@ def places(make_namespace, classes):  # noqa: ARG001 - is there
 
 @pytest.fixture(scope="module")
 def refused(places):
-    """The status of each refused replica; by now nothing refuses it any more."""
+    """The status of each refused replica, read before the fixture removes the cause of the refusal."""
     told = {name: place.wait_for_reason("waits", "PodsRefused") for name, place in places.items()}
     for name, place in places.items():
         REFUSALS[name].end(place)
@@ -118,7 +118,7 @@ def refused(places):
 
 @pytest.fixture
 def one_place(cluster):
-    """A node with one unit of the resource for which jobs compete, however large it is."""
+    """Give a node one unit of an extended resource for which jobs compete, whatever the node's size."""
     node = named(cluster.select("nodes", None)[0])
 
     def give(amount: str | None) -> None:
@@ -132,7 +132,7 @@ def one_place(cluster):
 
 @pytest.mark.parametrize("name", REFUSALS)
 def test_the_status_quotes_the_refusal(name, refused):
-    """Without a pod, only the Job's events or the API server's response to the operator have the reason."""
+    """Without a pod, only events of the Job or responses to the operator contain the cause."""
     assert refused[name]["phase"] == "Pending"
     assert REFUSALS[name].words in refused[name]["message"]
     assert refused[name]["attempt"] == 0
@@ -140,7 +140,10 @@ def test_the_status_quotes_the_refusal(name, refused):
 
 @pytest.mark.usefixtures("classes", "one_place")
 def test_a_job_that_the_scheduler_preempts_gets_an_event_and_comes_back(namespace, job):
-    """A PriorityClass preempts without a queue, too; this is a disruption and not a failure."""
+    """Even without a queue, the scheduler preempts by PriorityClass.
+
+    The job must not count this as a failure.
+    """
     namespace.apply(job("everyday", script=WAITS_ONCE, simulator=IN_PLACE, backoffLimit=0))
     namespace.wait_for_pod("everyday")
 
@@ -158,7 +161,7 @@ def test_a_job_that_the_scheduler_preempts_gets_an_event_and_comes_back(namespac
 @pytest.mark.parametrize("name", REFUSALS)
 @pytest.mark.usefixtures("refused")
 def test_a_job_that_was_refused_goes_on_by_itself(name, places):
-    """The job needs no change, and nothing counts as a failure."""
+    """A user need not change the job after the limit is gone, and no failure is counted."""
     place = places[name]
 
     assert place.wait_for_end("waits", LONG_S) == "Succeeded"

@@ -1,4 +1,4 @@
-"""A TrainingJob gives its author no new access: the objects that it names must be open to jobs."""
+"""A TrainingJob gives its author no new access: it may only name objects that are labeled for jobs."""
 
 import pytest
 
@@ -12,7 +12,7 @@ FOR_JOBS = {"metadata": {"labels": {"palaestra.dev/for-jobs": "true"}}}
 
 
 def let_secrets_be_read(namespace):
-    """Allow the operator to read Secrets, which a person must do for each namespace."""
+    """Bind the role to read Secrets to the operator, as an administrator does for each namespace."""
     role = {"apiGroup": "rbac.authorization.k8s.io", "kind": "ClusterRole", "name": SECRETS_ROLE}
     subject = {"kind": "ServiceAccount", "name": OPERATOR, "namespace": SYSTEM}
     binding = {"metadata": {"name": SECRETS_ROLE}, "roleRef": role, "subjects": [subject]}
@@ -20,7 +20,7 @@ def let_secrets_be_read(namespace):
 
 
 def test_a_claim_is_used_only_if_it_is_for_jobs(namespace, job):
-    """Otherwise every author of TrainingJobs could write to every volume of the namespace."""
+    """Otherwise a user who may only create TrainingJobs could write to every volume of the namespace."""
     namespace.apply(job("writes", script="touch /var/lib/palaestra/mark", storage={"existingClaim": "kept"}))
     namespace.wait(lambda: namespace.condition("writes", "Accepted").get("reason") == "ClaimMissing")
 
@@ -34,7 +34,7 @@ def test_a_claim_is_used_only_if_it_is_for_jobs(namespace, job):
 
 
 def test_a_secret_is_used_only_if_it_is_for_jobs(namespace, job):
-    """Otherwise every author of TrainingJobs could read every Secret of the namespace."""
+    """Otherwise a user who may only create TrainingJobs could read every Secret of the namespace."""
     let_secrets_be_read(namespace)
     variable = {"name": "WORD", "secretKeyRef": {"name": "words", "key": "word"}}
     namespace.apply(job("reads", script='test "$WORD" = open', trainer={"env": [variable]}, backoffLimit=0))

@@ -1,4 +1,4 @@
-"""A training from its first object to its end, where everything that *restricted* forbids is refused."""
+"""A complete training in a namespace that refuses everything that *restricted* forbids."""
 
 from datetime import datetime, timedelta
 
@@ -17,7 +17,7 @@ TOKEN = "/var/run/secrets/kubernetes.io/serviceaccount/token"
 
 
 def test_a_pod_that_asks_for_more_is_refused_here(namespace):
-    """This is the control: without it, the tests below would prove nothing about *restricted*."""
+    """If the namespace did not enforce *restricted*, the tests below would prove nothing."""
     pod = plain_pod("control")
     del pod["spec"]["securityContext"]["runAsNonRoot"]
 
@@ -32,7 +32,7 @@ def test_a_pod_that_asks_for_more_is_refused_here(namespace):
 @pytest.mark.after_the_kills
 @pytest.mark.timeout(1200)
 def test_a_training_succeeds_and_its_status_tells_how(namespace, job):
-    """The status has everything that a person needs about an ended run, without a look into its pod."""
+    """A person learns everything about an ended run from its status, without access to the pod."""
     namespace.apply(job("tiny"))
 
     assert namespace.wait_for_end("tiny") == "Succeeded"
@@ -55,9 +55,10 @@ def test_a_training_succeeds_and_its_status_tells_how(namespace, job):
 @pytest.mark.timeout(1200)
 @pytest.mark.parametrize("moment", ENDS)
 def test_a_pod_ends_with_its_trainer(namespace, job, moment):
-    """Nobody waits for simulators and the ROS master, and a preempted node gives no time.
+    """Simulators and the ROS master must end with the trainer, because a preempted node allows little time.
 
-    The pod ends at once even while the sidecars start, when process 1 of a container loses early signals.
+    Even while the sidecars start, the pod ends at once, although process 1 of a container ignores early
+    signals.
     """
     namespace.apply(job("ends", script=ENDS[moment]))
     assert namespace.wait_for_end("ends") == "Succeeded"
@@ -75,7 +76,7 @@ def finished(terminated):
 @pytest.mark.beside
 @pytest.mark.timeout(1200)
 def test_no_container_can_write_its_image_or_speak_to_the_cluster(namespace, job):
-    """A user who may create TrainingJobs but no pods must gain no other permission."""
+    """A user's code in the trainer must change no image and get no token for the API server."""
     namespace.apply(job("waits", script=WAIT))
     pod = namespace.wait_for_pod("waits", LONG_S)
 

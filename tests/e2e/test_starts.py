@@ -1,4 +1,4 @@
-"""Jobs that do not start: each has a reason and the container's name."""
+"""Jobs that do not start: the status of each has a reason and names the container."""
 
 import pytest
 
@@ -24,15 +24,15 @@ NEVER_UP = {
 
 
 def world_map(**labels):
-    """Return a ConfigMap with the arena in it."""
+    """Return a ConfigMap that contains the arena."""
     return {"metadata": {"name": "arena", "labels": labels}, "data": {"arena.wbt": builtin("arena").decode()}}
 
 
 @pytest.mark.after_the_kills
 def test_a_simulator_that_never_comes_up_is_named_and_spends_the_trainers_budget(namespace, job):
-    """Kubernetes sees a running sidecar.
+    """To Kubernetes the sidecar runs.
 
-    Only trainer and operator know that the simulator does not respond.
+    Only the trainer and the operator can detect that the simulator does not respond.
     """
     namespace.apply(job("never-up", simulator=NEVER_UP, trainer={"resources": SMALL}, backoffLimit=0))
 
@@ -42,7 +42,7 @@ def test_a_simulator_that_never_comes_up_is_named_and_spends_the_trainers_budget
 
 
 def test_a_sidecar_that_crash_loops_is_named_and_ends_nothing(namespace, job):
-    """The kubelet restarts it repeatedly, and this is not counted."""
+    """The kubelet restarts the sidecar, so the operator only reports the problem and counts no failure."""
     namespace.apply(job("crashes", script=WAIT, simulator=CRASHES))
 
     told = namespace.wait_for_reason("crashes", "SidecarCrashLoop", LONG_S)
@@ -52,9 +52,9 @@ def test_a_sidecar_that_crash_loops_is_named_and_ends_nothing(namespace, job):
 
 
 def test_an_image_that_cannot_be_pulled_is_named_and_waited_for(namespace, job):
-    """The reason is shown at once, and nothing is ended before the author sets a limit.
+    """The reason appears at once, but the job waits until its author sets a time limit.
 
-    The limit is set after the reason is known, because a busy node takes long to find out.
+    The test sets the limit after the reason appears, because a busy node reports the failure late.
     """
     namespace.apply(job("no-image", script=WAIT, simulator=NO_IMAGE))
 
@@ -69,7 +69,7 @@ def test_an_image_that_cannot_be_pulled_is_named_and_waited_for(namespace, job):
 
 
 def test_a_job_starts_when_its_world_appears(namespace, job):
-    """The order of `kubectl apply` does not matter; a ConfigMap that is not for jobs stays closed."""
+    """A user may apply a job first; the job waits until its ConfigMap exists and has the label for jobs."""
     source = {"world": {"configMap": {"name": "arena", "key": "arena.wbt"}}}
     namespace.apply(job("waits", simulator=source, script="exit 0"))
     namespace.wait(lambda: namespace.condition("waits", "Accepted").get("reason") == "WorldMissing")
@@ -84,7 +84,7 @@ def test_a_job_starts_when_its_world_appears(namespace, job):
 
 
 def test_the_status_of_an_unschedulable_pod_quotes_the_scheduler(namespace, job):
-    """It does not fail, because a node may be added."""
+    """The job must wait and not fail, because an administrator may add a node."""
     namespace.apply(job("no-node", script=WAIT, scheduling=NOWHERE))
 
     told = namespace.wait_for_reason("no-node", "Unschedulable", LONG_S)

@@ -1,4 +1,4 @@
-"""Other people's robot, world and program, in a pod."""
+"""A pod runs a robot, a world and a program that Palaestra did not provide."""
 
 import pytest
 
@@ -13,9 +13,9 @@ ENOUGH = {"requests": {"cpu": "50m", "memory": "160Mi"}}
 
 
 def test_a_differential_robot_drives_among_boxes_by_its_own_program(namespace, job):
-    """The robot is an E-puck, as its world names it.
+    """The robot is an E-puck, and the job's own program drives it instead of a trainer.
 
-    The program exits with 0 only if the robot has arrived.
+    The program exits with 0 only if the robot has reached its goal.
     """
     made = job("rover", script=SCRIPT, simulator=rover(), backoffLimit=0)
     made["spec"]["simulators"][0]["resources"] = ENOUGH

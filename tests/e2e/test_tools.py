@@ -1,4 +1,4 @@
-"""The commands that need a kubelet: logs, and fetches from a running pod and from a claim."""
+"""Commands that need a kubelet: `logs`, and `fetch` from a running pod or from a claim."""
 
 import os
 import subprocess
@@ -13,7 +13,7 @@ from tests.e2e.namespace import LONG_S, OPERATOR, SYSTEM
 pytestmark = pytest.mark.timeout(1200)
 
 COMMAND_S = 180
-# A program instead of the training: it writes the files of a run, prints a line, and stays for a given time.
+# This program replaces the training: it writes the files of a run and prints a line.
 LEAVES_A_RUN = (
     "mkdir -p $PALAESTRA_RUN/tensorboard && printf weights > $PALAESTRA_RUN/model.zip"
     " && head -c 3000000 /dev/zero > $PALAESTRA_RUN/tensorboard/events && echo left it"
@@ -38,13 +38,13 @@ def found(folder):
 
 
 def readers(namespace):
-    """Return the pods that read volumes."""
+    """Return the pods that `fetch` created to read volumes."""
     return namespace.cluster.select("pods", namespace.name, "palaestra.dev/fetch")
 
 
 @pytest.mark.beside
 def test_a_run_that_goes_on_is_fetched_and_its_log_is_read(namespace, tmp_path):
-    """The trainer is not disturbed."""
+    """A user can look at a run without a disturbance of its trainer."""
     namespace.apply(tiny_job("goes-on", script=LEAVES_A_RUN + STAYS))
     namespace.wait(lambda: "left it" in typed(namespace, "logs", "goes-on")[1], LONG_S)
 
@@ -59,7 +59,7 @@ def test_a_run_that_goes_on_is_fetched_and_its_log_is_read(namespace, tmp_path):
 
 @pytest.mark.beside
 def test_a_run_that_has_ended_is_fetched_from_its_claim(namespace, tmp_path):
-    """The pod for it meets *restricted* and is deleted afterwards."""
+    """The pod that reads the claim satisfies *restricted*, and `fetch` deletes it afterwards."""
     namespace.apply(tiny_job("ended", script=LEAVES_A_RUN))
     assert namespace.wait_for_end("ended", LONG_S) == "Succeeded"
 
@@ -71,9 +71,9 @@ def test_a_run_that_has_ended_is_fetched_from_its_claim(namespace, tmp_path):
     assert typed(namespace, "fetch", "ended", f"--dir={tmp_path}")[0] == 1
 
 
-@pytest.mark.comes_late  # after the long run, whose operator is killed again and again
+@pytest.mark.comes_late  # after the long run, which kills the operator repeatedly
 def test_the_doctor_finds_nothing_wrong_where_jobs_run(namespace, cluster):
-    """Jobs have trained here. The images on the nodes have tags, which gives a warning."""
+    """Jobs have trained in this cluster, so only one check warns: images with tags instead of digests."""
     cluster.rolled_out(SYSTEM, OPERATOR)
     code, told = typed(namespace, "doctor")
 

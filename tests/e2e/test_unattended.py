@@ -1,4 +1,4 @@
-"""A run without attendance in a cluster that evicts its pods repeatedly."""
+"""A run without supervision, in a cluster that evicts its pods repeatedly."""
 
 import pytest
 
@@ -9,7 +9,7 @@ from tests.e2e.namespace import LONG_S, NO_RESTARTS, named
 @pytest.mark.comes_late
 @pytest.mark.timeout(1500)
 def test_each_of_several_evictions_costs_at_most_a_checkpoint_interval(evictions):
-    """None of them counts against `backoffLimit`, and the status has counted each of them once."""
+    """No eviction counts against `backoffLimit`, and the status counts each eviction once."""
     evicted, namespace = evictions.result(), evictions.namespace
 
     resumed = [int(each["reason"].removeprefix("resumed at step ")) for each in evicted.attempts[1:]]

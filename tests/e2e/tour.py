@@ -1,6 +1,6 @@
-"""A tour through all that an operator does in a namespace uses each of its permissions.
+"""Actions of a person in a namespace, after which an operator has used each of its permissions.
 
-It lists a person's actions, not the permissions, so that it finds a permission that no action needs.
+The list consists of actions, and not of permissions, so that unnecessary permissions are found.
 """
 
 from palaestra.plan.job import QUEUE_LABEL
@@ -15,9 +15,9 @@ SPENT = {"metadata": {"name": "spent"}, "spec": {"hard": {"pods": "0"}}}
 
 
 def tour(place: Namespace, operators: str) -> None:
-    """Let the operator, whose pods are in the namespace `operators`, do all its work in `place`."""
+    """Make the operator do all its work in `place`; the operator's pods are in the namespace `operators`."""
     refer(place)
-    wait_in_queue(place)  # the operator requests the reason after 5 s; the next steps take longer
+    wait_in_queue(place)  # the operator requests the reason after 5 s; the next actions take longer
     give_up(place)
     stop_suspended(place)
     delete_unbound(place)
@@ -33,7 +33,7 @@ def tour(place: Namespace, operators: str) -> None:
 
 
 def refer(place: Namespace) -> None:
-    """Use an existing claim and world, and meet somebody else's Job."""
+    """Use an existing claim and an existing world, and a job whose Job's name is taken."""
     place.create("persistentvolumeclaims", make_claim("shared", labels=FOR_JOBS))
     world = {"arena.wbt": builtin("arena").decode()}
     place.create("configmaps", {"metadata": {"name": "worlds", "labels": FOR_JOBS}, "data": world})
@@ -48,19 +48,22 @@ def refer(place: Namespace) -> None:
 
 
 def wait_in_queue(place: Namespace) -> None:
-    """Give a suspended Job a queue, as Kueue does in a namespace with a default; it is never admitted."""
+    """Label a suspended Job with a queue, as Kueue does in a namespace with a default queue.
+
+    Kueue never admits the Job.
+    """
     place.cluster.patch("jobs", place.name, "mapped-0", {"metadata": {"labels": {QUEUE_LABEL: "default"}}})
     place.wait(lambda: "Queued" in place.reasons("mapped"), LONG_S)
 
 
 def give_up(place: Namespace) -> None:
-    """Let a job fail at once, and be deleted."""
+    """Create a job that fails at once and is deleted by its TTL."""
     place.apply(tiny_job("brief", trainer={"algorithm": {"name": "SAC"}}, ttlSecondsAfterFinished=1))
     place.wait(lambda: place.get("trainingjobs", "brief") is None, LONG_S)
 
 
 def stop_suspended(place: Namespace) -> None:
-    """Let the deadline of a job pass while one of its Jobs is suspended, which is then deleted."""
+    """Let a job's deadline pass while one of its Jobs is suspended; the operator then deletes that Job."""
     place.apply(tiny_job("over", script=WAIT, replicas=2, activeDeadlineSeconds=15))
     place.wait(lambda: len(place.pods("over")) == 2, LONG_S)
     place.cluster.patch("jobs", place.name, "over-0", {"spec": {"suspend": True}})
@@ -68,7 +71,7 @@ def stop_suspended(place: Namespace) -> None:
 
 
 def delete_unbound(place: Namespace) -> None:
-    """Delete a job whose claim was never bound, which deletes the claim."""
+    """Delete a job whose claim was never bound; the operator then deletes the claim."""
     place.apply(tiny_job("unbound", script=WAIT, suspend=True))
     [claim] = place.wait(lambda: place.select("persistentvolumeclaims", "unbound"), LONG_S)
     place.cluster.delete("trainingjobs", place.name, "unbound")
@@ -82,7 +85,7 @@ def suspend(place: Namespace, *, flag: bool) -> None:
 
 
 def replace_pod(place: Namespace) -> None:
-    """Let the operator replace the pod of a job, as after a mark of an operator that was killed."""
+    """Make the operator replace a job's pod, by the annotation that a killed operator leaves."""
     pod = place.wait(lambda: next(iter(place.pods("paused")), None), LONG_S)
     mark = f"1 {pod['metadata']['uid']} Stalled: it stands still"
     annotations = {"metadata": {"annotations": {"palaestra.dev/replaced": mark}}}
@@ -91,7 +94,7 @@ def replace_pod(place: Namespace) -> None:
 
 
 def replace_operator(place: Namespace, operators: str) -> None:
-    """Let another operator lead, which finds no Lease."""
+    """Delete the operator's pods and its Lease, so that the next operator creates a Lease."""
     before = place.cluster.select("pods", operators, "app.kubernetes.io/component=operator")
     for pod in before:
         place.cluster.delete("pods", operators, named(pod))

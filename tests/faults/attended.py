@@ -1,4 +1,4 @@
-"""An operator that is restarted when it dies, as a kubelet does with its container."""
+"""An operator that restarts whenever it dies, as a kubelet restarts a container."""
 
 import threading
 from pathlib import Path
@@ -6,16 +6,16 @@ from typing import Any, Self
 
 from tests.integration.operator.operators import RunningOperator
 
-UNFORESEEN = "exception"  # the field of a log line that has a traceback
+UNFORESEEN = "exception"  # the field of a log line that contains a traceback
 
 
 class AttendedOperator:
-    """An operator process until the block ends, which is started again whenever it dies.
+    """An operator process that runs until the block ends and restarts whenever it dies.
 
     Args:
-        kubeconfig: its kubeconfig.
-        folder: for its logs.
-        options: further options of its command line.
+        kubeconfig: the kubeconfig of the operator.
+        folder: the folder of the operator's logs.
+        options: further options for the command line.
     """
 
     def __init__(self, kubeconfig: Path, folder: Path, *options: str) -> None:
@@ -28,15 +28,15 @@ class AttendedOperator:
 
     @property
     def lives(self) -> int:
-        """The number of starts."""
+        """The number of times that the operator was started."""
         return len(self._started)
 
     def kill(self) -> None:
-        """Kill it, and return when it is dead; it is started again at once."""
+        """Kill the operator, and return when it is dead; another thread restarts it at once."""
         self._started[-1].kill()
 
     def unforeseen(self) -> list[dict[str, Any]]:
-        """Return the log lines that have a traceback."""
+        """Return the log lines that contain a traceback."""
         return [line for each in self._started for line in each.lines() if UNFORESEEN in line]
 
     def __enter__(self) -> Self:
@@ -48,7 +48,7 @@ class AttendedOperator:
         self._ending.set()
         self._started[-1].kill()
         self._thread.join()
-        self._started[-1].kill()  # a restart may have started it meanwhile
+        self._started[-1].kill()  # the other thread may have restarted it meanwhile
 
     def _start(self) -> None:
         log = self._folder / f"operator-{len(self._started)}.log"

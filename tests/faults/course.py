@@ -1,4 +1,4 @@
-"""Count the requests between operator and API server, and decide when the fault is due."""
+"""Count the requests between operator and API server, and decide which request gets the fault."""
 
 import threading
 import time
@@ -14,17 +14,17 @@ QUIET_KINDS = frozenset({LEASE, WATCH, ANSWER})  # an idle operator sends only t
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Passed:
-    """A request that passed, with its time in seconds of the monotonic clock."""
+    """A request that was counted, and its time in seconds of the monotonic clock."""
 
     asked: Asked
     at: float
 
 
 class Course:
-    """Counts requests and decides which of them is disturbed; safe to use from several threads.
+    """Counts requests and decides which of them gets the fault; safe to use from several threads.
 
     Attributes:
-        met: the request at which the fault occurred; "" until then.
+        met: the request that got the fault, or "" before that.
     """
 
     def __init__(self, fault: Fault | None, clock: Callable[[], float] = time.monotonic) -> None:
@@ -44,32 +44,32 @@ class Course:
 
     @property
     def away(self) -> bool:
-        """Whether all requests are refused now."""
+        """Whether the proxy refuses all requests now."""
         return self._clock() < self._away_until
 
     def leave(self, seconds: float) -> None:
-        """Refuse all requests for some seconds."""
+        """Refuse all requests for `seconds`."""
         self._away_until = self._clock() + seconds
 
     def request(self, asked: Asked) -> Fault | None:
-        """Count a request, and return its fault."""
+        """Count a request, and return the fault that it gets, or None."""
         with self._lock:
             self._passed.append(Passed(asked=asked, at=self._clock()))
             return self._count(asked.kind, asked.words)
 
     def change(self, watched: Asked) -> Fault | None:
-        """Count an event of a watch, and return its fault."""
+        """Count an event of a watch, and return the fault that it gets, or None."""
         with self._lock:
             return self._count(CHANGE, watched.words)
 
     def quiet_s(self) -> float:
-        """Return the seconds since the last request that is not a watch or for the Lease."""
+        """Return the seconds since the last request other than a watch or a Lease request."""
         with self._lock:
             last = max((each.at for each in self._passed if each.asked.kind not in QUIET_KINDS), default=0.0)
         return self._clock() - last
 
     def last(self, count: int) -> list[str]:
-        """Return the last requests except watches and those for the Lease, as text."""
+        """Return the last `count` requests as text, without watches and Lease requests."""
         with self._lock:
             return [each.asked.words for each in self._passed if each.asked.kind not in QUIET_KINDS][-count:]
 

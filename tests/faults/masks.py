@@ -1,7 +1,8 @@
-"""The common part of two runs of one workload: their end states, without values that always differ.
+"""Compare the end states of two runs of one workload, without values that differ in every run.
 
 Pure. An end state becomes leaves, each with a path. Times, uids, versions and numbers in sentences are
-replaced by their kind; any other difference between two undisturbed runs is masked.
+replaced by placeholders. Every other difference between two undisturbed runs is masked: later runs may differ
+there too.
 """
 
 import re
@@ -15,25 +16,25 @@ SHAPES = (
     (re.compile(r"\b[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}\b"), "<uid>"),
     (re.compile(r"\b\d{4}-\d\d-\d\dT[\d:.]+Z"), "<time>"),
     (re.compile(r"\bplace-\d+-\d+\b"), "<namespace>"),
-    (re.compile(r"\b127(\.\d+){3}\b"), "<address>"),  # a trainer listens at the first address that is free
-    # In the name of an object, from a uid or a namespace.
+    (re.compile(r"\b127(\.\d+){3}\b"), "<address>"),  # a trainer listens at the first free address
+    # A digest in the name of an object, made from a uid or a namespace.
     (re.compile(r"(?<=[-_])([0-9a-f]{10}|[0-9a-f]{8}|[0-9a-f]{6})\b"), "<digest>"),
-    (re.compile(r"(-\d+)-[a-z0-9]{5}\b"), r"\1-<pod>"),  # the Job controller adds it to a Job's name
+    (re.compile(r"(-\d+)-[a-z0-9]{5}\b"), r"\1-<pod>"),  # the Job controller's random suffix
 )
 NUMBER = re.compile(r"\d+(\.\d+)?")
 DROPPED = frozenset({"managedFields", "resourceVersion"})
-# Only trainers report these: they are written when a poll brings them, and no count depends on them.
+# Only trainers report these fields. Their values depend on the time of the last poll, and no count uses them.
 TOLD = frozenset(
     {"target", "furthestStep", "lastCheckpoint", "lastProgress", "stepsLost", "goodput", "faults"}
 )
 SENTENCES = frozenset({"message", "note"})
 SECONDS = re.compile(r"(Seconds|_s)$")
-LONGEST = 100  # characters of a value in a report: a world has thousands
+LONGEST = 100  # the most characters of a value in a report, because a world has thousands
 KEYS = ("type", "name", "index", "container")  # the fields that identify the members of a list, in this order
 
 
 def leaves(state: Any, path: str = "") -> Leaves:
-    """Return the leaves of a JSON value by path, with values that always differ replaced by their kind."""
+    """Return the leaves of a JSON value by path, with placeholders for values that differ in every run."""
     found: Leaves = {}
     for key, value in _members(state):
         below = f"{path}/{key}"
@@ -52,7 +53,7 @@ def mask(first: Leaves, second: Leaves) -> frozenset[str]:
 
 
 def differences(wanted: Leaves, found: Leaves, masked: frozenset[str]) -> list[str]:
-    """Return the differences between a run's end and the undisturbed one's, a sentence for each path."""
+    """Return one sentence for each path at which a run's end state differs from the undisturbed one."""
     return [
         f"{path}: {_shown(path, found)} in place of {_shown(path, wanted)}"
         for path in sorted(wanted.keys() | found.keys())
@@ -61,7 +62,7 @@ def differences(wanted: Leaves, found: Leaves, masked: frozenset[str]) -> list[s
 
 
 def shaped(text: str) -> str:
-    """Return a text with its uids, times and generated names replaced by their kind."""
+    """Return a text with placeholders for uids, times and generated names."""
     for pattern, shape in SHAPES:
         text = pattern.sub(shape, text)
     return text

@@ -1,4 +1,4 @@
-"""Conditions that hold for every run, however it was disturbed: its end state, its pods, its owners."""
+"""Conditions about the end state, pods and owners of a run, which hold after any fault."""
 
 import threading
 from collections import Counter, defaultdict
@@ -22,8 +22,8 @@ Object = dict[str, Any]
 def end_state(place: Place, changes: Iterable[tuple[str, Object]]) -> dict[str, dict[str, Object]]:
     """Return all objects of a namespace that belong to TrainingJobs, by kind and name.
 
-    The Job controller generates the names of pods, so pods are numbered by replica instead, in the order of a
-    watch. Their times are whole seconds, and two may be made in one.
+    The Job controller generates the names of pods, so a pod is named by its replica and a number. The numbers
+    follow the order of a watch, because two pods may have the same creation time in whole seconds.
     """
     state = {
         resource.kind: {each["metadata"]["name"]: each for each in place.all(resource)}
@@ -45,10 +45,10 @@ def _numbered(pods: Iterable[Object], changes: Iterable[tuple[str, Object]]) -> 
 
 
 def orphans(state: Mapping[str, Mapping[str, Object]]) -> list[str]:
-    """Return the orphans: objects whose TrainingJob or owner is gone, except claims.
+    """Return the orphans: objects whose TrainingJob or owner no longer exists.
 
-    A claim outlives its TrainingJob, because it holds the run. A pod that is being deleted waits for its
-    kubelet.
+    Two kinds of objects are excluded. A claim outlives its TrainingJob, because it holds the run. A pod that
+    is being deleted waits for its kubelet.
     """
     living = {each["metadata"]["uid"] for kind in state.values() for each in kind.values()}
     return [
@@ -70,7 +70,7 @@ def _belonging(metadata: Mapping[str, Any]) -> set[str]:
 
 
 def doubles(changes: Iterable[tuple[str, Object]]) -> list[str]:
-    """Return the replicas that had two pods at the same time, by a watch's ordered reports of all pods."""
+    """Return the replicas that had two pods at the same time, according to the events of a watch."""
     alive: dict[tuple[str, ...], set[str]] = defaultdict(set)
     found = []
     for kind, pod in changes:
@@ -92,7 +92,7 @@ def _replica(pod: Object) -> tuple[str, str, str]:
 
 
 class PodWatch:
-    """Records all events of the pods of a namespace during its block."""
+    """Records all events of a namespace's pods during a `with` block."""
 
     def __init__(self, api: Api, namespace: str) -> None:
         self._api = api
@@ -103,7 +103,7 @@ class PodWatch:
         self._thread = threading.Thread(target=self._run, daemon=True)
 
     def changes(self) -> list[tuple[str, Object]]:
-        """Return the reports so far: kind of change and pod."""
+        """Return the events so far: the type of each event, and the pod."""
         return list(self._changes)
 
     def __enter__(self) -> Self:

@@ -1,7 +1,7 @@
-"""Plans: which fault occurs at which request of which workload. Pure: a number always means the same plan.
+"""Plans: each disturbs one request of one workload with one fault. A number always means the same plan.
 
-The plans of a workload are numbered: first each row of `ROWS` at the first request of its kind, then at the
-second, and so on. If a workload sends fewer requests, the plan has nothing to disturb.
+The plans of a workload are numbered. First each row of `ROWS` disturbs the first request of its kind, then
+the second, and so on. If a workload sends fewer requests, the plan disturbs nothing.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -15,58 +15,58 @@ class Kind(StrEnum):
     """The kind of a fault."""
 
     KILL_BEFORE = "kill before"
-    """The operator is killed; the API server never gets the request."""
+    """The operator is killed, and the API server never gets the request."""
 
     KILL_AFTER = "kill after"
-    """The API server carries the request out, and the operator is killed before it has the answer."""
+    """The API server executes the request, and the operator is killed before it gets the response."""
 
     DROP = "drop the answer"
-    """The API server carries the request out; the connection closes without an answer."""
+    """The API server executes the request, and the connection closes without a response."""
 
     CONFLICT = "409"
-    """Somebody else wrote first."""
+    """The API server reports that another client changed the object first."""
 
     GONE = "410"
-    """The version, or the rest of a list, is forgotten."""
+    """The API server no longer has the requested version, or the rest of a list."""
 
     BUSY = "429"
-    """Too many requests; try again after 0 seconds."""
+    """The API server reports too many requests, and permits the next one after 0 seconds."""
 
     ERROR = "500"
-    """The API server is in trouble."""
+    """The API server reports an internal error."""
 
     UNAVAILABLE = "503"
-    """The API server, or what stands before it, serves nobody."""
+    """The API server, or a proxy in front of it, serves no requests."""
 
     CUT = "cut the watch"
     """The watch ends in the middle of an event."""
 
     FREEZE = "freeze the watch"
-    """The watch is silent for some seconds, and its cache is stale; then it continues."""
+    """The watch is silent for some seconds, so the operator's cache is stale; then the watch continues."""
 
     DELAY = "delay"
     """The request reaches the API server some seconds later."""
 
     AWAY = "away"
-    """For some seconds every connection is closed, those of watches too."""
+    """For some seconds every connection is closed, including connections of watches."""
 
     SLOW = "trainer answers slowly"
-    """Byte by byte, for a minute."""
+    """The response arrives byte by byte, for a minute."""
 
     HALF = "trainer answers half"
-    """The connection closes in the middle of the answer."""
+    """The connection closes in the middle of the response."""
 
     LIES = "trainer lies"
-    """Numbers that cannot be, and times that never were."""
+    """The response contains impossible numbers and times."""
 
     MUCH = "trainer answers too much"
-    """An answer without an end."""
+    """The response does not end."""
 
 
 CODES = {Kind.CONFLICT: 409, Kind.GONE: 410, Kind.BUSY: 429, Kind.ERROR: 500, Kind.UNAVAILABLE: 503}
 TRAINERS = frozenset({Kind.SLOW, Kind.HALF, Kind.LIES, Kind.MUCH})
 KILLS = frozenset({Kind.KILL_BEFORE, Kind.KILL_AFTER})
-LATE_S = 11.0  # longer than the operator waits for a response: the request is done after it has given up
+LATE_S = 11.0  # longer than the operator waits for a response
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,10 +74,10 @@ class Fault:
     """One fault.
 
     Attributes:
-        kind: the kind of the fault.
-        request: the kind of request that it disturbs.
-        number: which of these requests, from 1.
-        seconds: its duration; 0 if it is over at once.
+            kind: the kind of the fault.
+            request: the kind of the request that gets the fault.
+            number: the number, from 1, of the request among those of its kind.
+            seconds: the duration of the fault; 0 if the fault has none.
     """
 
     kind: Kind
@@ -94,7 +94,7 @@ class Fault:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Plan:
-    """A workload and the fault that disturbs it; `seed` identifies both."""
+    """A workload and the fault of one of its requests; `seed` identifies both."""
 
     seed: int
     workload: str
@@ -108,7 +108,7 @@ class Plan:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Row:
-    """A kind of fault at a kind of request; it occurs at every `stride`-th of them, from the `first` on."""
+    """A kind of fault for a kind of request: for every `stride`-th request, beginning with `first`."""
 
     kind: Kind
     request: str
@@ -117,9 +117,9 @@ class Row:
     first: int = 1
 
 
-# Every write is disturbed by two faults. After one of the first four the write has succeeded, but the
-# operator does not know; after one of the next six it has failed. Reads are repeated, so they are disturbed
-# less often.
+# Every write gets two faults. After a fault of the first four rows, the write has succeeded, but the operator
+# does not know it. After a fault of the next six rows, the write has failed. Reads get fewer faults, because
+# the operator repeats reads.
 ROWS = (
     Row(kind=Kind.KILL_AFTER, request=WRITE, stride=2, first=1),
     Row(kind=Kind.DROP, request=WRITE, stride=4, first=2),
@@ -150,7 +150,7 @@ ROWS = (
 
 
 def plan(seed: int, workloads: Sequence[str]) -> Plan:
-    """Return the plan of a number from 0; each workload begins its rows at another request."""
+    """Return the plan of a number from 0; the rows of each workload begin at a different request."""
     rest, workload = divmod(seed, len(workloads))
     turn, row_number = divmod(rest, len(ROWS))
     row = ROWS[row_number]
@@ -160,7 +160,7 @@ def plan(seed: int, workloads: Sequence[str]) -> Plan:
 
 
 def plans(counts: Mapping[str, Mapping[str, int]]) -> Iterator[Plan]:
-    """Yield every plan that disturbs a request, given the number of a workload's requests of each kind."""
+    """Yield every plan that disturbs a request; `counts` has each workload's requests by kind."""
     workloads = tuple(counts)
     most = max((number for each in counts.values() for number in each.values()), default=0)
     for seed in range(most * len(ROWS) * len(workloads)):

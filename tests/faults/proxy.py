@@ -1,7 +1,8 @@
-"""A proxy between an operator and its API server passes everything on, and disturbs it once by a plan.
+"""A proxy between an operator and its API server. It passes all requests on, and causes one fault by a plan.
 
-The operator speaks plain HTTP to it on the loopback. To the API server it uses the operator's certificate, so
-that permissions and the audit log are the operator's own. It does not change the data.
+The operator speaks plain HTTP to the proxy on the loopback interface. The proxy uses the operator's
+certificate, so the API server checks and logs the operator's own permissions. The proxy does not change the
+data.
 """
 
 import http.server
@@ -30,21 +31,21 @@ REASONS = {
     503: "ServiceUnavailable",
 }
 CONNECTIONS = 64
-LONGEST_S = 700.0  # longer than the operator lets a watch live
-LOOK_S = 0.05  # the delay with which the server notices its end
+LONGEST_S = 700.0  # longer than a watch of the operator lives
+LOOK_S = 0.05  # the delay until the server notices that it must stop
 BOOKMARK = b'"type":"BOOKMARK"'
 
 
 class Broken(Exception):
-    """The connection must be closed at once, without another byte."""
+    """The proxy must close the connection at once, without another byte."""
 
 
 class Proxy:
-    """A proxy on the loopback, until it is closed.
+    """A proxy on the loopback interface, which runs until it is closed.
 
     Attributes:
-        course: the counted requests.
-        kill: kills the operator and returns when it is dead; set before the operator starts.
+        course: counts the requests.
+        kill: kills the operator and returns when it is dead; set this before the operator starts.
     """
 
     def __init__(self, kubeconfig: Path, course: Course) -> None:
@@ -78,14 +79,14 @@ class Proxy:
         return self._closing.is_set()
 
     def pause(self, seconds: float) -> None:
-        """Wait, but not longer than the proxy lives."""
+        """Wait, but return at once when the proxy closes."""
         self._closing.wait(seconds)
 
     def send(self, method: str, target: str, headers: dict[str, str], body: bytes) -> Any:
-        """Return the API server's response, of which only the head was read.
+        """Return the API server's response, of which only the head has been read.
 
         Raises:
-            Broken: there was no response.
+            Broken: the API server sent no response.
         """
         try:
             answer = self._pool.request(
@@ -105,18 +106,18 @@ class Proxy:
         return answer
 
     def done(self, answer: Any) -> None:
-        """Close a response that was read or is no longer needed."""
+        """Close a response after it was read, or when nobody needs it any more."""
         self._open.pop(id(answer), None)
         answer.close()
 
     def break_all(self) -> None:
         """End every response in progress, including those of watches."""
         for answer in list(self._open.values()):
-            with suppress(ValueError, RuntimeError, OSError):  # it has already ended
+            with suppress(ValueError, RuntimeError, OSError):  # the response has already ended
                 answer.shutdown()
 
     def close(self) -> None:
-        """End everything, including watches."""
+        """Stop the proxy, and end all responses, including those of watches."""
         self._closing.set()
         self._server.shutdown()
         self._thread.join()
@@ -148,7 +149,7 @@ class _Handler(http.server.BaseHTTPRequestHandler):
     def do_GET(self) -> None:
         self._pass_on()
 
-    do_POST = do_PUT = do_PATCH = do_DELETE = do_GET  # noqa: N815 - as the standard library calls them
+    do_POST = do_PUT = do_PATCH = do_DELETE = do_GET  # noqa: N815 - the standard library defines these names
 
     def _pass_on(self) -> None:
         body = self.rfile.read(int(self.headers.get("Content-Length") or 0))
@@ -260,7 +261,7 @@ def _status(code: int) -> dict[str, Any]:
 
 
 def _pool(kubeconfig: Path) -> tuple[str, urllib3.PoolManager]:
-    """Return address and connection pool of the API server in a kubeconfig with certificates."""
+    """Return the API server's address and a connection pool, from a kubeconfig with certificates."""
     content = yaml.safe_load(kubeconfig.read_text())
     cluster, user = content["clusters"][0]["cluster"], content["users"][0]["user"]
     pool = urllib3.PoolManager(

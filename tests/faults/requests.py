@@ -1,11 +1,11 @@
-"""The meaning of an operator's request, from its first line; pure, so that plans can name requests."""
+"""Parse a request of an operator, so that plans and reports can name it. Pure."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from urllib.parse import parse_qs, urlsplit
 
 WRITE, EVENT, GET, LIST, WATCH, CHANGE, LEASE = "write", "event", "get", "list", "watch", "change", "lease"
-ANSWER = "answer"  # a trainer sends it; the API server sends all other responses
+ANSWER = "answer"  # a trainer sends this response; all others come from the API server
 METHODS = {"GET": "get", "POST": "create", "PUT": "update", "PATCH": "patch", "DELETE": "delete"}
 APPLY = "application/apply-patch"
 GROUP_PARTS = {"api": 2, "apis": 3}  # /api/v1, /apis/batch/v1
@@ -13,12 +13,12 @@ GROUP_PARTS = {"api": 2, "apis": 3}  # /api/v1, /apis/batch/v1
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Asked:
-    """One request, as RBAC names it.
+    """One request, in the words of RBAC.
 
     Attributes:
         verb: `get`, `list`, `watch`, `create`, `apply`, `patch` or `delete`.
         resource: the plural, with a subresource after a slash: `trainingjobs/status`.
-        name: of the object; "" if the request names none.
+        name: the name of the object, or "" if the request names none.
     """
 
     verb: str
@@ -27,7 +27,7 @@ class Asked:
 
     @property
     def kind(self) -> str:
-        """The kind by which plans count it: a write, an event, a get, a list, a watch, or the Lease's."""
+        """The kind by which plans count the request: write, event, get, list, watch, or lease."""
         plural = self.resource.partition("/")[0]
         if plural == "leases":
             return LEASE
@@ -42,7 +42,7 @@ class Asked:
 
 
 def asked(method: str, target: str, headers: Mapping[str, str]) -> Asked:
-    """Return the meaning of a request, from its method, its path with query, and its headers."""
+    """Return a request's verb and object, from its method, its path with query, and its headers."""
     address = urlsplit(target)
     parts = address.path.strip("/").split("/")
     resource, name = _object(parts[GROUP_PARTS.get(parts[0], len(parts)) :])
@@ -56,7 +56,7 @@ def asked(method: str, target: str, headers: Mapping[str, str]) -> Asked:
 
 def _object(parts: list[str]) -> tuple[str, str]:
     """Return resource and name from the path after group and version."""
-    if len(parts) > 2 and parts[0] == "namespaces":  # otherwise it is a Namespace itself
+    if len(parts) > 2 and parts[0] == "namespaces":  # two parts name a Namespace itself
         parts = parts[2:]
     plural, name, *below = [*parts, "", ""][: max(len(parts), 2)]
     return (f"{plural}/{below[0]}" if below else plural), name

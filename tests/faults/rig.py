@@ -1,4 +1,4 @@
-"""Run plans on a control plane, and compare each with the undisturbed runs of its workload."""
+"""Run plans on a control plane, and compare each run with the undisturbed runs of its workload."""
 
 import tempfile
 import threading
@@ -21,9 +21,9 @@ from tests.faults.workloads import WORKLOADS, Stage
 from tests.integration.operator.installed import USER
 from tests.waiting import TooLate
 
-CALL_S = 60.0  # for one request of the rig on a busy machine
+CALL_S = 60.0  # the timeout of one request of the tests, on a busy machine
 QUIET_S = 3.0
-SETTLES_S = 90.0  # a failed action is retried after a minute at most
+SETTLES_S = 90.0  # the operator retries a failed action after a minute at most
 PACE_S = 0.3
 
 
@@ -32,12 +32,12 @@ class Run:
     """The result of one run of a workload.
 
     Attributes:
-        state: its end state, as leaves.
-        counts: the number of the operator's requests of each kind.
-        met: the request at which the fault occurred; "" if it never did.
-        lives: the number of operators that it took.
-        wrong: violated conditions, as sentences.
-        seconds: its duration.
+        state: the end state, as leaves.
+        counts: the number of the operator's requests by kind.
+        met: the request that got the fault, or "" if none did.
+        lives: the number of times that the operator was started.
+        wrong: a sentence for each violated condition.
+        seconds: the duration of the run.
     """
 
     state: Leaves = field(default_factory=dict)
@@ -50,12 +50,12 @@ class Run:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Undisturbed:
-    """The result of a workload without a fault.
+    """The result of a workload without a fault, from two runs.
 
     Attributes:
-        state: the end state of its first run.
-        masked: the paths at which the second one differs.
-        counts: the least number of the operator's requests of each kind.
+        state: the end state of the first run.
+        masked: the paths at which the second run differs.
+        counts: the operator's requests by kind: the smaller number of both runs.
     """
 
     state: Leaves
@@ -81,7 +81,7 @@ class Rig:
         """Return the result of a workload without a fault; the first call runs it twice.
 
         Raises:
-            AssertionError: a condition is violated although nothing disturbs.
+                AssertionError: a condition is violated even though no fault occurs.
         """
         with self._locks[workload]:
             if workload not in self._undisturbed:
@@ -95,7 +95,7 @@ class Rig:
             return self._undisturbed[workload]
 
     def run(self, plan: Plan) -> Run:
-        """Run a plan and return its result; `wrong` is empty if the end is the same."""
+        """Run a plan and return the result; `wrong` is empty if the end state equals the undisturbed one."""
         return self._run(plan.workload, plan.fault, self.undisturbed(plan.workload))
 
     def _run(self, workload: str, fault: Fault | None, wanted: Undisturbed | None) -> Run:
@@ -133,7 +133,7 @@ class Rig:
 
 
 def _played(place: Stage, workload: str) -> list[str]:
-    """Run a workload's script, and return the condition for which it waited in vain."""
+    """Run a workload's script; return the condition that it did not reach, or an empty list."""
     try:
         WORKLOADS[workload](place)
     except TooLate as late:
@@ -144,7 +144,10 @@ def _played(place: Stage, workload: str) -> list[str]:
 def _settled(
     place: Stage, course: Course, pods: PodWatch, wanted: Undisturbed | None
 ) -> tuple[Leaves, list[str]]:
-    """Return the end state when it is as wanted and no request is sent, and the violated conditions."""
+    """Wait until the end state is as wanted and the operator is idle.
+
+    Return the end state, and the conditions that are still violated after the timeout.
+    """
     ends = time.monotonic() + SETTLES_S
     while True:
         found = end_state(place, pods.changes())
@@ -156,4 +159,4 @@ def _settled(
             wrong.append(f"still asks: {course.last(5)}")
         if not wrong or time.monotonic() > ends:
             return state, wrong
-        time.sleep(PACE_S)  # an API server that is polled must have time for its work
+        time.sleep(PACE_S)  # a shorter pace would load the API server

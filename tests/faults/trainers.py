@@ -1,6 +1,7 @@
-"""Trainers that serve their status on addresses of the loopback, correctly or as a plan says.
+"""Trainers that serve their status on loopback addresses, correctly or with a fault.
 
-From the response that the plan names, a trainer keeps its fault: slow, cut in half, false, or endless.
+From the response that the plan names, all responses of the trainer have the fault: slow, cut, false, or
+endless.
 """
 
 import threading
@@ -19,21 +20,21 @@ LIES = (
     replace(STATUS, step=10**18, target=10**18, attempt=10**9, steps_lost=10**18, phase="\x00" * 63),
     replace(STATUS, step=0, attempt=None, last_progress="9999-12-31T23:59:59Z", success_rate=1.0),
 )
-DRIBBLE_S = 0.2  # between two bytes: a response takes a minute
+DRIBBLE_S = 0.2  # between two bytes, so that a response takes a minute
 ENDLESS = b" " * 65_536
-MOST_PIECES = 4096  # 256 MiB, unless the operator closes the connection
+MOST_PIECES = 4096  # 256 MiB in total, unless the operator closes the connection first
 
 
 class Trainer:
-    """A trainer's /status on its own address, from now until it is closed.
+    """The /status of a trainer, served on an address of its own until `close`.
 
     Attributes:
-        host: its address.
-        asked: the times of its requests, in seconds of the monotonic clock.
+        host: the address.
+        asked: the times of the requests, in seconds of the monotonic clock.
     """
 
     def __init__(self, course: Course | None) -> None:
-        """Serve correctly, or as the plan of `course` says."""
+        """Serve correct responses, or responses with the fault that the plan of `course` names."""
         self.asked: list[float] = []
         self._course = course
         self._is: Kind | None = None

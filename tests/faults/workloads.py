@@ -1,6 +1,6 @@
-"""Actions of people, kubelets and queues while an operator is disturbed: scripts over several jobs.
+"""Scripts of workloads: actions of people, kubelets and queues while the operator meets a fault.
 
-A script waits for states of the cluster, and leaves no job that still trains.
+A script waits for states of the cluster, and no job trains at its end.
 """
 
 from collections.abc import Callable
@@ -16,23 +16,23 @@ from tests.faults.trainers import Trainer
 from tests.integration.operator.cluster import Place, world_map, world_of
 from tests.waiting import eventually
 
-PATIENCE_S = 90.0  # a disturbed operator may return to a job half a minute later
+PATIENCE_S = 90.0  # after a fault, the operator may retry a job only after half a minute
 DONE = Termination(step=20, reason="Completed", success_rate=0.9)
 SAVED = Termination(step=20, reason="Interrupted: SIGTERM received")
 BUDGET_SPENT, INTERRUPTED = 80, 75
-# Kubernetes' times are whole seconds: a queue's actions that are closer together have no order.
+# The times in Kubernetes are whole seconds, so the order of two actions within one second is unknown.
 DISTINCT_S = 3.0
-NOBODY = "127.0.0.1"  # no trainer listens here
+NOBODY = "127.0.0.1"  # an address at which no trainer listens
 
 Object = dict[str, Any]
 
 
 class Stage(Place):
-    """A namespace with people, a kubelet and trainers that respond; it ends with its block.
+    """A namespace for a script, with a kubelet and trainers; it exists until the block ends.
 
     Args:
         api: an administrator's client.
-        course: its plan sets the trainers' faults.
+        course: names the fault of the trainers.
     """
 
     def __init__(self, api: Api, course: Course) -> None:
@@ -41,7 +41,7 @@ class Stage(Place):
         self._trainers: list[Trainer] = []
 
     def trainer(self, *, honest: bool = True) -> Trainer:
-        """Return a new trainer; one that is not honest responds as the plan says."""
+        """Return a new trainer; unless it is `honest`, it responds with the fault of the plan."""
         self._trainers.append(Trainer(None if honest else self._course))
         return self._trainers[-1]
 
@@ -51,7 +51,7 @@ class Stage(Place):
     def __exit__(self, *_: object) -> None:
         for each in self._trainers:
             each.close()
-        with suppress(ApiError):  # a leftover costs the next runs only some memory
+        with suppress(ApiError):  # a namespace that stays costs later runs only some memory
             self.api.delete(NAMESPACES, None, self.name)
 
 
@@ -59,7 +59,7 @@ Script = Callable[[Stage], None]
 
 
 def ends(place: Stage) -> None:
-    """One job succeeds, one fails finally, one is refused, and one gets its world late."""
+    """Four jobs: one succeeds, one fails, one has an invalid spec, and one gets its world late."""
     place.train("good", replicas=2)
     place.train("bad")
     place.train("wrong", trainer={"algorithm": {"name": "SAC"}})
@@ -78,7 +78,7 @@ def ends(place: Stage) -> None:
 
 
 def pauses(place: Stage) -> None:
-    """A job is suspended before its pod runs, resumed, suspended while it runs, resumed, and succeeds."""
+    """One job is suspended before its pod runs, resumed, suspended while it runs, resumed, and succeeds."""
     place.train("paused", suspend=True)
     place.train("beside")
     place.until("Suspended", "paused", PATIENCE_S)
@@ -94,7 +94,7 @@ def pauses(place: Stage) -> None:
 
 
 def again(place: Stage) -> None:
-    """A job on a lost node is deleted and created again; the Job of another one is deleted."""
+    """One job, on a lost node, is deleted and created again; the Job of another job is deleted."""
     place.train("again")
     place.train("robbed")
     [lost] = place.pods("again", 1, PATIENCE_S)
@@ -112,7 +112,7 @@ def again(place: Stage) -> None:
 
 
 def deadlines(place: Stage) -> None:
-    """One job gets a deadline while it runs, and exceeds it; one is deleted a second after its end."""
+    """One job gets a deadline while it runs and exceeds it; another is deleted a second after its end."""
     place.train("slow")
     place.train("brief", ttlSecondsAfterFinished=1)
     _running(place, "slow")
@@ -124,7 +124,7 @@ def deadlines(place: Stage) -> None:
 
 
 def evictions(place: Stage) -> None:
-    """A pod is evicted and the next one continues; the Job controller waits in between, for 10 s."""
+    """A pod is evicted, and the next pod, which the Job controller creates after 10 s, resumes."""
     place.train("taken", backoffLimit=0)
     [pod] = _running(place, "taken")
     place.take(pod, "EvictionByEvictionAPI", "Eviction API: evicting")
@@ -136,7 +136,7 @@ def evictions(place: Stage) -> None:
 def queues(place: Stage) -> None:
     """A queue admits a job, preempts it and admits it again.
 
-    It suspends another job without being named by it.
+    It does the same with a job that does not name the queue.
     """
     place.train("queued", scheduling={"queueName": "robots"})
     place.train("seized")
@@ -156,7 +156,7 @@ def queues(place: Stage) -> None:
 
 
 def trainers(place: Stage) -> None:
-    """Two jobs train at the same time, and each is polled for its progress."""
+    """Two jobs train at the same time, and the operator polls both for their progress."""
     honest, other = place.trainer(), place.trainer(honest=False)
     place.train("honest")
     place.train("other")
@@ -182,7 +182,7 @@ WORKLOADS: dict[str, Script] = {
 
 
 def _running(place: Stage, name: str, count: int = 1, at: str = NOBODY) -> list[Object]:
-    """Let the pods of a job run, and return them when its status says that it runs."""
+    """Let the pods of a job run; return them when the job's status is Running."""
     pods = place.pods(name, count, PATIENCE_S)
     for pod in pods:
         place.run(pod, at)
@@ -197,7 +197,7 @@ def _succeed(place: Stage, name: str) -> None:
 
 
 def _succeed_at_once(place: Stage, name: str) -> None:
-    """Let a job succeed that may be deleted before the operator sees it."""
+    """Let a job succeed and return at once, because the job may be deleted before its status is set."""
     for pod in place.pods(name, 1, PATIENCE_S):
         place.run(pod)
         place.end(pod, word=DONE)
@@ -217,7 +217,7 @@ def _age_s(pod: Object) -> float:
 
 
 def _others(place: Stage, name: str, pod: Object) -> list[Object]:
-    """Return the pods of a job that have not ended, except one."""
+    """Return the pods of a job that have not ended, except `pod`."""
     return [
         each for each in place.pods(name, 1, PATIENCE_S) if each["metadata"]["uid"] != pod["metadata"]["uid"]
     ]

@@ -1,19 +1,19 @@
-"""Record the generated files again: `python -m tests.golden`.
+"""Write all generated files again: `python -m tests.golden`.
 
 - `tests/golden/`: the plans of the examples and of the cases, see `plans.py`
-- `manifests/crd.yaml`, docs/reference/trainingjob.md: made from the API's models
+- `manifests/crd.yaml`, docs/reference/trainingjob.md: from the models of the API
 - `docs/reference/trainingjob.md`: the default hyperparameters of the algorithms
-- `docs/reference/algorithms.md`: which algorithm works with which observations and actions
+- `docs/reference/algorithms.md`: the observations and actions that each algorithm supports
 - `docs/reference/metrics.md`: every metric that the programs declare
 - `docs/reference/simulators.md`: the devices of the stub
 - `docs/reference/ros-interface.md`: the services and topics of a robot
 - `docs/explain/judging.md`: the checks on a replica, in their order
 - `llms.txt`: the pages that docs/README.md links to
-- `charts/palaestra/README.md`: made from its values.yaml
-- `charts/palaestra/dashboards/*.json`: made by tools/dashboards
-- `manifests/install.yaml`: the chart with its default values, where Helm is built
+- `charts/palaestra/README.md`: from the chart's values.yaml
+- `charts/palaestra/dashboards/*.json`: from tools/dashboards
+- `manifests/install.yaml`: the chart with its default values, if Helm is built
 
-A new example or case needs no new test: its plans are recorded here and compared by test_golden.py.
+A new example or case needs no new test: this program writes its plans, and test_golden.py compares them.
 """
 
 import sys
@@ -37,7 +37,7 @@ ROOT = Path(__file__).parents[2]
 
 
 def recorded() -> Iterator[tuple[Path, str]]:
-    """Yield every generated file and what belongs into it."""
+    """Yield the path and the content of every generated file."""
     yield from plans.recorded()
     for name, text in generated_files(ROOT).items():
         yield ROOT / name, text
@@ -51,14 +51,14 @@ def recorded() -> Iterator[tuple[Path, str]]:
     for name, text in dashboards.generated_files().items():
         yield ROOT / name, text
     yield readme.PATH, readme.text()
-    with suppress(NoPrograms):  # without Helm the file stays as it is; a change of the chart needs Helm
+    with suppress(NoPrograms):  # without Helm, the file is not written
         yield installation.PATH, installation.text()
 
 
 def main() -> int:
-    """Write every file; recorded plans of examples and cases that are gone are removed."""
+    """Write every file, and remove the recorded plans of examples and cases that no longer exist."""
     current = set()
-    for path, text in recorded():  # in this order: the installation is rendered from the files before it
+    for path, text in recorded():  # in this order, because the installation is rendered from earlier files
         path.write_text(text)
         current.add(path)
     for stale in plans.on_disk() - current:

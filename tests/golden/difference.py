@@ -1,7 +1,8 @@
-"""The difference between two plans, for a person to read.
+"""The difference between two plans, in a form that a person can read.
 
-It is a unified diff whose hunks are headed by a place in an object, not by line numbers. So a line that is
-added to every plan changes only the plans that are recorded whole, and no difference.
+The result is a unified diff. The head of a hunk names a place in an object instead of line numbers. So if
+every plan gets a new line, only the two plans that are recorded whole change, and the recorded differences do
+not.
 """
 
 import re
@@ -10,16 +11,16 @@ from collections.abc import Iterator
 from difflib import SequenceMatcher
 from typing import NamedTuple
 
-CONTEXT = 1  # lines around a change; the head of a hunk names the place of the change
+CONTEXT = 1  # lines before and after a change
 
-Change = tuple[str, int, int, int, int]  # as difflib's: a tag, then the lines before and now
+Change = tuple[str, int, int, int, int]  # as in difflib: a tag, and the lines before and now
 
 
 class Line(NamedTuple):
-    """A line of a plan, and its place: the kind of its object, then the names of the fields around it.
+    """A line of a plan, and its place: the kind of its object, and the names of the fields around the line.
 
-    Lines of different places are never equal. Containers have the same fields, so difflib would otherwise
-    match the end of one container with the end of another.
+    Lines with different places are never equal. Otherwise difflib would match the end of one container with
+    the end of another, because all containers have the same fields.
     """
 
     place: str
@@ -27,16 +28,16 @@ class Line(NamedTuple):
 
 
 def difference(before: str, now: str) -> Iterator[str]:
-    """Yield the hunks of the diff from one plan to another, each with the place of its first change."""
+    """Yield the hunks of the diff between two plans; the head names the place of the first change."""
     old, new = lines_of(before), lines_of(now)
-    # autojunk would ignore lines that a plan has often.
+    # With autojunk, difflib would ignore lines that occur often in a plan.
     changes = SequenceMatcher(None, old, new, autojunk=False)
     for hunk in changes.get_grouped_opcodes(CONTEXT):
         yield "".join(f"{line}\n" for line in (f"@@ {_place(hunk, old, new)} @@", *_signed(hunk, old, new)))
 
 
 def lines_of(plan: str) -> list[Line]:
-    """Return the lines of a plan in YAML with their places; a second object of a kind is `<kind> 2`."""
+    """Return the lines of a plan in YAML with their places; the second object of a kind is `<kind> 2`."""
     seen: Counter[str] = Counter()
     lines: list[Line] = []
     for document in re.split(r"(?m)^---\n", plan):
@@ -48,9 +49,10 @@ def lines_of(plan: str) -> list[Line]:
 
 
 def _placed(texts: list[str], root: str) -> Iterator[Line]:
-    """Yield the lines of an object below `root`; a line lies in those before it that are indented less.
+    """Yield the lines of an object; `root` is the first part of their places.
 
-    An item of a list may be indented as its key is, and lies in it.
+    The other parts are the earlier lines with less indentation. A list's item may have the indentation of the
+    list's key, and is inside it.
     """
     around: list[tuple[tuple[int, bool], str]] = []
     for text in texts:
@@ -64,7 +66,7 @@ def _placed(texts: list[str], root: str) -> Iterator[Line]:
 
 
 def _name(content: str) -> str:
-    """Return the name of a line in the places of the lines below it: its key; of a list's item, a value."""
+    """Return the name that a line adds to the places below it: a key, or a value for an item of a list."""
     key, _, value = content.removeprefix("- ").partition(":")
     return value.strip() or key if content.startswith("- ") else key
 
@@ -76,7 +78,7 @@ def _place(hunk: list[Change], old: list[Line], new: list[Line]) -> str:
 
 
 def _signed(hunk: list[Change], old: list[Line], new: list[Line]) -> Iterator[str]:
-    """Yield the lines of a hunk: the lines that are gone, the new ones, and the context."""
+    """Yield the lines of a hunk with their signs: removed lines, added lines, and context."""
     for tag, old_start, old_end, new_start, new_end in hunk:
         if tag == "equal":
             yield from (f" {line.text}" for line in old[old_start:old_end])

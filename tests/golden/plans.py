@@ -1,12 +1,12 @@
-"""The plans that are recorded: two whole, and every other one as its difference from one of them.
+"""The recorded plans: two are whole, and every other plan is a difference from one of these two.
 
 - `minimal.<layout>.yaml`: the whole plan of manifests/examples/minimal.yaml, in a cluster and on a laptop
-- `examples/<example>.diff`: each other example, compared with minimal.yaml under the example's name; first
-  the hunks that are the same in both layouts, then those of one layout
+- `examples/<example>.diff`: the difference of each other example from minimal.yaml with the example's name;
+  hunks that are equal in both layouts come first
 - `cases/<case>.plan.diff`: each `cases/<case>.job.yaml`, merged into minimal.yaml, in a cluster
 
-In a difference, a world is one line with its checksum, and the name of a ConfigMap is without the hash of its
-data, because the data are there.
+In a difference, a world is one line with a checksum. The name of a ConfigMap has no hash, because the
+difference contains the data.
 """
 
 import hashlib
@@ -35,10 +35,10 @@ CASES = HERE / "cases"
 JOB = ".job.yaml"
 SMALLEST = "minimal"
 LAYOUTS = ("cluster", "local")
-IMAGES = Images.of_release("0.0.0")  # not the version of any release, so that a release changes no plan
+IMAGES = Images.of_release("0.0.0")  # no release has this version, so a release changes no plan
 UID = "0d1f3e5a-7c2b-4d68-9a40-c3b2a1908f7e"
 
-Compared = tuple[str, str]  # the plan of the smallest job, and the plan that is compared with it
+Compared = tuple[str, str]  # the plan of the smallest job, and the plan that is compared to it
 
 
 def recorded() -> Iterator[tuple[Path, str]]:
@@ -59,7 +59,7 @@ def recorded() -> Iterator[tuple[Path, str]]:
 
 
 def on_disk() -> set[Path]:
-    """Return the files of recorded plans, also of those that nothing makes any more."""
+    """Return the files of recorded plans, including files that no example or case writes any more."""
     return {*HERE.glob("*.yaml"), *HERE.glob("*/*.diff")}
 
 
@@ -79,18 +79,18 @@ def cases() -> list[Path]:
 
 
 def plan_of(path: Path) -> Path:
-    """Return the file with the plan of a case."""
+    """Return the file in which the plan of a case is recorded."""
     return path.with_name(f"{path.name.removesuffix(JOB)}.plan.diff")
 
 
 def case(path: Path) -> TrainingJob:
-    """Return the smallest job with the fields of a case."""
+    """Return the job of a case: the smallest job with the fields of the case's file."""
     smallest, changes = (read(file.read_text(), file.name) for file in (EXAMPLES / f"{SMALLEST}.yaml", path))
     return identified(load(write(merged(smallest, changes)), path.name), UID)
 
 
 def merged(base: Any, changes: Any) -> Any:
-    """Return `base` with `changes`; fields are merged, and items of a list that have the same `name`."""
+    """Return `base` with `changes`: fields are merged, and so are items of a list with the same `name`."""
     if isinstance(base, dict) and isinstance(changes, dict):
         return {**base, **{key: merged(base.get(key), value) for key, value in changes.items()}}
     if isinstance(base, list) and isinstance(changes, list):
@@ -105,13 +105,13 @@ def renamed(job: TrainingJob, name: str) -> TrainingJob:
 
 
 def plans_of(name: str) -> dict[str, Compared]:
-    """Return by layout the plan of the smallest job under the name of an example, and that of the example."""
+    """Return, by layout, the smallest job's plan under the example's name, and the example's plan."""
     before, now = renamed(example(SMALLEST), name), example(name)
     return {layout: (comparable(before, layout), comparable(now, layout)) for layout in LAYOUTS}
 
 
 def compared(job: str, plans: Mapping[str, Compared]) -> str:
-    """Return the differences of the plans of a job; hunks that all layouts have are there once."""
+    """Return the differences between the plans of a job; a hunk of all layouts occurs once."""
     hunks = {layout: Counter(difference(*pair)) for layout, pair in plans.items()}
     shared = reduce(and_, hunks.values())
     parts = [(tuple(plans), shared), *(((layout,), own - shared) for layout, own in hunks.items())]
@@ -119,7 +119,7 @@ def compared(job: str, plans: Mapping[str, Compared]) -> str:
 
 
 def headed(job: str, layouts: Iterable[str], hunks: Iterable[str]) -> str:
-    """Return hunks below two lines that name the plans which they compare."""
+    """Return hunks after two lines that name the compared plans."""
     bases = ", ".join(f"{SMALLEST}.{layout}.yaml" for layout in layouts)
     return "".join((f"--- {bases}\n", f"+++ {job}\n", *hunks))
 
@@ -130,7 +130,7 @@ def text_of(job: TrainingJob, layout: str) -> str:
 
 
 def comparable(job: TrainingJob, layout: str) -> str:
-    """Return the plan of a job, with `HASH` wherever the plan has the hash of its ConfigMaps' data."""
+    """Return the plan of a job, in which `HASH` replaces the hash of each ConfigMap's data."""
     text = text_of(job, layout)
     for planned in objects_of(job, layout):
         if "data" in planned:
@@ -145,14 +145,14 @@ def objects_of(job: TrainingJob, layout: str) -> Iterable[Object]:
 
 
 def layout_of(job: TrainingJob, name: str) -> Layout:
-    """Return the layout of that name, for a job."""
+    """Return the layout with a name, for a job."""
     if name == "cluster":
         return ClusterLayout(images=IMAGES)
     return LocalLayout(images=IMAGES, job_directory=f"/runs/{job.metadata.name}")
 
 
 def with_worlds_named(objects: Iterable[Object]) -> list[Object]:
-    """Return the objects with one line for each world, so that a plan can be read."""
+    """Return the objects with one line in place of each world, so that a person can read the plan."""
     return [
         {**planned, "data": {key: named(key, text) for key, text in planned["data"].items()}}
         if "data" in planned
@@ -162,7 +162,7 @@ def with_worlds_named(objects: Iterable[Object]) -> list[Object]:
 
 
 def named(key: str, text: str) -> str:
-    """Return the name, length and checksum of a text that is a world, and any other text unchanged."""
+    """Return the name, length and checksum of a world; return a text that is not a world unchanged."""
     if key == FILE:
         return text
     name = next((name for name in Builtin if builtin(name) == text.encode()), "the job's own world")

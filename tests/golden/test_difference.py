@@ -1,4 +1,4 @@
-"""The difference between two plans: short, readable, and complete."""
+"""The difference between two plans is short and readable, and shows every change."""
 
 from functools import cache
 
@@ -26,7 +26,7 @@ spec:
 
 
 def test_a_hunk_is_headed_by_the_place_of_its_first_change():
-    """A number of a line would change with every line above it."""
+    """A line number would change whenever a line above is added, in every recorded difference."""
     now = TWO.replace("second\n    image: a", "second\n    image: b")
 
     assert "".join(difference(TWO, now)) == (
@@ -35,7 +35,7 @@ def test_a_hunk_is_headed_by_the_place_of_its_first_change():
 
 
 def test_a_new_container_is_one_hunk():
-    """Its fields are those of its neighbors, among which difflib alone would spread them."""
+    """Containers have equal fields, and difflib alone would split the new one among its neighbors."""
     added = "  - name: added\n    image: a\n    env:\n    - name: SIZE\n      value: '1'\n"
     now = TWO.replace("  - name: second\n", f"{added}  - name: second\n")
 
@@ -46,14 +46,14 @@ def test_a_new_container_is_one_hunk():
 
 
 def test_equal_objects_of_a_kind_are_different_places():
-    """Each replica has a Job; the second is not the first."""
+    """Each replica has a Job, so a reader must see which Job changed."""
     [hunk] = difference(f"{TWO}---\n{TWO}", f"{TWO}---\n{TWO.replace('image: a', 'image: b', 1)}")
 
     assert hunk.startswith("@@ Job 2 spec.containers.first @@\n")
 
 
 def test_equal_plans_have_no_difference():
-    """A recorded difference is therefore empty, not missing."""
+    """The recorded difference of such a plan is an empty file, not a missing one."""
     assert list(difference(TWO, TWO)) == []
 
 
@@ -78,7 +78,7 @@ EDITS = {
     st.randoms(use_true_random=False),
 )
 def test_a_change_of_any_line_of_an_example_s_plan_changes_what_is_recorded(name, layout, edit, chance):
-    """The recorded difference proves as much as the whole plan would."""
+    """A test of the recorded difference therefore detects every change that the whole plan would show."""
     before, now = pairs(name)[layout]
     lines = now.splitlines()
     number = chance.choice([number for number, line in enumerate(lines) if line != "---"])

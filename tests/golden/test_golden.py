@@ -1,4 +1,4 @@
-"""Every recorded plan and every generated file is current; `make golden` records them again."""
+"""Every recorded plan and every generated file is up to date; `make golden` writes them again."""
 
 import runpy
 from difflib import unified_diff
@@ -9,24 +9,24 @@ from tests.golden import plans
 from tests.tables import for_each
 
 ROOT = plans.HERE.parents[1]
-MOST_LINES = 40  # a message shows so many; git shows all of them after `make golden`
+MOST_LINES = 40  # of a message; after `make golden`, git shows all lines
 
 
 @cache
 def recorded():
-    """Return the text that belongs into each generated file, by its path."""
+    """Return the content of each generated file, by path."""
     return dict(runpy.run_path(str(plans.HERE / "__main__.py"), run_name="golden")["recorded"]())
 
 
 def change_of(path):
-    """Return the difference between a file and its generated content, in lines; empty if it is current."""
+    """Return the difference between a file and its generated content, as lines; empty if there is none."""
     before, now = path.read_text() if path.exists() else "", recorded()[path]
     return list(unified_diff(before.splitlines(), now.splitlines(), "recorded", "now", lineterm=""))
 
 
 @for_each("path", recorded)
 def test_a_generated_file_is_current(path):
-    """A review of a plan shows the objects that a cluster will get."""
+    """A reviewer sees in the recorded plans which objects a cluster will get."""
     change = change_of(path)
     shown = "\n".join(islice(change, MOST_LINES))
 
@@ -34,13 +34,13 @@ def test_a_generated_file_is_current(path):
 
 
 def test_every_recorded_plan_has_its_example_or_case():
-    """A reader would believe a recorded plan that nothing makes any more."""
+    """A reader would trust a recorded plan even though no code produces it any more."""
     assert plans.on_disk() <= recorded().keys()
 
 
 @for_each("job", plans.cases)
 def test_a_case_says_what_it_shows_and_shows_it(job):
-    """The first line is the caption of the pair; a case without a difference shows nothing."""
+    """The caption tells a reader what the case shows, so a case without a difference would be useless."""
     caption, _, fields = job.read_text().partition("\n")
 
     assert caption.startswith("# ")
@@ -50,7 +50,7 @@ def test_a_case_says_what_it_shows_and_shows_it(job):
 
 @for_each("name, layout", lambda: [(name, layout) for name in plans.examples() for layout in plans.LAYOUTS])
 def test_the_name_of_a_job_changes_nothing_in_its_plan_but_the_name(name, layout):
-    """The difference of an example leaves out what its plan has in common with this one."""
+    """The recorded difference of an example compares two plans under one name, so only names may differ."""
     smallest = plans.example(plans.SMALLEST)
     whole = plans.comparable(smallest, layout)
     in_ros = name.replace("-", "_")

@@ -1,4 +1,4 @@
-"""Fixtures for several folders: a real ROS master, and a real API server without nodes."""
+"""Fixtures for several folders: a ROS master, and a real API server without nodes."""
 
 import os
 from collections.abc import Iterator
@@ -11,14 +11,14 @@ from tests.control_plane import shared
 from tests.control_plane.plane import ControlPlane
 from tests.integration.operator.cluster import Place
 
-RUN = shared.Run.of_this_process()  # the module is imported before the workers start
+RUN = shared.Run.of_this_process()  # created before pytest's workers, which inherit its environment
 
 
 @pytest.fixture(scope="session")
 def master() -> str:
-    """Return the master of this process.
+    """Start the ROS master of this process, and return its URI.
 
-    rospy registers only once, so there is one master per process, and it ends with the process.
+    rospy can register only once, so each process has one master, which ends with the process.
     """
     os.environ["ROS_HOSTNAME"] = "localhost"
     os.environ["ROS_MASTER_URI"] = "http://localhost:1"
@@ -28,21 +28,21 @@ def master() -> str:
 
 @pytest.fixture(scope="session")
 def control_plane(tmp_path_factory: pytest.TempPathFactory) -> ControlPlane:
-    """Return the control plane of the whole run; each test uses a separate namespace.
+    """Return the control plane of the whole run, with all objects of install.yaml except the Deployment.
 
-    Everything in install.yaml except the Deployment is installed.
+    Each test uses its own namespace.
     """
     return shared.joined(RUN, tmp_path_factory.mktemp("clients"))
 
 
 def pytest_unconfigure() -> None:
-    """End the control plane with the run."""
+    """End the control plane after the run."""
     shared.end(RUN)
 
 
 @pytest.fixture(scope="session")
 def installed(control_plane: ControlPlane) -> Iterator[Api]:
-    """Yield a client of an administrator."""
+    """Yield an administrator's client of the control plane."""
     api = connect(str(control_plane.kubeconfig))
     yield api
     api.close()
@@ -50,7 +50,7 @@ def installed(control_plane: ControlPlane) -> Iterator[Api]:
 
 @pytest.fixture
 def prefix() -> str:
-    """Return the prefix of the namespace's name."""
+    """Return the prefix for the names of namespaces."""
     return "place"
 
 

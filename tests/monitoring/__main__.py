@@ -1,9 +1,9 @@
-"""Draw dashboards for the documentation: `python -m tests.monitoring [NAME…]`; all of them take ten minutes.
+"""Draw dashboards for the documentation: `python -m tests.monitoring [NAME…]`. Both take ten minutes.
 
     docs/images/training.png      Training, of manifests/examples/move-to-target.yaml to its end
     docs/images/simulators.png    Simulators, of three minutes in which simulators crash, hang and are slow
 
-A Prometheus scrapes each job, and then gets the queries of the dashboards.
+Prometheus scrapes the programs of each job, and then evaluates the queries of the dashboards.
 """
 
 import json
@@ -28,12 +28,12 @@ IMAGES = ROOT / "docs/images"
 NAMESPACE = "robots"
 OVER = "30s"
 POINTS = 240
-WARM_S = 10.0  # a rate over a shorter time means nothing
+WARM_S = 10.0  # a rate over a shorter time is not meaningful
 
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """A job, how many seconds it runs unless it ends earlier, and the title of its picture."""
+    """A job, the most seconds that it runs, and the title of its picture."""
 
     job: dict[str, Any]
     seconds: float
@@ -41,14 +41,14 @@ class Picture:
 
 
 def main(names: Sequence[str]) -> int:
-    """Draw these dashboards, or all of them."""
+    """Draw the dashboards with these names, or all dashboards."""
     for name in names or PICTURES:
         _picture(name, PICTURES[name])
     return 0
 
 
 def _faulty() -> dict[str, Any]:
-    """Return the example with faults, which are frequent enough for a run of three minutes."""
+    """Return the example with faults, at rates that are high enough for a run of three minutes."""
     job = example("chaos")
     faults = "crash:probability=0.002 hang:probability=0.0005 slow:latency_ms=60,jitter_ms=40,probability=0.1"
     for group in job["spec"]["simulators"]:
@@ -79,7 +79,7 @@ def _picture(name: str, picture: Picture) -> None:
 
 
 def _asked(prometheus: Prometheus, dashboard: Mapping[str, Any], began: float, ended: float) -> Answers:
-    """Return the data of a dashboard's panels between two times (Unix time)."""
+    """Return the data of a dashboard's panels between two points in time (Unix time)."""
     values = values_of(dashboard, OVER, f"{ended - began:.0f}s")
     step_s = max(1.0, (ended - began) / POINTS)
     since = began + WARM_S

@@ -1,7 +1,7 @@
-"""A dashboard as a picture: its panels in their positions in Grafana, with the responses of Prometheus.
+"""Draw a dashboard as a picture, with its panels in their Grafana positions and data from Prometheus.
 
-It is for the documentation, where there is no Grafana. The content comes from the dashboard's JSON. The style
-is our own and not Grafana's.
+The pictures are for the documentation. Their content comes from the dashboard's JSON, but their style differs
+from Grafana's.
 """
 
 import itertools
@@ -22,8 +22,8 @@ from tests.monitoring.questions import panels
 COLUMNS = 24
 COLUMN_IN, UNIT_IN = 0.62, 0.34  # width of a column and height of a unit of the grid, in inches
 MARGINS_IN = {"left": 0.62, "right": 0.15, "top": 0.42, "bottom": 0.62}
-MOST_NAMES = 8  # in a legend; more would cover the curves
-LETTER_IN, MARK_IN = 0.05, 0.35  # in a legend: width of a letter, and of the rest of an entry
+MOST_NAMES = 8  # in a legend, because more names would cover the curves
+LETTER_IN, MARK_IN = 0.05, 0.35  # in a legend: width of a letter, and of the rest of its entry
 DPI = 90
 STYLE: dict[Any, Any] = {
     "font.size": 8,
@@ -47,7 +47,7 @@ PLAIN = FuncFormatter(lambda value, _: f"{value:g}" if abs(value) < 1000 else BI
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """The name of a series, and its values at minutes of the run."""
+    """A series: its name, the minutes since the start of the run, and the values."""
 
     name: str
     minutes: Any
@@ -59,9 +59,9 @@ Answers = Mapping[int, Sequence[Line]]  # keys: the numbers of panels
 
 
 def line(series: Mapping[str, Any], legend: str, began: float) -> Line:
-    """Return a series of a range query, with its legend filled in; `began` is Unix time.
+    """Return a series of a range query, named by the legend; `began` is Unix time.
 
-    Longer names leave out the run's own name, because a picture shows one run.
+    A name leaves out the job and the replica, because a picture shows only one run.
     """
     brief = legend.removeprefix("{{training_job}}/{{replica}} ")
     name = re.sub(r"{{\s*(\w+)\s*}}", lambda label: series["metric"].get(label[1], ""), brief)
@@ -72,7 +72,7 @@ def line(series: Mapping[str, Any], legend: str, began: float) -> Line:
 
 
 def draw(dashboard: Mapping[str, Any], answers: Answers, title: str, file: Path) -> None:
-    """Write a picture of a dashboard."""
+    """Draw a dashboard and write the picture to a file."""
     with mpl.rc_context(STYLE):
         height = max(place["y"] + place["h"] for place in (it["gridPos"] for it in dashboard["panels"])) + 2
         figure = Figure(figsize=(COLUMNS * COLUMN_IN, height * UNIT_IN), layout=None)
@@ -116,14 +116,14 @@ def _timeseries(axes: Axes, panel: Mapping[str, Any], lines: Sequence[Line]) -> 
 
 
 def _with_gaps(series: Line) -> tuple[Any, Any]:
-    """Return minutes and values, with a gap between points that are too far apart, as in Grafana."""
+    """Return minutes and values, with a gap where two points are far apart, as in Grafana."""
     apart = np.diff(series.minutes)
     gaps = np.flatnonzero(apart > 1.5 * apart.min(initial=np.inf)) + 1
     return np.insert(series.minutes, gaps, np.nan), np.insert(series.values, gaps, np.nan)
 
 
 def _top(lines: Sequence[Line], defaults: Mapping[str, Any]) -> float | None:
-    """Return the upper end of the axis, a little above the values; None leaves it to matplotlib."""
+    """Return the upper end of the axis, a little above the values, or None for matplotlib's choice."""
     if "min" not in defaults or not lines or "stacking" in defaults["custom"]:
         return None
     most = np.nanmax([0.0, *(np.nanmax(each.values, initial=0.0) for each in lines)])
@@ -146,9 +146,9 @@ def _stat(axes: Axes, panel: Mapping[str, Any], lines: Sequence[Line]) -> None:
 
 
 def _heatmap(axes: Axes, panel: Mapping[str, Any], lines: Sequence[Line]) -> None:
-    """Draw the count in each bucket.
+    """Draw the number of values in each bucket.
 
-    It is a difference of two buckets, because each one also counts all smaller values.
+    A bucket of Prometheus also counts all smaller values, so this number is the difference of two buckets.
     """
     buckets = sorted(lines, key=lambda each: float(each.labels["le"]))
     if not buckets:
@@ -194,7 +194,7 @@ def _name(axes: Axes) -> None:
 
 
 def _fitting(axes: Axes, letters: int) -> int:
-    """Return the number of entries with this many letters that fit side by side below the axes."""
+    """Return how many entries with this many letters fit next to each other below the axes."""
     width_in = axes.get_position().width * COLUMNS * COLUMN_IN
     return max(1, int(width_in / (LETTER_IN * letters + MARK_IN)))
 

@@ -1,6 +1,6 @@
-"""Draw the drives of a trained policy from above: `python -m tests.monitoring.drives RUN`.
+"""Draw the episodes of a trained policy from above: `python -m tests.monitoring.drives RUN`.
 
-docs/images/drives.gif    six episodes that the policy never saw, in the included simulator, played faster
+docs/images/drives.gif    six episodes that were not used in training, in the included simulator, accelerated
 """
 
 import io
@@ -33,12 +33,12 @@ SIDE_IN, DPI = 3.6, 100
 WALL_M = 0.06
 FASTER = 3.0
 LAST_MS = 1500
-COLORS = 32  # colors; enough for flat areas, and each further color makes the file larger
+COLORS = 32  # enough for flat areas; more colors make the file larger
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drive:
-    """One episode: its first sight, the poses after the reset and each step, and whether it succeeded."""
+    """One episode: its first sight, the poses after the reset and after each step, and its success."""
 
     first: Sight
     poses: list[Pose]
@@ -46,7 +46,7 @@ class Drive:
 
 
 def main(run: str) -> int:
-    """Draw the drives of the policy in a run directory."""
+    """Draw episodes of the policy in a run directory."""
     drives = _drives(run)
     steps = max(len(drive.poses) for drive in drives)
     frames = [_frame(drives, step) for step in range(steps)]
@@ -75,7 +75,7 @@ def _drive(policy: Any, env: Any, scene: Any, seed: int) -> Drive:
 
 
 def _frame(drives: list[Drive], step: int) -> Image.Image:
-    """Return the picture after `step` steps; a drive that has ended stays at its end."""
+    """Return the picture after `step` steps; an episode that has ended stays at its last pose."""
     with mpl.rc_context({"font.size": 8}):
         figure = Figure(figsize=(SIDE_IN, SIDE_IN), dpi=DPI, layout="tight")
         axes = figure.add_subplot()

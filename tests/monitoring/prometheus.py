@@ -1,7 +1,7 @@
-"""A local Prometheus that scrapes the given targets and answers queries.
+"""A local Prometheus that scrapes given targets and answers queries.
 
-It is Debian's, unpacked by tests/cluster/programs.sh. The caller gives a target the labels that the chart's
-PodMonitor and ServiceMonitor would give it.
+It is Debian's Prometheus, which tests/cluster/programs.sh unpacks. The caller gives each target the labels
+that the chart's PodMonitor and ServiceMonitor set.
 """
 
 import json
@@ -27,11 +27,11 @@ PROGRAMS = ("prometheus", "promtool")
 SCRAPE_S = 1
 START_DEADLINE_S = 30
 QUERY_DEADLINE_S = 10
-LOOK_EVERY_S = 0.1  # its API offers no way to wait
+LOOK_EVERY_S = 0.1  # the API of Prometheus has no request that waits
 
 
 class NotAnswered(Exception):
-    """Prometheus did not start, refused a query, or an awaited result did not come."""
+    """Prometheus did not start, refused a query, or did not return an awaited result in time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,10 +49,10 @@ class Prometheus:
     address: str
 
     def query(self, expr: str) -> list[dict[str, Any]]:
-        """Return the series of an expression now.
+        """Return the current series of an expression.
 
         Raises:
-            NotAnswered: the expression is wrong; the message is Prometheus' own.
+            NotAnswered: the expression is invalid; the message contains Prometheus' own.
         """
         return self._ask("query", query=expr)
 
@@ -64,7 +64,7 @@ class Prometheus:
         """Return the first true value of `claim`.
 
         Raises:
-            NotAnswered: it had no true value within `deadline_s`.
+                NotAnswered: `claim` returned no true value within `deadline_s`.
         """
         try:
             return eventually(claim, deadline_s, LOOK_EVERY_S)
@@ -86,7 +86,7 @@ class Prometheus:
 
 @contextmanager
 def scraping(targets: Sequence[Target], folder: Path, rules: Path | None = None) -> Iterator[Prometheus]:
-    """Run a Prometheus that scrapes `targets`, in the same way as `configured`.
+    """Run a Prometheus that scrapes `targets`; see `configured`.
 
     Raises:
         NoPrograms, NotAnswered: as `configured` does.
@@ -100,16 +100,16 @@ def scraping(targets: Sequence[Target], folder: Path, rules: Path | None = None)
 def configured(
     scrapes: Sequence[Mapping[str, Any]], folder: Path, rules: Path | None = None
 ) -> Iterator[Prometheus]:
-    """Run a Prometheus until the block ends; its `folder` exists and is empty.
+    """Run a Prometheus until the block ends; `folder` must exist and be empty.
 
     Args:
-        scrapes: its scrape_configs; every target is scraped every second.
-        folder: for its configuration, data and log.
-        rules: a file of alerting rules, evaluated every second.
+        scrapes: the scrape_configs; every target is scraped every second.
+        folder: for configuration, data and log.
+        rules: a file of alerting rules, which are evaluated every second.
 
     Raises:
-        NoPrograms: Prometheus is not there.
-        NotAnswered: it did not start.
+        NoPrograms: Prometheus is not built.
+        NotAnswered: Prometheus did not start.
     """
     binaries = programs(PROGRAMS)
     with ExitStack() as running:

@@ -1,4 +1,4 @@
-"""The dashboards' queries to Prometheus, as Grafana would send them: read from the chart's JSON."""
+"""The queries of the dashboards and alerts, read from the chart and completed as Grafana does."""
 
 import json
 import re
@@ -13,12 +13,12 @@ CHART = Path(__file__).parents[2] / "charts/palaestra"
 DASHBOARDS = sorted((CHART / "dashboards").glob("*.json"))
 ALERTS = CHART / "alerts.yaml"
 SELECTOR = re.compile(r"palaestra_\w+(?:{[^}]*})?")
-EVERYTHING = ".+"  # Grafana sends this for All
+EVERYTHING = ".+"  # the value that Grafana sends for "All"
 
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """A query of a panel."""
+    """A query of a dashboard's panel or of an alert."""
 
     dashboard: str
     panel: str
@@ -44,7 +44,7 @@ def questions(over: str, shown: str) -> Iterator[Question]:
 
 
 def looked_at() -> Iterator[Question]:
-    """Yield every metric in the expression of an alert, whether it fires or not."""
+    """Yield every metric selector in the expressions of the alerts."""
     for rule in alerts():
         for selector in SELECTOR.findall(rule["expr"]):
             yield Question("alerts", rule["alert"], selector, "")
@@ -56,14 +56,14 @@ def panels(dashboard: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def values_of(dashboard: Mapping[str, Any], over: str, shown: str) -> dict[str, str]:
-    """Return the value of each variable in a query when all is selected."""
+    """Return the value of each variable in a query if the user selects all values."""
     chosen = {variable["name"]: EVERYTHING for variable in dashboard["templating"]["list"]}
     return {**chosen, "__rate_interval": over, "__range": shown}
 
 
 def filled(expr: str, values: Mapping[str, str]) -> str:
     """Return a query with its variables replaced."""
-    for name in sorted(values, key=len, reverse=True):  # $job is the beginning of $job_namespace
+    for name in sorted(values, key=len, reverse=True):  # $job is a prefix of $job_namespace
         expr = expr.replace(f"${name}", values[name])
     return expr
 

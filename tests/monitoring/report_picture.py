@@ -1,6 +1,6 @@
-"""Photograph the report of a run in Chromium: `python -m tests.monitoring.report_picture RUN`.
+"""Take a picture of a run's report in Chromium: `python -m tests.monitoring.report_picture RUN`.
 
-docs/images/report.png    the upper part of RUN/report.html, light, in a window of a desk
+docs/images/report.png    the upper part of RUN/report.html in light colors, in a window for a desktop
 """
 
 import base64

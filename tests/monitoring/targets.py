@@ -10,7 +10,7 @@ ADDRESSES = re.compile(r"--control=(\S+) --health=(\S+)")
 
 
 def of_run(run: LocalRun, namespace: str) -> list[Target]:
-    """Return the targets of a local run, its trainer and sidecars, once all of them exist."""
+    """Wait for the trainer and the sidecars of a local run, and return them as scrape targets."""
     simulators = run.until(lambda: list(_sidecars(run)) if run.status() else None)
     pod = {"namespace": namespace, "pod": f"{run.name}-0", "training_job": run.name, "replica": "0"}
     trainer = Target(run.training()["statusAddress"], pod | {"container": "trainer"})
@@ -26,7 +26,7 @@ def of_operator(address: str, pod: str = "palaestra-operator-0") -> Target:
 
 
 def _sidecars(run: LocalRun) -> Iterator[tuple[str, str]]:
-    """Yield the name of each simulator and the address of its sidecar's port for health and metrics."""
+    """Yield the name of each simulator, and the address of its sidecar for health and metrics."""
     names = {simulator["control"]: simulator["name"] for simulator in run.training()["simulators"]}
     for _, words in run.processes():
         command = " ".join(words)

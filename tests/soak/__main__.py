@@ -1,9 +1,8 @@
-"""`make soak`: prove that nothing ends a training run without supervision; it prints JSON.
+"""`make soak`: prove that a training survives faults without supervision. It prints JSON.
 
-Every part runs complete trainings, breaks something in them, and reports figures and claims that hold or do
-not. Names as arguments choose parts, e.g. `python -m tests.soak recovery kills`. `--scale 0.1` runs a tenth
-of a part, which shows that the part itself works. `faults --seed N` repeats the one plan of that part with
-the number N.
+Every part runs complete trainings and causes faults in them. It reports figures, and claims that are true or
+false. Arguments select parts by name, e.g. `python -m tests.soak recovery kills`. `--scale 0.1` runs a tenth
+of a part, which tests that the part works. `faults --seed N` repeats the plan number N of that part.
 """
 
 import argparse
@@ -33,9 +32,9 @@ def main():
     A line contains the part, its seconds, its figures and its claims.
     """
     parser = argparse.ArgumentParser(prog="tests.soak", description=__doc__.splitlines()[0])
-    parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)}; default: all")
-    parser.add_argument("--scale", type=float, default=1.0, help="share of the whole size (default: 1)")
-    parser.add_argument("--seed", type=int, help="of the part `faults`: the one plan to run")
+    parser.add_argument("parts", nargs="*", metavar="PART", help=f"from {', '.join(PARTS)}; default: all")
+    parser.add_argument("--scale", type=float, default=1.0, help="share of the full size (default: 1)")
+    parser.add_argument("--seed", type=int, help="number of the only plan to run, for the part `faults`")
     asked = parser.parse_args()
     if asked.seed is not None:
         return 0 if prove(f"faults --seed {asked.seed}", 1.0, lambda _: faults.repeat(asked.seed)) else 1
@@ -51,7 +50,7 @@ def prove(name, scale, measure):
     started = time.monotonic()
     try:
         found = measure(scale)
-    except Exception as error:  # noqa: BLE001 - the parts after it are to be run all the same
+    except Exception as error:  # noqa: BLE001 - the other parts must run even if this part fails
         traceback.print_exc()
         found = {"error": type(error).__name__, "claims": {"the part came to its end": False}}
     line = {"part": name, "scale": scale, "seconds": round(time.monotonic() - started, 1), **found}

@@ -1,4 +1,4 @@
-"""A training with crashes, hangs and slow steps learns as much as one without them.
+"""A training with crashes, hangs and slow steps learns as much as a training without faults.
 
 The job is manifests/examples/chaos.yaml.
 """
@@ -21,7 +21,7 @@ LONGEST_S = 7200.0
 def measure(scale):
     """Return the results of the training.
 
-    They include the policy's success on episodes that took no part in any choice.
+    They include the policy's success rate on episodes that were not used to choose the policy.
     """
     job = example("chaos")
     trainer = job["spec"]["trainer"]
@@ -37,14 +37,14 @@ def measure(scale):
         "faults": faults,
         "summary": summary,
         "claims": {
-            "it broke often": sum(faults.values()) >= trainer["steps"] / 4000,
-            f"success of {WANTED:.0%} and more": scale < 1 or success >= WANTED,
+            "the simulators failed often": sum(faults.values()) >= trainer["steps"] / 4000,
+            f"a success rate of {WANTED:.0%} or more": scale < 1 or success >= WANTED,
         },
     }
 
 
 def measured(directory, episodes):
-    """Return the success rate of the run's policy in a simulator without faults."""
+    """Return the success rate of the run's policy, measured in a simulator without faults."""
     command = [EVAL, directory, f"--episodes={episodes}", "--seeds=soak"]
     told = subprocess.run(command, check=True, capture_output=True, text=True)
     return json.loads(told.stdout)["success_rate"]

@@ -1,4 +1,4 @@
-"""Each file of a checkpoint is damaged in turn: the damage is found, and the checkpoint before is used."""
+"""Each file of a checkpoint is damaged in turn; the trainer must detect it and use the older checkpoint."""
 
 import shutil
 import tempfile
@@ -13,14 +13,14 @@ NOTICED = "damaged checkpoint skipped"
 
 
 def flip(file):
-    """Change one byte in the middle, as a faulty disk does."""
+    """Change one byte in the middle of a file, as a faulty disk does."""
     content = bytearray(file.read_bytes())
     content[len(content) // 2] ^= 0xFF
     replace(file, bytes(content))
 
 
 def cut(file):
-    """Remove the second half, as a full disk does."""
+    """Remove the second half of a file, as a full disk does."""
     replace(file, file.read_bytes()[: file.stat().st_size // 2])
 
 
@@ -30,9 +30,9 @@ def remove(file):
 
 
 def replace(file, content):
-    """Write a file as a new one, because checkpoints may share an unchanged file.
+    """Replace a file by a new one with this content.
 
-    Only one of them is to be damaged.
+    Checkpoints may share an unchanged file by hard links, and only one checkpoint is to be damaged.
     """
     file.unlink()
     file.write_bytes(content)
@@ -42,7 +42,7 @@ DAMAGES = (flip, cut, remove)
 
 
 def measure(scale):
-    """Return the number of detected damages, and those that were not detected."""
+    """Return the files, the kinds of damage, and the damages that the trainer did not detect."""
     with tempfile.TemporaryDirectory() as folder:
         run = interrupted(Path(folder))
         files = files_of(run.checkpoints()[-1])
@@ -72,19 +72,19 @@ def job():
 
 
 def interrupted(folder):
-    """Train until there are several checkpoints, interrupt the run, and return it."""
+    """Train until several checkpoints exist, interrupt the run, and return it."""
     with LocalRun(folder, job()) as run:
         run.wait_for_step(STEPS)
     return run
 
 
 def files_of(checkpoint):
-    """Return the names of all files of a checkpoint, also of those in its folders."""
+    """Return the names of all files of a checkpoint, including files in subfolders."""
     return sorted(str(it.relative_to(checkpoint)) for it in checkpoint.rglob("*") if it.is_file())
 
 
 def is_survived(run, name, damage):
-    """Return whether a run survives damage to a file of its newest checkpoint.
+    """Damage a file of the newest checkpoint, and return whether the run resumes from the older checkpoint.
 
     The files are restored afterwards.
     """

@@ -1,4 +1,4 @@
-"""Disturb each write, and many reads, between operator and API server once: the end is the same."""
+"""Disturb every write, and many reads, between operator and API server; the jobs' ends must be the same."""
 
 import json
 import os
@@ -22,13 +22,13 @@ from tests.local_run import ROOT
 from tests.waiting import eventually
 
 KINDS = ROOT / "manifests" / "crd.yaml"
-AT_ONCE = 2 * (os.cpu_count() or 1) + 1  # a run waits most of its time
+AT_ONCE = 2 * (os.cpu_count() or 1) + 1  # runs mostly wait, so more than one per processor can run
 FEWEST = 200
 SEED = 1  # for the random sample below full scale
 
 
 def measure(scale):
-    """Return the number of plans with the same end as undisturbed runs, and the other plans."""
+    """Return how many plans end as undisturbed runs do, and the plans that end differently."""
     with rig() as at, several_at_once() as pool:
         undisturbed = dict(zip(WORKLOADS, pool.map(at.undisturbed, WORKLOADS), strict=True))
         every = list(plans({name: each.counts for name, each in undisturbed.items()}))
@@ -70,7 +70,7 @@ def repeat(seed):
 
 @contextmanager
 def several_at_once() -> Iterator[ThreadPoolExecutor]:
-    """Yield a pool that runs several plans at once; after an interruption it starts no further ones."""
+    """Yield a pool that runs several plans at once; an interruption cancels the plans that wait."""
     pool = ThreadPoolExecutor(AT_ONCE)
     try:
         yield pool
@@ -93,7 +93,7 @@ def rig() -> Iterator[Rig]:
 
 
 def told(chosen, run):
-    """Write a line about a run to standard error for a user who waits, and return the run."""
+    """Print a line about a run to standard error, for a person who waits, and return the run."""
     line = {"plan": chosen.words, "met": run.met, "seconds": run.seconds, "wrong": run.wrong}
     sys.stderr.write(json.dumps(line) + "\n")
     return run

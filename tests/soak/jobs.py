@@ -1,11 +1,10 @@
-"""The small TrainingJobs of the proof, whose simulators may fail any number of times."""
+"""The small TrainingJobs of `make soak`, whose simulators may fail any number of times."""
 
 import copy
 
 from tests.jobs import example
 
-# This is the largest limit that a job can have. // A proof is about the cost of a fault, not about the
-# budget.
+# This is the largest limit that a job can have, because these tests measure faults and not the budget.
 ANY_NUMBER = {"limit": 1000, "withinSeconds": 600}
 
 LITTLE_DQN = {
@@ -33,9 +32,9 @@ def tiny_job(*, collect=None, evaluate=None, faults="", seed=1, **trainer):
 
     Args:
         collect: fields of the group of simulators that collects.
-        evaluate: fields of the group that evaluates; leave it out with `evaluation.everySteps` 0.
-        faults: the faults of all simulators, as in PALAESTRA_STUB_FAULTS.
-        seed: of the job.
+        evaluate: fields of the group that evaluates; with `evaluation.everySteps` 0, this group is removed.
+        faults: the faults of all simulators, in the syntax of PALAESTRA_STUB_FAULTS.
+        seed: the seed of the job.
         trainer: fields of the trainer.
     """
     job = example("tiny")

@@ -1,4 +1,4 @@
-"""The trainer is killed or interrupted at random times: the run always continues."""
+"""The trainer is killed or terminated at random times, and the run must always resume."""
 
 import random
 import re
@@ -11,17 +11,17 @@ from tests.soak.jobs import LITTLE_DQN, tiny_job
 TIMES = 50
 SEED = 5
 CHECKPOINT_STEPS = 200
-# The time since the start of an attempt, which takes a second or two to start simulators.
+# The time since the start of an attempt; simulators need a second or two to start.
 MOMENT_S = (0.0, 8.0)
-SAVING_S = (0.0, 0.005)  # after the first sign of a checkpoint being written
+SAVING_S = (0.0, 0.005)  # after a draft of a checkpoint appears
 GRACE_S = 60.0
-IN_TIME_S = GRACE_S / 2  # the checkpoint's half of the grace period
+IN_TIME_S = GRACE_S / 2  # the half of the grace period in which the checkpoint is saved
 RESUMED = re.compile(r"resumed at step (\d+)")
 ENDED = re.compile(r"trainer ended with exit code (\d+)")
 
 
 def measure(scale):
-    """Return the number of killed trainers that resumed, and of interrupted ones that saved in time."""
+    """Return how many killed trainers resumed, and how many terminated trainers saved in time."""
     times = max(round(TIMES * scale), 2)
     killed = resumptions_after_kills(times)
     asked = ends_after_sigterm(times)
@@ -52,7 +52,7 @@ def job():
 
 
 def resumptions_after_kills(times):
-    """Return the results after several kills of the trainer, every second one while it saves."""
+    """Kill the trainer several times, every second time while it saves, and return the results."""
     moments = random.Random(SEED)
     with running(job()) as run:
         run.until(run.checkpoints)
@@ -81,7 +81,7 @@ def kill(run, moments, *, while_saving):
 def resumes(run):
     """Start the run again, and return whether it continues from the newest checkpoint."""
     newest = int(run.checkpoints()[-1].name)
-    run.stop()  # a runner waits longer and longer for a pod that fails without progress
+    run.stop()  # a running runner delays each further pod that fails without progress
     attempts = len(run.attempts())
     run.start()
     run.until(lambda: len(run.attempts()) > attempts)
@@ -89,7 +89,7 @@ def resumes(run):
 
 
 def goes_further(run):
-    """Wait until an attempt is past the step at which it began."""
+    """Wait until the attempt is past the step at which it began."""
     run.wait_for_step(resumed_at(run) + 1)
 
 
@@ -99,7 +99,7 @@ def drafts(run):
 
 
 def ends_after_sigterm(times):
-    """Return the results after several SIGTERMs, every fifth one during a hung call."""
+    """Send SIGTERM several times, every fifth time during a hung call, and return the results."""
     moments = random.Random(SEED)
     with running(job()) as run:
         run.wait_for_step(CHECKPOINT_STEPS)
@@ -110,7 +110,7 @@ def end(run, moments, *, hung):
     """Send SIGTERM to the trainer at a random time.
 
     Returns:
-        How the trainer ended, and the steps that it lost.
+        The exit code, the seconds until the end, and the number of lost steps.
     """
     trainer = run.trainer()
     time.sleep(moments.uniform(*MOMENT_S))
@@ -126,13 +126,13 @@ def end(run, moments, *, hung):
     code = int(run.until(lambda: ENDED.findall(run.output())[ends:])[0])
     run.until(lambda: len(run.attempts()) > attempts)
     step = before["step"] if before else 0
-    # An unfinished rollout is repeated: four steps of this algorithm.
+    # The trainer repeats an unfinished rollout, which is four steps with this algorithm.
     lost = max(step - resumed_at(run) - 4, 0)
     return {"exit": code, "seconds": round(seconds, 2), "lost": lost, "hung": hung}
 
 
 def is_in_time(ended):
-    """Return whether an interrupted trainer ended in time and lost nothing."""
+    """Return whether a terminated trainer ended in time without loss of a step."""
     return ended["exit"] == 75 and ended["seconds"] <= IN_TIME_S and ended["lost"] == 0
 
 

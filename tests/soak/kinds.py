@@ -1,4 +1,4 @@
-"""Every kind of fault in short runs of two algorithms: each run ends as docs/explain/reliability.md says."""
+"""Short runs of two algorithms with every kind of fault end as docs/explain/reliability.md promises."""
 
 import re
 
@@ -12,8 +12,8 @@ ROW = re.compile(
 ALGORITHMS = (LITTLE_DQN, LITTLE_PPO)
 FAULT_KINDS = {"dead", "hung", "wrong_data"}
 EXIT_CODES = {"Succeeded": 0, "SimulatorBudgetSpent": 80}
-# The steps are a multiple of PPO's rollout. The episodes are so short that there are more than 25 resets
-# between two restarts.
+# STEPS is a multiple of PPO's rollout. The episodes are so short that more than 25 resets lie between two
+# restarts.
 STEPS = 96
 EPISODE = {"id": "MoveToTargetEnv-v0", "options": {"max_steps": 3}}
 A_FEW = {"limit": 2, "withinSeconds": 600}  # for a simulator that fails after every restart
@@ -21,12 +21,12 @@ LONGEST_S = 600.0
 
 
 def rows():
-    """Return the lines of the table that a stub can cause: fault, Palaestra's report, end of the run."""
+    """Return the rows of the page's table that a stub can cause: fault, reported fault, end of the run."""
     return [match.groups() for match in ROW.finditer(PAGE.read_text())]
 
 
 def measure(scale):
-    """Return the end of the run with each fault, and the ends that differ from the table."""
+    """Return the number of runs, and the runs that end otherwise than the table says."""
     table = rows()
     chosen = table[:: max(round(1 / scale), 1)]
     runs = [
@@ -48,7 +48,7 @@ def measure(scale):
 
 
 def play(fault, algorithm, ending):
-    """Return exit code, faults by kind and slow steps of a short run with a fault."""
+    """Return exit code, number of faults by kind, and number of slow steps of a short run with a fault."""
     with running(job(fault, algorithm, ending)) as run:
         code, _ = run.end(LONGEST_S)
         slow = run.counters().get("faults", {}).get("slow", 0)
@@ -56,9 +56,9 @@ def play(fault, algorithm, ending):
 
 
 def is_as_told(found, ending, reported):
-    """Return whether a run ended as its line of the table says, with faults of that kind and no others.
+    """Return whether a run ended as its row of the table says, with faults of that kind only.
 
-    On a busy machine any step may be slow.
+    Slow steps are allowed in every run, because any step may be slow on a busy machine.
     """
     kinds = {reported} if reported in FAULT_KINDS else set()
     noticed = set(found["faults"]) == kinds and (reported != "slow" or found["slow"] > 0)
@@ -66,7 +66,7 @@ def is_as_told(found, ending, reported):
 
 
 def job(fault, algorithm, ending):
-    """Return the job whose collecting and evaluating simulators have the same fault."""
+    """Return a job in which the simulators of both groups have the same fault."""
     care = {"recycle": {"afterResets": 0}, "restart": ANY_NUMBER if ending == "Succeeded" else A_FEW}
     return tiny_job(
         faults=fault,

@@ -1,4 +1,4 @@
-"""Nothing grows while simulators are restarted 500 times: no thread, socket, descriptor or process."""
+"""After 500 restarts of simulators, no program holds more threads, sockets, descriptors or processes."""
 
 import os
 import time
@@ -10,17 +10,16 @@ from tests.soak.jobs import LITTLE_DQN, tiny_job
 
 RESTARTS = 500
 COLLECTORS = 2
-# A reset is two steps, so each life ends in the first episode.
+# A reset takes two steps, so the simulator always crashes in its first episode.
 DIES = "crash:step=6"
 WATCHED = ("palaestra-train", "palaestra-sidecar")
-# While its simulator lives, a sidecar holds up to three more of each kind of resource; with a leak it would
-# hold hundreds more.
+# While its simulator runs, a sidecar holds up to three more of each resource. A leak would add hundreds.
 SWAY = 4
 LONGEST_S = 3600.0
 
 
 def measure(scale):
-    """Return the resources of trainer and sidecars in the first and in the last tenth of the restarts."""
+    """Return the resources of trainer and sidecars in the first and the last tenth of the restarts."""
     restarts = max(round(RESTARTS * scale), 20)
     with running(job()) as run:
         run.wait_for_step(1)
@@ -36,7 +35,7 @@ def measure(scale):
 
 
 def job():
-    """Return an endless job whose simulators die again and again."""
+    """Return an endless job whose simulators crash repeatedly."""
     return tiny_job(
         collect={"count": COLLECTORS, "recycle": {"afterResets": 0}},
         faults=DIES,
@@ -48,9 +47,9 @@ def job():
 
 
 def least(run, first, last):
-    """Return the smallest use of each watched program between two numbers of restarts.
+    """Return each program's smallest use of resources between two numbers of restarts.
 
-    At the smallest use, no restart or the fewest restarts are in progress.
+    The smallest use excludes the resources of a restart in progress.
     """
     run.until(lambda: restarts_of(run) >= first, LONGEST_S)
     least_held = {}
@@ -63,9 +62,9 @@ def least(run, first, last):
 
 
 def grown(early, late):
-    """Return the resources of which a program has more than before.
+    """Return the resources of which a program holds more than before.
 
-    Memory may grow, as that of the replay buffer does.
+    Memory is excluded, because the replay buffer grows.
     """
     return [
         f"{name}: {what}"
@@ -81,11 +80,11 @@ def restarts_of(run):
 
 
 def holdings(run):
-    """Return the present resources of the trainer and each sidecar."""
+    """Return the resources that the trainer and each sidecar hold now."""
     found = {}
     for program in WATCHED:
         pids = set(run.pids(program))
-        # After a fork, a child has the name of its parent for a moment.
+        # A forked child has the command line of its parent until it executes another program.
         forked = {pid for each in pids for pid, _ in below(each)}
         for number, pid in enumerate(sorted(pids - forked)):
             found[f"{program} {number}"] = held_by(pid)
@@ -107,7 +106,7 @@ def held_by(pid):
 
 
 def kind_of(descriptor):
-    """Return the kernel's name for a descriptor: socket, pipe, a path; "" for a closed one."""
+    """Return a descriptor's kind in the kernel's words (socket, pipe or a path), or "" if it is closed."""
     try:
         return str(descriptor.readlink()).partition(":")[0]
     except OSError:

@@ -1,4 +1,4 @@
-"""The time until a simulator that failed steps again, and until a hang is detected."""
+"""The seconds until training continues after a simulator fails, and until a hang is detected."""
 
 import os
 import signal
@@ -15,7 +15,7 @@ TIMES = 10
 WARM_STEPS = 100
 LOOK_EVERY_S = 0.02
 SIMULATOR = "collect-0"
-# There is no promise about a spare that is still starting; a start takes half a second.
+# No claim covers a spare that is still starting; a start takes half a second.
 SPARE_READY_S = 30.0
 
 
@@ -40,13 +40,13 @@ def measure(scale):
 
 
 def recoveries(times, *, standby=False):
-    """Return the seconds from each SIGKILL of the simulator in use until training steps again."""
+    """Kill the simulator in use several times, and return the seconds until each next training step."""
     with training(standby=standby) as run:
         return [recovery(run, standby=standby) for _ in range(times)]
 
 
 def recovery(run, *, standby):
-    """Kill the collecting simulator, and return the seconds until training has stepped again."""
+    """Kill the simulator that collects, and return the seconds until the next training step."""
     run.until(lambda: is_ready(run, standby=standby), SPARE_READY_S)
     process, restarts = in_use(run), simulator(run)["restarts"]
     os.kill(process, signal.SIGKILL)
@@ -58,13 +58,13 @@ def recovery(run, *, standby):
 
 
 def noticings(times):
-    """Return the seconds from each stop of the simulator's process until it is counted as hung."""
+    """Stop the simulator's process several times, and return the seconds until each hang is counted."""
     with training() as run:
         return [noticing(run) for _ in range(times)]
 
 
 def noticing(run):
-    """Stop the collecting simulator, and return the seconds until a fault is counted."""
+    """Stop the process of the simulator that collects, and return the seconds until a hang is counted."""
     run.until(lambda: is_ready(run, standby=False))
     process, before = in_use(run), run.faults().get("hung", 0)
     os.kill(process, signal.SIGSTOP)
@@ -75,7 +75,7 @@ def noticing(run):
 
 @contextmanager
 def training(*, standby=False):
-    """Yield an endless run that collects with one simulator, after its first steps."""
+    """Start an endless run that collects with one simulator, and yield it after its first steps."""
     collect = {"recycle": {"afterResets": 0}} | ({"standby": True} if standby else {})
     job = tiny_job(
         collect=collect,
@@ -90,18 +90,18 @@ def training(*, standby=False):
 
 
 def is_ready(run, *, standby):
-    """Return whether the simulator, and its spare if needed, is ready."""
+    """Return whether the simulator is ready and, with `standby`, whether its spare is ready too."""
     seen = simulator(run)
     return seen["state"] == "ready" and (not standby or seen["standby"] == "ready")
 
 
 def simulator(run):
-    """Return the collecting simulator's part of /status."""
+    """Return the entry of the simulator that collects in /status."""
     return next(each for each in run.ask()["simulators"] if each["name"] == SIMULATOR)
 
 
 def in_use(run):
-    """Return the collecting simulator's process that is stepped now; a spare uses no processor time."""
+    """Return the process of the simulator that training steps now; the spare uses no processor time."""
     before = {pid: processor_s(pid) for pid in run.pids("palaestra-stub", SIMULATOR)}
     step = run.ask()["step"]
     run.wait_for_step(step + WARM_STEPS)

@@ -1,7 +1,7 @@
-"""2,500 episodes with a simulator that dies of a bus error after 24 resets, without supervision.
+"""A run of 2,500 episodes without supervision, with a simulator that a bus error ends after 24 resets.
 
-The cost of recycling is the run's time compared with a run without faults: the same seed and steps, episodes
-of 40 steps, steps of 3 ms.
+The cost of recycling is the ratio of two times: the time of this run, and the time of a run without faults.
+Both runs have the same seed and steps, episodes of 40 steps, and steps of 3 ms.
 """
 
 import time
@@ -14,7 +14,7 @@ STEPS_AN_EPISODE = 40
 RESETS = 24
 DIES = f"crash:signal=SIGBUS,reset={RESETS + 1}"
 STEP_MS = 3
-# A robot that turns on the spot never ends an episode early, so all have their 40 steps.
+# A robot that turns on the spot never ends an episode early, so every episode has 40 steps.
 TASK = {
     "id": "MoveToTargetEnv-v0",
     "options": {"max_steps": STEPS_AN_EPISODE, "movements": ["STOP", "TURN_LEFT", "TURN_RIGHT"]},
@@ -23,7 +23,7 @@ LONGEST_S = 3600.0
 
 
 def measure(scale):
-    """Return the runs' times, and that of the undisturbed run as a share of the others."""
+    """Return the times of all runs, and the ratio of the undisturbed time to each other time."""
     episodes = max(round(EPISODES * scale), 3 * RESETS)
     undisturbed = play(episodes, {"recycle": {"afterResets": 0}})
     recycled = play(episodes, {"recycle": {"afterResets": RESETS}}, DIES)

@@ -1,7 +1,7 @@
-"""A run that is interrupted anywhere and resumed ends as one that was not, bit for bit.
+"""A run that is interrupted at any step and resumed has the same results as an uninterrupted run, bit by bit.
 
-It compares the parameters of the last checkpoint's networks and of the best policy, the evaluations, and the
-results of every counted episode. All of this needs a deterministic simulator, such as the stub.
+The compared results are the networks of the last checkpoint and of the best policy, the evaluations, and all
+counted episodes. Equal results need a deterministic simulator, such as the stub.
 """
 
 import io
@@ -50,7 +50,7 @@ ASKED, KILLED = WAYS = ("asked to end", "killed")
 
 
 def measure(scale):
-    """Return the number of interrupted runs with the end of the uninterrupted one, and the other runs."""
+    """Return how many interrupted runs have the uninterrupted run's results, and the other runs."""
     points = max(round(POINTS * scale), 1)
     moments = random.Random(SEED)
     compared = [
@@ -69,14 +69,14 @@ def measure(scale):
 
 
 def uninterrupted(name, collectors):
-    """Return the results of a run without an interruption."""
+    """Return the results of an uninterrupted run."""
     with running(job(name, collectors)) as run:
         run.end(LONGEST_S)
         return results(run.directory)
 
 
 def difference(name, collectors, wanted, step, way):
-    """Return the differences at the end of a run that was interrupted after a step, or ""."""
+    """Return the results in which a run that was interrupted after a step differs, or ""."""
     with tempfile.TemporaryDirectory() as folder:
         run = LocalRun(Path(folder), job(name, collectors))
         interrupt(run, step, way)
@@ -88,7 +88,7 @@ def difference(name, collectors, wanted, step, way):
 
 
 def interrupt(run, step, way):
-    """Begin a run and end it after a step, by an interrupt as of Ctrl-C or by a kill."""
+    """Start a run, and end it after a step: by an interrupt like Ctrl-C, or by SIGKILL."""
     with run:
         run.wait_for_step(step, LONGEST_S)
         if way == KILLED:
@@ -109,7 +109,7 @@ def job(name, collectors):
 
 
 def results(directory):
-    """Return the results of a run that must not depend on an interruption; clocks may differ."""
+    """Return the results of a run that must be equal after an interruption; they contain no times."""
     last = max((directory / "checkpoints").glob("[0-9]*"), key=lambda path: int(path.name))
     state = json.loads((last / "state.json").read_text())
     return {

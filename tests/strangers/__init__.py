@@ -1,4 +1,4 @@
-"""A world and a program from other people, shared by tests of one machine and of a cluster."""
+"""A world and a program that Palaestra did not provide, for tests on one machine and in a cluster."""
 
 from pathlib import Path
 
@@ -8,7 +8,7 @@ DRIVE = (_FOLDER / "drive.py").read_text()
 
 
 def rover():
-    """Return a job's group of simulators with that world; the stub leaves out the devices that it lacks."""
+    """Return a job's group of simulators with this world; the stub leaves out unsupported devices."""
     return {
         "name": "collect",
         "role": "Collect",

@@ -1,6 +1,6 @@
 """Drive an E-puck toward a box until its front sensors detect it, then turn, and print the final pose.
 
-The program knows the simulator only by its sidecar, as a program of a TrainingJob does.
+The program reaches the simulator only through its sidecar, as a program of a TrainingJob does.
 """
 
 import math

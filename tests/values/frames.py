@@ -1,6 +1,6 @@
-"""Frames by formulas: what the values of simulated devices are compared with. Nothing here is of Palaestra.
+"""Frames by formulas, as a reference for the values of simulated devices. They use no code of Palaestra.
 
-Vectors and matrices are NumPy arrays, (3,) and (3, 3); lengths are in meters, angles in radians.
+Vectors and matrices are NumPy arrays, (3,) and (3, 3). Lengths are in meters, and angles in radians.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-# From the axes of the ground (east, north, up) to those of a world file, by its `coordinateSystem`.
+# Rotations from the axes of the ground (east, north, up) to the axes of a world file, by `coordinateSystem`.
 AXES = {
     "ENU": np.eye(3),
     "NUE": np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]),
@@ -24,7 +24,7 @@ def turn(axis, angle_rad):
 
 
 def axis_angle(rotation):
-    """Return x, y, z and angle of a rotation that is neither none nor half a turn."""
+    """Return axis (x, y, z) and angle of a rotation, which must not be half a turn."""
     angle_rad = np.arccos((np.trace(rotation) - 1.0) / 2.0)
     if angle_rad < 1e-9:
         return np.array([0.0, 0.0, 1.0, 0.0])
@@ -42,25 +42,25 @@ def quaternion(rotation):
 
 @dataclass(frozen=True)
 class Frame:
-    """A frame in another one: where its origin is, and the rotation whose columns are its axes."""
+    """A frame relative to another one: its origin, and a rotation whose columns are its axes."""
 
     position: np.ndarray = field(default_factory=lambda: np.zeros(3))
     rotation: np.ndarray = field(default_factory=lambda: np.eye(3))
 
     def __matmul__(self, inner):
-        """Return a frame in this one, or a point, in the frame around this one."""
+        """Return a frame or a point, given in this frame, in the parent frame."""
         if isinstance(inner, Frame):
             return Frame(self @ inner.position, self.rotation @ inner.rotation)
         return self.position + self.rotation @ np.asarray(inner, float)
 
     @property
     def inverse(self):
-        """Return the frame around this one, in this one."""
+        """Return the parent frame relative to this frame."""
         return Frame(-self.rotation.T @ self.position, self.rotation.T)
 
     @property
     def fields(self):
-        """Return `translation` and `rotation` as a world file has them."""
+        """Return `translation` and `rotation` as text of a world file."""
         numbers = [*self.position, *axis_angle(self.rotation)]
         return "translation {:.12g} {:.12g} {:.12g} rotation {:.15g} {:.15g} {:.15g} {:.15g}".format(*numbers)
 

@@ -1,4 +1,4 @@
-"""Latitude and longitude by the series of Krüger, which has no formula in common with the simulators'.
+"""Latitude and longitude by the series of Krüger. The simulators use none of these formulas.
 
 Source: C. F. F. Karney, Transverse Mercator with an accuracy of a few nanometers (2011), to the third order.
 """
@@ -14,7 +14,7 @@ DELTA = (2 * N - 2 * N**2 / 3 - 2 * N**3, 7 * N**2 / 3 - 8 * N**3 / 5, 56 * N**3
 
 
 def moved(latitude_deg, longitude_deg, east_m, north_m):
-    """Return latitude and longitude in degrees, so far from a point on the grid of its UTM zone."""
+    """Return latitude and longitude, in degrees, of a point that is displaced on the grid of its UTM zone."""
     middle = 6 * math.floor(longitude_deg / 6) + 3
     east, north = _grid(math.radians(latitude_deg), math.radians(longitude_deg - middle))
     latitude, longitude = _angles(east + east_m / MERIDIAN_M, north + north_m / MERIDIAN_M)

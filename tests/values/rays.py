@@ -1,7 +1,7 @@
-"""How far a ray travels until it meets a shape, by formulas of school geometry.
+"""The distance from a ray's origin to a shape, by formulas of school geometry.
 
-Each function takes the origin and the unit direction of a ray, (3,) in meters, in the frame of the shape, and
-returns meters; infinite if the ray misses. The origin is outside.
+Each function takes the origin and the unit direction of a ray, both (3,), in the frame of the shape. The
+origin is outside the shape. The result is in meters, and infinite if the ray misses the shape.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ def _first(candidates, holds):
 
 
 def box(origin, direction, size):
-    """Return the distance to a box: the nearest point on one of its six planes that is not beyond others."""
+    """Return the distance to a box: the nearest intersection with a face plane inside the other planes."""
     half = np.asarray(size) / 2.0
     slack = 1e-12
     candidates = [
@@ -56,13 +56,13 @@ def cylinder(origin, direction, radius, height):
 
 
 def capsule(origin, direction, radius, height):
-    """Return the distance to a capsule around z; `height` is that of its straight part."""
+    """Return the distance to a capsule around z; `height` is the length of the cylinder between the caps."""
     caps = [sphere(origin, direction, radius, (0.0, 0.0, end)) for end in (-height / 2.0, height / 2.0)]
     return min(tube(origin, direction, radius, height), *caps)
 
 
 def cone(origin, direction, radius, height):
-    """Return the distance to a cone around z, with its middle at the origin and its tip above."""
+    """Return the distance to a cone around z; the origin is halfway between the base and the tip above it."""
     slope = radius / height
     tip = np.array([0.0, 0.0, height / 2.0])
     apart = origin - tip
@@ -82,12 +82,12 @@ def plane(origin, direction):
 
 
 def front_of_plane(origin, direction):
-    """Return the distance to the upper side of the plane z = 0; from below nothing is seen."""
+    """Return the distance to the upper side of the plane z = 0; infinite from below."""
     return plane(origin, direction) if origin[2] > 0.0 else np.inf
 
 
 def triangles(origin, direction, corners):
-    """Return the distance to triangles, each three points: (n, 3, 3)."""
+    """Return the distance to triangles with these corners, an array of (n, 3, 3)."""
     nearest = np.inf
     for a, b, c in np.asarray(corners, float):
         matrix = np.stack([b - a, c - a, -direction], axis=1)
@@ -99,7 +99,7 @@ def triangles(origin, direction, corners):
 
 
 def front_of_triangles(origin, direction, corners):
-    """Return the distance to those triangles that are seen counter-clockwise: their outer sides."""
+    """Return the distance to triangles on their outer sides, where the corners run counter-clockwise."""
     facing = [
         (a, b, c) for a, b, c in np.asarray(corners, float) if np.cross(b - a, c - a) @ (origin - a) > 0.0
     ]

@@ -1,7 +1,7 @@
-"""The rows of shapes: each as a world file has it, and how far a ray travels until it meets the shape.
+"""Shapes as world files describe them, each with a formula for the distance of a ray.
 
-A row has the rays that are tried, each as a start and a point at which it aims, in meters in the frame of the
-shape. They meet the sides, the ends, the edges and the round parts, or pass close by.
+Each shape has rays for the test: a start, and a point on the ray, in meters in the frame of the shape. The
+rays meet sides, ends, edges and round parts, or miss the shape narrowly.
 """
 
 from __future__ import annotations
@@ -30,12 +30,13 @@ _TRIANGLES = [
 _POINTS = ", ".join("{:g} {:g} {:g}".format(*corner) for corner in _CORNERS)
 _INDICES = ", ".join(f"{' '.join(map(str, face))} -1" for face in _FACES)
 ELL = f"IndexedFaceSet {{ coord Coordinate {{ point [ {_POINTS} ] }} coordIndex [ {_INDICES} ] }}"
-# Webots turns the cross-section by half a turn where the spine points along z. A clockwise one faces out.
+# Where the spine points along z, Webots rotates the cross-section by half a turn. Clockwise sections face
+# out.
 _SECTION = ", ".join(f"{-x:g} {-y:g}" for x, y in [*reversed(_OUTLINE), _OUTLINE[-1]])
 EXTRUSION = f"Extrusion {{ crossSection [ {_SECTION} ] spine [ 0 0 -0.5, 0 0 0.5 ] }}"
 SHEET = """IndexedFaceSet { coord Coordinate { point [ 0 -1 -1, 0 1 -1, 0 1 1, 0 -1 1 ] }
   coordIndex [ 0 1 2 3 -1 ] }"""
-_SHEET = [[(0, -1, -1), (0, 1, -1), (0, 1, 1)], [(0, -1, -1), (0, 1, 1), (0, -1, 1)]]  # it faces +x
+_SHEET = [[(0, -1, -1), (0, 1, -1), (0, 1, 1)], [(0, -1, -1), (0, 1, 1), (0, -1, 1)]]  # the sheet faces +x
 _HEIGHTS = np.array([[0.0, 0.0, 0.0], [0.0, 0.5, 0.0], [0.2, 0.5, 0.2]])  # by y, then x; 1 m apart
 _CELLS = [
     [[x + dx, y + dy, _HEIGHTS[y + dy, x + dx]] for dx, dy in corners]
@@ -50,14 +51,14 @@ class Shape:
     """A geometry.
 
     Attributes:
-        type: of its node.
-        node: its text.
-        formula: of the origin and the unit direction of a ray, (3,) each in its frame; returns meters.
-        aims: the rays.
-        tolerance: absolute, in meters.
-        bounding: whether a boundingObject may have it.
-        seen: the formula of the visible shape, if it is another one.
-        volume_m3: None if it encloses none.
+        type: the type of the node.
+        node: the text of the node.
+        formula: returns meters for a ray's origin and unit direction, (3,) each in the frame of the shape.
+        aims: the rays, as start and target.
+        tolerance: absolute tolerance in meters.
+        bounding: whether a boundingObject may contain the geometry.
+        seen: the formula for the visible surface, if it differs.
+        volume_m3: the volume, or None if the surface is open.
         name: distinguishes shapes of the same type in the names of tests.
     """
 
@@ -72,7 +73,7 @@ class Shape:
     name: str = ""
 
     def __str__(self):
-        """Return its name, else its type, for the name of a test."""
+        """Return the name, or the type without one, for the name of a test."""
         return self.name or self.type
 
 
@@ -185,7 +186,7 @@ SHAPES = (
             ((1.0, 1.5, 0.0), (0.0, -0.5, 0.3)),
             ((1.0, 0.0, 1.5), (0.0, 0.0, 1.2)),
         ),
-        tolerance=2e-3,  # it is a millimeter thick
+        tolerance=2e-3,  # the sheet is a millimeter thick
         seen=partial(rays.front_of_triangles, corners=_SHEET),
         name="sheet",
     ),
@@ -199,7 +200,7 @@ SHAPES = (
             ((0.1, 0.1, -2.0), (0.1, 0.1, 0.0)),
             ((-1.0, 1.5, 1.2), (0.1, 0.0, -0.2)),
         ),
-        tolerance=0.02,  # Webots draws it with 32 sides
+        tolerance=0.02,  # Webots draws a cone with 32 sides
         bounding=False,
     ),
     Shape(

@@ -1,8 +1,8 @@
-"""The rows of sensors that measure place, direction and surroundings, on a robot that stands still.
+"""Sensors of pose, direction and environment on a robot that does not move, with formulas for their values.
 
-A row has the device as a world file has it, without its place; and a formula of the frame of the sensor, in
-the axes of the world file. All devices are mounted at `MOUNT`, off the middle and turned, and the robot is
-put to each of `POSES`.
+A row has the device's text in a world file, and a formula of the sensor's frame in the axes of the world
+file. `MOUNT` mounts every device off the robot's center and rotated. A test moves the robot to each of
+`POSES`.
 """
 
 from __future__ import annotations
@@ -17,28 +17,28 @@ from tests.values.worlds import Setting
 
 GRAVITY = 3.7  # m/s2, of this world
 REFERENCE = np.array([100.0, -20.0, 7.0])  # WorldInfo.gpsReference, in the axes of the file
-MOUNT = frame((0.1, -0.25, 0.3), (0.6, 0.0, 0.8), 0.9)  # from each sensor to its robot
+MOUNT = frame((0.1, -0.25, 0.3), (0.6, 0.0, 0.8), 0.9)  # from each sensor to the robot's frame
 POSES = (  # poses of the robot, in the axes of the ground
     frame((1.2, -0.7, 0.4), (0.3, -0.5, 0.8), 1.1),
     frame((-2.0, 3.0, 1.5), (1.0, 0.0, 0.0), 2.2),
     frame((0.1, 0.2, -3.0), (-0.6, 0.64, 0.48), -2.7),
     frame((5.0, 5.0, 0.5), (0.0, 0.0, 1.0), 0.7),
 )
-BEACON = frame((2.0, 1.0, -0.5))  # where the other robot emits, in the axes of the ground
+BEACON = frame((2.0, 1.0, -0.5))  # the pose of the robot that emits, in the axes of the ground
 SAID = "here"
 
 
 @dataclass(frozen=True)
 class Row:
-    """A device and the value that a formula gives.
+    """A device and the formula of its value.
 
     Attributes:
-        name: of the row and of its device.
-        types: the device types that it is a row of.
-        node: the text of the node, with `{place}` for its name and its place.
-        formula: of the frame of the sensor and the setting; numbers, (n,).
-        read: of the device, what is compared.
-        tolerance: absolute, in the unit of the value.
+            name: the name of the row and of its device.
+            types: the device types that the row tests.
+            node: the text of the node; `{place}` stands for its name and its pose.
+            formula: returns numbers, (n,), for the frame of the sensor and the setting.
+            read: returns the compared value of the device.
+            tolerance: absolute tolerance in the unit of the value.
     """
 
     name: str
@@ -50,18 +50,18 @@ class Row:
 
 
 def _through(table, value):
-    """Return a value through the rows of a lookup table: linear between them, constant beyond."""
+    """Return the output of a lookup table: linear between the rows, constant outside."""
     inputs, outputs = zip(*table, strict=True)
     return np.interp(value, inputs, outputs)
 
 
 def _gravity(sensor, setting):
-    """Return the reading of an accelerometer at rest: the reaction to gravity, in its own axes."""
+    """Return the reading of an accelerometer at rest: the reaction to gravity, in the sensor's axes."""
     return sensor.rotation.T @ (GRAVITY * setting.up)
 
 
 def _beacon(sensor, setting: Setting):
-    """Return the way from a sensor to the beacon, in its own axes."""
+    """Return the vector from a sensor to the beacon, in the sensor's axes."""
     return sensor.inverse @ setting.put(BEACON).position
 
 
@@ -71,7 +71,7 @@ def _signal(sensor, setting):
 
 
 def _packet(receiver):
-    """Return strength and direction of the last packet."""
+    """Return strength and direction of the receiver's last packet."""
     packet = receiver.queue[-1]
     return [packet.strength, *packet.direction]
 
@@ -128,7 +128,7 @@ ROWS = (
         "light sensor",
         ("LightSensor",),
         "LightSensor {{ {place} lookupTable [ 0 3 0, 1 1000 0 ] }}",
-        lambda *_: [3.0],  # there is no light
+        lambda *_: [3.0],  # the world contains no light
         read=lambda device: [device.value],
     ),
     Row("receiver", ("Receiver", "Emitter"), "Receiver {{ {place} channel 3 }}", _signal, read=_packet),

@@ -1,4 +1,4 @@
-"""Worlds whose robot stands still and is put to one pose after another, for sensors with known values."""
+"""Worlds in which a test moves a robot from pose to pose, for sensors whose values are known."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ STEP_MS = 16
 
 @dataclass(frozen=True)
 class Setting:
-    """One simulator, and the axes of its world file.
+    """A simulator, and the axes of its world file.
 
     Attributes:
         physics: "stub" or "mujoco".
@@ -29,12 +29,12 @@ class Setting:
     system: str = "ENU"
 
     def __str__(self):
-        """Return its words, for the name of a test."""
+        """Return simulator and axes, for the name of a test."""
         return f"{self.physics} {self.system}"
 
     @property
     def axes(self):
-        """Return the rotation from the axes of the ground to those of the file."""
+        """Return the rotation from the axes of the ground to the axes of the file."""
         return AXES[self.system]
 
     @property
@@ -48,7 +48,7 @@ class Setting:
         return self.axes @ [0.0, 1.0, 0.0]
 
     def put(self, frame):
-        """Return a frame in the axes of the ground, in those of the file."""
+        """Return a frame of the ground's axes in the axes of the file."""
         return Frame(self.axes @ frame.position, self.axes @ frame.rotation)
 
     def load(self, nodes, info=""):
@@ -64,13 +64,13 @@ SETTINGS = [Setting(physics, system) for physics in PHYSICS for system in AXES]
 
 
 def robot(parts, fields="", name="r"):
-    """Return a robot that a client drives and that may move others, with these parts."""
+    """Return the text of a robot with these parts, which is a supervisor under a client's control."""
     return f"""DEF {name.upper()} Robot {{ {fields} name "{name}" supervisor TRUE
   controller "ros" controllerArgs [ "--name={name}" "--synchronize" ] children [ {parts} ] }}"""
 
 
 def move(simulation, node, frame):
-    """Put a node of the world to a frame, as a supervisor does."""
+    """Move a node of the world to a frame, as a supervisor does."""
     found = simulation.tree.of_def(node)
     for name, kind, value in (
         ("translation", FieldType.VEC3F, frame.position),
@@ -80,13 +80,13 @@ def move(simulation, node, frame):
 
 
 def enable(simulation, robot_index=0):
-    """Enable what measures only while it is enabled."""
+    """Enable all devices of a robot, because some measure only while they are enabled."""
     for kind, device in simulation.robots[robot_index].parts.devices.rows.values():
         kind.enabled(device, STEP_MS)
 
 
 def device(simulation, name, robot_index=0):
-    """Return a device by its name."""
+    """Return the device with a name."""
     return simulation.robots[robot_index].parts.devices.rows[name][1]
 
 

@@ -1,8 +1,8 @@
 """A candidate for a lease in a separate process: `candidate.py KUBECONFIG NAMESPACE IDENTITY`.
 
-It writes a line for each change, `leads` or `follows`, and on each line whether `leads()` agrees. After a
-line on its standard input it writes the value of `leads()` now. At the end of its input it ends and releases
-the lease.
+For each change, it writes a line with `leads` or `follows`, and with the value of `leads()`. For each line on
+standard input, it writes `now` and the value of `leads()`. At the end of its input, it releases the lease and
+ends.
 """
 
 import sys
@@ -15,7 +15,7 @@ DURATION_S, RENEW_S = 3, 0.3
 
 
 def main(kubeconfig: str, namespace: str, identity: str) -> None:
-    """Take part in the election until the input ends."""
+    """Take part in the election until standard input ends."""
 
     def say(word: str) -> None:
         sys.stdout.write(f"{word} {leadership.leads()}\n")

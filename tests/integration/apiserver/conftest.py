@@ -1,4 +1,4 @@
-"""An API server that misbehaves, and clients of it and of the real one."""
+"""Fixtures: an API server that misbehaves, a real API server, and clients of both."""
 
 import itertools
 import json
@@ -19,7 +19,7 @@ numbers = itertools.count(1)
 
 
 def write_kubeconfig(path, server, user):
-    """Write a kubeconfig with two contexts; the current one is `usual`."""
+    """Write a kubeconfig with the contexts `usual`, which is the current one, and `other`."""
     content = {
         "clusters": [{"name": "here", "cluster": {"server": server}}],
         "users": [{"name": "me", "user": user}, {"name": "other", "user": {"token": "other-token"}}],
@@ -35,7 +35,7 @@ def write_kubeconfig(path, server, user):
 
 @pytest.fixture
 def rude(tmp_path):
-    """Return a server with the responses of a test, and a client of it with short timeouts."""
+    """Return a server whose responses a test prepares, and a client of it with short timeouts."""
     with serving() as (address, script):
         kubeconfig = write_kubeconfig(tmp_path / "kubeconfig", address, {"token": "my-token"})
         api = connect(kubeconfig, limits=HASTE)

@@ -1,4 +1,4 @@
-"""Proxies that speak CONNECT or SOCKS5 and record requests; they connect to one server for every target."""
+"""Proxies that speak CONNECT or SOCKS5 and record requests; they connect every client to one server."""
 
 import selectors
 import socket
@@ -20,9 +20,9 @@ class Notes:
     """The requests that a proxy received.
 
     Attributes:
-        targets: host and port of each connection.
-        users: the user and password of each, or "".
-        refuses: whether it refuses all connections.
+            targets: host and port of each connection.
+            users: user and password of each connection, or "".
+            refuses: whether the proxy refuses all connections.
     """
 
     targets: list[str] = field(default_factory=list)
@@ -38,14 +38,14 @@ class _Relay(StreamRequestHandler):
     tls: ssl.SSLContext | None
 
     def setup(self):
-        """Let clients connect by TLS."""
+        """Wrap the connection in TLS if the proxy has a certificate."""
         if self.tls is not None:
             self.request = self.tls.wrap_socket(self.request, server_side=True)
-        self.rbufsize = 0  # what follows the request is for the server
+        self.rbufsize = 0  # bytes after the request are for the server
         super().setup()
 
     def handle(self):
-        """Find the target by the protocol of the first byte, and relay the connection."""
+        """Read the target by the protocol that the first byte names, and relay the connection."""
         first = self.rfile.read(1)
         granted = self._socks() if first == b"\x05" else self._connect(first)
         if not granted:
@@ -54,7 +54,7 @@ class _Relay(StreamRequestHandler):
             _relay(self.request, server)
 
     def finish(self):
-        """Close the connection, because the server knows only what is below TLS."""
+        """Close the connection here, because socketserver closes only the TCP connection below TLS."""
         super().finish()
         self.request.close()
 
@@ -97,7 +97,7 @@ class _Relay(StreamRequestHandler):
 
 
 def _relay(client: socket.socket, server: socket.socket) -> None:
-    """Copy in both directions until one side ends."""
+    """Copy bytes in both directions until one side ends."""
     other = {client: server, server: client}
     with selectors.DefaultSelector() as selector, suppress(OSError):
         for end in other:
@@ -114,10 +114,10 @@ def _relay(client: socket.socket, server: socket.socket) -> None:
 
 @contextmanager
 def relaying(port: int, tls: ssl.SSLContext | None = None) -> Iterator[tuple[str, Notes]]:
-    """Run a proxy for one port of this machine.
+    """Run a proxy to one port of this machine.
 
     Yields:
-        Its host and port, and its record of requests.
+        The proxy's host and port, and its record of requests.
     """
     notes = Notes()
     handler = type("Noted", (_Relay,), {"notes": notes, "to": ("127.0.0.1", port), "tls": tls})
@@ -126,7 +126,7 @@ def relaying(port: int, tls: ssl.SSLContext | None = None) -> Iterator[tuple[str
         daemon_threads = True
 
         def handle_error(self, *arguments):
-            """Ignore the error: a client that disconnected is not a fault of the proxy."""
+            """Ignore the error, because a client that disconnects is not an error of the proxy."""
 
     server = Server(("127.0.0.1", 0), handler)
     thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.02})

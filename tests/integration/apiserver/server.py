@@ -1,4 +1,4 @@
-"""An API server that misbehaves: it has real sockets, and a test prepares its responses."""
+"""An API server that misbehaves: a test prepares the responses, which go over real sockets."""
 
 import json
 import socket
@@ -20,18 +20,18 @@ Answer = Callable[["Exchange"], None]
 
 @dataclass(frozen=True)
 class Asked:
-    """One request as it was received."""
+    """One request as the server received it."""
 
     method: str
     path: str
     query: dict[str, str]
     headers: dict[str, str]
     body: Any
-    lines: tuple[tuple[str, str], ...] = ()  # all headers, because a name may occur several times
+    lines: tuple[tuple[str, str], ...] = ()  # with repetitions, which `headers` loses
 
     @property
     def watches(self):
-        """Return whether it is a watch."""
+        """Return whether the request is a watch."""
         return self.query.get("watch") == "true"
 
 
@@ -59,13 +59,13 @@ class Script:
 
 
 class Exchange(BaseHTTPRequestHandler):
-    """One connection; the script of its server has the responses."""
+    """One connection; the server's script contains the responses."""
 
     protocol_version = "HTTP/1.1"
     script: Script
 
     def answer(self):
-        """Respond as the script says."""
+        """Send the script's next response."""
         address = urlsplit(self.path)
         length = int(self.headers.get("Content-Length") or 0)
         body = json.loads(self.rfile.read(length)) if length else None
@@ -93,22 +93,22 @@ class Exchange(BaseHTTPRequestHandler):
 
 
 def reply(code: int = 200, obj: Any = None, **headers: str) -> Answer:
-    """Respond with JSON."""
+    """Return a response with JSON."""
     return lambda exchange: exchange.send(code, json.dumps(obj or {}).encode(), **headers)
 
 
 def raw(body: bytes, code: int = 200) -> Answer:
-    """Respond with the bytes of a body as they are."""
+    """Return a response whose body is exactly these bytes."""
     return lambda exchange: exchange.send(code, body)
 
 
 def refusal(code: int, reason: str, **headers: str) -> Answer:
-    """Respond with a Status."""
+    """Return a response with a Status object."""
     return reply(code, {"kind": "Status", "code": code, "reason": reason, "message": "no"}, **headers)
 
 
 def hang(exchange: Exchange) -> None:
-    """Send nothing, as a server behind a half-open connection."""
+    """Send nothing, as a server at the other end of a half-open connection."""
     exchange.script.over.wait(30)
     exchange.close_connection = True
 
@@ -119,7 +119,7 @@ def hang_up(exchange: Exchange) -> None:
 
 
 def trickle(exchange: Exchange) -> None:
-    """Send a byte from time to time, without end."""
+    """Send a byte from time to time, and never complete the response."""
     exchange.send_response(200)
     exchange.send_header("Content-Length", "100000")
     exchange.end_headers()
@@ -128,9 +128,9 @@ def trickle(exchange: Exchange) -> None:
 
 
 def stream(*events: Any, ends: str = "properly") -> Answer:
-    """Send events of a watch.
+    """Return a response with the events of a watch.
 
-    The watch `ends` properly, is silent for ever, or is cut in the middle of a line.
+    The watch `ends` properly, stays silent, or breaks in the middle of a line.
     """
 
     def answer(exchange: Exchange) -> None:
@@ -151,9 +151,9 @@ def stream(*events: Any, ends: str = "properly") -> Answer:
 
 
 def command(*messages: bytes, ends: str = "properly") -> Answer:
-    """Run a command: send messages, each of which begins with the number of its stream.
+    """Return a response with the messages of a command; the first byte of a message numbers its stream.
 
-    The command `ends` properly by closing the websocket, is silent for ever, or is cut.
+    The command `ends` properly by closing the websocket, stays silent, or breaks.
     """
 
     def answer(exchange: Exchange) -> None:
@@ -189,7 +189,7 @@ def serving(tls: ssl.SSLContext | None = None, address: str = "127.0.0.1") -> It
             """Ignore the error: the tests make clients disconnect first."""
 
     server = Server((address, 0), handler)
-    if tls is not None:  # the connection's thread does the handshake, so a client that refuses blocks nobody
+    if tls is not None:  # each thread does its own handshake
         server.socket = tls.wrap_socket(server.socket, server_side=True, do_handshake_on_connect=False)
     thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.02})
     thread.start()

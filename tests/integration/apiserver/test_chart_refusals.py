@@ -1,4 +1,4 @@
-"""The errors of Helm in a cluster that lacks a kind; this cluster knows only Kubernetes' own kinds."""
+"""Helm's errors in a cluster without a kind that the chart needs; this cluster has only Kubernetes' kinds."""
 
 import pytest
 
@@ -8,7 +8,7 @@ MONITORS = "monitoring.podMonitor.enabled=true"
 
 
 def test_monitors_are_refused_until_the_cluster_knows_their_kinds(control_plane):
-    """docs/howto/install.md quotes this error with its remedy: install the Prometheus Operator first."""
+    """A user finds this error in docs/howto/install.md, with the remedy: first install the operator."""
     install = ("install", "palaestra", str(CHART), f"--namespace={NAMESPACE}", "--create-namespace")
     words = 'no matches for kind "PodMonitor"'
 

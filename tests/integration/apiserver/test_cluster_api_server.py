@@ -1,4 +1,4 @@
-"""Every kind of request against a real API server, which must respond as our code expects."""
+"""Every kind of request to a real API server, whose responses must be those that our client expects."""
 
 import threading
 import time
@@ -35,18 +35,18 @@ def child(namespace, name):
 
 
 def test_the_version_of_the_api_server_is_returned(real):
-    """This shows that credentials and certificates work."""
+    """A successful response shows that credentials and certificates work."""
     assert real.version().startswith("v1.")
 
 
 def test_a_group_that_is_not_served_is_no_error(real):
-    """A cluster without Kueue is normal."""
+    """Many clusters have no Kueue, and the operator must work there too."""
     assert real.serves("batch/v1")
     assert not real.serves("kueue.x-k8s.io/v1beta1")
 
 
 def test_what_was_created_is_read_back(real, namespace):
-    """The API server adds uid and version."""
+    """The API server adds uid and version, which the operator needs for later requests."""
     made = real.create(CONFIG_MAPS, config_map(namespace, data={"k": "v"}))
 
     assert real.get(CONFIG_MAPS, namespace, "c") == made
@@ -54,7 +54,7 @@ def test_what_was_created_is_read_back(real, namespace):
 
 
 def test_a_name_is_given_once(real, namespace):
-    """The names protect: of two operators that create the same object, one is refused."""
+    """If two operators create the same object, the unique name makes one of the requests fail."""
     with ThreadPoolExecutor(8) as pool:
         attempts = [pool.submit(real.create, CONFIG_MAPS, config_map(namespace)) for _ in range(8)]
     errors = [attempt.exception() for attempt in attempts]
@@ -64,7 +64,7 @@ def test_a_name_is_given_once(real, namespace):
 
 
 def test_what_is_not_there_is_not_found(real, namespace):
-    """This holds for a missing object and for a missing kind."""
+    """The caller must get the same error for a missing object and for a missing kind."""
     with pytest.raises(NotFound):
         real.get(PODS, namespace, "none")
     with pytest.raises(NotFound):
@@ -72,7 +72,7 @@ def test_what_is_not_there_is_not_found(real, namespace):
 
 
 def test_a_wrong_object_is_refused_with_the_name_of_the_field(real, namespace):
-    """The message becomes the reason of a condition."""
+    """The operator copies the message into a condition, where the author of a job reads it."""
     wrong = child(namespace, "j")
     wrong["spec"]["template"]["spec"]["restartPolicy"] = "Always"
 
@@ -81,7 +81,7 @@ def test_a_wrong_object_is_refused_with_the_name_of_the_field(real, namespace):
 
 
 def test_what_rbac_does_not_allow_is_forbidden(control_plane, namespace):
-    """The message names user, verb and resource."""
+    """From the message, an administrator learns which user needs which permission."""
     nobody = connect(str(control_plane.kubeconfig_of("nobody")))
 
     with pytest.raises(Forbidden, match=r'User "nobody" cannot list resource "pods"'):
@@ -90,7 +90,7 @@ def test_what_rbac_does_not_allow_is_forbidden(control_plane, namespace):
 
 
 def test_a_merge_changes_what_it_names_and_removes_what_is_null(real, namespace):
-    """This is a merge patch (RFC 7386)."""
+    """The operator removes a field with null, as RFC 7386 defines for merge patches."""
     real.create(CONFIG_MAPS, config_map(namespace, data={"a": "1", "b": "2"}))
 
     merged = real.merge(CONFIG_MAPS, namespace, "c", {"data": {"a": None, "c": "3"}})
@@ -99,7 +99,7 @@ def test_a_merge_changes_what_it_names_and_removes_what_is_null(real, namespace)
 
 
 def test_a_merge_into_another_version_is_a_conflict(real, namespace):
-    """Another client has written first."""
+    """If another client has written first, the operator must read the object again."""
     made = real.create(CONFIG_MAPS, config_map(namespace))
     version = made["metadata"]["resourceVersion"]
     real.merge(CONFIG_MAPS, namespace, "c", {"data": {"a": "1"}}, resource_version=version)
@@ -109,7 +109,7 @@ def test_a_merge_into_another_version_is_a_conflict(real, namespace):
 
 
 def test_a_status_is_merged_through_its_subresource(real, namespace):
-    """The subresource ignores the rest of the patch."""
+    """A patch of the status must not change other fields by accident."""
     real.create(NODES, {"apiVersion": "v1", "kind": "Node", "metadata": {"name": namespace}})
     patch = {"spec": {"unschedulable": True}, "status": {"phase": "Running"}}
 
@@ -121,7 +121,7 @@ def test_a_status_is_merged_through_its_subresource(real, namespace):
 
 
 def test_applying_makes_it_so_and_applying_less_takes_it_back(real, namespace):
-    """Server-side apply owns fields. For this reason the operator never applies Jobs."""
+    """Server-side apply removes omitted fields, and for this reason the operator never applies Jobs."""
     real.apply(config_map(namespace, data={"a": "1", "b": "2"}))
     applied = real.apply(config_map(namespace, data={"a": "1"}))
 
@@ -129,7 +129,7 @@ def test_applying_makes_it_so_and_applying_less_takes_it_back(real, namespace):
 
 
 def test_a_field_of_another_manager_is_taken_by_force_only(real, namespace):
-    """The API server supports both ways: with a conflict, and with force."""
+    """The operator needs both behaviors: a conflict, and the change by force."""
     real.apply(config_map(namespace, data={"a": "1"}), manager="another")
 
     with pytest.raises(Conflict, match="another"):
@@ -139,7 +139,7 @@ def test_a_field_of_another_manager_is_taken_by_force_only(real, namespace):
 
 
 def test_a_deletion_that_names_a_uid_spares_a_later_object_of_the_same_name(real, namespace):
-    """Otherwise a cache that is a minute old would delete a new object."""
+    """With an old cache, the operator would otherwise delete a new object of the same name."""
     first = real.create(CONFIG_MAPS, config_map(namespace))
     real.delete(CONFIG_MAPS, namespace, "c", uid=first["metadata"]["uid"])
     real.create(CONFIG_MAPS, config_map(namespace))
@@ -151,7 +151,7 @@ def test_a_deletion_that_names_a_uid_spares_a_later_object_of_the_same_name(real
 
 
 def test_six_hundred_objects_are_listed_in_pages_and_all_of_one_moment(real, namespace):
-    """Six requests list them; no name is missing or occurs twice."""
+    """Each of the six pages must contain the next objects, without a gap or a repetition."""
     with ThreadPoolExecutor(8) as pool:
         made = pool.map(
             lambda number: real.create(CONFIG_MAPS, config_map(namespace, f"c{number}", kind="many")),
@@ -169,7 +169,7 @@ def test_six_hundred_objects_are_listed_in_pages_and_all_of_one_moment(real, nam
 
 
 def test_a_reflector_follows_what_happens_and_looks_up_by_label(real, namespace):
-    """Objects are created before it starts, and created, changed and deleted while it watches."""
+    """The reflector must report objects that exist before it starts, and all later changes."""
     reports, more = [], threading.Condition()
 
     def changed(obj):
@@ -192,7 +192,7 @@ def test_a_reflector_follows_what_happens_and_looks_up_by_label(real, namespace)
     reported("after", {"a": "2"})
     both = reflector.store.select(namespace, {JOB_LABEL: "x"})
     real.delete(CONFIG_MAPS, namespace, "before")
-    reported("before", None, times=2)  # its creation gave the same report
+    reported("before", None, times=2)  # the first report was its creation
     started = time.monotonic()
     reflector.stop(5)
 
@@ -205,7 +205,7 @@ def test_a_reflector_follows_what_happens_and_looks_up_by_label(real, namespace)
 
 
 def test_contents_of_objects_can_stay_with_the_api_server(real, namespace):
-    """A list of a thousand worlds then holds only a thousand names."""
+    """Otherwise a list of a thousand jobs would hold a thousand worlds in memory."""
     real.create(CONFIG_MAPS, config_map(namespace, data={"world": "x" * 1000}, mine="yes"))
 
     found = real.list(CONFIG_MAPS.only_metadata(), namespace, labels="mine=yes")
@@ -215,7 +215,7 @@ def test_contents_of_objects_can_stay_with_the_api_server(real, namespace):
 
 
 def test_a_happening_that_repeats_is_one_event_with_a_count(real, namespace):
-    """This also holds after a restart of the operator in between."""
+    """A person must not see hundreds of equal events, even if the operator restarted in between."""
     made = real.create(JOBS, child(namespace, "j"))
     recorder = Recorder(real)
     recorder.record(made, "Warning", "Stalled", "no step for 600 s")
@@ -234,7 +234,7 @@ def test_a_happening_that_repeats_is_one_event_with_a_count(real, namespace):
 
 
 def test_an_event_that_the_api_server_forgot_is_written_again(real, namespace):
-    """The API server keeps events for an hour."""
+    """The API server keeps events for an hour, so a later repetition must create a new event."""
     made = real.create(JOBS, child(namespace, "j"))
     recorder = Recorder(real)
     recorder.record(made, "Normal", "Planned", "one replica")
@@ -247,7 +247,7 @@ def test_an_event_that_the_api_server_forgot_is_written_again(real, namespace):
 
 
 def test_an_event_that_cannot_be_written_stops_nobody(control_plane, real, namespace):
-    """The permission to write events may be missing, or a message may be too long."""
+    """A missing permission or a long message must not stop the operator."""
     made = real.create(JOBS, child(namespace, "j"))
     nobody = connect(str(control_plane.kubeconfig_of("nobody")))
 

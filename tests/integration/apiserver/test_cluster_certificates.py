@@ -1,4 +1,4 @@
-"""The certificate of an API server: the client accepts and refuses the same certificates as kubectl."""
+"""The certificate of an API server: our client accepts and rejects the same certificates as kubectl."""
 
 import json
 import socket
@@ -14,15 +14,15 @@ from tests.control_plane.certificates import Authority
 from tests.integration.apiserver.conftest import write_kubeconfig
 from tests.integration.apiserver.server import command, reply, serving
 
-# EKS made authorities without key identifiers in 2019. MicroK8s makes them with key identifiers and without a
-# key usage.
+# In 2019, EKS created authorities without key identifiers. MicroK8s creates authorities with key identifiers,
+# but without a key usage.
 KINDS = {"EKS": ("subjectKeyIdentifier=none", "authorityKeyIdentifier=none"), "MicroK8s": ()}
 WORKED = b'\x03{"status": "Success"}'
 
 
 @pytest.fixture(autouse=True)
 def strict(monkeypatch):
-    """Make every new context require the extensions that Python 3.13 requires, on each Python."""
+    """Make every TLS context as strict as in Python 3.13, whatever Python runs the tests."""
     usual = ssl.create_default_context
 
     def strictly(*arguments, **options):
@@ -43,7 +43,7 @@ def shown(pair):
 
 @pytest.fixture(scope="module")
 def authorities(tmp_path_factory):
-    """Return an authority of each kind."""
+    """Return an authority of each kind in `KINDS`."""
     made = {}
     for name, extensions in KINDS.items():
         made[name] = Authority.create(tmp_path_factory.mktemp(name), *extensions)
@@ -52,7 +52,7 @@ def authorities(tmp_path_factory):
 
 @pytest.fixture(scope="module", params=KINDS)
 def lenient(request, authorities):
-    """Yield a server whose authority lacks extensions."""
+    """Yield a server whose authority lacks extensions that Python 3.13 requires."""
     authority = authorities[request.param]
     pair = (
         authority.bare_server(["127.0.0.1"], 1) if KINDS[request.param] else authority.server(["127.0.0.1"])
@@ -62,7 +62,7 @@ def lenient(request, authorities):
 
 
 def kubeconfig_of(path, address, **cluster):
-    """Write a kubeconfig for a server with the given fields of the cluster."""
+    """Write a kubeconfig for a server, with these additional fields of the cluster."""
     file = write_kubeconfig(path / "kubeconfig", address, {"token": "my-token"})
     content = json.loads((path / "kubeconfig").read_text())
     content["clusters"][0]["cluster"] |= cluster
@@ -71,7 +71,7 @@ def kubeconfig_of(path, address, **cluster):
 
 
 def test_python_of_the_images_would_refuse_these_authorities(lenient, strict):
-    """Otherwise the other tests would prove nothing on an older Python."""
+    """If the images' Python accepted these authorities by default, the other tests would prove nothing."""
     context = strict(cafile=lenient.authority)
     assert context.verify_flags & ssl.VERIFY_X509_STRICT
     host, port = lenient.address.removeprefix("https://").split(":")
@@ -84,7 +84,7 @@ def test_python_of_the_images_would_refuse_these_authorities(lenient, strict):
 
 
 def test_a_kubeconfig_reaches_a_server_whose_authority_lacks_extensions(lenient, tmp_path):
-    """This holds for requests and for commands, because kubectl does not require these extensions."""
+    """A user whose kubectl accepts these authorities expects that `palaestra` does so too."""
     lenient.script.calls = [reply(obj={"gitVersion": "v1.36.4"}), command(b"\x01hello", WORKED)]
     file = kubeconfig_of(tmp_path, lenient.address, **{"certificate-authority": str(lenient.authority)})
 
@@ -96,7 +96,7 @@ def test_a_kubeconfig_reaches_a_server_whose_authority_lacks_extensions(lenient,
 
 
 def test_a_pod_reaches_a_server_whose_authority_lacks_extensions(lenient, tmp_path, monkeypatch):
-    """Otherwise the operator would never become ready."""
+    """If the client refused such an authority, the operator would never become ready in the cluster."""
     lenient.script.calls = [reply(obj={"gitVersion": "v1.36.4"})]
     (tmp_path / "ca.crt").write_bytes(lenient.authority.read_bytes())
     (tmp_path / "token").write_text("of-the-pod")
@@ -112,7 +112,7 @@ def test_a_pod_reaches_a_server_whose_authority_lacks_extensions(lenient, tmp_pa
 
 @pytest.fixture(scope="module")
 def wrong(authorities, tmp_path_factory):
-    """Yield servers whose certificate is wrong in one way, with the address and authority to use."""
+    """Yield servers with one error each in their certificates, with their addresses and the authority."""
     good = authorities["MicroK8s"]
     other = Authority.create(tmp_path_factory.mktemp("other"))
     with (
@@ -135,7 +135,7 @@ def wrong(authorities, tmp_path_factory):
     ],
 )
 def test_what_is_wrong_with_a_certificate_is_named(wrong, tmp_path, way, fact, remedy):
-    """Requests, commands and the doctor name it, and no credentials are sent."""
+    """A user must learn the cause from any command, and the client must not send credentials."""
     address, authority = wrong[way]
     api = connect(kubeconfig_of(tmp_path, address, **{"certificate-authority": authority}))
 
@@ -147,7 +147,7 @@ def test_what_is_wrong_with_a_certificate_is_named(wrong, tmp_path, way, fact, r
 
 
 def test_the_doctor_gives_the_remedy_of_the_certificate(wrong, tmp_path):
-    """`check the connection` would mislead, because the connection works."""
+    """The usual remedy, to check the connection, would mislead a user whose connection works."""
     address, authority = wrong["name"]
     api = connect(kubeconfig_of(tmp_path, address, **{"certificate-authority": authority}))
 
@@ -159,7 +159,7 @@ def test_the_doctor_gives_the_remedy_of_the_certificate(wrong, tmp_path):
 
 
 def test_a_server_may_have_another_name_in_its_certificate(wrong, tmp_path):
-    """The remedy names this setting, `tls-server-name`."""
+    """The error message names this setting, so the setting must work."""
     address, authority = wrong["name"]
     settings = {"certificate-authority": authority, "tls-server-name": "localhost"}
     api = connect(kubeconfig_of(tmp_path, address, **settings))
@@ -169,7 +169,7 @@ def test_a_server_may_have_another_name_in_its_certificate(wrong, tmp_path):
 
 
 def test_an_unverified_server_is_warned_of_once(wrong, tmp_path, caplog):
-    """This is `insecure-skip-tls-verify`. Any other warning would be an error in these tests."""
+    """The user has set `insecure-skip-tls-verify`, and needs only one warning about it."""
     address, _ = wrong["dates"]
     file = kubeconfig_of(tmp_path, address, **{"insecure-skip-tls-verify": True})
     api = connect(file)

@@ -1,4 +1,4 @@
-"""The API server and the identity come from a kubeconfig, a plugin, or a pod's service account."""
+"""The client reads server and user from a kubeconfig, a plugin, or a pod's service account."""
 
 import base64
 import json
@@ -34,7 +34,7 @@ def _elsewhere(monkeypatch, tmp_path):
 
 
 def who_asks(rude, api):
-    """Return the credentials that arrive at the server."""
+    """Return the credentials that the server received."""
     rude.script.calls = [reply(obj={"gitVersion": "v1.36.4"})]
     assert api.version() == "v1.36.4"
     api.close()
@@ -42,24 +42,24 @@ def who_asks(rude, api):
 
 
 def test_the_current_context_is_used_where_none_is_named(rude):
-    """This is what kubectl does."""
+    """The client must connect to the same cluster as kubectl."""
     assert who_asks(rude, connect(rude.kubeconfig)) == "Bearer my-token"
 
 
 def test_a_context_may_be_named(rude):
-    """One file then serves many clusters."""
+    """A user may have one file for several clusters."""
     assert who_asks(rude, connect(rude.kubeconfig, "other")) == "Bearer other-token"
 
 
 def test_the_environment_names_a_kubeconfig(rude, monkeypatch):
-    """The variable is KUBECONFIG, as for kubectl."""
+    """A user sets KUBECONFIG for kubectl, and expects the same from `palaestra`."""
     monkeypatch.setenv("KUBECONFIG", rude.kubeconfig)
 
     assert who_asks(rude, connect()) == "Bearer my-token"
 
 
 def test_a_plugin_is_asked_for_a_token(rude, tmp_path):
-    """Clouds provide credentials in this way."""
+    """Clouds issue short-lived credentials by such plugins."""
     plugin = tmp_path / "plugin"
     answer = {
         "apiVersion": "client.authentication.k8s.io/v1",
@@ -76,7 +76,7 @@ def test_a_plugin_is_asked_for_a_token(rude, tmp_path):
 
 
 def test_certificates_may_stand_in_the_kubeconfig_itself(control_plane, tmp_path):
-    """Kubeconfigs of kind and of most clouds look like this."""
+    """Most clouds, and kind, write kubeconfigs that contain the certificates."""
     content = json.loads(control_plane.kubeconfig.read_text())
     for part in (content["clusters"][0]["cluster"], content["users"][0]["user"]):
         for field in [field for field in part if field != "server"]:
@@ -90,7 +90,7 @@ def test_certificates_may_stand_in_the_kubeconfig_itself(control_plane, tmp_path
 
 
 def test_a_server_that_another_authority_vouches_for_is_not_talked_to(control_plane, tmp_path):
-    """No credentials are sent to such a server."""
+    """A server with a certificate from another authority must not receive credentials."""
     content = json.loads(control_plane.kubeconfig.read_text())
     other = tmp_path / "other"
     other.mkdir()
@@ -105,7 +105,7 @@ def test_a_server_that_another_authority_vouches_for_is_not_talked_to(control_pl
 
 @pytest.fixture
 def in_a_pod(control_plane, tmp_path, monkeypatch):
-    """Set the environment and write the files of a pod, and return the folder of its account."""
+    """Set the environment and write the files of a pod, and return the folder of the service account."""
     authority = control_plane.authority.pair.certificate
     (tmp_path / "ca.crt").write_bytes(authority.read_bytes())
     monkeypatch.setenv("KUBERNETES_SERVICE_HOST", "127.0.0.1")
@@ -122,7 +122,7 @@ def token_of(control_plane, *options):
 
 
 def test_a_pod_is_its_service_account_and_reads_its_token_anew(control_plane, in_a_pod):
-    """The kubelet replaces tokens before they expire, and the operator continues to run."""
+    """The kubelet replaces a token before it expires, while the operator runs."""
     now_s = [0.0]
     (in_a_pod / "token").write_text("expired")
     api = Api(Transport(service_account.account(clock=lambda: now_s[0]), Timeouts()))
@@ -138,7 +138,7 @@ def test_a_pod_is_its_service_account_and_reads_its_token_anew(control_plane, in
 
 
 def test_in_a_pod_nothing_has_to_be_named(control_plane, in_a_pod):
-    """This holds in every pod of a cluster."""
+    """A user in a pod needs no kubeconfig and no option."""
     (in_a_pod / "token").write_text(token_of(control_plane))
 
     api = connect()
@@ -152,7 +152,7 @@ def test_in_a_pod_nothing_has_to_be_named(control_plane, in_a_pod):
     ["", "[]", "{}", "not: [yaml", '{"current-context": "x", "contexts": []}', "contexts: 7"],
 )
 def test_a_kubeconfig_that_cannot_be_used_is_named_with_a_remedy(tmp_path, content):
-    """This holds for any wrong content."""
+    """From the message, a user learns which file is wrong and how to name another one."""
     path = tmp_path / "wrong"
     path.write_text(content)
 
@@ -161,13 +161,13 @@ def test_a_kubeconfig_that_cannot_be_used_is_named_with_a_remedy(tmp_path, conte
 
 
 def test_a_missing_kubeconfig_is_named(tmp_path):
-    """The pod's service account is not used instead."""
+    """If the file that a user named is missing, the client must not use another identity."""
     with pytest.raises(NotConfigured, match="missing"):
         connect(str(tmp_path / "missing"))
 
 
 def test_nowhere_to_connect_to_is_said_with_a_remedy():
-    """This happens on a laptop without a cluster."""
+    """A new user runs a command on a laptop without a cluster, and must learn the option."""
     with pytest.raises(NotConfigured, match="--kubeconfig"):
         connect()
 
@@ -178,7 +178,7 @@ def test_nowhere_to_connect_to_is_said_with_a_remedy():
     ids=["a pod's", "empty", "damaged", "no pod"],
 )
 def test_the_own_namespace_is_the_pods_or_the_usual_one(monkeypatch, tmp_path, content, namespace):
-    """This also holds where a service account is mounted only in part."""
+    """A pod may mount only parts of its service account, so the file may be missing or empty."""
     file = tmp_path / "namespace"
     if content is not None:
         file.write_bytes(content)

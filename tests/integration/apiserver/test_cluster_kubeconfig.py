@@ -1,4 +1,4 @@
-"""The client reads a kubeconfig as kubectl does: the user of its requests, and their way to the server."""
+"""The client reads a kubeconfig as kubectl does: the user, and the proxy and address of the server."""
 
 import io
 import json
@@ -49,7 +49,7 @@ def shown(authority):
 
 @pytest.fixture
 def secure(shown, authority):
-    """Yield a server with TLS that responds to one request, one watch and one command."""
+    """Yield a TLS server that responds to a request, a watch and a command."""
     with serving(shown) as (address, script):
         prepare(script)
         port = int(address.rpartition(":")[2])
@@ -64,7 +64,7 @@ def prepare(script):
 
 
 def written(path, address, user, **cluster):
-    """Write a kubeconfig with a user and the given fields of the cluster."""
+    """Write a kubeconfig with a user, and with these additional fields of the cluster."""
     file = write_kubeconfig(path / "kubeconfig", address, user)
     content = json.loads((path / "kubeconfig").read_text())
     content["clusters"][0]["cluster"] |= cluster
@@ -86,7 +86,7 @@ def authorizations(script):
 
 
 def test_requests_act_for_the_user_that_the_kubeconfig_names(secure, tmp_path):
-    """This holds for requests, watches and commands. Otherwise a student would act as the administrator."""
+    """Without impersonation in every kind of request, a student would act as the administrator."""
     user = {
         "token": "of-the-administrator",
         "as": "Jürgen",
@@ -96,7 +96,7 @@ def test_requests_act_for_the_user_that_the_kubeconfig_names(secure, tmp_path):
     }
     ask_all(connect(written(tmp_path, secure.address, user, **{"certificate-authority": secure.ca})))
 
-    # The header has the bytes of UTF-8, which http.server reads as Latin-1.
+    # The header contains bytes in UTF-8, which http.server reads as Latin-1.
     whom = [("Impersonate-User", "Jürgen".encode().decode("latin-1")), ("Impersonate-Uid", "7")]
     whom += [("Impersonate-Group", "students"), ("Impersonate-Group", "system:serviceaccounts")]
     whom += [("Impersonate-Extra-example.org%2Fscope%20%25", value) for value in "ab"]
@@ -134,7 +134,7 @@ def test_requests_act_for_the_user_that_the_kubeconfig_names(secure, tmp_path):
     ],
 )
 def test_a_wrong_user_is_refused_in_one_sentence(tmp_path, user, fact):
-    """The error comes before anything is sent, and names the file and the field."""
+    """The client must report file and field before it sends a request."""
     file = written(tmp_path, "https://127.0.0.1:1", user)
 
     with pytest.raises(NotConfigured, match=f"^{file}: .*{fact}") as refused:
@@ -155,7 +155,7 @@ def test_a_wrong_user_is_refused_in_one_sentence(tmp_path, user, fact):
     ],
 )
 def test_a_wrong_cluster_is_refused_in_one_sentence(tmp_path, cluster, fact):
-    """The error comes before anything is sent, and names file and field without a password."""
+    """The client must report file and field before it sends a request, and must not print a password."""
     file = written(tmp_path, "https://127.0.0.1:1", {"token": "x"}, **cluster)
 
     with pytest.raises(NotConfigured, match=f"^{file}: .*{fact}") as refused:
@@ -165,7 +165,7 @@ def test_a_wrong_cluster_is_refused_in_one_sentence(tmp_path, cluster, fact):
 
 
 def test_a_tokens_file_may_end_with_a_newline(secure, tmp_path):
-    """`echo` writes a newline, and kubectl removes it. The path is relative to the kubeconfig."""
+    """`echo` adds a newline, which kubectl removes. The path of the file is relative to the kubeconfig."""
     (tmp_path / "token").write_text("in-a-file\n")
     user = {"tokenFile": "token", "token": "older"}
 
@@ -175,7 +175,7 @@ def test_a_tokens_file_may_end_with_a_newline(secure, tmp_path):
 
 
 def test_a_user_may_have_a_password(secure, tmp_path):
-    """API servers no longer accept passwords, but proxies in front of them do."""
+    """API servers no longer accept passwords, but a proxy in front of an API server may accept them."""
     user = {"username": "me", "password": "p:w"}
 
     ask_all(connect(written(tmp_path, secure.address, user, **{"certificate-authority": secure.ca})))
@@ -184,7 +184,7 @@ def test_a_user_may_have_a_password(secure, tmp_path):
 
 
 def plugin_of(path, script, **fields):
-    """Return a user with a plugin, which is a shell script."""
+    """Return a user whose credential plugin is a shell script."""
     plugin = path / "plugin"
     plugin.write_text(f"#!/bin/sh\n{script}\n")
     plugin.chmod(plugin.stat().st_mode | stat.S_IXUSR)
@@ -193,12 +193,12 @@ def plugin_of(path, script, **fields):
 
 
 def given(**status):
-    """Return the output of a plugin."""
+    """Return the text that a plugin prints."""
     return json.dumps({"apiVersion": V1, "kind": "ExecCredential", "status": status})
 
 
 def test_a_plugin_is_run_where_the_kubeconfig_lies_and_again_when_its_token_has_expired(secure, tmp_path):
-    """The plugin receives the cluster's data if its kubeconfig requests them."""
+    """A plugin's path is relative to the kubeconfig, and the plugin may request the cluster's data."""
     count = f'echo "$KUBERNETES_EXEC_INFO $REGION" >> {tmp_path}/runs'
     old = given(token="mine", expirationTimestamp="2020-01-01T00:00:00Z")
     variables = [{"name": "REGION", "value": "eu"}]
@@ -214,7 +214,7 @@ def test_a_plugin_is_run_where_the_kubeconfig_lies_and_again_when_its_token_has_
 
 
 def test_a_plugin_may_give_a_certificate(authority, tmp_path):
-    """The log-ins of some companies do this; the server requires a certificate here."""
+    """The login programs of some companies issue certificates. The server of this test requires one."""
     server, client = authority.server(["127.0.0.1"]), authority.client("me", "", tmp_path)
     asking = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     asking.load_cert_chain(server.certificate, server.key)
@@ -255,7 +255,7 @@ def test_a_plugin_may_give_a_certificate(authority, tmp_path):
 def test_a_plugin_that_gives_nothing_is_named_in_one_sentence(
     secure, tmp_path, monkeypatch, script, fields, fact
 ):
-    """Nothing is sent, because a response to a request without credentials would be about permissions."""
+    """A request without credentials would fail with a misleading error about permissions."""
     monkeypatch.setattr(sys, "stdin", io.StringIO())
     user = plugin_of(tmp_path, script, **fields)
     api = connect(written(tmp_path, secure.address, user, **{"certificate-authority": secure.ca}))
@@ -281,9 +281,9 @@ def test_a_plugin_that_gives_nothing_is_named_in_one_sentence(
     ],
 )
 def test_the_proxy_of_a_cluster_is_used_in_every_form(secure, shown, tmp_path, form, target, user):
-    """Requests, watches and commands use it.
+    """Requests, watches and commands all use the cluster's proxy.
 
-    SOCKS proxies resolve names, because kubectl leaves that to them.
+    A SOCKS proxy resolves the server's name, because kubectl leaves that to the proxy.
     """
     tls = shown if form.startswith("https") else None
     server = f"https://{target}:{secure.port}"
@@ -300,7 +300,7 @@ def test_the_proxy_of_a_cluster_is_used_in_every_form(secure, shown, tmp_path, f
 
 @pytest.mark.parametrize("scheme", ["http", "https", "socks5"])
 def test_a_proxy_that_is_not_there_is_named(tmp_path, scheme):
-    """The errors of requests and commands contain its address without its password."""
+    """The errors of requests and commands contain the proxy's address without the password."""
     proxy = f"{scheme}://me:secret@127.0.0.1:1"
     file = written(tmp_path, "https://10.99.0.1:6443", {"token": "x"}, **{"proxy-url": proxy})
     api = connect(file, limits=HASTE)
@@ -313,7 +313,7 @@ def test_a_proxy_that_is_not_there_is_named(tmp_path, scheme):
 
 
 def test_a_proxy_that_refuses_is_named(secure, tmp_path):
-    """The proxy of a company requires a user."""
+    """A company's proxy may require a user, so the error must name the proxy and the code 407."""
     with relaying(secure.port) as (address, notes):
         notes.refuses = True
         settings = {"certificate-authority": secure.ca, "proxy-url": f"http://{address}"}
@@ -327,7 +327,7 @@ def test_a_proxy_that_refuses_is_named(secure, tmp_path):
 
 @pytest.mark.parametrize("scheme", ["http", "socks5"])
 def test_the_proxy_of_the_environment_is_used(secure, tmp_path, monkeypatch, scheme):
-    """The proxy is used for a server on another machine, not for one on loopback."""
+    """A user in a company sets HTTPS_PROXY, and the client must reach a cluster outside of the company."""
     with relaying(secure.port) as (address, notes):
         monkeypatch.setenv("HTTPS_PROXY", f"{scheme}://{address}")
         settings = {"certificate-authority": secure.ca, "tls-server-name": "localhost"}
@@ -339,7 +339,7 @@ def test_the_proxy_of_the_environment_is_used(secure, tmp_path, monkeypatch, sch
 
 
 def test_a_pod_uses_the_proxy_of_the_environment(secure, tmp_path, monkeypatch):
-    """The nodes of some clusters reach the API server through a proxy."""
+    """In some clusters, pods reach the API server only through a proxy."""
     (tmp_path / "ca.crt").write_bytes(Path(secure.ca).read_bytes())
     (tmp_path / "token").write_text("of-the-pod\n")
     monkeypatch.setenv("KUBERNETES_SERVICE_HOST", "10.96.0.1")
@@ -353,7 +353,7 @@ def test_a_pod_uses_the_proxy_of_the_environment(secure, tmp_path, monkeypatch):
 
 
 def test_a_proxy_of_the_environment_is_not_asked_for_this_machine(secure, tmp_path, monkeypatch):
-    """This holds for any value of the variable, because Go excludes loopback addresses."""
+    """For loopback addresses, which local test clusters have, kubectl never uses a proxy."""
     monkeypatch.setenv("HTTPS_PROXY", "http://127.0.0.1:1")
 
     ask_all(
@@ -362,7 +362,7 @@ def test_a_proxy_of_the_environment_is_not_asked_for_this_machine(secure, tmp_pa
 
 
 def test_a_server_may_have_an_address_of_ipv6(shown, authority, tmp_path):
-    """This holds for requests, watches and commands, directly and through a proxy."""
+    """Brackets, ports and proxies need special handling for an IPv6 address."""
     ca = {"certificate-authority": str(authority.pair.certificate)}
     with serving(shown, "::1") as (address, script):
         prepare(script)
@@ -378,14 +378,14 @@ def test_a_server_may_have_an_address_of_ipv6(shown, authority, tmp_path):
 
 
 def test_a_server_without_a_scheme_is_https_where_there_are_settings_for_it(secure, tmp_path):
-    """client-go completes the address in the same way."""
+    """Like kubectl, the client must complete such an address with https."""
     server = secure.address.removeprefix("https://")
 
     ask_all(connect(written(tmp_path, server, {"token": "x"}, **{"certificate-authority": secure.ca})))
 
 
 def test_the_first_file_decides_the_current_context(secure, tmp_path):
-    """KUBECONFIG may name several files, and the first that sets a value applies."""
+    """KUBECONFIG may name several files; as in kubectl, the first file that sets a value applies."""
     first = tmp_path / "first"
     first.write_text(json.dumps({"current-context": "other"}))
     second = written(tmp_path, secure.address, {"token": "x"}, **{"certificate-authority": secure.ca})

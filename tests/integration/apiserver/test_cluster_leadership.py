@@ -1,4 +1,4 @@
-"""Two operators share a lease on a real API server: when the leader ends in any way, the other one leads."""
+"""Operators share a lease on a real API server: when the leader ends in any way, another one leads."""
 
 import os
 import select
@@ -22,7 +22,7 @@ from tests.faults.proxy import Proxy
 
 PROGRAM = Path(__file__).with_name("candidate.py")
 DURATION_S = 3
-ABSENT_S = 6.0  # duration of the leases of leaders that lose their API server, for up to 8 s
+ABSENT_S = 6.0  # the lease's duration for leaders that lose their API server for up to 8 s
 SOON_S = 5.0
 WAIT_S = 20.0
 
@@ -42,7 +42,7 @@ class Candidate:
         self.unread = b""
 
     def line(self, deadline_s=15):
-        """Return its next line, or None if no line comes in time."""
+        """Return the next line of the process, or None after the timeout."""
         ends = time.monotonic() + deadline_s
         while b"\n" not in self.unread:
             ready, _, _ = select.select([self.process.stdout], [], [], max(0, ends - time.monotonic()))
@@ -54,12 +54,12 @@ class Candidate:
         return line.decode()
 
     def ask(self):
-        """Make the process write whether it leads now, and return its next line."""
+        """Make the process write whether it leads, and return its next line."""
         self.process.stdin.write(b"\n")
         return self.line()
 
     def close(self):
-        """End the process in any state."""
+        """End the process, whatever its state is."""
         self.process.kill()
         self.process.wait()
         self.process.stdin.close()
@@ -68,7 +68,7 @@ class Candidate:
 
 @pytest.fixture
 def candidate(control_plane, namespace):
-    """Yield a function that starts candidates for one lease, and end them all."""
+    """Yield a function that starts candidates for one lease; end all candidates at the end."""
     started = []
 
     def start(identity):
@@ -81,7 +81,7 @@ def candidate(control_plane, namespace):
 
 
 def test_one_of_two_leads(candidate):
-    """The second one waits while the first one lives."""
+    """While the first operator runs, the second one must wait."""
     first = candidate("first")
     assert first.line() == "leads True"
 
@@ -93,7 +93,7 @@ def test_one_of_two_leads(candidate):
 
 
 def test_a_leader_that_ends_hands_over_at_once(candidate, real, namespace):
-    """The leader releases the lease, so nobody waits for it to expire."""
+    """A leader that ends releases the lease, so its successor need not wait until the lease expires."""
     first, second = candidate("first"), None
     assert first.line() == "leads True"
     second = candidate("second")
@@ -110,7 +110,7 @@ def test_a_leader_that_ends_hands_over_at_once(candidate, real, namespace):
 
 
 def test_a_leader_that_is_killed_is_followed_after_its_lease(candidate):
-    """A killed leader does not release the lease."""
+    """A leader that is killed cannot release the lease, so its successor waits for the expiry."""
     first = candidate("first")
     assert first.line() == "leads True"
     second = candidate("second")
@@ -124,7 +124,7 @@ def test_a_leader_that_is_killed_is_followed_after_its_lease(candidate):
 
 
 def test_a_leader_that_was_frozen_knows_that_it_is_none_when_it_wakes(candidate):
-    """It knows this before it does anything else, because `leads()` compares the time."""
+    """`leads()` compares the time, so a leader that wakes cannot write with an expired lease."""
     first = candidate("first")
     assert first.line() == "leads True"
     second = candidate("second")
@@ -140,7 +140,7 @@ def test_a_leader_that_was_frozen_knows_that_it_is_none_when_it_wakes(candidate)
 
 
 def test_a_leader_whose_lease_was_deleted_takes_it_again(candidate, real, namespace):
-    """A user may delete any object."""
+    """A user may delete the lease, and the operator must then create a new one."""
     first = candidate("first")
     assert first.line() == "leads True"
 
@@ -155,7 +155,7 @@ def test_a_leader_whose_lease_was_deleted_takes_it_again(candidate, real, namesp
 
 
 def test_a_leader_whose_lease_another_has_taken_stops(candidate, real, namespace):
-    """A user may also write any object."""
+    """A user may write another holder into the lease; the operator must then stop."""
     first = candidate("first")
     assert first.line() == "leads True"
 
@@ -165,7 +165,7 @@ def test_a_leader_whose_lease_another_has_taken_stops(candidate, real, namespace
 
 
 def test_a_leader_that_ends_leaves_the_lease_to_nobody(real, namespace):
-    """The old leader stops at once, and the next one need not wait for the Lease to expire."""
+    """The leader removes its name from the lease, so the next operator can lead at once."""
     leads, follows = threading.Event(), threading.Event()
     leadership = Leadership(real, namespace, "operator", "me", duration_s=DURATION_S, renew_s=0.3)
     leadership.start(leads.set, follows.set)
@@ -179,7 +179,7 @@ def test_a_leader_that_ends_leaves_the_lease_to_nobody(real, namespace):
 
 
 def test_a_candidate_that_never_started_can_be_stopped(real, namespace):
-    """An operator may fail before it starts its candidate."""
+    """An operator may fail before it starts its candidate, and then stops the candidate in cleanup."""
     leadership = Leadership(real, namespace, "operator", "me")
     leadership.stop()
 
@@ -187,7 +187,7 @@ def test_a_candidate_that_never_started_can_be_stopped(real, namespace):
 
 
 def test_a_lease_that_was_lost_and_regained_is_another_tenure(real, namespace):
-    """A decision of the first tenure must not be written in the second."""
+    """A decision from the first term must not be written in the second, so the term's number changes."""
     leads, follows = threading.Semaphore(0), threading.Event()
     leadership = Leadership(real, namespace, "operator", "me", duration_s=DURATION_S, renew_s=0.3)
     leadership.start(leads.release, follows.set)
@@ -205,11 +205,11 @@ def test_a_lease_that_was_lost_and_regained_is_another_tenure(real, namespace):
 
 
 class Absent:
-    """A leader with one worker, and an API server that is unreachable for some time.
+    """A leader with one worker, whose API server is unreachable for some time.
 
     Attributes:
-        absence_s: the time for which it is unreachable.
-        renewed: set once the lease was renewed after a renewal had failed.
+        absence_s: the time for which the API server is unreachable.
+        renewed: set once a renewal of the lease succeeds after one has failed.
     """
 
     def __init__(self, control_plane, namespace, folder, absence_s):
@@ -234,7 +234,7 @@ class Absent:
         )
 
     def play(self):
-        """Lead during changes and the absence, and return the keys that are not written."""
+        """Lead while changes arrive and the server is away; return the keys that were never written."""
         keys = {f"{self._name}-{number}" for number in range(5)}
         self._workers.start()
         self._leadership.start(self._gate.set, self._gate.clear, self.renewed.set)
@@ -242,7 +242,7 @@ class Absent:
             assert self._gate.wait(WAIT_S)
             self._course.leave(self.absence_s)
             self._proxy.break_all()
-            for key in sorted(keys):  # some come during the absence, and some after it
+            for key in sorted(keys):  # some keys are added during the absence, and some after it
                 self._queue.add((self._namespace, key))
                 time.sleep(self.absence_s / 4)
             ends = time.monotonic() + SOON_S
@@ -262,10 +262,10 @@ class Absent:
 
 
 def test_no_change_is_forgotten_after_an_absence_of_any_length(control_plane, namespace, tmp_path):
-    """Between two thirds of a lease's duration and the next renewal, a leader writes nothing and still leads.
+    """When two thirds of the lease's duration have passed without a renewal, a leader writes nothing.
 
-    Once, the changes that it gave up in this time were lost, because no later change and no new tenure
-    brought them back.
+    After the next renewal, the leader writes again, in the same term. Earlier versions lost the changes from
+    the time between, because neither a later change nor a new term caused another attempt.
     """
     absences = [Absent(control_plane, namespace, tmp_path, step * ABSENT_S / 30) for step in range(1, 41)]
 
@@ -273,6 +273,6 @@ def test_no_change_is_forgotten_after_an_absence_of_any_length(control_plane, na
         forgotten = list(together.map(Absent.play, absences))
 
     assert {it.absence_s: keys for it, keys in zip(absences, forgotten, strict=True) if keys} == {}
-    # This shows that the case occurred. On a busy machine some leaders lose the lease instead, and lead
-    # again.
+    # At least one leader must have been in this state. On a busy machine, some leaders lose the lease
+    # instead, and lead again later.
     assert any(it.renewed.is_set() for it in absences if ABSENT_S / 3 < it.absence_s < ABSENT_S / 2)

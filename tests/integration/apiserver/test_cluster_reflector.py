@@ -1,4 +1,4 @@
-"""The cache with an API server that misbehaves: it continues, finds the true state, and sends no storm."""
+"""The cache survives an API server that misbehaves: it finds the true state, without too many requests."""
 
 import threading
 import time
@@ -11,17 +11,17 @@ from tests.integration.apiserver.server import hang, raw, refusal, reply, stream
 
 
 def pod(name, version="1"):
-    """Return a pod as the API server sends it; a pod called `bad` makes the cache's user fail."""
+    """Return a pod as the API server sends it; a pod with the name `bad` causes an error in `keep`."""
     return {"metadata": {"name": name, "namespace": "n", "resourceVersion": version, "labels": {}}}
 
 
 def listed(*names, version="10"):
-    """Return a complete list."""
+    """Return the response to a list request, with pods of these names."""
     return reply(obj={"metadata": {"resourceVersion": version}, "items": [pod(name) for name in names]})
 
 
 def added(name, version):
-    """Return an event."""
+    """Return the event for a new pod."""
     return {"type": "ADDED", "object": pod(name, version)}
 
 
@@ -37,7 +37,7 @@ EXPIRED = {
 
 
 class Followed:
-    """A reflector of pods, and its reports."""
+    """A reflector of pods; it records the reports."""
 
     def __init__(self, rude, resource=PODS):
         self.script, self.names, self.labels = rude.script, [], []
@@ -45,29 +45,29 @@ class Followed:
         self.reflector = Reflector(rude.api, resource, namespace="n", keep=self.keep, changed=self.changed)
 
     def keep(self, obj):
-        """Keep everything, but fail for a pod called bad."""
+        """Keep every object, but raise an error for a pod with the name `bad`."""
         if obj["metadata"]["name"] == "bad":
             raise ValueError("nobody foresaw this")
         return obj
 
     def changed(self, obj):
-        """Record the name."""
+        """Record the name and the job of a reported object."""
         with self.more:
             self.names.append(obj["metadata"]["name"])
             self.labels.append(obj["metadata"]["labels"].get("palaestra.dev/job"))
             self.more.notify_all()
 
     def wait_reported(self, *names):
-        """Wait until all of these names were reported."""
+        """Wait until all these names have been reported."""
         with self.more:
             assert self.more.wait_for(lambda: set(names) <= set(self.names), timeout=5), self.names
 
     def wait_asked(self, count, *, watches):
-        """Wait for this many watches, or this many lists, and return them."""
+        """Wait until the server has received this many watches or lists, and return them."""
         ends = time.monotonic() + 5
         while len(asked := self.script.of(watches=watches)) < count:
             assert time.monotonic() < ends, f"only {len(asked)} of {count}"
-            threading.Event().wait(0.01)  # the server sends no notice
+            threading.Event().wait(0.01)  # the server cannot notify the test
         return asked
 
     def known(self):
@@ -78,7 +78,7 @@ class Followed:
 
 @pytest.fixture
 def follow(rude):
-    """Start a reflector with a list and some watches; the last watch is silent."""
+    """Return a function that starts a reflector with a list and watches; the last watch is silent."""
     started = []
 
     def start(*watches, lists=(), resource=PODS):
@@ -97,7 +97,7 @@ def follow(rude):
 
 
 def test_what_is_listed_and_what_is_added_is_known(follow):
-    """This is the case without failures."""
+    """In this test, the server makes no mistake. Each of the tests below changes one response."""
     followed = follow(stream(added("c", "11"), ends="silent"))
 
     followed.wait_reported("a", "b", "c")
@@ -107,9 +107,9 @@ def test_what_is_listed_and_what_is_added_is_known(follow):
 
 
 def test_an_object_whose_label_changes_is_reported_for_the_old_label_too(follow):
-    """The old label's job has lost the object, and would not look until another change wakes it.
+    """The job of the old label has lost the object, so the operator must reconcile that job too.
 
-    The present state is reported last, because a program that counts the reports would otherwise keep the old
+    The current state is reported last, because a program that counts reports would otherwise keep the old
     state.
     """
     first, later = added("c", "11"), {**added("c", "12"), "type": "MODIFIED"}
@@ -124,7 +124,7 @@ def test_an_object_whose_label_changes_is_reported_for_the_old_label_too(follow)
 
 
 def test_a_watch_that_is_silent_for_too_long_is_given_up_and_continued(follow):
-    """A half-open connection looks alive for ever. The next watch continues without a new list."""
+    """A half-open connection looks alive forever, so the next watch must continue from the last version."""
     followed = follow(stream(added("c", "11"), ends="silent"), stream(added("d", "12"), ends="silent"))
 
     followed.wait_reported("d")
@@ -135,7 +135,7 @@ def test_a_watch_that_is_silent_for_too_long_is_given_up_and_continued(follow):
 
 
 def test_a_watch_whose_answer_never_begins_is_given_up(follow):
-    """The server accepted the connection and did nothing more."""
+    """The server accepts the connection and then sends nothing."""
     followed = follow(hang, stream(added("c", "11"), ends="silent"))
 
     followed.wait_reported("c")
@@ -145,7 +145,7 @@ def test_a_watch_whose_answer_never_begins_is_given_up(follow):
     "forgotten", [refusal(410, "Expired"), stream(EXPIRED)], ids=["as a status", "as an event"]
 )
 def test_a_forgotten_version_means_a_new_list_and_no_missed_deletion(follow, forgotten):
-    """The pod b was deleted while no watch was open."""
+    """Pod `b` was deleted while no watch was open, and only a new list shows that."""
     followed = follow(forgotten, lists=[listed("a", "b"), listed("a", "c", version="90")])
 
     followed.wait_reported("c")
@@ -157,11 +157,11 @@ def test_a_forgotten_version_means_a_new_list_and_no_missed_deletion(follow, for
 
 
 def test_a_version_that_is_forgotten_again_and_again_does_not_become_a_storm(follow, rude):
-    """Some clients stop at the second 410, others send 3,000 requests a second."""
+    """After repeated 410 errors, some clients give up, and others send 3,000 requests per second."""
     followed = follow()
     rude.script.watches = [refusal(410, "Expired")]
     followed.wait_reported("a", "b")
-    threading.Event().wait(1.0)  # count the requests in this time
+    threading.Event().wait(1.0)  # the time in which requests are counted
 
     assert 2 <= len(rude.script.of(watches=False)) <= 10
 
@@ -171,17 +171,17 @@ def test_a_version_that_is_forgotten_again_and_again_does_not_become_a_storm(fol
     ids=["500", "garbage", "ends at once", "garbage lines"],
 )  # fmt: skip
 def test_trouble_that_lasts_is_met_with_patience(follow, rude, trouble):
-    """The waits are 0.05 to 0.2 s here, and 0.5 to 30 s in a cluster."""
+    """The reflector waits 0.05 to 0.2 s between requests here, and 0.5 to 30 s in a cluster."""
     follow()
     rude.script.watches = [trouble]
     rude.script.calls = [listed("a")]
-    threading.Event().wait(1.0)  # count the requests in this time
+    threading.Event().wait(1.0)  # the time in which requests are counted
 
     assert len(rude.script.of(watches=True)) <= 10
 
 
 def test_an_event_that_was_cut_is_never_seen(follow):
-    """The next watch brings the complete event."""
+    """The client must drop half of an event; the next watch brings the whole event."""
     followed = follow(stream(added("c", "11"), ends="broken"), stream(added("d", "12"), ends="silent"))
 
     followed.wait_reported("d")
@@ -191,7 +191,7 @@ def test_an_event_that_was_cut_is_never_seen(follow):
 
 
 def test_bookmarks_alone_move_the_version_on(follow):
-    """The version does not expire, even where nothing changes for an hour."""
+    """Even if no object changes for an hour, the version must not expire."""
     followed = follow(stream(bookmark("50")), stream(bookmark("60"), ends="silent"))
 
     asked = followed.wait_asked(3, watches=True)
@@ -203,7 +203,7 @@ def test_bookmarks_alone_move_the_version_on(follow):
 
 
 def test_lists_that_fail_are_tried_until_one_succeeds(follow):
-    """The API server may start after the operator."""
+    """The API server may start later than the operator."""
     followed = follow(lists=[refusal(503, "ServiceUnavailable"), raw(b"garbage"), listed("a")])
 
     assert followed.reflector.wait_synced(5)
@@ -211,14 +211,14 @@ def test_lists_that_fail_are_tried_until_one_succeeds(follow):
 
 
 def test_before_the_first_whole_list_nothing_is_in_step(follow):
-    """Before the first list an empty cache does not mean that there are no objects."""
+    """An empty cache does not show that no objects exist, so the operator must not act on it."""
     followed = follow(lists=[hang])
 
     assert not followed.reflector.wait_synced(0.2)
 
 
 def test_one_object_that_nobody_foresaw_hides_no_other(follow):
-    """One wrong object never delays another."""
+    """An error for one object must not delay the others."""
     followed = follow(stream(added("bad", "11"), added("c", "12"), ends="silent"), lists=[listed("bad", "a")])
 
     followed.wait_reported("a", "c")
@@ -227,7 +227,7 @@ def test_one_object_that_nobody_foresaw_hides_no_other(follow):
 
 
 def test_a_change_that_leaves_what_is_kept_as_it_was_is_not_reported(follow):
-    """Heartbeats do not wake a worker."""
+    """A heartbeat changes only fields that the cache drops, so no worker need reconcile."""
     same = {"type": "MODIFIED", "object": pod("a", "1")}
     followed = follow(stream(same, added("c", "12"), ends="silent"))
 
@@ -237,7 +237,7 @@ def test_a_change_that_leaves_what_is_kept_as_it_was_is_not_reported(follow):
 
 
 def test_metadata_are_kept_under_the_name_of_their_kind(follow):
-    """The API server sends PartialObjectMetadata, and no other code has to know that."""
+    """The API server sends the kind PartialObjectMetadata, which no other code expects."""
     followed = follow(stream(added("c", "11"), ends="silent"), resource=CONFIG_MAPS.only_metadata())
 
     followed.wait_reported("a", "c")
@@ -247,7 +247,7 @@ def test_metadata_are_kept_under_the_name_of_their_kind(follow):
 
 @pytest.mark.parametrize("watch", [stream(ends="silent"), hang], ids=["watching", "not answered"])
 def test_stopping_takes_no_longer_than_it_may(follow, rude, watch):
-    """The operator must end within two seconds."""
+    """The operator must end within two seconds, even during a request without a response."""
     followed = follow(watch)
     followed.wait_asked(1, watches=True)
     started = time.monotonic()

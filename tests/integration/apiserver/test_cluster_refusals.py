@@ -1,4 +1,4 @@
-"""One request to an API server that misbehaves: a typed error comes in time, and no write is repeated."""
+"""Requests to an API server that misbehaves raise a typed error in time, and no write is repeated."""
 
 import time
 from itertools import pairwise
@@ -15,7 +15,7 @@ POD = {"apiVersion": "v1", "kind": "Pod", "metadata": {"name": "p", "namespace":
 
 @pytest.mark.parametrize("answer", [hang, trickle], ids=["silent", "byte by byte"])
 def test_an_answer_that_does_not_end_is_given_up(rude, answer):
-    """No call takes longer than twice its deadline, which is 1 s here."""
+    """A worker must not hang: a call takes at most twice its timeout, which is 1 s here."""
     rude.script.calls = [answer]
     started = time.monotonic()
 
@@ -27,7 +27,7 @@ def test_an_answer_that_does_not_end_is_given_up(rude, answer):
 
 @pytest.mark.parametrize("body", [b"<html>", b"[]", b"", b'"text"', b"\xff\xfe"])
 def test_an_answer_that_is_no_object_is_no_answer(rude, body):
-    """A proxy between client and server may send anything."""
+    """A proxy between client and server may send anything with the code 200."""
     rude.script.calls = [raw(body)]
 
     with pytest.raises(Unreachable, match="JSON"):
@@ -35,7 +35,7 @@ def test_an_answer_that_is_no_object_is_no_answer(rude, body):
 
 
 def test_a_gateway_that_answers_in_html_is_a_server_error(rude):
-    """Such a response has no Status object."""
+    """A gateway's response has no Status object, so the error must come from the HTTP code."""
     rude.script.calls = [raw(b"<html>", 502)]
 
     with pytest.raises(ServerError, match="502"):
@@ -43,14 +43,14 @@ def test_a_gateway_that_answers_in_html_is_a_server_error(rude):
 
 
 def test_a_read_on_a_connection_that_broke_is_repeated_once(rude):
-    """Servers close idle connections at any moment."""
+    """Servers close idle connections at any time, and a repeated read has no effect on objects."""
     rude.script.calls = [hang_up, reply(obj=POD)]
 
     assert rude.api.get(PODS, "n", "p") == POD
 
 
 def test_a_write_on_a_connection_that_broke_is_not_repeated(rude):
-    """The server may have done the write. The caller reads before it writes again."""
+    """The server may have executed the write, so the caller must read before it writes again."""
     rude.script.calls = [hang_up, reply(obj=POD)]
 
     with pytest.raises(Unreachable):
@@ -60,7 +60,7 @@ def test_a_write_on_a_connection_that_broke_is_not_repeated(rude):
 
 
 def test_a_write_that_a_busy_server_turned_away_is_repeated_when_it_says(rude):
-    """The code 429 means that the server did nothing."""
+    """With the code 429 the server has not executed the write, so the client may repeat it."""
     rude.script.calls = [refusal(429, "TooManyRequests", Retry_After="0.3"), reply(obj=POD)]
     started = time.monotonic()
 
@@ -70,7 +70,7 @@ def test_a_write_that_a_busy_server_turned_away_is_repeated_when_it_says(rude):
 
 
 def test_a_busy_server_that_asks_for_more_time_than_there_is_gets_it_from_the_queue(rude):
-    """No worker sleeps for a minute."""
+    """A worker must not sleep for a minute, because the queue can retry the job later."""
     rude.script.calls = [refusal(429, "TooManyRequests", Retry_After="60")]
     started = time.monotonic()
 
@@ -82,7 +82,7 @@ def test_a_busy_server_that_asks_for_more_time_than_there_is_gets_it_from_the_qu
 
 
 def test_a_busy_server_that_asks_for_no_time_at_all_is_not_hammered(rude):
-    """`Retry-After: 0` is legal, but to obey it would mean thousands of requests a second."""
+    """`Retry-After: 0` is legal, but a client that obeys it sends thousands of requests per second."""
     rude.script.calls = [refusal(429, "TooManyRequests", Retry_After="0")]
 
     with pytest.raises(TooManyRequests):
@@ -92,7 +92,7 @@ def test_a_busy_server_that_asks_for_no_time_at_all_is_not_hammered(rude):
 
 
 def test_an_eviction_that_a_disruption_budget_refuses_is_not_waited_for(rude):
-    """A budget may refuse for days, and thirty such pods would block a worker for minutes at each check."""
+    """A budget may refuse for days; thirty such pods would block a worker for minutes at each reconcile."""
     rude.script.calls = [refusal(429, "TooManyRequests", Retry_After="0")]
 
     with pytest.raises(TooManyRequests):
@@ -102,7 +102,7 @@ def test_an_eviction_that_a_disruption_budget_refuses_is_not_waited_for(rude):
 
 
 def test_nobody_who_listens_is_unreachable(tmp_path):
-    """The message names the address."""
+    """A user with a wrong address must see that address in the message."""
     kubeconfig = write_kubeconfig(tmp_path / "nobody", "http://127.0.0.1:9", {})
 
     with pytest.raises(Unreachable, match=r"127\.0\.0\.1:9"):
@@ -110,7 +110,7 @@ def test_nobody_who_listens_is_unreachable(tmp_path):
 
 
 def test_a_list_is_read_page_by_page(rude):
-    """Each page contains where the next one begins."""
+    """Each response contains the token with which the client requests the next page."""
     names = ["a", "b", "c"]
     rude.script.calls = [
         reply(
@@ -131,7 +131,7 @@ def test_a_list_is_read_page_by_page(rude):
 
 
 def test_a_list_whose_next_page_is_forgotten_starts_again(rude):
-    """Half of an old list with half of a new one would be wrong."""
+    """A list that mixes pages of two versions would miss objects."""
     first = reply(obj={"metadata": {"continue": "b"}, "items": [{"metadata": {"name": "old"}}]})
     whole = reply(obj={"metadata": {}, "items": [{"metadata": {"name": "new"}}]})
     rude.script.calls = [first, refusal(410, "Expired"), whole]
@@ -140,7 +140,7 @@ def test_a_list_whose_next_page_is_forgotten_starts_again(rude):
 
 
 def test_a_list_that_is_forgotten_again_and_again_is_an_error(rude):
-    """After three attempts the caller waits."""
+    """After three attempts, the caller must decide when to retry."""
     rude.script.calls = [refusal(410, "Expired")]
 
     with pytest.raises(Gone):
@@ -150,7 +150,7 @@ def test_a_list_that_is_forgotten_again_and_again_is_an_error(rude):
 
 
 def test_every_request_is_counted_with_its_verb_and_its_end(rude):
-    """The metrics include the requests that failed."""
+    """A dashboard must show failed requests too."""
     seen = []
     rude.api.on_request = lambda verb, plural, code, seconds: seen.append((verb, plural, code, seconds >= 0))
     rude.script.calls = [reply(obj=POD), refusal(409, "Conflict"), hang_up]
@@ -164,7 +164,7 @@ def test_every_request_is_counted_with_its_verb_and_its_end(rude):
 
 
 def test_a_watch_is_counted_when_it_ends_and_when_it_is_refused(rude):
-    """Each watch is counted once."""
+    """A watch that is counted twice would falsify the metrics of requests."""
     seen = []
     rude.api.on_request = lambda *request: seen.append(request[:3])
     rude.script.watches = [stream(), refusal(410, "Expired")]
@@ -177,7 +177,7 @@ def test_a_watch_is_counted_when_it_ends_and_when_it_is_refused(rude):
 
 @pytest.mark.parametrize("ends", ["properly", "broken"])
 def test_a_watch_that_ends_in_the_middle_of_an_event_did_not_end(rude, ends):
-    """A proxy may close a response as if it were complete."""
+    """A proxy may close the connection as if the response were complete, and an event would be lost."""
     rude.script.watches = [stream(b'{"type": "ADDED", "obj', ends=ends)]
 
     with pytest.raises(Unreachable):
@@ -185,7 +185,7 @@ def test_a_watch_that_ends_in_the_middle_of_an_event_did_not_end(rude, ends):
 
 
 def test_an_error_event_is_raised_as_what_it_is(rude):
-    """Otherwise a Status would be taken for an object."""
+    """If no error were raised, the cache would store the Status as an object."""
     status = {"kind": "Status", "code": 500, "reason": "InternalError", "message": "etcd is gone"}
     rude.script.watches = [stream({"type": "ERROR", "object": status})]
 
@@ -194,7 +194,7 @@ def test_an_error_event_is_raised_as_what_it_is(rude):
 
 
 def test_contents_stay_with_the_server_where_only_metadata_are_asked_for(rude):
-    """The contents of Secrets never get into a cache by accident."""
+    """A cache of Secrets must not hold their contents."""
     rude.script.calls = [reply(obj={"metadata": {"name": "c"}})]
 
     rude.api.get(CONFIG_MAPS.only_metadata(), "n", "c")

@@ -1,6 +1,6 @@
-"""Logs and commands in containers are complete, or an error is raised.
+"""Logs and commands in containers: the output is complete, or the client raises an error.
 
-A scripted server plays the kubelet.
+A scripted server stands in for the kubelet.
 """
 
 import json
@@ -34,14 +34,14 @@ def run(api, within_s=5.0):
 
 
 def test_output_arrives_byte_for_byte_without_what_was_said(rude):
-    """A tar file is not text, and warnings do not belong to it."""
+    """The output may be a tar file, which warnings on standard error would destroy."""
     rude.script.calls = [command(b"\x01\x00\xff\r\n", b"\x02warning", b"\x01\x01", SUCCESS)]
 
     assert run(rude.api) == b"\x00\xff\r\n\x01"
 
 
 def test_a_command_is_asked_for_as_this_identity(rude):
-    """The permission is `create pods/exec`."""
+    """RBAC checks the permission `create pods/exec` of the user in the kubeconfig."""
     rude.script.calls = [command(SUCCESS)]
 
     run(rude.api)
@@ -54,7 +54,7 @@ def test_a_command_is_asked_for_as_this_identity(rude):
 
 
 def test_an_exit_code_comes_with_what_the_command_said(rude):
-    """The standard error of the command names the cause."""
+    """The standard error of the command explains the exit code to a user."""
     rude.script.calls = [command(b"\x01half", b"\x02No such file", FAILURE)]
 
     with pytest.raises(CommandFailed, match="exit code 7: No such file") as failed:
@@ -63,7 +63,7 @@ def test_an_exit_code_comes_with_what_the_command_said(rude):
 
 
 def test_a_missing_program_raises_an_error_with_the_runtimes_words(rude):
-    """A missing program has no exit code."""
+    """Without a program there is no exit code, so the runtime's message must be in the error."""
     rude.script.calls = [command(NOT_STARTED)]
 
     with pytest.raises(OSError, match="no such program"):
@@ -72,7 +72,7 @@ def test_a_missing_program_raises_an_error_with_the_runtimes_words(rude):
 
 @pytest.mark.parametrize("ends", ["properly", "broken"])
 def test_output_without_the_word_about_success_is_not_whole(rude, ends):
-    """A node that fails also closes its connections properly."""
+    """A failing node also closes its connections properly, so only the last message proves success."""
     rude.script.calls = [command(b"\x01half", ends=ends)]
 
     with pytest.raises(Unreachable, match="broke off"):
@@ -80,7 +80,7 @@ def test_output_without_the_word_about_success_is_not_whole(rude, ends):
 
 
 def test_a_command_that_says_nothing_ends_at_its_deadline(rude):
-    """No connection is waited for without end."""
+    """The caller must not wait forever for a silent connection."""
     rude.script.calls = [command(b"\x01half", ends="silent")]
     began = time.monotonic()
 
@@ -90,7 +90,7 @@ def test_a_command_that_says_nothing_ends_at_its_deadline(rude):
 
 
 def test_a_command_that_is_not_allowed_is_forbidden(rude):
-    """The error has the API server's words, although the request was for a websocket."""
+    """The server refuses a websocket with a normal response, whose message a user must see."""
     rude.script.calls = [refusal(403, "Forbidden")]
 
     with pytest.raises(Forbidden):
@@ -98,7 +98,7 @@ def test_a_command_that_is_not_allowed_is_forbidden(rude):
 
 
 def test_a_server_that_is_not_there_is_unreachable(rude):
-    """The error leaves out the text of the command, which may be long."""
+    """The command may be long, so the error must not contain it."""
     rude.script.calls = [raw(b"", code=502)]
 
     with pytest.raises(OSError, match="502"):
@@ -106,7 +106,7 @@ def test_a_server_that_is_not_there_is_unreachable(rude):
 
 
 def test_lines_of_a_log_come_one_by_one(rude):
-    """This also holds for a line in two pieces, and for a last line without a newline."""
+    """A line may arrive in two pieces, and the last line may lack its newline."""
     rude.script.calls = [stream(b"one\ntw", b"o\nthr\xffee")]
 
     lines = list(rude.api.logs("lab", "pod", "trainer", tail=3, within_s=5))
@@ -118,7 +118,7 @@ def test_lines_of_a_log_come_one_by_one(rude):
 
 
 def test_a_log_that_is_followed_ends_at_its_deadline(rude):
-    """The lines before the deadline are not lost."""
+    """Lines from before the deadline must reach the caller."""
     rude.script.calls = [stream(b"one\n", ends="silent")]
     lines = rude.api.logs("lab", "pod", "trainer", follow=True, within_s=0.5)
 

@@ -1,4 +1,4 @@
-"""The control plane of the tests: it starts in seconds and leaves nothing behind."""
+"""The tests' own control plane starts in seconds and leaves no process or file."""
 
 import re
 import shutil
@@ -21,13 +21,13 @@ PROGRAMS = {*FIRST, "kube-controller-manager"}
 
 
 def children(pid):
-    """Return the programs that a process started, by process id."""
+    """Return the child processes of a process: the name of the program by process id."""
     found = {}
     for status in Path("/proc").glob("[0-9]*/status"):
         try:
             lines = dict(line.split(":\t", 1) for line in status.read_text().splitlines())
             program = status.with_name("exe").readlink().name
-        except OSError:  # it has ended in the meantime
+        except OSError:  # the process has ended meanwhile
             continue
         if lines["PPid"] == str(pid):
             found[int(status.parent.name)] = program
@@ -35,7 +35,7 @@ def children(pid):
 
 
 def gone(pid):
-    """Return whether no process with this id runs any more."""
+    """Return whether the process with this id has ended."""
     try:
         return "State:\tZ" in Path(f"/proc/{pid}/status").read_text()
     except OSError:
@@ -43,7 +43,7 @@ def gone(pid):
 
 
 def owner(*arguments):
-    """Start `python -m tests.control_plane` or another module of it, if the programs are built."""
+    """Start a module of tests.control_plane, by default its main program; skip if it is not built."""
     programs()
     module = ".".join(("tests.control_plane", *arguments[:1]))
     command = [sys.executable, "-m", module, *arguments[1:]]
@@ -51,9 +51,9 @@ def owner(*arguments):
 
 
 def all_gone(pids):
-    """Return whether all of these processes end within ten seconds.
+    """Wait up to ten seconds, and return whether all these processes have ended.
 
-    It polls, because a process gets no notice of the end of processes that it did not start.
+    The function polls, because the kernel does not notify a process about processes of others.
     """
     ends = time.monotonic() + 10
     while not all(map(gone, pids)) and time.monotonic() < ends:
@@ -63,13 +63,13 @@ def all_gone(pids):
 
 @pytest.mark.parametrize("end", [signal.SIGTERM, signal.SIGINT], ids=lambda end: end.name)
 def test_nothing_of_it_is_left_when_it_is_asked_to_end(end):
-    """A user ends `python -m tests.control_plane` with Ctrl-C."""
+    """A user ends `python -m tests.control_plane` with Ctrl-C, and must find no process or file of it."""
     with owner() as process:
         kubeconfig = process.stdout.readline().strip().partition("=")[2]
         connected = connect(kubeconfig)
         assert connected.version()
         connected.close()
-        # Each process begins as a wrapper that makes it end with its owner; wait for the real programs.
+        # Each process starts as a wrapper that sets its end with its owner. Wait for the real programs.
         started = eventually(lambda: set((found := children(process.pid)).values()) == PROGRAMS and found)
         process.send_signal(end)
         process.wait(30)
@@ -79,7 +79,7 @@ def test_nothing_of_it_is_left_when_it_is_asked_to_end(end):
 
 
 def test_no_process_of_it_outlives_a_killed_owner():
-    """This holds at any moment; here the API server is about to start."""
+    """The owner may be killed at any time. This test kills it just after the start of the API server."""
     with owner() as process:
         started = eventually(lambda: set((found := children(process.pid)).values()) >= FIRST and found)
         etcd = next(pid for pid, program in started.items() if program == "etcd")
@@ -91,7 +91,7 @@ def test_no_process_of_it_outlives_a_killed_owner():
 
 
 def test_the_control_plane_of_a_run_ends_with_the_run_however_that_ends(tmp_path):
-    """Pytest's process may be killed. No worker waits for the process that runs the plane."""
+    """If pytest is killed, no worker can end the control plane."""
     folder = tmp_path / "plane"
     folder.mkdir()
     with ExitStack() as stack:

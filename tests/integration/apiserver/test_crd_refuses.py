@@ -1,6 +1,6 @@
-"""The refusals by the API server itself: no wrong TrainingJob reaches the operator.
+"""The API server itself refuses wrong TrainingJobs, so they never reach the operator.
 
-Every message names the field. If one of our rules refuses, the message is our sentence, with the remedy.
+Every message names the field. If one of our own rules refuses, the message contains the remedy.
 """
 
 import itertools
@@ -22,14 +22,14 @@ numbers = itertools.count(1)
 
 
 @pytest.fixture(scope="session")
-def defined(control_plane, installed):  # noqa: ARG001 - is there by then
-    """Return the control plane once it knows TrainingJobs."""
+def defined(control_plane, installed):  # noqa: ARG001 - it defines TrainingJobs
+    """Return the control plane after it has the definition of TrainingJobs."""
     return control_plane
 
 
 @pytest.fixture(scope="session")
 def create(defined):
-    """Send one TrainingJob unchanged, without kubectl's checks, and return exit code and output."""
+    """Return a function that sends a TrainingJob without kubectl's checks, and returns code and output."""
 
     def created(job):
         done = defined.kubectl("create", "--raw", STRICT, "-f", "-", sent=json.dumps(job))
@@ -40,7 +40,7 @@ def create(defined):
 
 @pytest.fixture(scope="session")
 def apply(defined):
-    """Apply objects with kubectl, as a user does, and return exit code and output."""
+    """Return a function that applies objects with kubectl, as a user does, and returns code and output."""
 
     def applied(*objects):
         sent = json.dumps({"apiVersion": "v1", "kind": "List", "items": list(objects)})
@@ -51,7 +51,7 @@ def apply(defined):
 
 
 def changed_job(**changes):
-    """Return the minimal example, with a new name and changes by path (`__` for a dot)."""
+    """Return the minimal example with a new name, and with changes by path (`__` stands for a dot)."""
     job = changed(MINIMAL, "metadata.name", f"job-{next(numbers)}")
     for path, value in changes.items():
         job = changed(job, path.replace("__", "."), value)
@@ -166,7 +166,7 @@ WRONG = [
     ("path", "value", "message"), WRONG, ids=[f"{path}={value}" for path, value, _ in WRONG]
 )
 def test_a_wrong_manifest_is_refused_with_the_name_of_the_field(create, path, value, message):
-    """The API server refuses it alone, because no operator runs here."""
+    """No operator runs here, so the API server alone refuses the manifest."""
     code, said = create(changed(changed_job(), path, value))
 
     assert code == 1
@@ -174,7 +174,7 @@ def test_a_wrong_manifest_is_refused_with_the_name_of_the_field(create, path, va
 
 
 def test_suspending_a_queued_job_by_hand_is_refused(create):
-    """The two fields exclude each other, because Kueue decides about suspension."""
+    """Kueue suspends and resumes a queued job, so a user must not do that as well."""
     code, said = create(changed_job(spec__suspend=True, spec__scheduling__queueName="team"))
 
     assert code == 1
@@ -182,7 +182,7 @@ def test_suspending_a_queued_job_by_hand_is_refused(create):
 
 
 def test_a_driver_that_is_a_command_needs_one(create):
-    """The command stands next to the image, which the driver needs too."""
+    """The driver `command` starts the job's own program, so the job must name the program's command."""
     code, said = create(
         changed_job(spec__simulators__0__driver="command", spec__simulators__0__image="mine:1")
     )
@@ -200,7 +200,7 @@ def groups_with_worlds(*lengths):
 
 
 def test_inline_worlds_are_bounded_together(create):
-    """Each world is within its bounds, but a few such jobs would fill a cache."""
+    """Each world is small enough, but a few such jobs would fill the operator's cache."""
     fits, too_much = (180_000,) * 5, (180_000,) * 4 + (180_001,)
     evaluation = {"spec__trainer__evaluation": {"everySteps": 0}}
     accepted, _ = create(changed_job(spec__simulators=groups_with_worlds(*fits), **evaluation))
@@ -213,14 +213,14 @@ def test_inline_worlds_are_bounded_together(create):
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
 def test_every_example_is_accepted(apply, example):
-    """Users copy the examples, so they must work."""
+    """Users copy the examples and expect that they work."""
     code, said = apply(*yaml.safe_load_all(example.read_text()))
 
     assert code == 0, said
 
 
 def test_an_empty_spec_is_accepted_and_completed(apply, defined):
-    """The API server sets the defaults, so that everybody sees them."""
+    """The API server sets the defaults, so a user sees them in the stored job."""
     job = changed_job(spec={})
     code, said = apply(job)
     stored = yaml.safe_load(defined.kubectl("get", "tj", job["metadata"]["name"], "-o", "yaml").stdout)
@@ -264,7 +264,7 @@ MAY_NOT_CHANGE = [
 
 @pytest.mark.parametrize(("path", "value"), MAY_CHANGE, ids=[path for path, _ in MAY_CHANGE])
 def test_what_may_change_changes(apply, path, value):
-    """This is the complete list in docs/reference/trainingjob.md."""
+    """docs/reference/trainingjob.md lists exactly these fields as mutable."""
     job = changed_job()
     apply(job)
 
@@ -278,7 +278,7 @@ def test_what_may_change_changes(apply, path, value):
     ("path", "value"), MAY_NOT_CHANGE, ids=[f"{path}={value}" for path, value in MAY_NOT_CHANGE]
 )
 def test_what_may_not_change_is_refused_with_the_remedy(apply, path, value):
-    """The result of a run that changed in the middle could not be explained."""
+    """Nobody could explain the result of a run whose settings changed in the middle."""
     job = changed_job()
     apply(job)
 
@@ -301,7 +301,7 @@ def test_what_may_not_change_is_refused_with_the_remedy(apply, path, value):
     ids=str,
 )
 def test_the_refusal_of_a_change_names_the_field_that_was_changed(apply, path, value):
-    """With `spec.trainer: cannot be changed` a user had to compare forty fields."""
+    """With only `spec.trainer: cannot be changed`, a user would have to compare forty fields."""
     job = changed_job()
     apply(job)
 
@@ -312,7 +312,7 @@ def test_the_refusal_of_a_change_names_the_field_that_was_changed(apply, path, v
 
 
 def assert_says(said, message):
-    """Assert that the parts of a message, separated by `.*`, occur in this order."""
+    """Assert that the parts of a message (separated by `.*`) occur in the output in this order."""
     rest = said
     for part in message.split(".*"):
         assert part in rest, f"{part!r} is not in {said!r}"

@@ -1,4 +1,4 @@
-"""The definition of this release with jobs of an earlier one: the API server accepts their changes."""
+"""After an upgrade of the definition, the API server still accepts changes of older jobs."""
 
 import json
 
@@ -9,8 +9,8 @@ from palaestra.api.crd import crd
 from palaestra.api.model_walk import walk
 from tests.waiting import eventually
 
-# The group is a separate one, because the other tests on this API server use the definition itself, and
-# `kubectl describe` lists a short name in all groups.
+# The tests use a group of their own. Other tests on this API server use the real definition, and `kubectl
+# describe` finds a short name in all groups.
 GROUP = "earlier.example.com"
 NAMES = {
     "plural": "earlierjobs",
@@ -24,7 +24,7 @@ GUARDS = {guard.message for _, model in walk(TrainingJob) for guard in model.gua
 
 
 def definition():
-    """Return the definition of this release under another group and name."""
+    """Return the present definition with another group and name."""
     found = crd()
     return {
         **found,
@@ -34,7 +34,7 @@ def definition():
 
 
 def without_guards(schema):
-    """Return a schema as in a release without today's guards."""
+    """Return a schema without the present guards, as in an earlier release."""
     if isinstance(schema, list):
         return [without_guards(item) for item in schema]
     if not isinstance(schema, dict):
@@ -46,7 +46,7 @@ def without_guards(schema):
 
 
 def job(name):
-    """Return a job whose spec breaks a guard."""
+    """Return a job whose spec violates a guard."""
     return {
         "apiVersion": f"{GROUP}/v1alpha1",
         "kind": NAMES["kind"],
@@ -57,7 +57,7 @@ def job(name):
 
 @pytest.fixture
 def apply(control_plane):
-    """Apply an object as a user does, and return the exit code and kubectl's output."""
+    """Return a function that applies an object as a user does, and returns exit code and output."""
 
     def applied(obj):
         done = control_plane.kubectl("apply", "--server-side", "-f", "-", sent=json.dumps(obj))
@@ -68,7 +68,7 @@ def apply(control_plane):
 
 
 def test_a_job_with_a_password_can_still_be_changed_and_its_status_written(control_plane, apply):
-    """Validation ratchets: a later rule does not apply to unchanged fields."""
+    """The API server does not apply a new rule to unchanged fields (ratcheting)."""
     apply(without_guards(definition()))
     eventually(lambda: apply(job("earlier"))[0] == 0)
     apply(definition())

@@ -1,4 +1,4 @@
-"""An API server that knows the kinds in the chart and the examples, and Helm to install with."""
+"""Fixtures: an API server with all kinds of the chart and the examples, and Helm."""
 
 import json
 from collections.abc import Callable, Iterator
@@ -11,9 +11,9 @@ from tests.chart.helm import NAMESPACE
 from tests.control_plane.plane import ControlPlane, running
 from tests.control_plane.programs import programs
 
-DEFINITION = "trainingjobs.palaestra.dev"  # not deleted after tests that need no other object of Palaestra
+DEFINITION = "trainingjobs.palaestra.dev"  # deleted at the start of a test, which removes all TrainingJobs
 NAMESPACES = (NAMESPACE, "robots", "drones")
-# These projects have dozens of kinds, which are megabytes that an API server takes seconds to read.
+# Only these kinds are installed, because the projects have dozens, which an API server needs seconds to read.
 KINDS = (
     (PROMETHEUS, "monitoring.coreos.com", ("podmonitors", "prometheusrules", "servicemonitors")),
     (KUEUE, "kueue.x-k8s.io", ("clusterqueues", "localqueues", "resourceflavors")),
@@ -23,9 +23,9 @@ Kubectl = Callable[..., str]
 
 @pytest.fixture(scope="package")
 def control_plane(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ControlPlane]:
-    """Yield a control plane for this folder only.
+    """Yield a control plane that only this folder uses.
 
-    The tests delete definitions, and every TrainingJob with them.
+    Its tests delete the definition and thereby every TrainingJob, which would disturb all other tests.
     """
     with running(tmp_path_factory.mktemp("chart")) as plane:
         yield plane
@@ -33,9 +33,9 @@ def control_plane(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ControlP
 
 @pytest.fixture(scope="package")
 def kubectl(control_plane: ControlPlane) -> Kubectl:
-    """Return a function that runs kubectl as the administrator and returns its output.
+    """Return a function that runs kubectl as the administrator and returns the output.
 
-    The command must succeed.
+    The function raises an error if the command fails.
     """
 
     def run(*arguments: str, sent: str = "") -> str:
@@ -48,7 +48,7 @@ def kubectl(control_plane: ControlPlane) -> Kubectl:
 
 @pytest.fixture(scope="package")
 def cluster(control_plane: ControlPlane, kubectl: Kubectl) -> ControlPlane:
-    """Return the control plane with the kinds of Prometheus and Kueue in the chart and the examples."""
+    """Return the control plane after it has the kinds of Prometheus and Kueue."""
     files = [
         f"--filename={definitions(*module)}/{group}_{kind}.yaml"
         for module, group, kinds in KINDS
@@ -61,10 +61,10 @@ def cluster(control_plane: ControlPlane, kubectl: Kubectl) -> ControlPlane:
 
 
 @pytest.fixture
-def places(cluster: ControlPlane, kubectl: Kubectl) -> None:  # noqa: ARG001 - is up by then
-    """Make the namespaces of the modes.
+def places(cluster: ControlPlane, kubectl: Kubectl) -> None:  # noqa: ARG001 - it must run
+    """Create the namespaces of all modes.
 
-    They refuse pods that are not restricted, and warn about the objects that create such pods.
+    They refuse pods that violate *restricted*, and warn about objects that create such pods.
     """
     labels = {f"pod-security.kubernetes.io/{each}": "restricted" for each in ("enforce", "warn")}
     for name in NAMESPACES:

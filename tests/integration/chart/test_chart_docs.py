@@ -1,4 +1,4 @@
-"""All commands of docs/howto/install.md work as written, from top to bottom."""
+"""All commands of docs/howto/install.md work as written, in the order of the page."""
 
 import json
 import re
@@ -16,8 +16,7 @@ from tests.terminal import Terminal
 PAGE = (ROOT / "docs/howto/install.md").read_text()
 BLOCKS = blocks(PAGE, "sh")
 REGISTRY = blocks(PAGE, "sh with-a-registry")
-# No job ends without nodes. The tests with the operator cover `palaestra try`, and `make e2e` covers `helm
-# test`.
+# Without nodes, no job ends. The operator's tests cover `palaestra try`, and `make e2e` covers `helm test`.
 NO_NODES = 'helm() { [[ $1 == test ]] || command helm "$@"; }\n'
 AWAY = f"""
 helm uninstall palaestra --namespace {NAMESPACE} --ignore-not-found
@@ -30,7 +29,7 @@ TYPED_S = 120
 
 @pytest.fixture
 def typed(cluster, kubectl, tmp_path):
-    """Return a function that types commands in a checkout and returns their output."""
+    """Return a function that runs commands in a checkout and returns their output."""
     kubectl("delete", "crd", DEFINITION, "--ignore-not-found")
     for name in (NAMESPACE, "lab", "robots", "drones"):
         kubectl("delete", "namespace", name, "--ignore-not-found", "--wait")
@@ -47,13 +46,13 @@ def typed(cluster, kubectl, tmp_path):
 
 
 def test_no_command_for_everybody_names_a_registry_that_is_a_placeholder():
-    """Later upgrades keep the values of these commands, so no image could be pulled after them."""
+    """Later upgrades keep such a value, and no image could be pulled from a placeholder."""
     assert [block for block in BLOCKS if "registry.example.com" in block] == []
     assert len(REGISTRY) == 1
 
 
 def test_the_commands_for_a_registry_can_be_typed_after_the_installation(typed, kubectl):
-    """The other commands are tested without these."""
+    """The other tests of the page leave out these commands."""
     for block in (BLOCKS[0], *REGISTRY):
         typed(block)
 
@@ -62,9 +61,9 @@ def test_the_commands_for_a_registry_can_be_typed_after_the_installation(typed, 
 
 
 def test_tensorboard_has_a_claim_that_jobs_may_name(typed, kubectl):
-    """The page must create the claim.
+    """The page must create the claim, with the label that admits jobs.
 
-    Once it did not: TensorBoard's pod waited for it. A claim without the label blocks each job.
+    Without the claim, the pod of TensorBoard waits forever. Without the label, the operator holds each job.
     """
     chapter = PAGE[PAGE.index("## TensorBoard and notebooks") : PAGE.index("## Upgrade")]
     [job] = [yaml.safe_load(block) for block in blocks(chapter, "yaml")]
@@ -81,7 +80,7 @@ def test_tensorboard_has_a_claim_that_jobs_may_name(typed, kubectl):
 
 
 def test_an_uninstalled_palaestra_leaves_nothing_but_claims_of_jobs(typed, kubectl):
-    """Lease, Secrets, namespace and roles stayed, and the page did not mention them."""
+    """The page must name every object that Helm keeps: Lease, Secrets, namespace and roles."""
     typed(BLOCKS[0])
     kubectl("create", "secret", "generic", "notebooks", f"--namespace={NAMESPACE}")
     kubectl("create", "namespace", "robots")
@@ -97,9 +96,9 @@ def test_an_uninstalled_palaestra_leaves_nothing_but_claims_of_jobs(typed, kubec
 
 
 def test_the_roles_can_be_typed_after_the_installation_alone(typed, kubectl):
-    """Their binding is in a namespace that only other chapters created.
+    """The binding of the roles is in a namespace that another chapter creates.
 
-    Once, the commands of those chapters failed when they were typed twice.
+    A reader who has skipped that chapter must be able to run the commands.
     """
     people = PAGE[PAGE.index("## For the people who train") : PAGE.index("## Without Helm")]
     [roles] = blocks(people, "sh")
@@ -115,7 +114,7 @@ def test_the_roles_can_be_typed_after_the_installation_alone(typed, kubectl):
 
 @pytest.mark.timeout(600)
 def test_the_page_can_be_typed_from_top_to_bottom(typed):
-    """Each command works after those above it, without a warning.
+    """A reader runs all commands in this order and must see no warning.
 
     At the end, Palaestra is installed without Helm.
     """

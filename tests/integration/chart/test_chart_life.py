@@ -1,4 +1,4 @@
-"""A release on a real API server, from its installation to its end."""
+"""A release of the chart on a real API server, from its installation to its removal."""
 
 import shutil
 from concurrent.futures import ThreadPoolExecutor
@@ -20,10 +20,10 @@ from tests.waiting import eventually
 
 
 @pytest.fixture
-def release(cluster, places, kubectl):  # noqa: ARG001 - are installed into
+def release(cluster, places, kubectl):  # noqa: ARG001 - the release is installed there
     """Return a function that runs Helm on a cluster without a release.
 
-    Everything is uninstalled at the end.
+    At the end, the fixture uninstalls all releases.
     """
     kubectl("delete", "crd", DEFINITION, "--ignore-not-found")
 
@@ -42,7 +42,7 @@ def release(cluster, places, kubectl):  # noqa: ARG001 - are installed into
 
 @pytest.fixture
 def older(tmp_path):
-    """Return the chart of an earlier release, with another definition and another image."""
+    """Return the chart of a fictitious earlier release, with another definition and another version."""
     chart = tmp_path / "palaestra"
     shutil.copytree(CHART, chart)
     for name, change in {
@@ -56,12 +56,12 @@ def older(tmp_path):
 
 
 def short_names(api):
-    """Return the short names of TrainingJobs."""
+    """Return the short names of the kind TrainingJob in the definition."""
     return api.get(DEFINITIONS, None, DEFINITION)["spec"]["names"]["shortNames"]
 
 
 def test_an_upgrade_brings_the_new_definition_and_touches_no_job(release, older, api):
-    """Helm never upgrades the files in crds/, so the definition is a template."""
+    """Helm never upgrades files in crds/, so the chart contains the definition as a template."""
     release("install", "palaestra", chart=older)
     eventually(lambda: served(api))
     made = api.create(TRAINING_JOBS, _in("robots", make_job("runs")))
@@ -74,7 +74,7 @@ def test_an_upgrade_brings_the_new_definition_and_touches_no_job(release, older,
 
 
 def test_the_end_of_a_release_leaves_the_jobs(release, api):
-    """Deleting the definition would delete every TrainingJob of the cluster."""
+    """If Helm deleted the definition, Kubernetes would delete every TrainingJob of the cluster."""
     release("install", "palaestra")
     eventually(lambda: served(api))
     api.create(TRAINING_JOBS, _in("robots", make_job("stays")))
@@ -82,12 +82,12 @@ def test_the_end_of_a_release_leaves_the_jobs(release, api):
     release("uninstall", "palaestra")
 
     assert api.get(TRAINING_JOBS, "robots", "stays")
-    release("install", "palaestra")  # the release adopts its definition again
+    release("install", "palaestra")  # the new release adopts the definition
 
 
 @pytest.mark.parametrize("values", [{}, {"watchNamespaces": ["robots"]}], ids=["cluster", "namespaced"])
 def test_a_second_release_for_the_same_jobs_is_refused(release, values):
-    """Two operators would do everything twice."""
+    """Two operators with the same jobs would do all work twice."""
     release("install", "palaestra", values=values)
 
     with pytest.raises(HelmRefused, match="invalid ownership metadata"):
@@ -97,7 +97,7 @@ def test_a_second_release_for_the_same_jobs_is_refused(release, values):
 def test_a_namespaced_operator_looks_after_its_namespaces_and_asks_for_no_other(
     release, cluster, api, tmp_path
 ):
-    """It has the permissions of such an installation, which are valid in two namespaces."""
+    """The operator has only the permissions of such a release, which apply in two namespaces."""
     release("install", "palaestra", values={**MODES["namespaced"], "crds": {"install": True}})
     eventually(lambda: served(api))
     account = f"system:serviceaccount:{NAMESPACE}:palaestra-operator"
@@ -116,14 +116,14 @@ def test_a_namespaced_operator_looks_after_its_namespaces_and_asks_for_no_other(
 
         assert api.get(TRAINING_JOBS, "default", "trains")["status"]["observedGeneration"] == 0
         assert operator.said("watch broken") == []
-        # The operator counts a job once it has seen its own writes.
+        # The operator's metric counts a job after the operator's own writes have reached its cache.
         eventually(lambda: pending(operator.ask("/metrics")) == 2)
     finally:
         operator.kill()
 
 
 def pending(metrics):
-    """Return the number of TrainingJobs without a pod that an operator counts."""
+    """Return the number of pending TrainingJobs in an operator's metrics."""
     lines = [line for line in metrics.splitlines() if line.startswith("palaestra_jobs{")]
     return sum(float(line.split()[-1]) for line in lines if 'phase="Pending"' in line)
 
@@ -133,7 +133,7 @@ def _in(namespace, job):
 
 
 def test_the_trial_needs_no_more_rights_than_it_has_and_says_what_is_missing(release, cluster, api):
-    """`helm test` without an operator ends in time, names what to check, and leaves nothing."""
+    """Without an operator, `helm test` must end in time, name the check to make, and leave no job."""
     release("install", "palaestra")
     eventually(lambda: served(api))
     account = f"system:serviceaccount:{NAMESPACE}:palaestra-trial"
@@ -148,7 +148,7 @@ def test_the_trial_needs_no_more_rights_than_it_has_and_says_what_is_missing(rel
 
 
 def test_a_test_of_a_release_is_reported_once(release, kubectl, api):
-    """Without nodes the pod ends by hand."""
+    """The test sets the phase of the pod, because the control plane has no nodes."""
     release("install", "palaestra")
 
     with ThreadPoolExecutor() as threads:
@@ -167,7 +167,7 @@ def named(obj):
 
 
 def test_helm_takes_over_what_kubectl_has_installed(release, kubectl, api):
-    """Helm keeps the objects that kubectl created, even the definition and its jobs."""
+    """Helm must keep the objects that kubectl created, including the definition and all jobs."""
     kubectl("apply", "-f", str(installation.PATH))
     eventually(lambda: served(api))
     made = api.create(TRAINING_JOBS, _in("robots", make_job("before")))

@@ -1,4 +1,4 @@
-"""A real API server accepts every object of the chart and of the platform's examples unchanged."""
+"""A real API server accepts every object of the chart and of the examples for a platform."""
 
 import json
 
@@ -14,10 +14,10 @@ DRY = ("apply", "--server-side", "--force-conflicts", "--dry-run=server", "--val
 
 
 @pytest.fixture
-def accounts(places, kubectl):  # noqa: ARG001 - are there
-    """Create the account of `helm test` in each namespace.
+def accounts(places, kubectl):  # noqa: ARG001 - they must exist
+    """Create the service account of `helm test` in each namespace.
 
-    Its pod is refused without the account, and a dry run creates none.
+    Without the account, the API server refuses the pod, and a dry run does not create the account.
     """
     for name in NAMESPACES:
         account = {"name": "palaestra-trial", "namespace": name}
@@ -26,8 +26,8 @@ def accounts(places, kubectl):  # noqa: ARG001 - are there
 
 
 @pytest.mark.parametrize("mode", MODES)
-def test_an_api_server_takes_every_mode(mode, accounts, kubectl):  # noqa: ARG001 - are there
-    """Unknown fields count as mistakes, and so do warnings, as those about pods that are not restricted."""
+def test_an_api_server_takes_every_mode(mode, accounts, kubectl):  # noqa: ARG001 - they must exist
+    """Unknown fields and all warnings are errors, including warnings about pods that violate *restricted*."""
     said = kubectl(*DRY, sent=rendered(MODES[mode]))
 
     assert said.count("serverside-applied (server dry run)") >= 9
@@ -36,7 +36,7 @@ def test_an_api_server_takes_every_mode(mode, accounts, kubectl):  # noqa: ARG00
 
 @pytest.mark.parametrize("path", PLATFORM, ids=lambda path: path.stem)
 def test_an_api_server_takes_an_example_for_the_platform(path, places, kubectl):  # noqa: ARG001 - as above
-    """Users copy the examples, change them a little, and apply them."""
+    """Users copy the examples, change some fields, and apply them."""
     said = kubectl(*DRY, sent=path.read_text())
 
     assert "Warning" not in said
@@ -44,15 +44,15 @@ def test_an_api_server_takes_an_example_for_the_platform(path, places, kubectl):
 
 @pytest.mark.parametrize("path", PLATFORM, ids=lambda path: path.stem)
 def test_an_example_says_what_each_object_is_for(path):
-    """Otherwise nobody would dare to change an object."""
+    """A user needs an explanation to know which objects to change."""
     for document in path.read_text().split("---\n"):
         assert document.lstrip().startswith("# ")
 
 
 def test_authors_train_and_readers_look_on(cluster, places, kubectl):  # noqa: ARG001 - as above
-    """The roles that every cluster has allow this.
+    """The cluster roles `edit` and `view` of Kubernetes give these permissions.
 
-    The author's own role allows it alone, without permissions for pods.
+    The role in our example permits a user to create TrainingJobs, but not pods.
     """
     (roles,) = (path for path in PLATFORM if path.stem == "roles")
     kubectl("apply", "-f", str(roles), "-f", str(ROOT / "manifests" / "crd.yaml"))

@@ -1,4 +1,4 @@
-"""Clients: of a namespace of a real control plane, and of a server whose responses a test scripts."""
+"""Clients of a namespace in a real control plane, and of a server whose responses a test prepares."""
 
 import json
 from collections.abc import Callable, Iterator
@@ -16,7 +16,7 @@ from tests.integration.operator.cluster import Place
 
 @pytest.fixture
 def client(control_plane: ControlPlane, place: Place) -> Iterator[Client]:
-    """Return a client of that namespace."""
+    """Return a client of the test's namespace."""
     with Client(namespace=place.name, kubeconfig=str(control_plane.kubeconfig)) as made:
         yield made
 
@@ -25,7 +25,7 @@ def client(control_plane: ControlPlane, place: Place) -> Iterator[Client]:
 def typed(
     control_plane: ControlPlane, place: Place, capsys: pytest.CaptureFixture[str]
 ) -> Callable[..., tuple[int, list[str], list[str]]]:
-    """Return a function that types a command and returns its exit code and the lines of both outputs."""
+    """Return a function that runs a command, and returns exit code and lines of both outputs."""
 
     def run(*arguments: str) -> tuple[int, list[str], list[str]]:
         where = [f"--kubeconfig={control_plane.kubeconfig}", f"--namespace={place.name}"]
@@ -40,7 +40,7 @@ def typed(
 def tell(place: Place) -> Callable[..., None]:
     """Return a function that writes the status of a job, as the operator does.
 
-    Keywords are fields of the status.
+    Its keywords are fields of the status.
     """
 
     def write(name: str, phase: str, generation: int = 1, **fields: object) -> None:

@@ -1,4 +1,4 @@
-"""How commands treat responses that a real API server seldom gives; a scripted server gives them here."""
+"""Commands with responses that a real API server rarely sends; a scripted server sends them here."""
 
 import pytest
 import yaml
@@ -27,9 +27,9 @@ NO_ROOM = "trainingjobs.palaestra.dev is forbidden: exceeded quota: few, request
 
 @pytest.fixture
 def tried(server, tmp_path):
-    """Return a function that tries a job and returns the exit code.
+    """Return a function that runs `palaestra try` with a job and returns the exit code.
 
-    The job reaches a phase, or does not exist. The response to its deletion is given.
+    The caller chooses the phase of the job (none if it does not exist) and the response to its deletion.
     """
     script, kubeconfig = server
     file = tmp_path / "job.yaml"
@@ -51,9 +51,9 @@ def tried(server, tmp_path):
 
 @pytest.mark.parametrize(("phase", "code"), [("Succeeded", 0), ("Failed", 1), ("", 1)])
 def test_a_trial_whose_job_is_gone_already_goes_by_what_was_seen(tried, server, phase, code):
-    """The job may have passed its time to live, or a user has deleted it.
+    """The job's TTL may have passed, or a user may have deleted the job.
 
-    The job was in the namespace of the context.
+    The command must then use the last phase that it saw. The job is in the namespace of the context.
     """
     assert tried(phase, refusal(404, "NotFound")) == code
 
@@ -64,9 +64,9 @@ def test_a_trial_whose_job_is_gone_already_goes_by_what_was_seen(tried, server, 
 
 @pytest.fixture
 def waited(server):
-    """Return a function that waits for a job, which waits for its image and then succeeds.
+    """Return a function that waits for a job, which first waits for its image and then succeeds.
 
-    The caller gives `report`.
+    The keyword `report` is passed to the client.
     """
     script, kubeconfig = server
     job = yaml.safe_load(JOB) | {"metadata": NAMED | {"generation": 1, "resourceVersion": "1"}}
@@ -84,7 +84,7 @@ def waited(server):
 
 
 def test_a_wait_reports_phases_and_why_replicas_wait(waited):
-    """The user sees them in the notebook during the wait."""
+    """During the wait, the user reads the phases and the waiting reasons in the notebook."""
     lines = []
 
     assert waited(report=lines.append).status.phase == "Succeeded"
@@ -92,14 +92,14 @@ def test_a_wait_reports_phases_and_why_replicas_wait(waited):
 
 
 def test_a_wait_prints_nothing_of_its_own(waited, capsys):
-    """A library prints only where its caller requests it."""
+    """A library must not print unless its caller requests it."""
     waited()
 
     assert capsys.readouterr() == ("", "")
 
 
 def test_a_trial_prints_why_its_replica_waits(server, tmp_path, monkeypatch, capsys):
-    """Once, `helm test` with a wrong image printed nothing until its deadline."""
+    """Without a line about the replica, `helm test` with a wrong image printed nothing until its timeout."""
     monkeypatch.setattr("palaestra.smoke_test.PERIOD_S", 0.0)
     script, kubeconfig = server
     (tmp_path / "job.yaml").write_text(JOB)
@@ -118,21 +118,21 @@ def test_a_trial_prints_why_its_replica_waits(server, tmp_path, monkeypatch, cap
 
 @pytest.mark.parametrize(("phase", "code"), [("Succeeded", 0), ("Failed", 1)])
 def test_a_trial_that_cannot_be_deleted_for_now_is_reported_beside_its_verdict(tried, capsys, phase, code):
-    """An API server that restarts says nothing about the installation."""
+    """A short outage of the API server is no error of the tested installation."""
     assert tried(phase, refusal(503, "ServiceUnavailable")) == code
 
     assert "delete it by hand: `kubectl delete trainingjob -n robots trial-x7k2p`" in capsys.readouterr().out
 
 
 def test_a_trial_that_may_not_be_deleted_fails(tried, capsys):
-    """A permission is missing, so every trial would leave a job behind."""
+    """A missing permission would leave a job behind after every trial."""
     assert tried("Succeeded", refusal(403, "Forbidden")) == 1
 
     assert capsys.readouterr().err == "Forbidden (403): no\n"
 
 
 def test_a_trial_that_failed_tells_why_although_it_may_not_be_deleted(tried, capsys):
-    """The user must fix the first error first."""
+    """The user must first see and fix the failure of the job, not the missing permission."""
     assert tried("Failed", refusal(403, "Forbidden")) == 1
 
     said = capsys.readouterr()
@@ -142,7 +142,7 @@ def test_a_trial_that_failed_tells_why_although_it_may_not_be_deleted(tried, cap
 
 @pytest.mark.parametrize(("message", "hint"), [(NO_RIGHT, True), (NO_ROOM, False)])
 def test_the_doctor_is_named_where_a_right_is_missing_alone(server, capsys, message, hint):
-    """The doctor knows nothing about quotas and policies."""
+    """The doctor lists missing permissions, but knows nothing about quotas and policies."""
     script, kubeconfig = server
     answer = {"kind": "Status", "code": 403, "reason": "Forbidden", "message": message}
     script.calls = [reply(403, answer)]
@@ -163,7 +163,7 @@ def test_the_doctor_is_named_where_a_right_is_missing_alone(server, capsys, mess
     ids=["there", "not there"],
 )
 def test_one_job_is_asked_for_once(server, capsys, answer, code, said):
-    """Only the table that the API server makes is printed."""
+    """The command prints the API server's table, so it needs no second request for the object."""
     script, kubeconfig = server
     script.calls = [answer]
 
@@ -183,7 +183,7 @@ def test_one_job_is_asked_for_once(server, capsys, answer, code, said):
 def test_the_error_for_a_cluster_without_trainingjobs_shows_how_to_install_them(
     server, tmp_path, capsys, command
 ):
-    """The API server's own response is `404 page not found`, and the job's name is not the cause."""
+    """The API server responds with `404 page not found`, which looks as if the job's name were wrong."""
     script, kubeconfig = server
     file = tmp_path / "job.yaml"
     file.write_text(JOB)
@@ -197,7 +197,7 @@ def test_the_error_for_a_cluster_without_trainingjobs_shows_how_to_install_them(
 
 
 def test_logs_of_a_container_that_is_not_there_lists_those_that_are(server, capsys):
-    """The API server names only the wrong one, and `describe` does not list the containers."""
+    """The API server names only the wrong container, and `describe` does not list the containers."""
     script, kubeconfig = server
     pod = {"name": "trial-0-x7k2p", "uid": "u", "created": "2026-01-31T12:00:00Z"}
     status = {"replicas": [{"index": 0, "phase": "Running", "pod": pod}]}
@@ -223,7 +223,7 @@ def test_logs_of_a_container_that_is_not_there_lists_those_that_are(server, caps
     ],
 )
 def test_an_event_knows_the_container_that_it_is_about(server, path, container):
-    """Kubelets write `Container created` for each container, and no name into the message."""
+    """The kubelet's message `Container created` lacks the container's name, which a user needs."""
     script, kubeconfig = server
     event = {
         "metadata": {"name": "a", "creationTimestamp": "2026-01-31T12:00:00Z"},
@@ -241,7 +241,7 @@ def test_an_event_knows_the_container_that_it_is_about(server, path, container):
 
 
 def test_programs_can_catch_that_a_cluster_does_not_know_trainingjobs(server):
-    """Once, waiting and applying ended with an error of the transport, because no job's name was missing."""
+    """`apply`, `list` and `wait` must raise the same error, so a program need not parse a message."""
     script, kubeconfig = server
     script.calls = [raw(b"404 page not found\n", 404)]
 
@@ -256,7 +256,7 @@ def test_programs_can_catch_that_a_cluster_does_not_know_trainingjobs(server):
 
 
 def test_a_job_that_is_made_anew_under_the_name_is_not_waited_for(server):
-    """A GitOps controller creates it again at once, but the first job is deleted."""
+    """A GitOps controller may create the job again at once, but the first job is deleted."""
     script, kubeconfig = server
     anew = {"metadata": NAMED | {"uid": "another", "resourceVersion": "2"}}
     script.calls = [
@@ -272,7 +272,7 @@ def test_a_job_that_is_made_anew_under_the_name_is_not_waited_for(server):
 
 
 def test_a_lease_that_is_given_back_has_no_leader(server):
-    """Only the next change, by the new holder, shows that an operator leads."""
+    """An operator leads only after the lease has a new holder, so the doctor must wait for that change."""
     script, kubeconfig = server
 
     def lease(version, holder):

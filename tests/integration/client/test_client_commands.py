@@ -1,4 +1,4 @@
-"""The commands as a user types them, against a real API server."""
+"""The commands against a real API server, as a user types them."""
 
 import json
 import os
@@ -30,7 +30,7 @@ REPLICA = {
 
 
 def test_get_lists_with_the_columns_of_the_definition(typed, place, tell):
-    """The output is the same as that of `kubectl get tj`."""
+    """A user who knows `kubectl get tj` must find the same columns."""
     place.train("a")
     place.train("b")
     tell("b", "Running", step=12000)
@@ -47,7 +47,7 @@ def test_get_lists_with_the_columns_of_the_definition(typed, place, tell):
 
 
 def test_describe_and_watch_take_a_job_whose_name_the_api_server_made(typed, place, tell):
-    """`kubectl create` leaves the field generateName in the object."""
+    """`kubectl create` leaves generateName in the object, which the commands must accept."""
     made = place.create(TRAINING_JOBS, {**yaml.safe_load(TRIAL), "metadata": {"generateName": "try-"}})
     name = made["metadata"]["name"]
     tell(name, "Succeeded")
@@ -59,7 +59,7 @@ def test_describe_and_watch_take_a_job_whose_name_the_api_server_made(typed, pla
 
 
 def test_get_of_all_namespaces_names_them(typed, place):
-    """This is what kubectl does."""
+    """A user expects the namespaces in the first column, as with kubectl."""
     place.train("a")
 
     _, [headings, *rows], _ = typed("get", "-A")
@@ -69,7 +69,7 @@ def test_get_of_all_namespaces_names_them(typed, place):
 
 
 def test_get_without_jobs_says_so_instead_of_headings_alone(typed, place):
-    """The message goes to standard error, as kubectl does, so a script that counts lines counts none."""
+    """The message goes to standard error, so that a script which counts lines counts zero."""
     assert typed("get") == (0, [], [f"no TrainingJobs in namespace {place.name}"])
     assert typed("get", "-l", "a=b") == (
         0,
@@ -80,7 +80,7 @@ def test_get_without_jobs_says_so_instead_of_headings_alone(typed, place):
 
 @pytest.mark.parametrize("form", [(), ("-o", "json")])
 def test_get_in_a_namespace_that_does_not_exist_says_so(control_plane, capsys, form):
-    """Once, a misspelled namespace looked like one without jobs."""
+    """With only an empty list, a user would not notice a misspelled namespace."""
     code = main(["get", *form, f"--kubeconfig={control_plane.kubeconfig}", "--namespace=nosuch"])
 
     out, err = capsys.readouterr()
@@ -90,7 +90,7 @@ def test_get_in_a_namespace_that_does_not_exist_says_so(control_plane, capsys, f
 
 @pytest.mark.parametrize("name", [(), ("a",)])
 def test_get_for_programs_is_what_the_api_server_has(typed, place, name):
-    """The output for one job is one object, so that it can be applied elsewhere."""
+    """The output for one job is a single object, so that a user can apply it elsewhere."""
     place.train("a", seed=7)
 
     names = typed("get", *name, "-o", "name")[1]
@@ -106,7 +106,7 @@ def test_get_for_programs_is_what_the_api_server_has(typed, place, name):
     "command", ["get", "describe", "events", "logs", "watch", "suspend", "delete", "fetch"]
 )
 def test_a_job_that_is_not_there_is_one_line_and_1(typed, command):
-    """One line is good for users, and the exit code for scripts."""
+    """A user reads one line, and a script uses the exit code."""
     code, out, [line] = typed(command, "none")
 
     assert code == 1
@@ -115,7 +115,7 @@ def test_a_job_that_is_not_there_is_one_line_and_1(typed, command):
 
 
 def test_options_that_exclude_each_other_are_2(typed):
-    """Nothing is sent to the cluster."""
+    """The command must report the mistake before it sends a request."""
     code, _, [line] = typed("get", "a", "-A")
 
     assert code == 2
@@ -123,7 +123,7 @@ def test_options_that_exclude_each_other_are_2(typed):
 
 
 def test_describe_tells_status_and_events(typed, place, tell):
-    """One command shows everything about a job."""
+    """A user runs one command to see everything about a job."""
     place.train("a")
     tell("a", "Running", replicas=[REPLICA])
     place.complain({"metadata": {"name": "a-0-x7k2p", "uid": "u"}}, "BackOff", "no such image")
@@ -137,7 +137,7 @@ def test_describe_tells_status_and_events(typed, place, tell):
 
 @pytest.mark.parametrize(("phase", "code"), [("Succeeded", 0), ("Failed", 1)])
 def test_watch_ends_with_the_job_and_says_how(typed, place, tell, phase, code):
-    """A script can use the exit code."""
+    """A script uses the exit code to decide whether the training succeeded."""
     place.train("a")
     tell("a", phase, replicas=[REPLICA | {"phase": phase}])
 
@@ -149,13 +149,13 @@ def test_watch_ends_with_the_job_and_says_how(typed, place, tell, phase, code):
 
 @pytest.mark.parametrize("phase", [None, "Running"])
 def test_watch_of_a_job_that_is_deleted_says_so_and_ends_with_1(control_plane, place, tell, phase):
-    """The result of such a job is unknown, and a script must not treat it as a success."""
+    """The result of a deleted job is unknown, so a script must not take it as a success."""
     place.train("a")
     if phase:
         tell("a", phase, replicas=[REPLICA])
 
     with started(control_plane, place, "watch", "a", "--timeout=30") as process:
-        process.stdout.readline()  # the command has seen the job
+        process.stdout.readline()  # wait until the command has seen the job
         place.api.delete(TRAINING_JOBS, place.name, "a")
         out, _ = process.communicate(timeout=30)
 
@@ -164,7 +164,7 @@ def test_watch_of_a_job_that_is_deleted_says_so_and_ends_with_1(control_plane, p
 
 
 def test_a_trial_that_is_stopped_leaves_nothing(control_plane, place, tmp_path):
-    """Kubelets and helm end a pod with SIGTERM. The trial runs in the given namespace."""
+    """Kubelets and Helm end a pod with SIGTERM, and the job of the trial must not stay."""
     file = tmp_path / "job.yaml"
     file.write_text(TRIAL)
 
@@ -180,7 +180,7 @@ def test_a_trial_that_is_stopped_leaves_nothing(control_plane, place, tmp_path):
 
 
 def test_a_trial_of_a_wrong_file_asks_nothing(typed, place, tmp_path):
-    """The exit code is 2, as for every mistake in a command."""
+    """The exit code is 2, as for every mistake in a command line."""
     file = tmp_path / "job.yaml"
     file.write_text(TRIAL + "  seed: -1\n")
 
@@ -192,7 +192,7 @@ def test_a_trial_of_a_wrong_file_asks_nothing(typed, place, tmp_path):
 
 
 def started(control_plane, place, *arguments):
-    """Start a command in a separate process whose output can be read while it runs."""
+    """Start a command in a separate process; the test reads its output while it runs."""
     return subprocess.Popen(
         [
             *(sys.executable, "-c", "import sys; from palaestra.cli import main; sys.exit(main())"),
@@ -204,7 +204,7 @@ def started(control_plane, place, *arguments):
 
 
 def test_watch_draws_where_there_is_a_terminal(control_plane, place, tell):
-    """The last picture stays, with the line about the end of the job."""
+    """The last picture stays on the screen, followed by the line about the end of the job."""
     place.train("a")
     tell("a", "Succeeded", replicas=[REPLICA | {"successRate": 0.5}])
     ours, theirs = os.openpty()
@@ -234,7 +234,7 @@ def test_watch_draws_where_there_is_a_terminal(control_plane, place, tell):
 
 
 def test_suspend_and_resume_change_the_spec(typed, place):
-    """The commands accept several jobs, as kubectl does."""
+    """A user may name several jobs in one command, as with kubectl."""
     for name in ("a", "b"):
         place.train(name)
 
@@ -248,7 +248,7 @@ def test_suspend_and_resume_change_the_spec(typed, place):
 
 @pytest.mark.parametrize("command", ["suspend", "resume"])
 def test_suspending_a_job_with_a_queue_says_that_kueue_decides_and_how_to_stop_it(typed, place, command):
-    """The error `Invalid (422)` looked like a mistake in the job, and `resume` cannot do what Kueue does."""
+    """`Invalid (422)` would look like a mistake in the job, and only Kueue can resume this job."""
     place.train("a", scheduling={"queueName": "robots"})
 
     code, out, [line] = typed(command, "a")
@@ -260,7 +260,7 @@ def test_suspending_a_job_with_a_queue_says_that_kueue_decides_and_how_to_stop_i
 
 @pytest.mark.parametrize("command", ["suspend", "resume"])
 def test_a_job_that_has_ended_is_neither_suspended_nor_resumed(typed, place, tell, command):
-    """`kubectl wait --for=condition=Suspended` would wait for ever."""
+    """Otherwise a user's `kubectl wait --for=condition=Suspended` would wait forever."""
     place.train("a")
     tell("a", "Succeeded")
 
@@ -272,7 +272,7 @@ def test_a_job_that_has_ended_is_neither_suspended_nor_resumed(typed, place, tel
 
 
 def test_restart_refuses_a_job_that_has_lost_nothing(typed, place, tell):
-    """The request would stay until a later loss, and the run would then begin again without a new request."""
+    """A request that stays in the job would restart the run at a later loss, without the user's consent."""
     place.train("a")
     tell("a", "Running", replicas=[REPLICA])
 
@@ -284,7 +284,7 @@ def test_restart_refuses_a_job_that_has_lost_nothing(typed, place, tell):
 
 
 def test_delete_says_what_stays(typed, place):
-    """A run may be worth more than its job."""
+    """The results of a run may be valuable, so the user must learn that its claim still exists."""
     uid = place.train("a")["metadata"]["uid"]
     place.train("b", storage={"ephemeral": True})
 
@@ -297,7 +297,7 @@ def test_delete_says_what_stays(typed, place):
 
 
 def test_kubectl_finds_the_plugin_and_hands_it_its_options(control_plane, place, tmp_path):
-    """`kubectl palaestra get` is the same as `palaestra get`."""
+    """With the plugin, a user types `kubectl palaestra get` with the options of `palaestra get`."""
     place.train("a")
     plugin = tmp_path / "kubectl-palaestra"
     program = tmp_path / "program.py"

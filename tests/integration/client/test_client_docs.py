@@ -1,4 +1,4 @@
-"""The script in docs/howto/python.md and the commands in docs/reference/commands.md work as written."""
+"""The script of docs/howto/python.md and the table of docs/reference/commands.md are right."""
 
 import re
 from concurrent.futures import ThreadPoolExecutor
@@ -18,9 +18,9 @@ PAGE = (ROOT / "docs/howto/python.md").read_text()
 
 
 def test_the_script_of_the_page_runs(control_plane, place, tell, tmp_path, monkeypatch, capsys):
-    """The script goes from apply to delete, in the context's namespace.
+    """A reader copies the script and runs it in the namespace of the context.
 
-    The test writes the statuses of the operator.
+    The test writes the statuses that an operator would write.
     """
     [script] = blocks(PAGE, "python with-a-cluster")
     kubeconfig = yaml.safe_load(control_plane.kubeconfig.read_text())
@@ -41,7 +41,7 @@ def test_the_script_of_the_page_runs(control_plane, place, tell, tmp_path, monke
 
 
 def test_every_command_of_the_page_exists_and_every_command_is_on_it():
-    """Each command has a row, in the table of those for a cluster or in that of the others."""
+    """A reader must find each command in one of two tables: with a cluster, or without one."""
     for_clusters, others = COMMANDS_PAGE.split("These commands need no cluster:")
 
     assert commands_in(for_clusters) == {*FOR_CLUSTERS, "view"}
@@ -49,6 +49,6 @@ def test_every_command_of_the_page_exists_and_every_command_is_on_it():
 
 
 def commands_in(text):
-    """Return the commands that have a row in a table."""
+    """Return the commands that have a row in the tables of a text."""
     rows = re.findall(r"^\| (`palaestra .+?`) \|", text, re.MULTILINE)
     return {name for row in rows for name in re.findall(r"`palaestra ([\w-]+)", row)}

@@ -1,4 +1,4 @@
-"""The doctor with a real API server: it reports each problem with its remedy."""
+"""The doctor against a real API server: each problem has a finding with a remedy."""
 
 from importlib.metadata import version
 
@@ -32,8 +32,8 @@ ACCOUNTS = Resource(api_version="v1", kind="ServiceAccount", plural="serviceacco
 
 @pytest.fixture
 def found(place):
-    """Return the doctor's findings by name; the operator's namespace is that of the test."""
-    eventually(lambda: place.get(ACCOUNTS, "default"))  # a pod without this account is refused
+    """Return a function that returns the doctor's findings by name, for the test's namespace alone."""
+    eventually(lambda: place.get(ACCOUNTS, "default"))  # the API server refuses pods without this account
 
     def look(api=None):
         site = Site(api=api or place.api, namespace=place.name, operator_namespace=place.name)
@@ -43,12 +43,12 @@ def found(place):
 
 
 def verdicts(findings):
-    """Return the verdict of each finding."""
+    """Return the verdict of each finding, by name."""
     return {what: each.verdict.value for what, each in findings.items()}
 
 
 def test_missing_nodes_storage_and_operator_are_reported(found):
-    """Each finding has its remedy, and the findings without a problem are right."""
+    """A user must get a remedy for each problem, and no false alarm about the rest."""
     findings = found()
 
     assert verdicts(findings) == {
@@ -72,7 +72,7 @@ def test_missing_nodes_storage_and_operator_are_reported(found):
 
 
 def test_the_command_ends_with_1_if_anything_is_wrong(typed, place):
-    """The exit code is for scripts; each remedy has a separate line."""
+    """A script uses the exit code, and a user finds each remedy on a line of its own."""
     code, out, _ = typed("doctor", f"--operator-namespace={place.name}")
 
     assert code == 1
@@ -81,7 +81,7 @@ def test_the_command_ends_with_1_if_anything_is_wrong(typed, place):
 
 
 def test_an_api_server_that_does_not_answer_is_the_only_finding(tmp_path, capsys):
-    """All other findings would repeat the same line."""
+    """Without the API server, all other findings would repeat the same error."""
     kubeconfig = tmp_path / "kubeconfig"
     kubeconfig.write_text(
         "{current-context: a, contexts: [{name: a, context: {cluster: c, user: u}}],"
@@ -95,7 +95,7 @@ def test_an_api_server_that_does_not_answer_is_the_only_finding(tmp_path, capsys
 
 
 def test_a_node_a_class_and_a_leader_that_are_there_are_right(found, place):
-    """A leader counts only if it renews its Lease."""
+    """An operator counts as leader only while it renews its Lease."""
     node = {"metadata": {"name": f"node-{place.name}"}, "apiVersion": "v1", "kind": "Node"}
     place.api.create(NODES, node)
     place.api.merge(
@@ -130,7 +130,7 @@ def test_a_node_a_class_and_a_leader_that_are_there_are_right(found, place):
 
 
 def install(place, *, replicas=1, **container):
-    """Create the operator's Deployment, which no controller carries out."""
+    """Create the operator's Deployment, for which no controller creates pods."""
     container = {"name": "operator", "image": "palaestra-operator:0.0.0"} | container
     labels = {"a": "b"}
     template = {
@@ -149,7 +149,7 @@ def install(place, *, replicas=1, **container):
 
 
 def test_the_finding_about_an_operator_that_is_not_ready_names_its_image(found, place):
-    """The log of the operator shows the cause."""
+    """A wrong image is a frequent cause, and the log of the operator shows other causes."""
     install(place)
 
     findings = found()
@@ -161,7 +161,7 @@ def test_the_finding_about_an_operator_that_is_not_ready_names_its_image(found, 
 
 
 def test_the_finding_about_an_operator_at_0_replicas_has_the_command_that_scales_it(found, place):
-    """Such an operator has no leader, and no pod whose log would explain the problem."""
+    """No pod exists whose log could explain the missing leader, so the remedy is one command."""
     install(place, replicas=0)
 
     findings = found()
@@ -173,7 +173,7 @@ def test_the_finding_about_an_operator_at_0_replicas_has_the_command_that_scales
 
 
 def test_the_finding_about_a_missing_namespace_shows_how_to_make_or_choose_one(place):
-    """RBAC allows requests in it all the same, and a dry run there says only that it is not found."""
+    """RBAC allows requests in such a namespace, and a dry run reports only `not found`."""
     site = Site(api=place.api, namespace="nosuch", operator_namespace=place.name)
 
     findings = {each.what: each for each in examine(site)}
@@ -186,7 +186,7 @@ def test_the_finding_about_a_missing_namespace_shows_how_to_make_or_choose_one(p
 
 
 def test_a_pod_is_tried_with_the_image_that_the_operator_gives(place):
-    """Where only a private registry is allowed, another image would be refused although no job would."""
+    """If only a private registry is allowed, another image would be refused although jobs work."""
     site = Site(api=place.api, namespace=place.name, operator_namespace=place.name)
     before = trainer_image(site)
 
@@ -197,7 +197,7 @@ def test_a_pod_is_tried_with_the_image_that_the_operator_gives(place):
 
 
 def test_what_a_person_may_not_do_is_named_and_what_cannot_be_seen_is_unknown(found, control_plane, place):
-    """The doctor queries RBAC itself, so that roles, groups and other authorizers all count."""
+    """The doctor asks the API server, so all roles, groups and authorizers are considered."""
     nobody = connect(str(control_plane.kubeconfig_of("nobody")))
 
     findings = found(nobody)
@@ -206,7 +206,7 @@ def test_what_a_person_may_not_do_is_named_and_what_cannot_be_seen_is_unknown(fo
     assert findings["to read jobs"].verdict is CheckStatus.WRONG
     assert "get trainingjobs, list trainingjobs, watch trainingjobs" in findings["to read jobs"].fact
     assert findings["to author jobs"].verdict is CheckStatus.WRONG
-    assert findings["to read logs"].verdict is CheckStatus.UNKNOWN  # not every user needs this right
+    assert findings["to read logs"].verdict is CheckStatus.UNKNOWN  # not every user needs this permission
     assert findings["to fetch runs"].verdict is CheckStatus.UNKNOWN
     assert "create pods/exec" in findings["to fetch runs"].fact
     assert findings["storage class"].verdict is CheckStatus.UNKNOWN
@@ -215,7 +215,7 @@ def test_what_a_person_may_not_do_is_named_and_what_cannot_be_seen_is_unknown(fo
 
 
 def test_a_quota_with_room_is_no_hindrance_and_a_spent_one_hides_what_follows(found, place):
-    """The pod of the dry run has requests and limits, because a quota on them demands them of every pod."""
+    """A quota requires requests and limits of every pod, so the doctor's test pod must have them."""
     quota = {"apiVersion": "v1", "kind": "ResourceQuota", "metadata": {"name": "few"}}
     room = {"requests.cpu": "1", "requests.memory": "1Gi", "limits.memory": "1Gi", "pods": "1"}
     place.create(QUOTAS, quota | {"spec": {"hard": room}})
@@ -232,7 +232,7 @@ def test_a_quota_with_room_is_no_hindrance_and_a_spent_one_hides_what_follows(fo
 
 
 def test_something_that_drops_restart_policy_is_found_by_a_dry_run(found, place):
-    """An old mutating webhook does not know the field in pods; here a policy plays the webhook."""
+    """An old mutating webhook drops the unknown field. In this test, a policy stands in for the webhook."""
     expression = 'JSONPatch{op: "remove", path: "/spec/initContainers/0/restartPolicy"}'
     rule = {"apiGroups": [""], "apiVersions": ["v1"], "operations": ["CREATE"], "resources": ["pods"]}
     only_here = {"matchLabels": {"kubernetes.io/metadata.name": place.name}}
@@ -262,7 +262,7 @@ def test_something_that_drops_restart_policy_is_found_by_a_dry_run(found, place)
 
     found_out = eventually(
         lambda: (each := found()["sidecars"]).verdict is CheckStatus.WRONG and each
-    )  # the API server learns of a policy a moment later
+    )  # the API server applies a new policy after a moment
 
     place.api.delete(BINDINGS, None, "old")
     place.api.delete(POLICIES, None, "old")

@@ -1,6 +1,6 @@
-"""Fetching a run copies all of it or nothing, and leaves no pod behind.
+"""`fetch` copies a whole run or nothing, and leaves no pod.
 
-A scripted server plays the cluster.
+A scripted server stands in for the cluster.
 """
 
 import io
@@ -31,7 +31,7 @@ WAITING = {"reason": "ErrImagePull", "message": "no such image"}
 
 
 def tar(files):
-    """Return the messages in which a tar of these files arrives."""
+    """Return the websocket messages that contain a tar of these files."""
     file = io.BytesIO()
     with tarfile.open(fileobj=file, mode="w") as archive:
         for name, content in files.items():
@@ -46,12 +46,12 @@ class Scene:
     """A job with one replica in a scripted cluster.
 
     Attributes:
-        phase: of the run's pod; None if it does not exist.
-        trainer: state of the trainer's container in it.
+        phase: the phase of the run's pod, or None if the pod does not exist.
+        trainer: the state of the pod's trainer container.
         replica: fields of the replica's status.
-        reader: status of the pod that is created to read the volume.
-        execution: how a command in a container proceeds.
-        deletion: the response to the deletion of the pod.
+        reader: the status of the pod that `fetch` creates to read the volume.
+        execution: the course of a command in a container.
+        deletion: the response to the deletion of that pod.
     """
 
     def __init__(self, address, script, tmp_path):
@@ -79,11 +79,11 @@ class Scene:
         self.client = Client(kubeconfig=str(kubeconfig))
 
     def fetch(self, deadline_s=30.0):
-        """Fetch the run."""
+        """Fetch the run of the job."""
         return self.client.fetch("job", into=self.into, deadline_s=deadline_s)
 
     def left(self):
-        """Return the files below the target."""
+        """Return the files in the target folder."""
         return {
             str(each.relative_to(self.into)): each.read_bytes()
             for each in self.into.rglob("*")
@@ -91,7 +91,7 @@ class Scene:
         }
 
     def asked(self, method, end):
-        """Return the requests of a method whose path has this end."""
+        """Return the requests of this method whose path ends with `end`."""
         return [
             each
             for each in self._script.of(watches=False)
@@ -148,7 +148,7 @@ def scene(tmp_path):
 
 
 def test_a_run_that_goes_on_is_read_in_its_own_pod(scene):
-    """Only one node can mount its volume, and the run's pod is on that node."""
+    """Only one node can mount the volume, and the run's own pod is on that node."""
     scene.phase, scene.replica = "Running", {"phase": "Running"}
 
     folder = scene.fetch()
@@ -163,7 +163,7 @@ def test_a_run_that_goes_on_is_read_in_its_own_pod(scene):
     ("phase", "replica"),
     [
         ("Succeeded", "Succeeded"),
-        ("Succeeded", "Running"),  # the operator is about to see the end
+        ("Succeeded", "Running"),  # the operator has not seen the end yet
         ("Failed", "Failed"),
         ("Failed", "Suspended"),
         (None, "Succeeded"),
@@ -171,7 +171,7 @@ def test_a_run_that_goes_on_is_read_in_its_own_pod(scene):
     ],
 )
 def test_a_run_that_has_ended_is_read_with_a_pod_that_is_deleted_again(scene, phase, replica):
-    """Exactly this pod is deleted, and no other one with its name."""
+    """The deletion names the pod's uid, so that it cannot hit another pod with the name."""
     scene.phase, scene.replica = phase, {"phase": replica}
 
     scene.fetch()
@@ -196,7 +196,7 @@ def test_a_run_that_has_ended_is_read_with_a_pod_that_is_deleted_again(scene, ph
     ids=["it fails", "its end is not told", "it breaks off", "nothing is there", "it is not allowed"],
 )
 def test_what_is_not_whole_is_not_written_and_the_pod_is_deleted(scene, execution, error):
-    """Half a policy would look like a complete policy."""
+    """A user would take half of a policy for a complete policy."""
     scene.execution = execution
 
     with pytest.raises(error):
@@ -208,7 +208,7 @@ def test_what_is_not_whole_is_not_written_and_the_pod_is_deleted(scene, executio
 
 
 def test_a_copy_that_takes_too_long_says_so(scene):
-    """The connection works, so the remedy is another one."""
+    """The connection works, so the user needs more time and not another address."""
     scene.execution = command(tar(FILES)[0], ends="silent")
 
     with pytest.raises(TookTooLong, match="was not copied in time; allow more time with --timeout"):
@@ -218,14 +218,14 @@ def test_a_copy_that_takes_too_long_says_so(scene):
 
 @pytest.mark.parametrize("code", [403, 503])
 def test_a_pod_that_cannot_be_deleted_spoils_no_copy(scene, code):
-    """The pod ends by itself, and a repeated command would be refused because the folder exists."""
+    """The copy is complete and the pod ends by itself, so the command must not fail."""
     scene.deletion = refusal(code, "Refused")
 
     assert scene.fetch() == scene.into / "job" / "0"
 
 
 def test_a_folder_that_is_there_is_left_as_it_is(scene):
-    """No pod is created for it."""
+    """The command must refuse before it creates a pod."""
     there = scene.into / "job" / "0"
     there.mkdir(parents=True)
 
@@ -235,7 +235,7 @@ def test_a_folder_that_is_there_is_left_as_it_is(scene):
 
 
 def test_a_pod_that_is_about_to_start_is_not_robbed_of_its_volume(scene):
-    """A claim that another node holds would prevent its start."""
+    """A second pod would bind the volume to another node, and the run's pod could not start."""
     scene.phase = "Pending"
 
     with pytest.raises(NotFetched, match=f"pod {RUN_POD}: is about to start"):
@@ -244,7 +244,7 @@ def test_a_pod_that_is_about_to_start_is_not_robbed_of_its_volume(scene):
 
 
 def test_a_pod_whose_trainer_has_just_ended_is_not_entered(scene):
-    """The pod runs until its simulators are stopped, and a command in it would end with them."""
+    """The pod ends when its simulators have stopped, and a copy in that pod would break off."""
     scene.phase, scene.trainer = "Running", {"terminated": {"exitCode": 0}}
 
     with pytest.raises(NotFetched, match=f"pod {RUN_POD}: its trainer has just ended; .* in a minute"):
@@ -256,7 +256,7 @@ def test_a_pod_whose_trainer_has_just_ended_is_not_entered(scene):
 @pytest.mark.parametrize("replica", ["Pending", "Running"])
 @pytest.mark.parametrize("phase", ["Failed", None])
 def test_a_pod_that_will_come_again_is_not_robbed_of_its_volume(scene, phase, replica):
-    """The Job waits before it creates the next pod."""
+    """The Job waits before it creates the next pod, which then needs the volume."""
     scene.phase, scene.replica = phase, {"phase": replica}
 
     with pytest.raises(NotFetched, match="job job: replica 0 is about to be started again"):
@@ -265,7 +265,7 @@ def test_a_pod_that_will_come_again_is_not_robbed_of_its_volume(scene, phase, re
 
 
 def test_the_first_pod_is_not_robbed_of_its_volume_either(scene):
-    """The Job exists before its first pod."""
+    """The Job may exist before its first pod, which then needs the volume."""
     scene.replica = {"phase": "Pending", "pod": None}
 
     with pytest.raises(NotFetched, match="job job: replica 0 is about to be started, "):
@@ -274,7 +274,7 @@ def test_the_first_pod_is_not_robbed_of_its_volume_either(scene):
 
 
 def test_the_error_for_a_run_that_went_with_its_pod_names_the_field(scene):
-    """There is no claim to mount."""
+    """An ephemeral run has no claim, so the user must change this field before the next run."""
     scene.ephemeral = True
 
     with pytest.raises(NotFetched, match=r"spec\.storage\.ephemeral"):
@@ -282,7 +282,7 @@ def test_the_error_for_a_run_that_went_with_its_pod_names_the_field(scene):
 
 
 def test_a_pod_that_does_not_start_is_deleted_and_the_error_has_the_reason(scene):
-    """The words are those of the kubelet."""
+    """The user needs the kubelet's message to know why the pod did not start."""
     scene.reader = {"phase": "Pending", "containerStatuses": [{"state": {"waiting": WAITING}}]}
 
     with pytest.raises(TookTooLong, match="ErrImagePull: no such image"):

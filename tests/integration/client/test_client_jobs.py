@@ -1,4 +1,4 @@
-"""The client with a real API server; the tests write the statuses of the operator."""
+"""The Python client against a real API server; the tests write the operator's statuses."""
 
 import json
 import time
@@ -20,13 +20,13 @@ SOON_S = 30.0
 
 @pytest.fixture
 def later():
-    """Return a function that calls another one in a thread and returns its future."""
+    """Return a function that calls another function in a thread and returns the future result."""
     with ThreadPoolExecutor(2) as pool:
         yield pool.submit
 
 
 def test_what_is_applied_is_stored_in_the_clients_namespace(client, place):
-    """The job is stored as plain data, as by kubectl."""
+    """A job that a Python program applies must be stored like a job that kubectl applies."""
     stored = client.apply(make_job("a", seed=7))
 
     assert stored.spec.seed == 7
@@ -34,7 +34,7 @@ def test_what_is_applied_is_stored_in_the_clients_namespace(client, place):
 
 
 def test_a_file_and_a_model_are_applied_alike(client, tmp_path):
-    """The cluster fills in what they omit, so the same job applied twice changes nothing."""
+    """The API server sets the same defaults for both, so the second call changes nothing."""
     file = tmp_path / "job.yaml"
     file.write_text("apiVersion: palaestra.dev/v1alpha1\nkind: TrainingJob\nmetadata: {name: a}\nspec: {}\n")
     from_file = client.apply(file)
@@ -46,9 +46,9 @@ def test_a_file_and_a_model_are_applied_alike(client, tmp_path):
 
 
 def test_a_job_whose_name_the_api_server_made_is_listed_and_followed(client, place, tell):
-    """`kubectl create` makes such names from generateName.
+    """`kubectl create` generates such a name from generateName.
 
-    One such job once hid all others of its namespace.
+    An error about one such job must not hide the other jobs of the namespace.
     """
     place.train("a")
     made = place.create(TRAINING_JOBS, {**make_job(), "metadata": {"generateName": "try-"}})
@@ -63,7 +63,7 @@ def test_a_job_whose_name_the_api_server_made_is_listed_and_followed(client, pla
 def test_inline_worlds_of_more_than_256_kib_are_applied_by_the_server_only(
     client, control_plane, place, tmp_path
 ):
-    """A plain `kubectl apply` copies the file into an annotation, which would be too long."""
+    """A plain `kubectl apply` copies the file into an annotation, which has a limit of 256 KiB."""
     world = builtin("arena").decode() + "# a comment\n" * 12_000
     groups = [
         {"name": name, "role": role, "world": {"inline": world}}
@@ -83,7 +83,7 @@ def test_inline_worlds_of_more_than_256_kib_are_applied_by_the_server_only(
 
 
 def test_a_wrong_job_is_refused_before_anything_is_sent(client):
-    """The error lists every mistake, as with `palaestra run`."""
+    """The error lists every mistake, as `palaestra run` does."""
     with pytest.raises(SpecErrors) as refused:
         client.apply(make_job("a", seed=-1, replica=2))
 
@@ -92,7 +92,7 @@ def test_a_wrong_job_is_refused_before_anything_is_sent(client):
 
 
 def test_what_a_job_is_fixed_on_cannot_be_applied_anew(client):
-    """The message of the API server names the field."""
+    """The API server's message names the field, which the user must put back."""
     client.apply(make_job("a", seed=1))
 
     with pytest.raises(Invalid, match="seed"):
@@ -100,7 +100,7 @@ def test_what_a_job_is_fixed_on_cannot_be_applied_anew(client):
 
 
 def test_the_error_for_a_missing_job_shows_how_to_find_it(client):
-    """A wrong namespace is the usual cause."""
+    """The usual cause is a wrong namespace, so the error names a command that searches all namespaces."""
     for ask in (client.get, client.suspend, client.delete, client.events):
         with pytest.raises(
             NoSuchJob, match=f"job none: does not exist in namespace {client.namespace}; .* -A"
@@ -111,7 +111,7 @@ def test_the_error_for_a_missing_job_shows_how_to_find_it(client):
 
 
 def test_a_wait_ends_with_the_job(client, tell, later):
-    """The test waits with `until="ended"`, which both results satisfy."""
+    """By default, a wait ends with a success as well as with a failure."""
     client.apply(make_job("a"))
     waited = later(client.wait, "a", deadline_s=SOON_S)
 
@@ -122,7 +122,7 @@ def test_a_wait_ends_with_the_job(client, tell, later):
 
 
 def test_a_job_that_ended_otherwise_is_not_waited_for_any_longer(client, tell):
-    """The error contains the reason, because the user would ask for it next."""
+    """The user would ask for the reason next, so the error contains it."""
     client.apply(make_job("a"))
     tell("a", "Failed")
 
@@ -131,7 +131,7 @@ def test_a_job_that_ended_otherwise_is_not_waited_for_any_longer(client, tell):
 
 
 def test_a_wait_has_a_deadline(client):
-    """No operator works on this job."""
+    """No operator works on this job, and the caller must not wait forever."""
     client.apply(make_job("a"))
     began = time.monotonic()
 
@@ -141,7 +141,7 @@ def test_a_wait_has_a_deadline(client):
 
 
 def test_a_job_that_is_deleted_is_not_waited_for(client, later):
-    """The job will not come back."""
+    """A deleted job never ends, so the wait must raise an error."""
     client.apply(make_job("a"))
     waited = later(client.wait, "a", deadline_s=SOON_S)
 
@@ -152,7 +152,7 @@ def test_a_job_that_is_deleted_is_not_waited_for(client, later):
 
 
 def test_a_status_of_an_older_spec_is_not_believed(client, tell, later):
-    """Right after `resume` the status still says Suspended."""
+    """Right after `resume`, the status is that of the older spec and still shows Suspended."""
     client.apply(make_job("a"))
     client.suspend("a")
     tell("a", "Suspended", generation=2)
@@ -167,7 +167,7 @@ def test_a_status_of_an_older_spec_is_not_believed(client, tell, later):
 
 
 def test_statuses_come_until_the_end(client, tell, later):
-    """The last status is the final one, and the iterator ends by itself."""
+    """The iterator yields the final status last and then ends by itself."""
     client.apply(make_job("a"))
     seen = []
 
@@ -184,9 +184,9 @@ def test_statuses_come_until_the_end(client, tell, later):
 
 
 def test_a_job_in_a_queue_is_neither_suspended_nor_resumed_and_the_error_names_what_stops_it(client):
-    """Kueue decides when such a job runs.
+    """Kueue decides when such a job runs, so the error must name Kueue's means.
 
-    The API server's own message would speak of a wrong spec, which is not the problem.
+    The API server's message would report a wrong spec, which is not the problem.
     """
     client.apply(make_job("a", scheduling={"queueName": "robots"}))
 
@@ -196,7 +196,7 @@ def test_a_job_in_a_queue_is_neither_suspended_nor_resumed_and_the_error_names_w
 
 
 def test_a_delete_with_a_deadline_waits_for_what_the_job_owns(client, place):
-    """A job with the same name can be created right afterwards."""
+    """After the call, a user can create a job with the same name at once."""
     job = client.apply(make_job("a"))
     owner = {
         "apiVersion": job.api_version,
@@ -215,7 +215,7 @@ def test_a_delete_with_a_deadline_waits_for_what_the_job_owns(client, place):
 
 
 def test_events_of_pods_are_the_jobs(client, place):
-    """A kubelet's warning explains why a job makes no progress."""
+    """A kubelet's warning about a pod explains why the job makes no progress."""
     client.apply(make_job("a"))
     place.complain({"metadata": {"name": "a-0-x7k2p", "uid": "u"}}, "BackOff", "no such image")
     place.complain({"metadata": {"name": "other-0-x7k2p", "uid": "v"}}, "BackOff", "another's")
@@ -226,7 +226,7 @@ def test_events_of_pods_are_the_jobs(client, place):
 
 
 def test_a_replica_without_a_pod_has_no_log(client):
-    """The error names another command as remedy."""
+    """The error must name the command that shows why the replica has no pod."""
     client.apply(make_job("a"))
 
     with pytest.raises(NoPod, match=r"replica 0 has no pod; .*palaestra describe a"):
@@ -234,7 +234,7 @@ def test_a_replica_without_a_pod_has_no_log(client):
 
 
 def test_reading_a_log_that_went_with_its_pod_is_an_error(client, tell):
-    """The status keeps its last lines."""
+    """The log is lost with the pod, but the status still contains its last lines."""
     client.apply(make_job("a"))
     pod = {"name": "a-0-x7k2p", "uid": "u", "created": "2026-01-31T12:00:00Z"}
     tell("a", "Running", replicas=[{"index": 0, "phase": "Running", "pod": pod}])

@@ -1,4 +1,4 @@
-"""A sweep in a cluster: TrainingJobs with a common label; the tests write the statuses of the operator."""
+"""A sweep in a cluster: TrainingJobs with a common label. The tests write the operator's statuses."""
 
 from concurrent.futures import ThreadPoolExecutor
 
@@ -25,7 +25,7 @@ SUCCESS = Objective.SUCCESS_RATE
 
 @pytest.fixture
 def file(tmp_path):
-    """Return a function that writes a sweep and returns its file."""
+    """Return a function that writes the file of a sweep and returns its path."""
 
     def write(**spec):
         content = {"apiVersion": "palaestra.dev/v1alpha1", "kind": "Sweep", "metadata": {"name": "s"}}
@@ -42,7 +42,7 @@ def replica(index, phase, step=100, rate=None):
 
 
 def test_trials_are_jobs_with_a_label_that_their_queue_runs(file, client, place, tell, tmp_path):
-    """All jobs are created at once; the command waits for their ends and compares them."""
+    """The command creates all jobs at once, because the queue decides when they run."""
     sweep = load(file(matrix={"trainer.steps": [100, 200]}, seeds=2))
     search = InTurn(trials(sweep), {})
     with ThreadPoolExecutor(1) as pool:
@@ -67,7 +67,7 @@ def test_trials_are_jobs_with_a_label_that_their_queue_runs(file, client, place,
 
 
 def test_the_job_of_a_pruned_trial_is_deleted(file, client, place, tell, tmp_path):
-    """Its pods would only take resources from others."""
+    """The pods of a pruned trial would take resources from the other trials."""
     space = {"trainer.steps": {"low": 100, "high": 200}}
     sweep = load(file(random=space, trials=2, optuna={"startupTrials": 1}))
     search, journal = OptunaSearch(sweep, tmp_path), tmp_path / "optuna.journal"
@@ -89,7 +89,7 @@ def test_the_job_of_a_pruned_trial_is_deleted(file, client, place, tell, tmp_pat
 
 
 def test_a_job_that_is_not_of_the_sweep_is_not_touched(file, client, place, tmp_path):
-    """A job may have the name of a trial by chance."""
+    """A job of another user may have the name of a trial by chance."""
     place.train("s-0")
     before = place.get(TRAINING_JOBS, "s-0")
     search = InTurn(trials(load(file(matrix={"seed": [1]}))), {})
@@ -101,7 +101,7 @@ def test_a_job_that_is_not_of_the_sweep_is_not_touched(file, client, place, tmp_
 
 
 def test_a_namespace_in_the_job_is_that_of_the_command(file, client):
-    """A command in another namespace than its jobs would wait for ever."""
+    """If the command looked for its jobs in another namespace, the command would wait forever."""
     [trial] = trials(
         load(file(job={**JOB, "metadata": {"name": "j", "namespace": "x"}}, matrix={"seed": [1]}))
     )
@@ -111,7 +111,7 @@ def test_a_namespace_in_the_job_is_that_of_the_command(file, client):
 
 
 def test_the_command_shows_a_sweep_that_has_ended_in_the_cluster(file, client, tell, typed, tmp_path):
-    """The jobs do not need the command, which was closed in the meantime."""
+    """The jobs run without the command, so a user may close it and run it again later."""
     [trial] = trials(load(file(matrix={"seed": [1]})))
     client.apply(trial.job)
     tell("s-0", "Succeeded", replicas=[replica(0, "Succeeded", rate=0.75)])

@@ -1,4 +1,4 @@
-"""How a sweep treats responses that a real API server seldom gives; a scripted server gives them here."""
+"""A sweep with responses that a real API server rarely sends; a scripted server sends them here."""
 
 from concurrent.futures import ThreadPoolExecutor
 
@@ -28,7 +28,7 @@ def trial():
 
 
 def test_a_trial_whose_job_was_deleted_makes_room_for_the_next(server, trial):
-    """With one trial at a time, the sweep would wait forever for a job that does not exist."""
+    """Otherwise, with one trial at a time, the sweep would wait forever for a deleted job."""
     script, kubeconfig = server
     stored = {**data_of(trial.job), "metadata": {"name": "s-0", "labels": {LABEL: "s"}}}
     script.calls = [refusal(404, "NotFound"), reply(201, stored), reply(obj={"metadata": {}, "items": []})]
@@ -46,7 +46,7 @@ def test_a_trial_whose_job_was_deleted_makes_room_for_the_next(server, trial):
 
 
 def test_a_sweep_reports_an_api_server_that_is_away_once_and_its_return(server):
-    """Otherwise the command seems to hang. A short time without a response is not reported."""
+    """Without a report, the command would seem to hang, but a short outage is not worth a line."""
     script, kubeconfig = server
     none = reply(obj={"metadata": {}, "items": []})
     away = [refusal(503, "ServiceUnavailable")] * (QUIET_LOOKS - 1)
@@ -72,7 +72,7 @@ def test_a_sweep_reports_an_api_server_that_is_away_once_and_its_return(server):
 
 
 def test_a_sweep_begins_and_prunes_trials_although_the_api_server_is_away_meanwhile(server, trial):
-    """An upgrade of the control plane takes minutes, and a search takes days."""
+    """The upgrade of a control plane takes minutes, and must not end a search that takes days."""
     script, kubeconfig = server
     stored = {**data_of(trial.job), "metadata": {"name": "s-0", "uid": "u", "labels": {LABEL: "s"}}}
     away, gone = refusal(503, "ServiceUnavailable"), refusal(404, "NotFound")
@@ -93,7 +93,7 @@ def test_a_sweep_begins_and_prunes_trials_although_the_api_server_is_away_meanwh
 
 
 def test_a_sweep_refuses_an_api_server_that_does_not_answer_at_first(server, trial):
-    """The kubeconfig may name a cluster that does not exist, so the command fails at once."""
+    """At the start, the kubeconfig may name a wrong cluster, so the command must fail at once."""
     script, kubeconfig = server
     script.calls = [hang_up]
 
@@ -103,7 +103,7 @@ def test_a_sweep_refuses_an_api_server_that_does_not_answer_at_first(server, tri
 
 @pytest.mark.parametrize("answers", [[], [reply(obj={"metadata": NAMED})]], ids=["before", "meanwhile"])
 def test_a_trial_whose_job_somebody_deletes_can_be_pruned(server, trial, answers):
-    """A user and the sweep may both decide that the trial is not worth continuing."""
+    """If a user has deleted the job already, the sweep must not fail when it deletes that job."""
     script, kubeconfig = server
     script.calls = [*answers, refusal(404, "NotFound")]
 

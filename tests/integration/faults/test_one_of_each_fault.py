@@ -1,7 +1,7 @@
-"""One fault of each kind between operator and API server: each run ends as it does without a fault.
+"""One fault of each kind between operator and API server; each run must end as a run without a fault does.
 
-`python -m tests.soak faults` does the same at every write. It also has the workloads in which the Job
-controller pauses between two pods for 10 s or more.
+`python -m tests.soak faults` causes faults at every write. It also runs the workloads in which the Job
+controller waits 10 s or more before the next pod.
 """
 
 from concurrent.futures import ThreadPoolExecutor
@@ -11,10 +11,10 @@ import pytest
 from tests.faults.plans import TRAINERS, Fault, Kind, Plan
 from tests.faults.rig import Rig
 
-# The first test also waits for the runs without faults.
+# The time of the first test includes the runs without faults.
 pytestmark = [pytest.mark.minutes(2), pytest.mark.timeout(600)]
 
-AT_ONCE = 3  # a run waits most of its time
+AT_ONCE = 3  # runs mostly wait, so several can run at once
 FAULTS = {
     Fault(kind=Kind.KILL_BEFORE, request="write", number=9): "again",
     Fault(kind=Kind.KILL_AFTER, request="write", number=10): "pauses",
@@ -33,7 +33,7 @@ FAULTS = {
 
 @pytest.fixture(scope="module")
 def runs(control_plane, installed):
-    """Yield the result of each plan as a future; several plans run at the same time."""
+    """Start all plans, several at a time, and yield the future result of each."""
     rig = Rig(control_plane, installed)
     with ThreadPoolExecutor(AT_ONCE) as pool:
         undisturbed = [pool.submit(rig.undisturbed, each) for each in sorted(set(FAULTS.values()))]
@@ -46,7 +46,7 @@ def runs(control_plane, installed):
 
 @pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.words)
 def test_a_disturbed_operator_brings_every_job_to_the_same_end(fault, runs):
-    """The test compares states and counters; each replica has one pod, no orphan stays, and requests stop."""
+    """The same states and counters result, each replica has one pod, no orphan stays, and requests stop."""
     run = runs[fault].result()
 
     assert run.met, "the fault never came"
@@ -54,5 +54,5 @@ def test_a_disturbed_operator_brings_every_job_to_the_same_end(fault, runs):
 
 
 def test_each_kind_of_fault_is_tried():
-    """Faults of trainers take a minute each, so only the soak has them."""
+    """The faults of trainers take a minute each, so only `make soak` runs them."""
     assert {fault.kind for fault in FAULTS} == set(Kind) - TRAINERS

@@ -1,4 +1,4 @@
-"""Small pods of small programs, and functions that observe them from outside."""
+"""Pods of small shell scripts, and functions that observe their processes."""
 
 import asyncio
 import os
@@ -18,11 +18,11 @@ from palaestra.local.output import Log
 from palaestra.local.pod import Kubelet, RunningPod
 from palaestra.local.pod_spec import Container, Pod
 
-PATIENCE_S = 20.0  # for what takes milliseconds on an idle machine
+PATIENCE_S = 20.0  # the waits take milliseconds on an idle machine
 
 
 def alive(pod_uid: str) -> list[int]:
-    """Return the processes that have the marker of a pod."""
+    """Return the ids of processes that have the marker of a pod in their environment."""
     wanted = f"{MARKER}={pod_uid}/".encode()
     found = []
     for entry in os.scandir("/proc"):
@@ -44,13 +44,13 @@ def _eventually(claim: Callable[[], object]) -> None:
 
 @pytest.fixture
 def eventually() -> Callable[[Callable[[], object]], None]:
-    """Return a function that waits until a condition holds, and fails after `PATIENCE_S`."""
+    """Return a function that waits until a claim is true, and fails after `PATIENCE_S`."""
     return _eventually
 
 
 @dataclass
 class Stage:
-    """A place in which a pod runs: its folder, its events, its containers."""
+    """The surroundings of one pod: its folder, events, logs and containers."""
 
     folder: Path
     opened: ExitStack
@@ -62,12 +62,12 @@ class Stage:
 
     @property
     def events(self) -> list[str]:
-        """Return the lines that the containers wrote with `event`, in order."""
+        """Return the lines that the containers have written with `event`, in order."""
         file = self.folder / "events"
         return file.read_text().splitlines() if file.exists() else []
 
     def container(self, name: str, script: str, **options: object) -> Container:
-        """Return a container that runs a bash script; `event x` in it writes `<name> x`."""
+        """Return a container that runs a bash script, in which `event x` writes the line `<name> x`."""
         events = shlex.quote(str(self.folder / "events"))
         helper = f'event() {{ echo "{name} $1" >> {events}; }}\n'
         fields = {"env": {}, "sidecar": name != "main", **options}
@@ -79,7 +79,7 @@ class Stage:
         return self.container(name, script, **options)
 
     def pod(self, *init: Container, main: str, grace_s: float = PATIENCE_S) -> RunningPod:
-        """Return a pod that is ready to run."""
+        """Return a pod with these containers, which has not been started."""
         pod = Pod(
             uid=self.uid,
             init=init,
@@ -103,7 +103,7 @@ class Stage:
     def interrupt(
         self, event: str, *init: Container, main: str, grace_s: float = PATIENCE_S, kill: bool = False
     ) -> int | None:
-        """Run a pod, stop it (and kill it) after an event, and return the main exit code."""
+        """Run a pod, stop it after an event, kill it if `kill`, and return the main exit code."""
 
         async def run() -> int | None:
             pod = self.pod(*init, main=main, grace_s=grace_s)
@@ -117,7 +117,7 @@ class Stage:
         return asyncio.run(asyncio.wait_for(run(), PATIENCE_S * 2))
 
     def log(self, name: str) -> Log:
-        """Return a log that is closed with the test."""
+        """Return a log that is closed at the end of the test."""
         log = Log(name, self.folder / "logs", None)
         self.opened.callback(log.close)
         return log
@@ -130,7 +130,7 @@ class Stage:
 
 @pytest.fixture
 def stage(tmp_path: Path) -> Iterator[Stage]:
-    """Yield a place in which a pod runs; at the end no process of the pod may exist."""
+    """Yield a stage for a pod; after the test, no process of the pod may exist."""
     with ExitStack() as opened:
         yield (stage := Stage(folder=tmp_path, opened=opened))
         assert alive(stage.uid) == []

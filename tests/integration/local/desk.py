@@ -1,4 +1,4 @@
-"""A folder in which a user types `palaestra run`."""
+"""A folder in which a test runs `palaestra run` as a user does."""
 
 import subprocess
 import sys
@@ -14,7 +14,7 @@ PATIENCE_S = 60
 
 
 class Desk:
-    """A folder with a job file, in which a user types `palaestra run`."""
+    """A folder with a job file and the commands that a test runs there."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -42,10 +42,10 @@ class Desk:
             process.communicate()
 
     def training(self, eventually, program: str) -> tuple[subprocess.Popen, list[int]]:
-        """Start a run whose trainer starts its simulators.
+        """Start a run whose trainer starts its simulators, and wait until they run.
 
         Returns:
-            The run's process, and the process ids of all its processes once they exist.
+            The process of the command, and the ids of all its child processes.
         """
         self.write(program)
         process = self.start()
@@ -54,7 +54,7 @@ class Desk:
         return process, [pid for pid, _ in below(process.pid)]
 
     def run(self, *options: str) -> tuple[int, str]:
-        """Run `palaestra run`, and return its exit code and output."""
+        """Run `palaestra run` to its end, and return exit code and output."""
         process = self.start(*options)
         out, _ = process.communicate(timeout=PATIENCE_S)
         return process.returncode, out

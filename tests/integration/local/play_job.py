@@ -1,6 +1,6 @@
 """Run a planned Job as `palaestra run` does: `python play_job.py JOB.json DIRECTORY [DEADLINE_S]`.
 
-It is a separate program, because the tests kill it.
+The tests start this program as a separate process, because they kill it.
 """
 
 import asyncio

@@ -1,4 +1,4 @@
-"""The commands of the pages about a first run, training from Python and sweeps work as written."""
+"""The commands on the pages about a first run, training from Python, and sweeps work as written."""
 
 from pathlib import Path
 
@@ -19,7 +19,7 @@ TYPED_S = 300
 
 @pytest.mark.timeout(400)
 def test_the_first_run_of_the_page_about_a_laptop_trains_and_is_measured(tmp_path):
-    """These are the first two commands that a new reader types."""
+    """A new reader types these two commands first."""
     (tmp_path / "manifests").symlink_to(ROOT / "manifests")
     [commands] = blocks(LAPTOP, "sh")
 
@@ -30,7 +30,7 @@ def test_the_first_run_of_the_page_about_a_laptop_trains_and_is_measured(tmp_pat
 
 
 def test_the_script_of_the_page_about_python_trains(tmp_path, monkeypatch, capsys):
-    """The script uses the example that users have, in a separate folder."""
+    """A reader copies the script into a folder with the examples, and runs it."""
     [script] = blocks((ROOT / "docs/howto/python.md").read_text(), "python with-a-run")
     (tmp_path / "manifests").symlink_to(ROOT / "manifests")
     monkeypatch.chdir(tmp_path)
@@ -43,7 +43,7 @@ def test_the_script_of_the_page_about_python_trains(tmp_path, monkeypatch, capsy
 
 @pytest.fixture
 def sweep(tmp_path, monkeypatch):
-    """Return a function that writes the sweep with a given fence on the page, next to the examples."""
+    """Return a function that writes the page's sweep with this fence into a folder with the examples."""
     (tmp_path / "manifests").symlink_to(ROOT / "manifests")
     monkeypatch.chdir(tmp_path)
 
@@ -56,7 +56,7 @@ def sweep(tmp_path, monkeypatch):
 
 
 def test_the_first_sweep_of_the_page_trains_and_compares(sweep, tmp_path, capsys):
-    """The real trainer trains two trials of an example as on the page, here with one seed each."""
+    """The real trainer trains the page's two trials, but with one seed each to save time."""
     [console] = blocks(SWEEPS, "console")
     typed = console.removeprefix("$ palaestra ").split()
     file = sweep("yaml sweep")
@@ -73,10 +73,10 @@ def test_the_first_sweep_of_the_page_trains_and_compares(sweep, tmp_path, capsys
 
 @pytest.mark.parametrize(("fence", "count"), [("yaml sweep-at-random", 20), ("yaml sweep-by-optuna", 2)])
 def test_the_other_sweeps_of_the_page_are_right(sweep, fence, count):
-    """Every job of a matrix is checked; of a search, the jobs at its bounds."""
+    """All jobs of a matrix are checked, and of a search the jobs at the bounds."""
     assert len(trials(load(sweep(fence)))) == count
 
 
 def test_the_page_explains_every_field():
-    """The table is below the first sweep."""
+    """A reader looks up a field of a sweep in the table on this page."""
     assert all(f"| `{name}` |" in SWEEPS for name in SweepSpec.model_fields)

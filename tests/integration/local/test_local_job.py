@@ -1,4 +1,4 @@
-"""A planned Job on this machine: its pods run one after another, and several things end them."""
+"""A planned Job on this machine: its pods run one after another, and end in several ways."""
 
 import json
 import os
@@ -33,7 +33,7 @@ TRAIN = "touch $FOLDER/training; while :; do sleep 0.02; done"
 
 
 class Play:
-    """One Job that a separate process runs."""
+    """A Job that a separate process runs."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -44,7 +44,7 @@ class Play:
     def start(
         self, trainer: str, *, sidecar: str = "sleep 300", limit: int = 3, deadline: str = ""
     ) -> subprocess.Popen:
-        """Start the runner; every container writes its process ids to `pids`."""
+        """Start the runner; every container appends its process id to `pids`."""
         count = f"echo $$ >> {shlex.quote(str(self.pids))}\n"
         trainer = f"echo x >> {shlex.quote(str(self.starts))}\n{count}{trainer}"
         env = [{"name": "FOLDER", "value": str(self.folder)}]
@@ -71,7 +71,7 @@ class Play:
         return self._runners[-1]
 
     def run(self, trainer: str, **options) -> dict:
-        """Run a Job to its end, and return its outcome and the number of its pods."""
+        """Run a Job to its end, and return the outcome and the number of started trainers."""
         out, _ = self.start(trainer, **options).communicate(timeout=60)
         return json.loads(out.splitlines()[-1]) | {"seen": len(self.starts.read_text().split())}
 
@@ -82,7 +82,7 @@ class Play:
                 runner.kill()
 
     def running(self) -> list[int]:
-        """Return those of the processes in `pids` that still run, without zombies."""
+        """Return those processes in `pids` that still run; a zombie does not count."""
         written = self.pids.read_text().split() if self.pids.exists() else []
         return [pid for pid in map(int, written) if _runs(pid)]
 
@@ -96,32 +96,32 @@ def _runs(pid: int) -> bool:
 
 @pytest.fixture
 def play(tmp_path, eventually):
-    """Yield a place to run a Job in; nothing of the Job stays after the test."""
+    """Yield a folder for a Job; after the test, no process of the Job may run."""
     yield (place := Play(tmp_path))
     place.end()
     eventually(lambda: not place.running())
 
 
 def test_a_trainer_that_is_done_completes_the_job(play):
-    """After exit code 0 no second pod is needed."""
+    """After exit code 0, the runner must start no second pod."""
     assert play.run("exit 0") == {"code": 0, "pods": 1, "steps": None, "seen": 1}
 
 
 @pytest.mark.parametrize("code", [2, 80, 81])
 def test_what_a_retry_cannot_mend_is_not_tried_again(play, code):
-    """A wrong configuration, a spent budget and a divergence would occur again in every pod."""
+    """A wrong configuration, a spent budget or a divergence would occur again in every pod."""
     assert play.run(f"exit {code}")["seen"] == 1
 
 
 def test_other_failures_are_tried_again_up_to_the_limit(play):
-    """A limit of n allows n + 1 pods."""
+    """With `backoffLimit: 1`, one failure is retried, so two pods run."""
     outcome = play.run("exit 82", limit=1)
 
     assert outcome == {"code": 82, "pods": 2, "steps": None, "seen": 2}
 
 
 def test_an_interrupted_pod_is_not_counted(play):
-    """Exit code 75 does not count, so that a limit of 0 does not end a run that lost its master."""
+    """Exit code 75 means that the run can resume, so a limit of 0 must not end it."""
     outcome = play.run('[ $(wc -l < "$FOLDER/starts") = 2 ] && exit 0; exit 75', limit=0)
 
     assert outcome["code"] == 0
@@ -129,7 +129,7 @@ def test_an_interrupted_pod_is_not_counted(play):
 
 
 def test_the_last_word_of_the_trainer_is_part_of_the_outcome(play):
-    """The step in it is compared with that of a resumed run."""
+    """The step in the termination message shows how far the run has come."""
     word = json.dumps({"step": 1200, "reason": "Interrupted"})
 
     outcome = play.run(f"echo {shlex.quote(word)} > $FOLDER/termination.json; exit 2")
@@ -138,7 +138,7 @@ def test_the_last_word_of_the_trainer_is_part_of_the_outcome(play):
 
 
 def test_a_killed_runner_leaves_no_process_behind(play, eventually):
-    """This holds even for a grandchild in another session which ignores every signal that it can ignore."""
+    """Even a grandchild in another session that ignores all signals must end."""
     fork = FORK.format(pids=shlex.quote(str(play.pids)))
     runner = play.start(f"trap '' TERM\n{fork}\nsleep 300", sidecar=f"{fork}\nsleep 300")
     eventually(lambda: play.pids.exists() and len(play.pids.read_text().split()) == 4)
@@ -150,7 +150,7 @@ def test_a_killed_runner_leaves_no_process_behind(play, eventually):
 
 
 def test_the_first_ctrl_c_lets_the_trainer_save_and_ends_with_75(play, eventually):
-    """The Ctrl-C of a user reaches only the runner, and the run can be resumed."""
+    """The user's Ctrl-C reaches only the runner, which must let the trainer save a checkpoint."""
     runner = play.start(f"trap 'echo saved > $FOLDER/saved; exit 75' TERM; {TRAIN}")
     eventually((play.folder / "training").exists)
 
@@ -164,7 +164,7 @@ def test_the_first_ctrl_c_lets_the_trainer_save_and_ends_with_75(play, eventuall
 
 @pytest.mark.parametrize("code", [1, 80, 81])
 def test_ctrl_c_does_not_hide_that_the_trainer_failed(play, eventually, code):
-    """Exit code 75 means that a checkpoint exists, and a divergence must not be resumed."""
+    """Exit code 75 would promise a checkpoint, and a run that diverged must not resume."""
     runner = play.start(f"trap 'exit {code}' TERM; {TRAIN}")
     eventually((play.folder / "training").exists)
 
@@ -182,7 +182,7 @@ def test_ctrl_c_does_not_hide_that_the_trainer_failed(play, eventually, code):
     ],
 )
 def test_a_run_past_its_deadline_is_stopped_and_has_failed(play, trainer):
-    """This also holds during a back-off; Kubernetes does the same to a Job."""
+    """Kubernetes stops a Job at its deadline too, even during the back-off between two pods."""
     runner = play.start(trainer, limit=100, deadline="1.5")
 
     out, _ = runner.communicate(timeout=60)
@@ -192,12 +192,12 @@ def test_a_run_past_its_deadline_is_stopped_and_has_failed(play, trainer):
 
 
 def test_a_run_that_is_done_before_its_deadline_is_not_held_up(play):
-    """The deadline is an upper bound."""
+    """The runner must not wait for the rest of the time."""
     assert play.run("exit 0", deadline="300")["code"] == 0
 
 
 def test_the_second_ctrl_c_kills(play, eventually):
-    """A user does not have to wait for a checkpoint that hangs."""
+    """A user must not have to wait for a checkpoint that hangs."""
     runner = play.start(f"trap 'echo asked > $FOLDER/asked' TERM; {TRAIN}")
     eventually((play.folder / "training").exists)
 
@@ -211,7 +211,7 @@ def test_the_second_ctrl_c_kills(play, eventually):
 
 
 def test_a_run_that_was_done_when_it_was_interrupted_stays_done(play, eventually):
-    """The trainer had nothing more to save."""
+    """The trainer completes although it is interrupted, so the run has succeeded."""
     runner = play.start(f"trap 'exit 0' TERM; {TRAIN}")
     eventually((play.folder / "training").exists)
 
@@ -222,7 +222,7 @@ def test_a_run_that_was_done_when_it_was_interrupted_stays_done(play, eventually
 
 
 def test_a_killed_sidecar_takes_its_simulator_with_it_and_comes_back(play, eventually):
-    """In a container, all processes end with the first one, too."""
+    """In a container, all processes end with process 1, and the kubelet restarts the container."""
     fork = FORK.format(pids=shlex.quote(str(play.pids)))
     sidecar = f"echo $$ > $FOLDER/sidecar\n{fork}\nwait"
     runner = play.start("while :; do sleep 0.02; done", sidecar=sidecar)

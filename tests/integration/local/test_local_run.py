@@ -1,4 +1,4 @@
-"""`palaestra run` with the real ROS master and sidecars, and with small programs as trainers."""
+"""`palaestra run` with the real ROS master and sidecars; small programs stand in for the trainer."""
 
 import fcntl
 import os
@@ -60,14 +60,14 @@ TRAIN = START + WAIT
 
 @pytest.fixture
 def desk(tmp_path):
-    """Yield a folder for a user's commands."""
+    """Yield a folder in which a test runs a user's commands."""
     desk = Desk(tmp_path)
     yield desk
     desk.clear()
 
 
 def test_a_run_ends_with_a_summary_and_is_reported_when_it_is_typed_again(desk):
-    """The trainer found a master, its configuration and its worlds."""
+    """The same command must report a finished run and not train again."""
     desk.write(ASK)
 
     code, out = desk.run()
@@ -81,7 +81,7 @@ def test_a_run_ends_with_a_summary_and_is_reported_when_it_is_typed_again(desk):
 
 
 def test_a_finished_run_is_prolonged_by_more_steps_and_began_with_the_policy_of_another(desk):
-    """The policy is in another run's directory, which a user types relative to the folder."""
+    """A user types the path of the other run relative to the working directory."""
     other = desk.folder / "other"
     other.mkdir()
     with zipfile.ZipFile(other / "model.zip", "w") as archive:
@@ -102,7 +102,7 @@ def test_a_finished_run_is_prolonged_by_more_steps_and_began_with_the_policy_of_
 
 
 def test_a_run_whose_output_is_no_longer_read_ends_as_it_would_have(desk):
-    """`palaestra run job.yaml | head` closes the pipe after ten lines, and training continues."""
+    """`palaestra run job.yaml | head` closes the pipe after ten lines, and training must continue."""
     desk.write(ASK)
 
     process = desk.start()
@@ -113,7 +113,7 @@ def test_a_run_whose_output_is_no_longer_read_ends_as_it_would_have(desk):
 
 
 def test_the_run_directory_holds_what_was_run(desk):
-    """It contains the source worlds, the configuration, the job, and a log of each container."""
+    """A user finds all inputs and logs of the run in one folder."""
     desk.write(ASK)
 
     desk.run()
@@ -124,7 +124,7 @@ def test_the_run_directory_holds_what_was_run(desk):
 
 
 def test_fresh_begins_anew_and_keeps_the_old_run(desk):
-    """The second training has its directory next to the first."""
+    """A user can compare the new run with the old one, which keeps its files."""
     desk.write(ASK)
     desk.run()
 
@@ -136,7 +136,7 @@ def test_fresh_begins_anew_and_keeps_the_old_run(desk):
 
 
 def test_a_wrong_job_is_corrected_without_fresh(desk):
-    """Nothing was trained, so the trainer's files are set aside together with its logs."""
+    """No step was trained, so the refused run and its logs are only moved aside."""
     desk.write(REFUSE)
     refused, _ = desk.run()
     desk.write(ASK, seed=7)
@@ -150,7 +150,7 @@ def test_a_wrong_job_is_corrected_without_fresh(desk):
 
 
 def test_a_second_run_of_the_same_directory_is_refused(desk, eventually):
-    """The first run does not notice the second."""
+    """Two runs in one directory would overwrite each other's checkpoints."""
     desk.write(WAIT)
     first = desk.start()
     eventually((desk.run_directory / "begun").exists)
@@ -165,7 +165,7 @@ def test_a_second_run_of_the_same_directory_is_refused(desk, eventually):
 
 
 def test_ctrl_c_ends_with_75_says_how_to_go_on_and_leaves_no_process(desk, eventually):
-    """The same command resumes the run, and no process of the first one is left on the machine."""
+    """The user can resume with the same command, and no process stays on the machine."""
     process, pids = desk.training(eventually, TRAIN)
 
     process.send_signal(signal.SIGINT)
@@ -178,7 +178,7 @@ def test_ctrl_c_ends_with_75_says_how_to_go_on_and_leaves_no_process(desk, event
 
 
 def test_a_second_ctrl_c_does_not_wait_for_the_trainer_and_leaves_no_process(desk, eventually):
-    """After a second Ctrl-C there is no time for a checkpoint, but the simulators must end all the same."""
+    """The user does not wait for a checkpoint any more, but no simulator may stay."""
     process, pids = desk.training(eventually, TRAIN.replace("sys.exit(75)", "(run / 'asked').touch()"))
     process.send_signal(signal.SIGINT)
     eventually((desk.run_directory / "asked").exists)
@@ -193,7 +193,7 @@ def test_a_second_ctrl_c_does_not_wait_for_the_trainer_and_leaves_no_process(des
 
 
 def test_ctrl_c_tells_a_trainer_that_fails_on_it_and_starts_no_further_replica(desk, eventually):
-    """The trainer did not write its checkpoint, and the user wants to end."""
+    """The user must learn that no checkpoint was saved, and that the command has ended."""
     desk.write(WAIT.replace("sys.exit(75)", "sys.exit('no room to save')"), replicas=2)
     process = desk.start()
     eventually((desk.run_directory / "begun").exists)
@@ -208,7 +208,7 @@ def test_ctrl_c_tells_a_trainer_that_fails_on_it_and_starts_no_further_replica(d
 
 
 def test_a_run_past_its_deadline_says_so_and_can_go_on(desk):
-    """The user sets the deadline and may increase it, because the run itself is intact."""
+    """The user may increase the deadline and continue, because the run is intact."""
     desk.write(WAIT, activeDeadlineSeconds=1)
 
     code, out = desk.run()
@@ -220,7 +220,7 @@ def test_a_run_past_its_deadline_says_so_and_can_go_on(desk):
 
 
 def test_a_killed_run_leaves_neither_process_nor_lock(desk, eventually):
-    """The master, the sidecars and their simulators end with the runner, and the run can continue."""
+    """After SIGKILL of the runner, no process stays, and the user can resume the run."""
     process, pids = desk.training(eventually, TRAIN)
 
     process.kill()
@@ -233,7 +233,7 @@ def test_a_killed_run_leaves_neither_process_nor_lock(desk, eventually):
 
 
 def _processes_that_name(folder: Path) -> list[str]:
-    """Return the processes whose environment contains the folder."""
+    """Return the ids of processes whose environment names a run below the folder."""
     found = []
     for entry in os.scandir("/proc"):
         try:
@@ -246,7 +246,7 @@ def _processes_that_name(folder: Path) -> list[str]:
 
 
 def test_verbose_shows_every_log_with_the_name_of_its_container(desk):
-    """Without the option only the trainer's output is on the screen."""
+    """Without `-v`, the screen shows only the trainer's output."""
     desk.write("print('hello from the trainer')")
 
     _, out = desk.run("-v")
@@ -255,7 +255,7 @@ def test_verbose_shows_every_log_with_the_name_of_its_container(desk):
 
 
 def test_a_failure_prints_its_last_lines_and_the_path_of_its_log(desk):
-    """A user sees why a run failed without a search for the log."""
+    """A user must see the cause of a failure without a search for the log."""
     desk.write("raise SystemExit('no such reward')")
 
     code, out = desk.run()
@@ -267,7 +267,7 @@ def test_a_failure_prints_its_last_lines_and_the_path_of_its_log(desk):
 
 
 def test_a_changed_job_is_refused_and_nothing_is_touched(desk):
-    """The checkpoints belong to a training with another job."""
+    """The checkpoints belong to a training with the recorded job."""
     desk.write("raise SystemExit(1)", seed=1)
     desk.run()
     before = (desk.run_directory / "job.yaml").read_text()
@@ -281,7 +281,7 @@ def test_a_changed_job_is_refused_and_nothing_is_touched(desk):
 
 
 def test_a_port_in_use_is_one_line_and_nothing_is_written(desk):
-    """The user chose the port, so the user must choose another one."""
+    """The user has chosen the port, so only the user can choose another one."""
     desk.write(ASK)
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]
@@ -295,7 +295,7 @@ def test_a_port_in_use_is_one_line_and_nothing_is_written(desk):
 
 
 def test_replicas_run_one_after_another(desk):
-    """Each replica has its own seed and its own directory."""
+    """Each replica trains with a different seed, in its own directory."""
     desk.write(ASK, replicas=2)
 
     code, out = desk.run()
@@ -310,7 +310,7 @@ def test_replicas_run_one_after_another(desk):
 
 
 def test_on_a_terminal_the_trainer_draws_and_the_log_stays_readable(desk):
-    """A progress bar that is drawn several times is one line of the log."""
+    """A progress bar that was drawn repeatedly must be one line of the log."""
     bar = (
         "import sys; assert sys.stderr.isatty(); "
         "sys.stderr.write('\\r10%\\r\\x1b[2K20%\\x1b[0m\\n'); sys.stderr.flush()"
@@ -329,7 +329,7 @@ def test_on_a_terminal_the_trainer_draws_and_the_log_stays_readable(desk):
 
 
 def _read_to_the_end(terminal: int) -> bytes:
-    """Return the output on a terminal until all writers have closed it."""
+    """Return the output on a terminal until no process writes to it any more."""
     drawn = b""
     while True:
         try:
@@ -340,7 +340,7 @@ def _read_to_the_end(terminal: int) -> bytes:
 
 
 def test_a_differential_robot_drives_by_its_own_program(desk):
-    """Its world has no name and no --synchronize, its wheels have other names, and its PROTOs are URLs."""
+    """Another project's world has no ROS name, no --synchronize, other wheel names, and PROTOs as URLs."""
     desk.write(
         DRIVE,
         simulators=[rover()],

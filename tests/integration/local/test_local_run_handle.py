@@ -1,4 +1,4 @@
-"""`palaestra.run`: a job trains in the background of a Python program."""
+"""`palaestra.run` trains a job in the background of a Python program."""
 
 import json
 import os
@@ -76,7 +76,7 @@ time.sleep(1000)
 
 @pytest.fixture
 def job(tmp_path):
-    """Return a function that makes jobs as plain data, whose trainer is a small Python program."""
+    """Return a function that builds jobs as plain data, with a small Python program as trainer."""
 
     def make(program, name="desk", **spec):
         file = tmp_path.with_name(f"{tmp_path.name}-{hash(program)}.py")
@@ -87,12 +87,12 @@ def job(tmp_path):
 
 
 def begun(run):
-    """Wait until the trainer of a run waits to be ended."""
+    """Wait until the trainer of a run waits for SIGTERM."""
     eventually(lambda: (run.directory / "begun").exists() or run.ended, PATIENCE_S)
 
 
 def test_a_complete_run_has_a_result_and_is_not_repeated(job, tmp_path):
-    """Users run a notebook again from its first cell."""
+    """A user who runs a notebook again from its first cell must not train again."""
     with palaestra.run(job(END), runs=tmp_path) as run:
         readable, _, _ = select.select([run], [], [], PATIENCE_S)
         assert readable == [run]
@@ -107,7 +107,7 @@ def test_a_complete_run_has_a_result_and_is_not_repeated(job, tmp_path):
 
 
 def test_the_log_of_a_run_has_a_limit(job, tmp_path):
-    """The log also has the trainer's lines, and an environment may print at every step."""
+    """An environment may print at every step, and its output must not fill the disk."""
     with palaestra.run(job(PRINT + END), runs=tmp_path) as run:
         result = run.result(PATIENCE_S)
 
@@ -119,7 +119,7 @@ def test_the_log_of_a_run_has_a_limit(job, tmp_path):
 
 
 def test_a_result_is_not_that_of_an_earlier_run(job, tmp_path):
-    """A run that cannot begin writes no outcome, and the earlier one may have had the same exit code."""
+    """A run that cannot start writes no outcome, so an older file must not be reported."""
     with palaestra.run(job(FAIL), runs=tmp_path) as run:
         first = run.result(PATIENCE_S)
     logs = run.directory / "logs"
@@ -135,9 +135,9 @@ def test_a_result_is_not_that_of_an_earlier_run(job, tmp_path):
 
 
 def test_two_runs_at_the_same_time_are_stopped_with_a_checkpoint(job, tmp_path):
-    """Each run has its own ports, directory and end.
+    """Each run has its own ports and its own directory, so two can train at once.
 
-    A deadline that passes during a call ends neither.
+    A timeout of `result` must end neither of them.
     """
     with (
         palaestra.run(job(WAIT), runs=tmp_path) as one,
@@ -156,7 +156,7 @@ def test_two_runs_at_the_same_time_are_stopped_with_a_checkpoint(job, tmp_path):
 
 
 def test_the_progress_is_what_the_trainer_reports(job, tmp_path):
-    """Before the trainer responds, the phase is `starting`."""
+    """Before the trainer's first response, the phase is `starting`."""
     with palaestra.run(job(ANSWER), runs=tmp_path) as run:
         first = run.progress
         progress = eventually(lambda: run.progress if run.progress.step else None, PATIENCE_S)
@@ -169,7 +169,7 @@ def test_the_progress_is_what_the_trainer_reports(job, tmp_path):
 
 
 def test_a_second_run_of_the_same_directory_is_refused_at_once(job, tmp_path):
-    """The call raises the error, so that it is not only in the log."""
+    """The caller must get an exception, because nobody reads the log of a run that did not start."""
     with palaestra.run(job(WAIT), runs=tmp_path) as run:
         with pytest.raises(RunRefused, match="is in use by"):
             palaestra.run(job(WAIT), runs=tmp_path)
@@ -180,7 +180,7 @@ def test_a_second_run_of_the_same_directory_is_refused_at_once(job, tmp_path):
 
 
 def test_mistakes_are_raised_before_anything_is_started(job, tmp_path):
-    """The call with the mistake raises the exception."""
+    """The call that contains the mistake must raise the exception."""
     with pytest.raises(SpecErrors, match=r"spec.seed: -1 is less than 0"):
         palaestra.run(job(END, seed=-1), runs=tmp_path)
     with pytest.raises(RunRefused, match="choose one with replica="):
@@ -195,9 +195,9 @@ def test_mistakes_are_raised_before_anything_is_started(job, tmp_path):
 
 @pytest.mark.parametrize("fork", ["", "os.fork() or time.sleep(1000)"], ids=["alone", "with-a-fork"])
 def test_all_of_it_ends_with_the_program_also_after_sigkill(job, tmp_path, fork):
-    """A checkpoint is saved.
+    """If the program ends in any way, its run saves a checkpoint and leaves no process.
 
-    This also holds if a forked child still has the pipe.
+    This must work even if a forked child of the program still holds the pipe.
     """
     (tmp_path / "job.yaml").write_text(json.dumps(job(WAIT)))
     script = NOTEBOOK.format(fork=fork)
@@ -225,6 +225,6 @@ def test_all_of_it_ends_with_the_program_also_after_sigkill(job, tmp_path, fork)
 
 
 def outcome_of(directory: Path):
-    """Return the outcome of a run, or None before its end."""
+    """Return the outcome of a run, or None while it runs."""
     path = directory / "outcome.json"
     return json.loads(path.read_text()) if path.exists() else None

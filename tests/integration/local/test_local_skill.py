@@ -1,4 +1,4 @@
-"""The guide for coding agents leads from an empty folder to trained jobs, with the commands as they stand."""
+"""The commands of the guide for coding agents train jobs in an empty folder, without any other command."""
 
 import json
 from importlib.resources import files
@@ -15,7 +15,7 @@ SKILL = (files("palaestra") / "SKILL.md").read_text(encoding="utf-8")
 
 
 def test_the_commands_of_the_guide_train_two_jobs_from_an_empty_folder(tmp_path):
-    """An agent types them one after the other and believes each sentence between them."""
+    """An agent runs the commands in order and relies on the sentences between them."""
     commands = "".join(blocks(SKILL, "sh"))
 
     Terminal(tmp_path, path=PALAESTRA.parent).type_in(commands, TYPED_S)
@@ -29,7 +29,7 @@ def test_the_commands_of_the_guide_train_two_jobs_from_an_empty_folder(tmp_path)
 
 
 def test_explain_prints_the_guide_and_where_it_is(capsys):
-    """A program for agents copies the file, or reads it there; `>` must not mix the path into it."""
+    """The text goes to standard output and the path to standard error, so that `>` copies the text only."""
     assert main(["explain", "--skill"]) == 0
 
     out, err = capsys.readouterr()
@@ -38,7 +38,7 @@ def test_explain_prints_the_guide_and_where_it_is(capsys):
 
 
 def test_the_guide_has_the_head_that_agents_look_for():
-    """They choose a guide by the name, which is that of its folder, and the description."""
+    """An agent chooses a guide by its description and by its name, which must equal the folder's."""
     _, head, _ = SKILL.split("---\n", 2)
 
     described = yaml.safe_load(head)

@@ -59,7 +59,7 @@ finish(1.0)
 
 @pytest.fixture
 def desk(tmp_path):
-    """Return a function that writes a sweep of a job with a program and returns its file."""
+    """Return a function that writes a sweep whose trainer is a program, and returns the file."""
 
     def write(program, **spec):
         (tmp_path / "program.py").write_text(COMMON + program)
@@ -79,13 +79,13 @@ def desk(tmp_path):
 
 
 def states(folder):
-    """Return the state of each trial that has ended, by number."""
+    """Return the state of each finished trial, by number."""
     lines = (folder / "trials.jsonl").read_text().splitlines()
     return {line["trial"]: line["state"] for line in map(json.loads, lines)}
 
 
 def test_a_sweep_ends_with_a_table_a_picture_and_a_run_directory_a_seed(desk, tmp_path, capsys):
-    """The same command prints the result again without any training."""
+    """The same command again must print the result without training."""
     typed = ["sweep", str(desk(LEARN, matrix={RATE: [0.1, 0.2]}, seeds=2)), "--dir", str(tmp_path / "runs")]
 
     assert main(typed) == 0
@@ -104,7 +104,7 @@ def test_a_sweep_ends_with_a_table_a_picture_and_a_run_directory_a_seed(desk, tm
 
 
 def test_ctrl_c_ends_all_runs_with_a_checkpoint_and_the_same_command_resumes_them(desk, tmp_path):
-    """Two trials run while the third one waits."""
+    """Two trials run and a third waits when the user types Ctrl-C."""
     file = desk(WAIT_ONCE, matrix={RATE: [0.1, 0.2, 0.3]})
     command = [PALAESTRA, "sweep", file, "--dir", tmp_path / "runs", "--at-once", "2"]
     folder = tmp_path / "runs" / "s"
@@ -128,7 +128,7 @@ def test_ctrl_c_ends_all_runs_with_a_checkpoint_and_the_same_command_resumes_the
 
 
 def test_a_trial_that_optuna_prunes_is_stopped(desk, tmp_path, capsys):
-    """The trial keeps its checkpoint, and the sweep continues."""
+    """The pruned trial keeps its checkpoint, and the sweep continues with the next trial."""
     space = {RATE: {"low": 0.1, "high": 0.2}}
     file = desk(FIRST_IS_BEST, random=space, trials=3, optuna={"startupTrials": 1})
 
@@ -140,7 +140,7 @@ def test_a_trial_that_optuna_prunes_is_stopped(desk, tmp_path, capsys):
 
 
 def test_every_trial_is_checked_before_the_first_begins(desk, tmp_path, capsys):
-    """Otherwise the mistake would appear only after a night, with the last trial."""
+    """Otherwise a user might find the mistake only after a night, when the last trial starts."""
     file = desk(LEARN, matrix={"trainer.steps": [10, 0]})
 
     assert main(["sweep", str(file), "--dir", str(tmp_path / "runs")]) == 2
@@ -150,7 +150,7 @@ def test_every_trial_is_checked_before_the_first_begins(desk, tmp_path, capsys):
 
 
 def test_a_failed_trial_is_named_and_the_others_go_on(desk, tmp_path, capsys):
-    """The exit code is for scripts, and the table for users."""
+    """A script uses the exit code, and a user reads the failed trial in the table."""
     file = desk("finish(1.0)\nsys.exit(81 if rate > 0.1 else 0)\n", matrix={RATE: [0.2, 0.1]})
 
     assert main(["sweep", str(file), "--dir", str(tmp_path / "runs")]) == 1
@@ -160,9 +160,9 @@ def test_a_failed_trial_is_named_and_the_others_go_on(desk, tmp_path, capsys):
 
 
 def test_a_run_keeps_as_many_processors_busy_as_it_has_collecting_simulators():
-    """These simulators step at the same time.
+    """The collecting simulators step at the same time, and each keeps one processor busy.
 
-    The trainer waits in that time, and the evaluating simulators are idle.
+    Meanwhile the trainer waits, and the evaluating simulators are idle.
     """
     assert busy(job_of(EXAMPLES / "minimal.yaml")) == 1
     assert busy(job_of(EXAMPLES / "two-collectors.yaml")) == 2

@@ -1,4 +1,4 @@
-"""`palaestra try --local` with a real simulator."""
+"""`palaestra try --local` runs a task with a real simulator."""
 
 import json
 import os
@@ -16,7 +16,7 @@ TINY = EXAMPLES / "tiny.yaml"
 
 
 def started(folder, *options, stdin=subprocess.DEVNULL):
-    """Return the process of a try, whose temporary files are in a folder."""
+    """Start `palaestra try`, with its temporary files in a folder, and return the process."""
     return subprocess.Popen(
         [PALAESTRA, "try", "--local", TINY, *options],
         env={**os.environ, "TMPDIR": str(folder)},
@@ -28,7 +28,7 @@ def started(folder, *options, stdin=subprocess.DEVNULL):
 
 
 def test_a_task_that_ships_is_tried_without_a_problem(tmp_path):
-    """The checkers of two libraries and ours agree; the time of a step has all its parts."""
+    """The task must pass all checks, and the command must report the time of every part of a step."""
     process = started(tmp_path, "--episodes", "2", "--json")
     out, err = process.communicate(timeout=PATIENCE_S)
 
@@ -42,7 +42,7 @@ def test_a_task_that_ships_is_tried_without_a_problem(tmp_path):
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGKILL, -signal.SIGKILL)])
 def test_a_try_that_is_ended_leaves_no_process(tmp_path, number, code):
-    """Ctrl-C leaves no file either; a kill leaves the folder for temporary files to the system."""
+    """Ctrl-C leaves no temporary file either, but SIGKILL leaves the folder of temporary files."""
     process = started(tmp_path, "--episodes", "9999")
     with process:
         for line in process.stdout:
@@ -59,7 +59,7 @@ def test_a_try_that_is_ended_leaves_no_process(tmp_path, number, code):
 
 
 def test_a_person_drives_with_the_keys_of_a_terminal(tmp_path):
-    """Each key is one step, also an arrow of three bytes; afterwards the terminal is as before."""
+    """Each key makes one step, even an arrow key of three bytes, and the terminal's mode is restored."""
     controller, terminal = pty.openpty()
     before = termios.tcgetattr(terminal)
     process = started(tmp_path, "--agent", "keyboard", stdin=terminal)

@@ -1,4 +1,4 @@
-"""`pip install` of the three packages, built as wheels, into each Python that is promised."""
+"""The wheels of the three packages can be installed with `pip` into each supported Python."""
 
 import json
 import re
@@ -32,7 +32,7 @@ NO_ROS = "import sys, importlib.util as util; sys.exit(any(map(util.find_spec, (
 
 @pytest.fixture(scope="module")
 def programs(tmp_path_factory):
-    """`programs("3.12")`: the programs of an environment with the wheels, made once for each Python."""
+    """Return a function that installs the wheels for a version such as "3.12" and returns the programs."""
     built = cache(lambda: wheels.built(tmp_path_factory.mktemp("wheels")))
 
     @cache
@@ -49,12 +49,12 @@ def programs(tmp_path_factory):
 
 
 def typed(*words, **options):
-    """Return the finished process of a command."""
+    """Run a command and return the finished process."""
     return subprocess.run(words, capture_output=True, text=True, timeout=DEADLINE_S, check=False, **options)
 
 
 def helps(folder, *names):
-    """Assert that the help of these programs is printed, and nothing else."""
+    """Assert that each program prints its help and no error."""
     for name in names:
         shown = typed(folder / name, "--help")
         assert (shown.returncode, shown.stderr) == (0, ""), name
@@ -62,7 +62,7 @@ def helps(folder, *names):
 
 @pytest.mark.parametrize("version", VERSIONS)
 def test_the_wheels_install_into_each_python(version, programs):
-    """People have the Python of their distribution, which is seldom ours, and no checkout."""
+    """A user has the Python of a distribution, which may differ from ours, and no checkout."""
     folder = programs(version)
 
     assert typed(folder / "python", "-c", NO_ROS).returncode == 0, "this environment proves nothing"
@@ -70,7 +70,7 @@ def test_the_wheels_install_into_each_python(version, programs):
 
 
 def test_a_job_is_trained_with_the_newest_python(programs, tmp_path):
-    """A module that a Python removed is missed at run time; a library warns one release before that."""
+    """Only a run shows that this Python lacks a module, and a warning announces the next removal."""
     folder = programs(next(filter(wheels.python, reversed(VERSIONS))))
     (tmp_path / "job.yaml").write_text(yaml.safe_dump(JOB))
 
@@ -84,7 +84,7 @@ def test_a_job_is_trained_with_the_newest_python(programs, tmp_path):
 
 
 def test_every_program_of_the_wheels_starts_without_ros_and_without_a_checkout(programs, tmp_path):
-    """A program that reads a file of the checkout, or imports what no wheel asks for, fails here."""
+    """A program that reads a file of the checkout, or imports an undeclared dependency, fails here."""
     folder = programs(next(filter(wheels.python, reversed(VERSIONS))))
 
     helps(folder, *SCRIPTS)
@@ -95,7 +95,7 @@ def test_every_program_of_the_wheels_starts_without_ros_and_without_a_checkout(p
 
 
 def test_a_job_is_trained_in_a_bare_debian_by_an_ordinary_user(programs, tmp_path):
-    """Nothing is there but a Python and the wheels: no package of ROS, no compiler, no checkout, no root."""
+    """The system has only a Python and the wheels: no ROS, no compiler, no checkout and no root."""
     if why := bare_debian.lack():
         pytest.skip(why)
     version = next(filter(wheels.python, reversed(VERSIONS)))
@@ -121,7 +121,7 @@ SCRIPTS = [
 
 
 def test_the_trainer_refuses_pythons_for_which_its_pytorch_has_no_wheel():
-    """`pip` then reports the wrong Python; otherwise it would report only that PyTorch is missing."""
+    """With the bound in requires-python, `pip` reports a wrong Python instead of a missing PyTorch."""
     bounds = tomllib.loads((ROOT / "trainer/pyproject.toml").read_text())["project"]["requires-python"]
 
     lowest, above = re.fullmatch(r">=3\.(\d+),<3\.(\d+)", bounds).groups()

@@ -1,4 +1,4 @@
-"""`palaestra run`, and a program with a facade, in a file system without any package of ROS."""
+"""`palaestra run`, and a script with a facade, run in a file system without packages of ROS."""
 
 import json
 import subprocess
@@ -12,7 +12,7 @@ from tests import without_ros
 from tests.jobs import make_job
 
 PALAESTRA = Path(sys.executable).with_name("palaestra")
-DEADLINE_S = 240.0  # the work takes ten seconds, but the machine may be busy
+DEADLINE_S = 240.0  # the work takes ten seconds on an idle machine
 MODULES = ("rospy", "rosmaster", "rosgraph", "genpy", "std_msgs", "netifaces")
 JOB = make_job(
     "bare",
@@ -24,7 +24,7 @@ JOB = make_job(
         "evaluation": {"everySteps": 100, "episodes": 1, "confirmEpisodes": 1},
     },
 )
-# A program of a user, which is a node by itself and starts a master.
+# A user's program, which is a ROS node itself and starts a master.
 PROGRAM = f"""
 import importlib.util, os, xmlrpc.client
 print([name for name in {MODULES} if importlib.util.find_spec(name)])
@@ -47,7 +47,7 @@ with webots:
 
 @pytest.fixture
 def bare(tmp_path):
-    """`bare(words)`: exit code and output of a command where no ROS is installed."""
+    """Return a function that runs a command without ROS and returns exit code and output."""
     if not without_ros.works(tmp_path):
         pytest.skip("this machine lets nobody lay a file system over /usr in a namespace")
 
@@ -67,7 +67,7 @@ def bare(tmp_path):
 
 
 def test_a_job_is_trained_where_no_ros_is_installed(bare, tmp_path):
-    """`make run` and `palaestra run` need no package of a distribution."""
+    """A user can train on a machine without a distribution's packages of ROS."""
     job = tmp_path / "job.yaml"
     job.write_text(yaml.safe_dump(JOB))
 
@@ -79,7 +79,7 @@ def test_a_job_is_trained_where_no_ros_is_installed(bare, tmp_path):
 
 
 def test_a_facade_starts_its_simulator_where_no_ros_is_installed(bare):
-    """Notebooks and scripts have no runner that starts a master."""
+    """A notebook or script has no runner, so the facade must start the ROS master."""
     code, output = bare(sys.executable, "-c", PROGRAM)
 
     assert code == 0, output

@@ -1,4 +1,4 @@
-"""Events in the cluster that Prometheus scrapes."""
+"""Situations in a cluster for the metrics that Prometheus scrapes."""
 
 from palaestra_protocol.pod.status import Termination
 from tests.integration.operator.cluster import Place
@@ -7,17 +7,17 @@ from tests.waiting import eventually
 
 
 def address(operator: RunningOperator) -> str:
-    """Return the address at which an operator serves its metrics, once it does."""
+    """Wait until an operator serves its metrics, and return the address."""
     [line] = eventually(lambda: operator.said("started"))
     return str(line["address"])
 
 
 def diverge(place: Place, job: str = "unlucky") -> None:
-    """Make a job's replica fail once, start again and then diverge."""
+    """Let a job's replica fail once, restart, and then diverge."""
     place.train(job)
     [first] = place.pods(job)
     place.run(first)
-    place.until("Running", job)  # otherwise a slow operator sees the pod for the first time after its end
+    place.until("Running", job)  # a slow operator must see the pod before its end
     place.end(first, 1)
     [second] = place.pods(job)
     place.run(second)

@@ -1,7 +1,7 @@
-"""Every alert, alone and in a real Prometheus: it fires, and it clears.
+"""Every alert fires and clears, with simulated time in promtool and in a real Prometheus.
 
-promtool, whose time is simulated, tests long times: how long a problem must last before its alert fires, and
-that the two alerts that look some minutes back clear.
+promtool tests long times: how long a problem must last before its alert fires, and when the two alerts clear
+that consider the last minutes.
 """
 
 import signal
@@ -23,7 +23,7 @@ pytestmark = pytest.mark.minutes(2)
 
 CASES = Path(__file__).with_name("alerts.test.yaml")
 DEADLINE_S = 90
-# The simulators are slower than real time, and a rollout has six checkpoints.
+# The simulators are slower than real time, and a checkpoint is due six times per rollout.
 SICK = {
     "collect": {"restart": {"limit": 4, "withinSeconds": 60}},
     "faults": "slow:latency_ms=250",
@@ -36,7 +36,7 @@ SICK = {
 
 @pytest.fixture
 def rules(tmp_path):
-    """Return the alerts without their waiting times."""
+    """Write the alerts without their waiting times, and return the file."""
     content = yaml.safe_load(ALERTS.read_text())
     for group in content["groups"]:
         for rule in group["rules"]:
@@ -48,14 +48,14 @@ def rules(tmp_path):
 
 @pytest.fixture
 def folder(tmp_path):
-    """Return Prometheus's folder."""
+    """Return an empty folder for Prometheus."""
     made = tmp_path / "prometheus"
     made.mkdir()
     return made
 
 
 def test_the_alerts_are_rules_that_prometheus_reads_and_fire_and_clear_in_time():
-    """Promtool simulates time, so that ten minutes take none."""
+    """The rules take minutes to fire, and promtool simulates that time."""
     promtool = programs(PROGRAMS) / "promtool"
 
     for command in (["check", "rules", ALERTS], ["test", "rules", CASES]):
@@ -64,7 +64,7 @@ def test_the_alerts_are_rules_that_prometheus_reads_and_fire_and_clear_in_time()
 
 
 def test_no_alert_is_without_a_case_in_which_it_fires_and_one_in_which_it_does_not():
-    """Only a test in which an alert fires proves that it works."""
+    """With only one of the two cases, an alert that always fires, or never fires, could pass."""
     cases = [case for test in yaml.safe_load(CASES.read_text())["tests"] for case in test["alert_rule_test"]]
     names = {rule["alert"] for rule in alerts()}
 
@@ -73,7 +73,7 @@ def test_no_alert_is_without_a_case_in_which_it_fires_and_one_in_which_it_does_n
 
 
 def test_the_alerts_about_a_sick_run_fire_and_clear(tmp_path, folder, rules):
-    """Its simulators are slow and later stopped, it saves no checkpoint, and its budget runs out."""
+    """The run's simulators are slow and later stopped, it saves no checkpoint, and its budget runs out."""
     job = tiny_job(**SICK)
     job["spec"]["stallDeadlineSeconds"] = 30
     with LocalRun(tmp_path, job) as run, scraping(targets.of_run(run, "lab"), folder, rules) as prometheus:
@@ -88,7 +88,7 @@ def test_the_alerts_about_a_sick_run_fire_and_clear(tmp_path, folder, rules):
         stopped = [
             run.pid_of(program, "sim-collect-0/") for program in ("palaestra-sidecar", "palaestra-stub")
         ]
-        for pid in stopped:  # the sidecar too, because it would restart the simulator before the alert fires
+        for pid in stopped:  # the sidecar too, because it would restart the simulator
             send(pid, signal.SIGSTOP)
         _fires(prometheus, "PalaestraTrainingStalled")
         for pid in stopped:
@@ -97,7 +97,7 @@ def test_the_alerts_about_a_sick_run_fire_and_clear(tmp_path, folder, rules):
 
 
 def test_alerts_fire_without_a_leader_and_without_an_operator(folder, rules, place, start):
-    """The second operator waits for the Lease of the first, which ends as in a power failure."""
+    """The first operator ends as in a power failure, and the second one waits until its Lease expires."""
     first = start(elect=True)
     address(first)
     second = start(elect=True)

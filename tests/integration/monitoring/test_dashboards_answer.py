@@ -1,4 +1,4 @@
-"""A real Prometheus scrapes a real run and operator: the queries of every panel and alert return data."""
+"""With a real run and a real operator, the queries of every panel and alert return data."""
 
 import math
 from contextlib import suppress
@@ -10,9 +10,9 @@ from tests.monitoring.prometheus import NotAnswered, scraping
 from tests.monitoring.questions import looked_at, questions
 from tests.soak.jobs import LITTLE_DQN, tiny_job
 
-OVER, SHOWN = "30s", "10m"  # range of the rates; the time range at the top of a dashboard
+OVER, SHOWN = "30s", "10m"  # the range of rates, and the time range of a dashboard
 ANSWERED_S = 150
-# Without a fault, a panel about faults would have no data.
+# Faults are needed, because panels about faults would have no data otherwise.
 FAULTY = {
     "faults": "crash:step=60 lost:topic=ir1/value,every=25",
     "algorithm": LITTLE_DQN,
@@ -23,7 +23,7 @@ FAULTY = {
 
 
 def test_every_query_of_every_panel_and_all_that_an_alert_looks_at_is_answered(tmp_path, place, start):
-    """Users take an empty panel, or an alert without data, as a sign that all is well."""
+    """A user takes an empty panel, or an alert without data, as a sign that all is well."""
     operator = start(elect=True)
     folder = tmp_path / "prometheus"
     folder.mkdir()
@@ -42,7 +42,7 @@ def test_every_query_of_every_panel_and_all_that_an_alert_looks_at_is_answered(t
 
 
 def _drop_answered(asked, prometheus):
-    """Remove the queries that now return a number, and return the others."""
+    """Remove the queries that return a number by now, and return the rest."""
     asked[:] = [it for it in asked if not any(map(_is_number, prometheus.query(it.expr)))]
     return asked
 

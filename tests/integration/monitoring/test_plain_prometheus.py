@@ -1,9 +1,8 @@
-"""The scrape configuration of docs/reference/metrics.md, in a real Prometheus.
+"""The scrape configuration of docs/reference/metrics.md works in a real Prometheus.
 
-Debian's Prometheus is built without discovery in Kubernetes, so the tests play the discovered pods: each port
-of the recorded plan's pod and of the chart's. Each target has the labels for the role `pod` from https:
-
-prometheus.io/docs/prometheus/latest/configuration/configuration/#pod.
+Debian's Prometheus has no discovery in Kubernetes, so the tests provide static targets: each port of a pod in
+the recorded plan and in the chart. Each target has the labels of the discovery role `pod`.
+Source: https://prometheus.io/docs/prometheus/latest/configuration/configuration/#pod.
 """
 
 import re
@@ -24,7 +23,7 @@ PLAN = ROOT / "tests/golden/minimal.cluster.yaml"
 
 @pytest.fixture
 def written():
-    """Write the configuration of one scrape, as a user copies it."""
+    """Return the page's scrape configuration, as a user copies it."""
     pages = blocks((ROOT / "docs/reference/metrics.md").read_text(), "yaml")
     [text] = [each for each in pages if "scrape_configs" in each]
     [scrape] = yaml.safe_load(text)["scrape_configs"]
@@ -33,7 +32,7 @@ def written():
 
 @pytest.fixture
 def played(written):
-    """Return the scrape with static pods instead of the discovery."""
+    """Return a function that replaces the discovery in the configuration by static pods."""
     assert written.pop("kubernetes_sd_configs") == [{"role": "pod"}]
 
     def discovering(*pods):
@@ -45,7 +44,7 @@ def played(written):
 
 @pytest.fixture
 def folder(tmp_path):
-    """Return Prometheus's folder."""
+    """Return an empty folder for Prometheus."""
     made = tmp_path / "prometheus"
     made.mkdir()
     return made
@@ -64,14 +63,14 @@ def operator():
 
 
 def stranger():
-    """Return a pod of another project which has a port with the same name."""
+    """Return a pod of another project with a port of the same name."""
     container = {"name": "main", "ports": [{"name": "metrics", "containerPort": 9999}]}
     template = {"metadata": {"labels": {"app": "theirs"}}, "spec": {"containers": [container]}}
     return {"name": "theirs", "phase": "Running", "template": template}
 
 
 def discovered(name, phase, template):
-    """Yield a static target for each port of a pod, with the labels from the discovery."""
+    """Yield a static target for each port of a pod, with the labels of the discovery."""
     labels = {"namespace": "lab", "pod_name": name, "pod_phase": phase}
     for key, value in template["metadata"]["labels"].items():
         safe = re.sub(r"[^a-zA-Z0-9_]", "_", key)
@@ -85,16 +84,16 @@ def discovered(name, phase, template):
 
 
 def found(prometheus, count):
-    """Return the labels of the targets once there are `count`.
+    """Return the labels of the targets, or None while there are fewer than `count`.
 
-    No program listens at them, so `up` is 0.
+    No program listens at the targets, so their `up` is 0.
     """
     up = [series["metric"] for series in prometheus.query("up")]
     return {tuple(map(each.get, LABELS)) for each in up} if len(up) >= count else None
 
 
 def test_promtool_finds_nothing_wrong_with_the_scrape_configuration(played, tmp_path):
-    """Users copy it into a file, and it must not add mistakes there."""
+    """A user copies the configuration into a file, and Prometheus must accept that file."""
     file = tmp_path / "prometheus.yaml"
     file.write_text(yaml.safe_dump({"scrape_configs": [played()]}))
     command = [programs(PROGRAMS) / "promtool", "check", "config", file]
@@ -105,7 +104,7 @@ def test_promtool_finds_nothing_wrong_with_the_scrape_configuration(played, tmp_
 
 
 def test_a_plain_prometheus_gives_every_program_the_labels_of_the_dashboards(played, folder):
-    """Without `training_job`, `replica` and `simulator` most panels stay empty."""
+    """Without the labels `training_job`, `replica` and `simulator`, most panels stay empty."""
     with configured([played(training(), operator(), stranger())], folder) as prometheus:
         targets = prometheus.until(lambda: found(prometheus, 4), FOUND_S)
 
@@ -119,7 +118,7 @@ def test_a_plain_prometheus_gives_every_program_the_labels_of_the_dashboards(pla
 
 
 def test_a_plain_prometheus_asks_no_pod_that_has_ended(played, folder):
-    """Pods of finished jobs stay for weeks, and each of their ports would be a target that is down."""
+    """The pods of finished jobs stay for weeks, and each port would be a target that is down."""
     pods = (training("done", "Succeeded"), training("broken", "Failed"), training("goes-on"))
     with configured([played(*pods)], folder) as prometheus:
         targets = prometheus.until(lambda: found(prometheus, 3), FOUND_S)

@@ -1,4 +1,4 @@
-"""A namespace of a control plane without nodes, and methods that play its kubelet."""
+"""A namespace of a control plane without nodes, with methods that act as its kubelet."""
 
 import itertools
 import json
@@ -30,7 +30,7 @@ numbers = itertools.count(1)
 
 
 def served(api: Api) -> bool:
-    """Return whether TrainingJobs can be created; discovery may still show a definition that was deleted."""
+    """Return whether TrainingJobs can be created; discovery may still list a deleted definition."""
     try:
         api.list(TRAINING_JOBS)
     except NotFound:
@@ -39,7 +39,7 @@ def served(api: Api) -> bool:
 
 
 def world_of(config_map: str) -> Object:
-    """Return the fields of a job whose only simulator has the world in a ConfigMap."""
+    """Return the fields of a job whose only simulator reads its world from a ConfigMap."""
     world = {"configMap": {"name": config_map, "key": "my.wbt"}}
     return {
         "simulators": [{"name": "collect", "role": "Collect", "world": world}],
@@ -48,7 +48,7 @@ def world_of(config_map: str) -> Object:
 
 
 def world_map() -> Object:
-    """Return a ConfigMap with a world, with the label that allows jobs to use it."""
+    """Return a ConfigMap that contains a world and has the label for jobs."""
     return {
         "apiVersion": "v1",
         "kind": "ConfigMap",
@@ -58,16 +58,16 @@ def world_map() -> Object:
 
 
 def local_queues() -> Object:
-    """Return the kind whose existence shows that a cluster has Kueue; the test plays Kueue."""
+    """Return the definition by which the operator detects Kueue; the test acts as Kueue."""
     return kind_of_kueue("LocalQueue", "v1beta1")
 
 
 def kind_of_kueue(kind: str, version: str) -> Object:
-    """Return a kind of Kueue that accepts any fields."""
+    """Return the definition of a kind of Kueue that accepts any fields."""
     singular = kind.lower()
     names = {"kind": kind, "listKind": f"{kind}List", "plural": f"{singular}s", "singular": singular}
     schema = {"openAPIV3Schema": {"type": "object", "x-kubernetes-preserve-unknown-fields": True}}
-    # Kinds in a group of Kubernetes' own projects need the approval of these projects.
+    # A definition in a group of a Kubernetes project needs the approval annotation of that project.
     approval = {"api-approved.kubernetes.io": "unapproved, plays Kueue in a test"}
     return {
         "apiVersion": "apiextensions.k8s.io/v1",
@@ -83,7 +83,7 @@ def kind_of_kueue(kind: str, version: str) -> Object:
 
 
 def stranger(name: str) -> Object:
-    """Return a Job that does not belong to Palaestra."""
+    """Return a Job that was not created by Palaestra."""
     container = {"name": "main", "image": "theirs", "command": ["true"]}
     template = {"spec": {"restartPolicy": "Never", "containers": [container]}}
     return {
@@ -95,7 +95,7 @@ def stranger(name: str) -> Object:
 
 
 class Place:
-    """A namespace, with the actions of users and kubelets in it; `api` is an administrator's client."""
+    """A namespace in which a test acts as users and kubelets; `api` is an administrator's client."""
 
     def __init__(self, api: Api, prefix: str = "place") -> None:
         self.api = api
@@ -103,7 +103,7 @@ class Place:
         api.create(NAMESPACES, {"apiVersion": "v1", "kind": "Namespace", "metadata": {"name": self.name}})
 
     def create(self, resource: Resource, obj: Object) -> Object:
-        """Create an object here."""
+        """Create an object in this namespace."""
         return self.api.create(resource, {**obj, "metadata": {**obj["metadata"], "namespace": self.name}})
 
     def get(self, resource: Resource, name: str) -> Object | None:
@@ -114,7 +114,7 @@ class Place:
             return None
 
     def all(self, resource: Resource, job: str | None = None) -> list[Object]:
-        """Return all objects of a kind here, or those of a TrainingJob."""
+        """Return all objects of a kind in this namespace, or only those of a TrainingJob."""
         labels = f"palaestra.dev/job={job}" if job else None
         return self.api.list(resource, self.name, labels=labels)
 
@@ -132,7 +132,7 @@ class Place:
         return next((each for each in conditions if each["type"] == kind), {})
 
     def children(self, name: str = "job") -> dict[str, str]:
-        """Return kind and name of every object made for a TrainingJob, each with its uid."""
+        """Return the uid of every object that was created for a TrainingJob, by kind and name."""
         return {
             f"{resource.kind}/{each['metadata']['name']}": each["metadata"]["uid"]
             for resource in KINDS
@@ -149,7 +149,7 @@ class Place:
         return [each for each in found if each["involvedObject"]["kind"] == "TrainingJob"]
 
     def until(self, phase: str, name: str = "job", deadline_s: float = DEADLINE_S) -> Object:
-        """Return the status of a TrainingJob once it is in a phase."""
+        """Wait until a TrainingJob is in a phase, and return the status."""
         try:
             eventually(lambda: self.status(name).get("phase") == phase, deadline_s)
         except TooLate as late:
@@ -157,7 +157,7 @@ class Place:
         return self.status(name)
 
     def pods(self, name: str = "job", count: int = 1, deadline_s: float = DEADLINE_S) -> list[Object]:
-        """Return the pods of a TrainingJob that have not ended, once there are this many."""
+        """Wait for this many pods of a TrainingJob that have not ended, and return them."""
 
         def seen() -> list[Object]:
             alive = [
@@ -171,19 +171,19 @@ class Place:
         return list(eventually(seen, deadline_s))
 
     def run(self, pod: Object, address: str = "127.0.0.1") -> None:
-        """Set the status of a pod that runs, as a kubelet does."""
+        """Set the status of a pod to running, as a kubelet does."""
         now = f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}"
         running = {"state": {"running": {"startedAt": now}}, "ready": True, "started": True}
         self._report(pod, "Running", running, podIP=address, podIPs=[{"ip": address}], startTime=now)
 
     def hold_up(self, pod: Object, reason: str, message: str) -> None:
-        """Set the status of a pod whose trainer the kubelet does not start yet."""
+        """Set the status of a pod whose trainer waits for the kubelet to start it."""
         waiting = {"state": {"waiting": {"reason": reason, "message": message}}, "ready": False}
         trainer = {"name": "trainer", "image": "i", "imageID": "", "restartCount": 0, **waiting}
         self._patch(pod, {"phase": "Pending", "containerStatuses": [trainer]})
 
     def end(self, pod: Object, code: int = 0, word: Termination | None = None) -> None:
-        """Set the status of a pod whose trainer has ended, with an exit code and a termination message."""
+        """Set the status of a pod whose trainer has ended with this exit code and termination message."""
         now = f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}"
         reason = "Error" if code else "Completed"
         ended = {"exitCode": code, "startedAt": now, "finishedAt": now, "reason": reason}
@@ -193,7 +193,7 @@ class Place:
         self._report(pod, "Failed" if code else "Succeeded", done)
 
     def take(self, pod: Object, reason: str, message: str, **status: Any) -> None:
-        """Set the condition of a pod that the cluster removes; keywords are other fields of its status."""
+        """Set the condition of a pod that is about to be removed; keywords are other fields of the status."""
         # Kubernetes removes a disruption condition that is older than two minutes.
         now = f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}"
         taken = {"type": "DisruptionTarget", "status": "True", "lastTransitionTime": now}
@@ -201,7 +201,7 @@ class Place:
         self._patch(pod, {"conditions": [taken], **status})
 
     def kill(self, pod: Object, container: str) -> None:
-        """Set the status of a running pod whose sidecar was killed for its memory and runs again at once."""
+        """Set the status of a running pod whose sidecar was killed for its memory and has restarted."""
         now = f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}"
         ended = {"exitCode": 137, "reason": "OOMKilled", "startedAt": now, "finishedAt": now}
         status = (self.get(PODS, pod["metadata"]["name"]) or pod)["status"]
@@ -219,7 +219,7 @@ class Place:
         )
 
     def complain(self, pod: Object, reason: str, message: str) -> None:
-        """Write a kubelet's warning about a pod."""
+        """Create a kubelet's warning event about a pod."""
         metadata = {"name": f"{pod['metadata']['name']}.1", "namespace": self.name}
         about = {
             "apiVersion": "v1",

@@ -1,4 +1,4 @@
-"""A fixture that starts operators in the namespace of a test."""
+"""The fixture that starts operators in the namespace of a test."""
 
 import fcntl
 from collections.abc import Callable, Iterator
@@ -23,8 +23,8 @@ Start = Callable[..., RunningOperator]
 def start(control_plane: ControlPlane, installed: Api, place: Place, tmp_path: Path) -> Iterator[Start]:
     """Yield a function that starts operators for this namespace, with the permissions of an installation.
 
-    There is no election unless a test requires it. The tests share one Lease, so only one test at a time has
-    an election.
+    The operators have no leader election unless a test requests it. All tests share one Lease, so only one
+    test at a time may have an election.
     """
     kubeconfig = control_plane.kubeconfig_of(USER, "system:serviceaccounts")
     started: list[RunningOperator] = []
@@ -34,7 +34,7 @@ def start(control_plane: ControlPlane, installed: Api, place: Place, tmp_path: P
         election = "--leader-elect" if elect else "--no-leader-elect"
         if elect and not started:
             fcntl.flock(turn, fcntl.LOCK_EX)
-            with suppress(NotFound):  # otherwise the Lease of an earlier test would first have to expire
+            with suppress(NotFound):  # otherwise an earlier test's Lease must first expire
                 installed.delete(LEASES, NAMESPACE, NAME)
         log = tmp_path / f"operator-{len(started)}.log"
         common = (f"--namespace={place.name}", election, *options)

@@ -1,4 +1,4 @@
-"""The command line as in a pod: `in_a_pod.py FOLDER operator …`; the folder has the files of its account."""
+"""The command line as in a pod: `in_a_pod.py FOLDER operator …`; FOLDER has the service account's files."""
 
 import io
 import sys
@@ -10,6 +10,6 @@ from palaestra.cli import main
 if __name__ == "__main__":
     folder, *arguments = sys.argv[1:]
     with suppress(SystemExit), redirect_stdout(io.StringIO()):
-        main(["operator", "--help"])  # imports what an operator imports, and nothing more
+        main(["operator", "--help"])  # imports the same modules as an operator, and no others
     sys.modules["palaestra.cluster.service_account"].FILES = Path(folder)
     sys.exit(main(arguments))

@@ -1,4 +1,4 @@
-"""An operator as a process with the permissions of an installation, and its requests to the API server."""
+"""An operator as a process with an installation's permissions, and its requests to the API server."""
 
 import os
 import re
@@ -29,7 +29,7 @@ END_S = 10
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Asked:
-    """One request of the operator, from the API server's audit log."""
+    """One request of an operator, from the API server's audit log."""
 
     verb: str
     resource: str
@@ -38,7 +38,7 @@ class Asked:
 
     @property
     def counts(self) -> bool:
-        """Return whether it is neither a watch nor a request for the Lease."""
+        """Return whether the request is neither a watch nor for the Lease."""
         return self.verb != "watch" and self.resource != "leases"
 
 
@@ -51,14 +51,14 @@ class Installed:
     port: int
 
     def rss_bytes(self) -> int:
-        """Return the process's present resident memory."""
+        """Return the current resident memory of the process in bytes."""
         lines = Path(f"/proc/{self.process.pid}/status").read_text().splitlines()
         return next(int(line.split()[1]) * 1024 for line in lines if line.startswith("VmRSS:"))
 
     def requests(self) -> Counter[tuple[str, str]]:
-        """Return the numbers of requests by verb and resource, from the operator's own metrics.
+        """Return the number of requests by verb and resource, from the operator's own metrics.
 
-        Watches and requests for the Lease are left out.
+        Watches and requests for the Lease are excluded.
         """
         with urllib.request.urlopen(f"http://127.0.0.1:{self.port}/metrics", timeout=10) as answer:
             families = list(text_string_to_metric_families(answer.read().decode()))
@@ -74,7 +74,7 @@ class Installed:
         )
 
     def end(self) -> float:
-        """End the operator with SIGTERM and return the seconds that it took."""
+        """End the operator with SIGTERM, and return the seconds until its end."""
         started = time.monotonic()
         self.process.send_signal(signal.SIGTERM)
         self.process.wait(END_S)
@@ -82,7 +82,7 @@ class Installed:
 
 
 def asked(plane: ControlPlane) -> list[Asked]:
-    """Return all requests of all operators in order, including watches and those for the Lease."""
+    """Return all requests of all operators in order, including watches and requests for the Lease."""
     found = []
     for entry in plane.audit(USER):
         if entry["user"].get("username") == USER and entry["stage"] == "ResponseComplete":
@@ -100,9 +100,10 @@ def asked(plane: ControlPlane) -> list[Asked]:
 
 @contextmanager
 def operator(plane: ControlPlane, log: Path, *, in_a_pod: bool = False) -> Iterator[Installed]:
-    """Run an operator until the block ends; its log goes to a file.
+    """Run an operator until the block ends, with its log in a file.
 
-    It has a kubeconfig. In a pod it has the files of its account and the environment from its image instead.
+    By default the operator has a kubeconfig. With `in_a_pod`, it has the files of a service account and the
+    environment of its image instead.
     """
     with HeldPorts() as ports:
         port = ports.any()
@@ -129,7 +130,7 @@ def _kubeconfig(plane: ControlPlane) -> tuple[str, str]:
 
 
 def _in_a_pod(plane: ControlPlane) -> tuple[str, ...]:
-    """Return the command line of an operator that has the files of a pod's account."""
+    """Return the command of an operator with the files of a pod's service account."""
     account = plane.folder / "account"
     account.mkdir(exist_ok=True)
     *_, namespace, name = USER.split(":")
@@ -143,7 +144,7 @@ def _in_a_pod(plane: ControlPlane) -> tuple[str, ...]:
 def _environment(plane: ControlPlane) -> dict[str, str]:
     """Return the variables that the image and a kubelet set.
 
-    The operator finds no kubeconfig of the user.
+    With them, the operator does not find the kubeconfig of the person who runs the tests.
     """
     lines = re.findall(r"^ENV (.+)$", (ROOT / "operator" / "Dockerfile").read_text(), re.MULTILINE)
     of_image = dict(word.split("=", 1) for line in lines for word in line.split())
@@ -152,11 +153,11 @@ def _environment(plane: ControlPlane) -> dict[str, str]:
 
 
 def wait_for(claim: Callable[[], bool], deadline_s: float, told: Callable[[], object]) -> None:
-    """Wait until a condition holds; after the deadline fail with the result of `told`."""
+    """Wait until a claim is true; after the deadline, fail with the result of `told`."""
     ends = time.monotonic() + deadline_s
     while not claim():
         assert time.monotonic() < ends, f"not within {deadline_s} s: {told()}"
-        time.sleep(0.5)  # leave the API server time for its work
+        time.sleep(0.5)  # a shorter pause would load the API server
 
 
 def _ready(port: int) -> bool:

@@ -1,6 +1,6 @@
-"""An operator that kills itself after the responses to N writes: `mortal.py N operator …`; 0 means never.
+"""An operator that kills itself after N writes: `mortal.py N operator …`; with N = 0, it does not.
 
-It ends after the API server has done the write and before the operator can react to it.
+The operator ends when the API server has executed the write, and before it can react to the response.
 """
 
 import os
@@ -15,7 +15,10 @@ WRITES = {"create", "patch", "apply", "delete"}
 
 
 def die_after(writes: int) -> None:
-    """Kill every operator of this process after this many writes, without those of the Lease."""
+    """Make each operator of this process kill the process after `writes` writes.
+
+    Writes of the Lease and of events do not count.
+    """
     count, lock = 0, threading.Lock()
     told = Metrics.request
 

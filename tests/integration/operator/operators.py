@@ -1,4 +1,4 @@
-"""Operators as processes with the permissions of an installation, which tests end in any way."""
+"""Operators as processes with the permissions of an installation; a test may end them in any way."""
 
 import signal
 import subprocess
@@ -15,13 +15,13 @@ END_S = 10.0
 
 
 class RunningOperator:
-    """One operator; its log lines are in a file.
+    """One operator process, with its log in a file.
 
     Args:
-        kubeconfig: contains the user with whose permissions it runs.
-        log: the file for its log lines.
+        kubeconfig: the kubeconfig of the user whose permissions the operator has.
+        log: the file of the log.
         options: further options of the command line.
-        dies_after: it kills itself with SIGKILL after the responses to this many writes.
+        dies_after: the number of writes after which the operator kills itself.
     """
 
     def __init__(self, kubeconfig: Path, log: Path, *options: str, dies_after: int | None = None) -> None:
@@ -42,29 +42,29 @@ class RunningOperator:
             )
 
     def lines(self) -> list[dict[str, Any]]:
-        """Return its complete log lines, without one that is still being written."""
+        """Return the log's complete lines, without a last line that is still being written."""
         return whole_lines(self._log)
 
     def said(self, event: str) -> list[dict[str, Any]]:
-        """Return its log lines with the given message."""
+        """Return the log lines with this message."""
         return [line for line in self.lines() if line["event"] == event]
 
     def ask(self, path: str) -> str:
-        """Return its response on its own port."""
+        """Return the operator's response on its port for metrics and probes."""
         [started] = eventually(lambda: self.said("started"))
         with urllib.request.urlopen(f"http://{started['address']}{path}", timeout=END_S) as answer:
             return answer.read().decode()
 
     def wait(self, deadline_s: float = END_S) -> int:
-        """Return its exit code once it has ended."""
+        """Wait for the end of the operator, and return the exit code."""
         return self.process.wait(deadline_s)
 
     def stop(self) -> int:
-        """End it as Kubernetes does, and return its exit code."""
+        """End the operator with SIGTERM, as Kubernetes does, and return the exit code."""
         self.process.send_signal(signal.SIGTERM)
         return self.wait()
 
     def kill(self) -> None:
-        """End it as a power failure does."""
+        """Kill the operator, as a power failure does."""
         self.process.kill()
         self.process.wait(END_S)

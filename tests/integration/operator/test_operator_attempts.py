@@ -1,4 +1,4 @@
-"""The record of an attempt whose pod no longer exists, with a real API server and a simulated kubelet."""
+"""The record of an attempt after its pod is deleted; the API server is real, and the kubelet simulated."""
 
 import pytest
 
@@ -25,12 +25,12 @@ SAVED = Termination(step=20, reason="Interrupted: SIGTERM received", log=("check
 
 
 def replica(place):
-    """Return the replica's part of the status."""
+    """Return the status of the first replica, or an empty object."""
     return next(iter(place.status().get("replicas", ())), {})
 
 
 def test_the_last_lines_and_faults_stay_when_the_pod_is_gone(place, start, control_plane):
-    """A pod's logs are deleted with it. `kubectl describe` shows what is kept."""
+    """A pod's log is deleted with the pod, so a user finds the last lines in `kubectl describe`."""
     start()
     place.train()
     [pod] = place.pods()
@@ -52,7 +52,7 @@ def test_the_last_lines_and_faults_stay_when_the_pod_is_gone(place, start, contr
 
 
 def test_suspensions_are_counted_however_fast_they_follow(place, start):
-    """The control plane counts time in whole seconds, and these suspensions are shorter."""
+    """Times in the control plane are whole seconds, and these suspensions are shorter."""
     start()
     place.train()
     for _ in range(PAUSES):
@@ -70,20 +70,20 @@ def test_suspensions_are_counted_however_fast_they_follow(place, start):
 
 
 def evict(place, pod):
-    """Evict a pod, whose trainer saves and stops."""
+    """Evict a pod; its trainer saves a checkpoint and exits with 75."""
     place.take(pod, "EvictionByEvictionAPI", "Eviction API: evicting")
     place.end(pod, 75, SAVED)
 
 
 def lose(place, pod):
-    """Delete a pod with its node, as the garbage collector does once the Node object is deleted."""
+    """Delete a pod after its node was deleted, as Kubernetes' garbage collector of pods does."""
     place.take(pod, "DeletionByPodGC", "node not found", phase="Failed")
     place.api.delete(PODS, place.name, pod["metadata"]["name"])
 
 
 @pytest.mark.parametrize("take", [evict, lose])
 def test_a_disruption_is_counted_and_reported_and_is_no_failure(take, place, start):
-    """Even with a backoffLimit of 0 the next pod is created."""
+    """Even if `backoffLimit` is 0, the run must continue in a new pod."""
     start()
     place.train(backoffLimit=0)
     [first] = place.pods()
@@ -104,12 +104,12 @@ def test_a_disruption_is_counted_and_reported_and_is_no_failure(take, place, sta
 
 
 def others(place, pod):
-    """Return the pods that have not ended, without the given one."""
+    """Return the pods that have not ended, except the given pod."""
     return [each for each in place.pods() if each["metadata"]["uid"] != pod["metadata"]["uid"]]
 
 
 def test_a_simulator_that_was_killed_for_its_memory_is_reported_with_its_limit(place, start):
-    """Its container restarts at once, so it would otherwise look like a crash."""
+    """The container restarts at once, so without a report the kill would look like a crash."""
     start()
     group = {"name": "collect", "role": "Collect", "resources": {"limits": {"memory": "512Mi"}}}
     place.train(simulators=[group, {"name": "evaluate", "role": "Evaluate"}])
@@ -126,7 +126,7 @@ def test_a_simulator_that_was_killed_for_its_memory_is_reported_with_its_limit(p
 
 
 def test_a_volume_that_cannot_be_mounted_is_reported(place, start):
-    """Only an event on the pod reports this; the pod's status only shows that it starts."""
+    """The pod's status shows only that the pod starts, and only an event of the pod contains the cause."""
     start()
     place.train()
     [pod] = place.pods()
@@ -139,15 +139,15 @@ def test_a_volume_that_cannot_be_mounted_is_reported(place, start):
 
 
 def marked(place, pod):
-    """Set the mark of an operator that was killed before it could evict the pod."""
+    """Set the annotation that an operator leaves if it is killed before it evicts the pod."""
     mark = f"1 {pod['metadata']['uid']} TrainerNotStarted: the node forgot it"
     place.api.merge(JOBS, place.name, "job-0", {"metadata": {"annotations": {REPLACED: mark}}})
 
 
 def test_a_pod_that_no_kubelet_heals_is_evicted_and_counted_once(place, start):
-    """This also holds for a new operator, which finds the mark while the pod lives.
+    """A new operator finds the annotation of a killed operator and must evict the pod exactly once.
 
-    The Job counts no failure.
+    The eviction is not a failure of the Job.
     """
     operator = start()
     place.train(backoffLimit=0)
@@ -168,7 +168,7 @@ def test_a_pod_that_no_kubelet_heals_is_evicted_and_counted_once(place, start):
 
 
 def test_a_disruption_budget_is_respected_and_reported(place, start):
-    """The budget's owner wants the pod to stay; the eviction is retried until the budget allows it."""
+    """The budget's owner wants the pod to stay, so the operator retries until the budget allows it."""
     start()
     place.train()
     [pod] = place.pods()

@@ -1,4 +1,4 @@
-"""The operator caches little of large jobs, and plans from the data of the API server."""
+"""The operator's cache holds little of a large job, and a plan is made from the API server's data."""
 
 import re
 from pathlib import Path
@@ -13,7 +13,7 @@ NO_EVALUATION = {"evaluation": {"everySteps": 0}}
 
 
 def with_worlds(*texts):
-    """Return the fields of a job with these inline worlds."""
+    """Return the fields of a job with one group of simulators for each inline world."""
     groups = [
         {"name": f"g{place}", "role": "Collect", "world": {"inline": text}}
         for place, text in enumerate(texts)
@@ -22,7 +22,7 @@ def with_worlds(*texts):
 
 
 def test_a_job_is_planned_from_its_worlds_and_not_from_their_digests(place, start):
-    """The cache has digests; pods get the author's text."""
+    """The cache holds only digests of the worlds, but the pods must get the author's text."""
     world = builtin("arena").decode() + "# " + "x" * 1000 + "\n"
     start()
 
@@ -34,7 +34,7 @@ def test_a_job_is_planned_from_its_worlds_and_not_from_their_digests(place, star
 
 
 def test_a_large_job_is_refused_by_what_it_holds_and_not_by_what_is_kept_of_it(place, start):
-    """Only the operator checks free fields, and large ones are not cached."""
+    """Only the operator checks these fields, so it must read the large fields that its cache drops."""
     start()
 
     place.train(trainer={"algorithm": {"hyperparameters": {"x": [0] * 30_000}}})
@@ -44,16 +44,16 @@ def test_a_large_job_is_refused_by_what_it_holds_and_not_by_what_is_kept_of_it(p
 
 
 def all_have_failed(place):
-    """Return whether every TrainingJob here is refused.
+    """Return whether every TrainingJob in the namespace has failed.
 
-    The request is for a table, which contains no worlds.
+    The request is for a table, because the jobs contain large worlds.
     """
     rows = place.api.table(TRAINING_JOBS, place.name)["rows"]
     return [row["cells"][1] for row in rows] == ["Failed"] * LARGE
 
 
 def test_large_jobs_that_are_refused_leave_the_operator_small(place, start):
-    """The jobs exist before the operator starts, so it reads them all at once."""
+    """The operator starts after the jobs exist, so it reads all of them at once."""
     worlds = with_worlds(*(["x" * 180_000] * 5))
     for number in range(LARGE):
         place.create(TRAINING_JOBS, make_job(f"job-{number}", **worlds))

@@ -1,4 +1,4 @@
-"""The columns of TrainingJobs in `kubectl get` and the fields for selection, with a real API server."""
+"""The columns of TrainingJobs in `kubectl get`, and field selectors, with a real API server."""
 
 import itertools
 
@@ -13,7 +13,7 @@ SAVED = CheckpointStatus(step=20, time="2026-01-31T12:00:00Z")
 
 @pytest.fixture
 def kubectl(control_plane, place):
-    """Return a function that returns kubectl's lines about this namespace."""
+    """Return a function that runs `kubectl get` in the namespace and returns the lines of the output."""
 
     def typed(*words):
         done = control_plane.kubectl("get", "--namespace", place.name, *words)
@@ -24,7 +24,7 @@ def kubectl(control_plane, place):
 
 
 def test_kubectl_get_shows_why_a_job_waits_and_how_far_it_has_to_go(place, start, kubectl):
-    """Otherwise a missing world and a wrong image would both read `Pending 0/1`."""
+    """Without the reason, a missing world and a wrong image would both show as `Pending 0/1`."""
     start()
     place.train("no-world", **world_of("nowhere"))
     place.train("no-image", trainer={"steps": 7000})
@@ -34,14 +34,14 @@ def test_kubectl_get_shows_why_a_job_waits_and_how_far_it_has_to_go(place, start
     def rows():
         headings, *jobs = (line.split() for line in kubectl("tj"))
         assert headings == ["NAME", "STATUS", "REASON", "REPLICAS", "STEP", "TARGET", "SUCCESS", "AGE"]
-        return [job[:5] for job in jobs]  # without a step, the target is the fifth word
+        return [job[:5] for job in jobs]  # if no step is shown, the target is the fifth word
 
     image, world = ["Pending", "ImagePull", "0/1", "7000"], ["Pending", "WorldMissing", "0/1", "50000"]
     eventually(lambda: rows() == [["no-image", *image], ["no-world", *world]])
 
 
 def test_kubectl_get_wide_shows_the_attempts_of_the_replicas(place, start, kubectl):
-    """The columns show the restarts of a replica, its node, and how many steps a failure now would cost."""
+    """A user sees the restarts and nodes of replicas, and the age of the last checkpoint."""
     start()
     place.train(replicas=2)
     for pod in place.pods(count=2):
@@ -62,7 +62,7 @@ def test_kubectl_get_wide_shows_the_attempts_of_the_replicas(place, start, kubec
 
 
 def test_kubectl_describe_shows_no_empty_field_of_the_status(place, start, control_plane):
-    """A heading with nothing below it looks as if something were missing."""
+    """A heading without content would look like lost data to a user."""
     start()
     place.train()
     [pod] = place.pods()
@@ -78,7 +78,7 @@ def test_kubectl_describe_shows_no_empty_field_of_the_status(place, start, contr
 
 
 def test_kubectl_selects_jobs_by_phase_and_by_queue(place, start, kubectl):
-    """In a namespace with hundreds of jobs, kubectl can request only those that run."""
+    """In a namespace with hundreds of jobs, a user wants to list only those that run."""
     start()
     place.train("waits", scheduling={"queueName": "trainings"})
     place.train("runs")
@@ -96,7 +96,7 @@ def test_kubectl_selects_jobs_by_phase_and_by_queue(place, start, kubectl):
 
 @pytest.mark.parametrize("category", ["all", "palaestra"])
 def test_kubectl_get_all_lists_training_jobs_too(place, kubectl, category):
-    """Users type `kubectl get all` in a namespace that they do not know."""
+    """A user types `kubectl get all` in an unknown namespace and must see its TrainingJobs."""
     place.train()
 
     assert "trainingjob.palaestra.dev/job" in kubectl(category, "-o", "name")

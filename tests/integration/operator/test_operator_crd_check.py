@@ -1,4 +1,4 @@
-"""An operator in a cluster with the TrainingJob definition of another release."""
+"""An operator in a cluster that has the TrainingJob definition of another release."""
 
 import json
 from contextlib import suppress
@@ -24,7 +24,7 @@ BEFORE = ["Accepted", "Running", "Suspended", "Succeeded", "Failed"]
 
 @pytest.fixture
 def older(tmp_path):
-    """Yield a control plane whose definition lacks a field of the status and two types of conditions."""
+    """Yield a control plane whose definition lacks a status field and two types of conditions."""
     definition = json.loads(json.dumps(crd()))
     [version] = definition["spec"]["versions"]
     status = version["schema"]["openAPIV3Schema"]["properties"]["status"]["properties"]
@@ -43,16 +43,16 @@ def older(tmp_path):
 
 
 def published(api):
-    """Return the published schema of TrainingJobs, or None if it is not published yet."""
+    """Return the published schema of TrainingJobs, or None before the API server publishes it."""
     with suppress(NotFound):
         return api.schema(API_VERSION, KIND)
     return None
 
 
 def test_an_outdated_definition_is_logged_and_measured(older, tmp_path):
-    """The API server drops new fields.
+    """With an old definition, the API server drops new fields, and an administrator must learn of it.
 
-    This happens with `crds.install: false`, if the administrator did not apply the new definition.
+    This happens with `crds.install: false` if nobody has applied the new definition.
     """
     kubeconfig = older.kubeconfig_of(USER, "system:serviceaccounts")
     operator = RunningOperator(kubeconfig, tmp_path / "operator.log", "--no-leader-elect")
@@ -67,7 +67,7 @@ def test_an_outdated_definition_is_logged_and_measured(older, tmp_path):
 
 
 def test_the_definition_of_this_release_is_asked_for_once(place, start, installed):
-    """The permissions of an installation are enough to read it, and no second request follows."""
+    """The installation's permissions suffice to read the schema, and one request is enough."""
     eventually(lambda: published(installed))
     operator = start()
     place.train()

@@ -1,4 +1,4 @@
-"""An operator may be killed at any write, run twice, or be replaced: the end is the same."""
+"""If an operator is killed at any write, runs twice or is replaced, the jobs end in the same state."""
 
 import threading
 import time
@@ -12,13 +12,13 @@ from palaestra_protocol.pod.status import Termination
 from tests.waiting import eventually
 
 DONE = Termination(step=20, reason="Completed", success_rate=0.9)
-WRITES = 7  # one replica that succeeds: accepted, policy, worlds, claim, Job, running, succeeded
+WRITES = 7  # for one replica that succeeds: accepted, policy, worlds, claim, Job, running, succeeded
 END_S = 2.0
 LEASE_S = 15.0
 
 
 def creations(control_plane, namespace):
-    """Return the number of objects of each kind that all clients created in a namespace."""
+    """Return the number of objects of each kind that were created in a namespace by any client."""
     counts = {}
     for event in control_plane.audit(namespace):
         target = event.get("objectRef", {})
@@ -30,7 +30,7 @@ def creations(control_plane, namespace):
 
 @pytest.mark.parametrize("write", range(1, WRITES + 1))
 def test_killed_after_any_write_it_ends_the_same(write, place, start, control_plane):
-    """The end is the same, and by the API server's audit log the created objects are the same too."""
+    """The status and the objects must be the same, and the audit log must show no second creation."""
     mortal = start(dies_after=write)
     successor = threading.Thread(target=lambda: (mortal.wait(60), start()))
     successor.start()
@@ -48,7 +48,7 @@ def test_killed_after_any_write_it_ends_the_same(write, place, start, control_pl
     assert {kind: made.get(kind) for kind in ("jobs", "pods", "networkpolicies")} == {
         "jobs": 1,
         "pods": 1,
-        "networkpolicies": None,  # applied, which is a patch
+        "networkpolicies": None,  # applied, so the log shows a patch
     }
     assert sorted(each.split("/")[0] for each in place.children()) == [
         "ConfigMap",
@@ -59,7 +59,7 @@ def test_killed_after_any_write_it_ends_the_same(write, place, start, control_pl
 
 
 def test_two_operators_at_once_make_no_second_pod(place, start, control_plane):
-    """Names protect the objects, not locks, because here both operators believe that they lead."""
+    """Here both operators believe that they lead, so only the unique names prevent duplicates."""
     start()
     start()
     for i in range(3):
@@ -76,7 +76,7 @@ def test_two_operators_at_once_make_no_second_pod(place, start, control_plane):
 
 
 def test_a_dead_leader_is_followed(place, start):
-    """The killed leader does not release the Lease, which therefore expires."""
+    """A leader that is killed does not release its Lease, so the successor waits for the expiry."""
     first = start(elect=True)
     eventually(lambda: first.said("leads"))
     second = start(elect=True)
@@ -90,7 +90,7 @@ def test_a_dead_leader_is_followed(place, start):
 
 
 def test_it_ends_within_two_seconds_of_sigterm_and_gives_the_lease_back(place, start):
-    """Neither the drain of a node nor the next leader waits for the operator."""
+    """A drain of the node must not wait for the operator, and the next leader must not wait for an expiry."""
     operator = start(elect=True)
     place.train()
     place.pods()
@@ -104,7 +104,7 @@ def test_it_ends_within_two_seconds_of_sigterm_and_gives_the_lease_back(place, s
 
 
 def test_an_upgrade_touches_nothing_of_a_running_job(place, start):
-    """A job keeps the images of its acceptance, so a new release is only for new jobs."""
+    """A job keeps the images of the release that accepted it, so an upgrade affects only new jobs."""
     old = start("--trainer-image=trainer:1")
     place.train()
     [pod] = place.pods()
@@ -125,7 +125,7 @@ def test_an_upgrade_touches_nothing_of_a_running_job(place, start):
 
 
 def test_a_job_that_is_made_again_after_an_upgrade_has_its_old_images(place, start):
-    """`kubectl delete job` of a running replica restarts it without an upgrade."""
+    """A user may delete the Job of a replica to restart it, which must not change its images."""
     start("--trainer-image=trainer:1")
     place.train()
     place.pods()
@@ -142,7 +142,7 @@ def test_a_job_that_is_made_again_after_an_upgrade_has_its_old_images(place, sta
 
 
 def test_a_job_that_cannot_be_read_delays_no_other(place, start):
-    """The status reports a mistake that the API server accepted; the other job still starts."""
+    """A mistake that the API server has accepted must not block the other jobs."""
     start("--workers=1")
     place.train("wrong", trainer={"algorithm": {"name": "SAC"}})
     place.train("right")

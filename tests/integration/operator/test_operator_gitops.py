@@ -1,6 +1,6 @@
-"""GitOps tools judge a job by the rules of kstatus: Helm 4 waits by them, as Flux does.
+"""GitOps tools evaluate a job by the rules of kstatus; Helm 4 waits by these rules, as Flux does.
 
-The commands are those of docs/howto/gitops.md.
+The tests run the commands of docs/howto/gitops.md.
 """
 
 from concurrent.futures import ThreadPoolExecutor
@@ -24,9 +24,9 @@ TYPED_S = 60
 
 @pytest.fixture
 def type_in(control_plane, place, tmp_path):
-    """Return a function that types commands and returns the exit code and all output.
+    """Return a function that runs commands and returns exit code and output.
 
-    The namespace of the test is the current one.
+    The current namespace of the commands is the test's.
     """
     where = {"KUBECONFIG": str(control_plane.kubeconfig), "HELM_NAMESPACE": place.name}
     terminal = Terminal(tmp_path, path=programs(("helm",)), **where)
@@ -35,7 +35,7 @@ def type_in(control_plane, place, tmp_path):
 
 @pytest.fixture
 def values(tmp_path, type_in):
-    """Return `values(spec, suspend=True)`, which writes the chart of the page with other values."""
+    """Return `values(spec, suspend=True)`, which writes the page's chart with these values."""
     type_in(TYPED.rpartition("helm upgrade")[0])
 
     def write(spec, **changeable):
@@ -46,13 +46,13 @@ def values(tmp_path, type_in):
 
 
 def only_job(place):
-    """Return the name of the only TrainingJob in a namespace, once it exists."""
+    """Wait for the only TrainingJob of a namespace, and return its name."""
     [job] = eventually(lambda: place.all(TRAINING_JOBS))
     return job["metadata"]["name"]
 
 
 def test_helm_waits_until_the_job_trains(place, start, type_in):
-    """The commands of the page work as written, while a kubelet starts the pod."""
+    """A reader runs the page's commands unchanged, and the test starts the pod as a kubelet does."""
     start()
     with ThreadPoolExecutor(1) as threads:
         typed = threads.submit(type_in, TYPED)
@@ -69,7 +69,7 @@ def test_helm_waits_until_the_job_trains(place, start, type_in):
 
 
 def test_helm_fails_at_once_for_a_job_that_lacks_its_world(place, start, type_in, values):
-    """Once, Helm ended within a tenth of a second and called the release deployed."""
+    """If Helm did not fail, it would report the release as deployed, although the job cannot start."""
     start()
     values(world_of("nowhere"))
 
@@ -87,7 +87,7 @@ def test_helm_fails_at_once_for_a_job_that_lacks_its_world(place, start, type_in
 
 
 def test_helm_waits_for_a_job_that_no_operator_has_seen(type_in, values):
-    """Otherwise every release would succeed while the operator is absent."""
+    """If Helm did not wait, every release would succeed in a cluster without an operator."""
     values({"trainer": {"steps": 100}})
 
     code, output = type_in(UPGRADE.replace("15m", "3s"))
@@ -100,9 +100,9 @@ def test_helm_waits_for_a_job_that_no_operator_has_seen(type_in, values):
 
 
 def test_helm_replaces_a_job_whose_spec_changed_and_keeps_one_that_is_resumed(place, start, type_in, values):
-    """A spec cannot be changed, so the job's name has a hash of it.
+    """The spec is immutable, so the chart adds a hash of it to the job's name.
 
-    The hash leaves out the fields that can be changed.
+    The hash excludes the mutable fields, so that a change of them keeps the job.
     """
     start()
     values({"trainer": {"steps": 100}}, suspend=True)

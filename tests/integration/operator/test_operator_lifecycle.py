@@ -1,4 +1,4 @@
-"""A TrainingJob from apply to its end, with a real API server and a simulated kubelet."""
+"""A TrainingJob from its creation to its end; the API server is real, and the kubelet simulated."""
 
 import pytest
 
@@ -13,7 +13,7 @@ DONE = Termination(step=20, reason="Completed", success_rate=0.9)
 
 
 def test_a_job_gets_its_objects_runs_and_succeeds(place, start):
-    """These are the steps that `kubectl apply` and `kubectl get tj -w` show."""
+    """A user sees these steps after `kubectl apply` in `kubectl get tj -w`."""
     start()
     place.train(replicas=2)
 
@@ -35,7 +35,7 @@ def test_a_job_gets_its_objects_runs_and_succeeds(place, start):
 
 @pytest.mark.parametrize("prefix", ["1team"])
 def test_a_job_in_a_namespace_that_begins_with_a_digit_runs(place, start):
-    """RFC 1123 allows such names, but once every job in them failed."""
+    """RFC 1123 allows such a namespace, and its name must not make the names of objects invalid."""
     start()
     place.train()
     [pod] = place.pods()
@@ -46,7 +46,7 @@ def test_a_job_in_a_namespace_that_begins_with_a_digit_runs(place, start):
 
 
 def test_a_replica_that_succeeded_is_not_trained_again_when_its_job_is_deleted(place, start):
-    """`kubectl delete job` of a finished Job only removes it and does not start hours of work."""
+    """A user who removes a finished Job does not want to start hours of training."""
     start()
     place.train()
     [pod] = place.pods()
@@ -63,7 +63,7 @@ def test_a_replica_that_succeeded_is_not_trained_again_when_its_job_is_deleted(p
 
 
 def bound(place):
-    """Bind the claims to volumes, as a provisioner does."""
+    """Bind all claims to volumes, as a provisioner does."""
     for claim in place.all(CLAIMS):
         name, bind = claim["metadata"]["name"], {"status": {"phase": "Bound"}}
         place.api.merge(CLAIMS, place.name, name, {"spec": {"volumeName": f"pv-{name}"}})
@@ -71,7 +71,7 @@ def bound(place):
 
 
 def test_a_deleted_job_leaves_its_claim_and_nothing_else(place, start):
-    """The run outlives the job. Owner references delete the rest, so we need no finalizer."""
+    """The claim keeps the results, and owner references delete the rest without a finalizer."""
     start()
     made = place.train()
     place.pods()
@@ -85,7 +85,7 @@ def test_a_deleted_job_leaves_its_claim_and_nothing_else(place, start):
 
 
 def test_a_claim_that_was_never_bound_goes_with_its_job(place, start):
-    """Such a claim has no run. Once, claims of jobs that never began filled the quota of the namespace."""
+    """Such a claim is empty, and claims of jobs that never started would fill the namespace's quota."""
     start()
     place.train("idle", suspend=True, replicas=2)
     place.train()
@@ -98,7 +98,7 @@ def test_a_claim_that_was_never_bound_goes_with_its_job(place, start):
 
 
 def test_a_claim_that_was_never_bound_goes_although_its_job_is_made_again(place, start):
-    """Its name has the uid of the earlier job, so no job would ever use it."""
+    """The name of the claim contains the uid of the deleted job, so no other job can use the claim."""
     place.train(suspend=True)
     first = start()
     eventually(lambda: place.all(CLAIMS))
@@ -116,12 +116,12 @@ def test_a_claim_that_was_never_bound_goes_although_its_job_is_made_again(place,
 
 
 def claim_or_other(name):
-    """Return `claim` for the name of a claim."""
+    """Return `claim` if the name is that of a claim, or the name itself."""
     return "claim" if name.startswith("PersistentVolumeClaim/") else name
 
 
 def test_suspending_and_resuming_changes_the_job_and_nothing_else(place, start):
-    """A user can type `kubectl patch tj job --type=merge -p '{"spec":{"suspend":true}}'`."""
+    """A user suspends a job with `kubectl patch`, and all its other objects must stay as they are."""
     start()
     place.train()
     place.pods()
@@ -137,10 +137,10 @@ def test_suspending_and_resuming_changes_the_job_and_nothing_else(place, start):
 
 
 def test_a_job_is_suspended_once_its_pod_has_ended_and_runs_in_no_dying_pod(place, start):
-    """`kubectl wait` would return too early otherwise.
+    """Otherwise a user's `kubectl wait` would return too early.
 
-    Once it returned for Suspended before the checkpoint, and for Running while the old pod saved that
-    checkpoint.
+    The command would return for Suspended before the checkpoint is saved, and for Running while the old pod
+    still saves its checkpoint.
     """
     start()
     place.train()
@@ -171,7 +171,7 @@ def claim(name):
 
 
 def test_a_claim_that_is_for_jobs_no_more_keeps_its_job_suspended(place, start):
-    """Running pods continue, but a pod that would start again is a new one."""
+    """Running pods may continue, but a resumed job needs a new pod, which must not use the claim."""
     start()
     place.create(CLAIMS, claim("runs"))
     place.train(storage={"existingClaim": "runs"})
@@ -189,7 +189,7 @@ def test_a_claim_that_is_for_jobs_no_more_keeps_its_job_suspended(place, start):
 
 
 def test_a_job_of_another_controller_is_left_alone(place, start):
-    """The field `managedBy` names the controller."""
+    """The field `managedBy` names another controller, which alone may act on the job."""
     start()
     place.train("theirs", managedBy="example.com/other")
     place.train("ours")
@@ -200,7 +200,7 @@ def test_a_job_of_another_controller_is_left_alone(place, start):
 
 
 def test_a_missing_world_is_reported_and_the_job_starts_when_it_is_there(place, start):
-    """The order of `kubectl apply` does not matter."""
+    """A user may apply the job and the ConfigMap in any order."""
     start()
     place.train(**world_of("world"))
     eventually(lambda: place.condition("Accepted").get("reason") == "WorldMissing")
@@ -212,7 +212,7 @@ def test_a_missing_world_is_reported_and_the_job_starts_when_it_is_there(place, 
 
 
 def test_a_world_without_the_label_for_jobs_is_not_opened(place, start):
-    """A TrainingJob must not give its author access to other objects."""
+    """Otherwise an author could read any ConfigMap of the namespace by a TrainingJob."""
     start()
     world = world_map()
     del world["metadata"]["labels"]
@@ -225,7 +225,7 @@ def test_a_world_without_the_label_for_jobs_is_not_opened(place, start):
 
 
 def test_a_taken_name_is_reported_and_the_job_starts_when_it_is_free(place, start):
-    """A Job of another owner is neither used nor changed."""
+    """The operator must neither use nor change a Job of another owner."""
     start()
     place.create(JOBS, stranger("job-0"))
 
@@ -239,7 +239,7 @@ def test_a_taken_name_is_reported_and_the_job_starts_when_it_is_free(place, star
 
 
 def test_ttl_deletes_the_job_and_keeps_the_run(place, start):
-    """`ttlSecondsAfterFinished` is about the object; a user still needs the result in the claim."""
+    """The TTL is for the object, but a user still needs the results in the claim."""
     start()
     place.train(ttlSecondsAfterFinished=1)
     [pod] = place.pods()
@@ -253,7 +253,7 @@ def test_ttl_deletes_the_job_and_keeps_the_run(place, start):
 
 
 def test_a_trained_job_without_its_claim_waits_for_a_person(place, start, control_plane):
-    """A new claim is empty, so the training would begin at step 0 without a message."""
+    """A new claim would be empty, and training would start again at step 0 unnoticed."""
     start()
     place.train(backoffLimit=0)
     [pod] = place.pods()

@@ -1,4 +1,4 @@
-"""The log of an operator during the deletion of a namespace, with a real API server."""
+"""The log of an operator while a namespace is deleted, with a real API server."""
 
 from palaestra.cluster.resources import JOBS, NAMESPACES, PODS, TRAINING_JOBS
 from tests.waiting import eventually
@@ -7,14 +7,14 @@ NAMES = ("one", "two")
 
 
 def test_a_namespace_that_is_deleted_is_logged_once_for_each_job_and_as_no_warning(place, start):
-    """Once, each event and each object to be created again was a warning: 39 for a few jobs."""
+    """A deletion of a namespace is normal, so an administrator must not see a warning for each object."""
     operator = start()
     for name in NAMES:
         place.train(name, replicas=2)
         for pod in place.pods(name, count=2):
             place.run(pod)
         place.until("Running", name)
-        # The finalizer keeps the job longer than its objects, so that the operator sees their absence.
+        # The finalizer keeps the job longer than its objects, so the operator sees that they are missing.
         place.api.merge(TRAINING_JOBS, place.name, name, {"metadata": {"finalizers": ["example.com/kept"]}})
 
     place.api.delete(NAMESPACES, None, place.name)

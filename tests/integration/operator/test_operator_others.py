@@ -1,4 +1,4 @@
-"""Changes of our objects by others are reported and left alone, because no two programs may fight."""
+"""If another program changes our objects, the operator reports it and leaves the change."""
 
 import pytest
 
@@ -16,7 +16,7 @@ from tests.integration.operator.installed import USER
 from tests.waiting import eventually
 
 SUSPEND_SET = "palaestra.dev/suspend-set"
-QUEUE = "kueue"  # the field manager, which an API server takes from the User-Agent
+QUEUE = "kueue"  # the field manager, which the API server reads from the User-Agent
 
 
 def as_kueue(place, control_plane, *, suspend, name="job-0"):
@@ -28,7 +28,7 @@ def as_kueue(place, control_plane, *, suspend, name="job-0"):
 
 
 def patches(control_plane, place):
-    """Return the number of the operator's patches of Jobs in a namespace, without the refused ones."""
+    """Return the number of the operator's successful patches of Jobs in a namespace."""
     wanted = {"resource": "jobs", "namespace": place.name}
     return sum(
         each["verb"] == "patch" and each["user"].get("username") == USER
@@ -44,14 +44,14 @@ def message(place, name="job"):
 
 
 def test_a_job_that_somebody_else_suspends_is_not_fought_over(place, start, control_plane):
-    """Kueue with manageJobsWithoutQueueName suspends the Job each time it is resumed."""
+    """With manageJobsWithoutQueueName, Kueue suspends the Job again each time the operator resumes it."""
     start()
     place.train()
     place.pods()
 
     as_kueue(place, control_plane, suspend=True)
     eventually(lambda: message(place).startswith(f"suspended by {QUEUE}, not by spec.suspend"))
-    place.train("later")  # after this job the operator has looked at everything before it
+    place.train("later")  # when this job has pods, the operator has seen all earlier changes
     place.pods("later")
 
     assert patches(control_plane, place) == 0
@@ -60,9 +60,9 @@ def test_a_job_that_somebody_else_suspends_is_not_fought_over(place, start, cont
 
 
 def test_what_the_operator_set_stands_on_the_job_and_its_author_is_heeded(place, start, control_plane):
-    """An annotation records the value that the operator set.
+    """The annotation shows that the suspension comes from another program, so the author's value counts.
 
-    The annotation is created with the Job and patched together with `spec.suspend`.
+    The operator creates the annotation with the Job, and patches it together with `spec.suspend`.
     """
     start()
     place.train()
@@ -81,7 +81,7 @@ def test_what_the_operator_set_stands_on_the_job_and_its_author_is_heeded(place,
 
 
 def test_a_job_without_its_annotation_is_made_as_its_spec_asks_once(place, start, control_plane):
-    """The patch sets the annotation too; a suspension after it is left alone."""
+    """The operator sets the annotation with its first patch, and does not undo a later suspension."""
     first = start()
     place.train()
     place.pods()
@@ -99,7 +99,7 @@ def test_a_job_without_its_annotation_is_made_as_its_spec_asks_once(place, start
 
 
 def test_a_job_is_made_again_beside_a_pod_on_a_lost_node(place, start):
-    """The new job has another claim, so it need not wait for a kubelet that does not respond."""
+    """The new job has a claim of its own, so it need not wait for a kubelet that does not respond."""
     start()
     place.train(replicas=2)
     for pod in place.pods(count=2):
@@ -114,7 +114,7 @@ def test_a_job_is_made_again_beside_a_pod_on_a_lost_node(place, start):
 
 
 def test_a_replica_that_waits_for_an_old_pod_on_the_same_claim_says_so(place, start):
-    """The status names the pod and its node. The replica starts once that pod is gone."""
+    """The user sees which pod on which node must end before the replica can start."""
     start()
     place.create(CLAIMS, shared_claim())
     place.train(storage={"existingClaim": "shared"})
@@ -128,7 +128,7 @@ def test_a_replica_that_waits_for_an_old_pod_on_the_same_claim_says_so(place, st
     assert old["metadata"]["name"] in message(place)
     assert "node-1" in message(place)
     assert place.get(JOBS, "job-0") is None
-    place.end(old, code=75)  # the machine works again, and its kubelet reports
+    place.end(old, code=75)  # the node is up again, and its kubelet reports the end
 
     assert place.pods()
 
@@ -144,9 +144,9 @@ def shared_claim():
 
 
 def test_what_was_decided_on_a_cache_that_lags_is_not_done(place, installed):
-    """The API server checks preconditions.
+    """The API server checks the versions on which the operator decided, so that it cannot act on old data.
 
-    Between decision and action, the time to live is removed and the Job resumed.
+    After the decision and before the action, the test removes the TTL and changes the Job.
     """
     writer = FencedClient(installed, lambda: True)
     acting = Executor(installed, writer, ForeignJobs(installed), RejectedCreations())
@@ -177,10 +177,10 @@ def test_what_was_decided_on_a_cache_that_lags_is_not_done(place, installed):
 
 @pytest.mark.parametrize("write", [0, 1, 3])
 def test_a_suspended_job_that_is_stopped_is_deleted_and_not_made_again(write, place, start, control_plane):
-    """A queue would admit it later and preempt others; another operator continues after a kill at any write.
+    """Otherwise a queue could admit the Job later and preempt other jobs for it.
 
-    The writes are the operator's mark, the stop of the other Job, the status and the deletion. With 0 no
-    operator is killed.
+    The writes are the operator's mark, the stop of the other Job, the status and the deletion. If `write` is
+    0, no operator is killed; otherwise another operator continues.
     """
     first = start()
     place.train(replicas=2, activeDeadlineSeconds=6)
@@ -206,12 +206,12 @@ def test_a_suspended_job_that_is_stopped_is_deleted_and_not_made_again(write, pl
         if made.items() <= each.get("objectRef", {}).items() and each["user"].get("username") == USER
     ]
     assert verbs.count("create") == 1
-    # The next operator may still see a Job whose deletion was the last write of the one before.
+    # The next operator may still see the Job in its cache after the first operator has deleted it.
     assert 1 <= verbs.count("delete") <= (2 if write else 1)
 
 
 def test_edits_of_policy_and_job_are_said_once_and_stay(place, start, control_plane):
-    """The edit may have had a reason, so it stays, but the author of the job must know of it."""
+    """The author must learn of an edit, which may have a reason and is therefore not undone."""
     start()
     place.train()
     place.pods()
@@ -220,7 +220,7 @@ def test_edits_of_policy_and_job_are_said_once_and_stay(place, start, control_pl
     place.api.merge(NETWORK_POLICIES, place.name, policy["metadata"]["name"], {"spec": {"ingress": None}})
     place.api.merge(JOBS, place.name, "job-0", {"spec": {"parallelism": 0}})
     eventually(lambda: len(edits(place)) == 2)
-    start()  # another operator sees the same edits
+    start()  # a second operator, which sees the same edits
     place.train("later")
     place.pods("later")
 
@@ -230,5 +230,5 @@ def test_edits_of_policy_and_job_are_said_once_and_stay(place, start, control_pl
 
 
 def edits(place):
-    """Return the events about edits."""
+    """Return the events about edits of our objects."""
     return [each for each in place.about() if each["reason"] == "Edited"]

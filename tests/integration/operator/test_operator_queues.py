@@ -1,4 +1,4 @@
-"""The status contains the reason why a job waits in a queue, with a real API server; the test plays Kueue."""
+"""The status of a queued job shows why it waits, with a real API server; the test acts as Kueue."""
 
 from dataclasses import replace
 
@@ -23,7 +23,7 @@ SHORT = "couldn't assign flavors to pod set main: insufficient unused quota for 
 
 
 def playing(installed, version):
-    """Serve kinds of Kueue for a time, with Workloads in the given version."""
+    """Serve kinds of Kueue until the fixture ends, with Workloads in this version."""
     kinds = (local_queues(), kind_of_kueue("Workload", version))
     for each in kinds:
         installed.create(DEFINITIONS, each)
@@ -36,7 +36,7 @@ def playing(installed, version):
 
 
 def there(api, resource):
-    """Return whether objects of a kind can be created."""
+    """Return whether the API server serves a kind already."""
     try:
         api.list(resource)
     except NotFound:
@@ -46,19 +46,19 @@ def there(api, resource):
 
 @pytest.fixture
 def kueue(installed):
-    """Provide a cluster that has Kueue and its Workloads."""
+    """Make the cluster look as if it had Kueue with its Workloads."""
     yield from playing(installed, "v1beta2")
 
 
 @pytest.fixture
 def old_kueue(installed):
-    """Provide a cluster with a Kueue whose Workloads have an earlier version."""
+    """Make the cluster look as if it had an older Kueue with another version of Workloads."""
     yield from playing(installed, "v1beta1")
 
 
 @pytest.fixture
 def old_role(installed):
-    """The operator's role without Workloads, as a role that was not updated may be."""
+    """Remove Workloads from the operator's role, as in a role of an earlier release."""
     rules = installed.get(ROLES, None, NAME)["rules"]
     others = [each for each in rules if each["apiGroups"] != [GROUP]]
     installed.merge(ROLES, None, NAME, {"rules": others})
@@ -69,7 +69,7 @@ def old_role(installed):
 
 
 def allowed(api):
-    """Return whether the API server already allows the operator to list Workloads."""
+    """Return whether the operator may list Workloads by now."""
     asked = {"group": GROUP, "resource": "workloads", "verb": "list", "namespace": "default"}
     review = {"apiVersion": RIGHTS.api_version, "kind": RIGHTS.kind, "metadata": {}}
     return api.create(RIGHTS, {**review, "spec": {"user": USER, "resourceAttributes": asked}})["status"][
@@ -78,13 +78,13 @@ def allowed(api):
 
 
 def job_in_queue(place):
-    """Return the Job of a TrainingJob that waits in a queue."""
+    """Create a TrainingJob with a queue, and return its Job, which waits."""
     place.train(scheduling=QUEUE)
     return eventually(lambda: place.get(JOBS, "job-0"))
 
 
 def not_admitted(place, job, message):
-    """Write Kueue's reason why a Job is not admitted."""
+    """Create a Workload with Kueue's reason why a Job is not admitted."""
     reserved = {"type": "QuotaReserved", "status": "False", "reason": "Pending", "message": message}
     metadata = {
         "name": "job-job-0-1a2b3",
@@ -101,7 +101,7 @@ def message(place):
 
 
 def lists(control_plane, place):
-    """Return the HTTP codes of the responses to the operator's requests for Workloads."""
+    """Return the HTTP codes of the operator's requests for Workloads."""
     wanted = {"resource": "workloads", "namespace": place.name}
     return [
         each["responseStatus"]["code"]
@@ -112,7 +112,7 @@ def lists(control_plane, place):
 
 @pytest.mark.usefixtures("kueue")
 def test_the_words_of_kueue_are_in_the_status(place, start):
-    """The author can read the TrainingJob, and need not have permission to read Workloads."""
+    """An author who cannot read Workloads finds the reason in the TrainingJob."""
     start()
     not_admitted(place, job_in_queue(place), SHORT + "x" * LONGEST_FACT)
 
@@ -125,7 +125,7 @@ def test_the_words_of_kueue_are_in_the_status(place, start):
 
 @pytest.mark.usefixtures("kueue")
 def test_a_job_of_which_kueue_makes_no_workload_says_what_to_check(place, start):
-    """For example the namespace lacks a label, and no object in the cluster says so."""
+    """The namespace may lack a label that Kueue requires, and no object in the cluster shows this cause."""
     start()
     job_in_queue(place)
 
@@ -134,7 +134,7 @@ def test_a_job_of_which_kueue_makes_no_workload_says_what_to_check(place, start)
 
 @pytest.mark.usefixtures("kueue")
 def test_a_job_that_is_admitted_is_asked_about_no_more(place, start, control_plane):
-    """If no job waits in a queue, an idle operator sends no request."""
+    """An idle operator must send no requests while no job waits in a queue."""
     start()
     job_in_queue(place)
     eventually(lambda: lists(control_plane, place), 60)
@@ -144,7 +144,7 @@ def test_a_job_that_is_admitted_is_asked_about_no_more(place, start, control_pla
     place.until("Running")
     before = len(lists(control_plane, place))
 
-    place.train("later", suspend=True)  # a suspended job without a queue
+    place.train("later", suspend=True)  # suspended without a queue
     place.until("Suspended", "later")
 
     assert len(lists(control_plane, place)) == before
@@ -152,11 +152,11 @@ def test_a_job_that_is_admitted_is_asked_about_no_more(place, start, control_pla
 
 @pytest.mark.usefixtures("old_kueue")
 def test_a_kueue_that_does_not_serve_this_version_disturbs_nothing(place, start, control_plane):
-    """Without the messages of Kueue, the status is the same as before this feature."""
+    """Without Kueue's message, the status must still show that the job waits in the queue."""
     operator = start()
     job_in_queue(place)
     eventually(lambda: lists(control_plane, place), 60)
-    place.train("later", scheduling=QUEUE)  # shows that the operator has continued
+    place.train("later", scheduling=QUEUE)  # shows that the operator continues
     place.until("Suspended", "later")
 
     assert set(lists(control_plane, place)) == {404}
@@ -166,7 +166,7 @@ def test_a_kueue_that_does_not_serve_this_version_disturbs_nothing(place, start,
 
 @pytest.mark.usefixtures("kueue", "old_role")
 def test_a_role_without_workloads_disturbs_nothing(place, start, control_plane):
-    """An operator of this release may run with the role of an earlier release."""
+    """After an upgrade, an operator may still have the role of the earlier release."""
     operator = start()
     not_admitted(place, job_in_queue(place), SHORT)
     eventually(lambda: lists(control_plane, place), 60)

@@ -1,4 +1,4 @@
-"""Refused and missing objects, and objects that a job may not use: the status gives the reason for each."""
+"""If an object is refused, is missing or may not be used by jobs, the status shows the reason."""
 
 import json
 from http import HTTPStatus
@@ -37,7 +37,7 @@ SECRET = {
 
 
 def quota(**hard):
-    """Return a quota that has no room from the start."""
+    """Return a quota that allows none of the given resources."""
     limits = {name.replace("_", "."): "0" for name in hard}
     return {
         "apiVersion": "v1",
@@ -54,7 +54,7 @@ def limited(place, obj):
 
 
 def test_the_status_quotes_the_api_server_that_refuses_pods(place, start):
-    """Otherwise only the Job's events would have the reason, and users do not look there."""
+    """Users look at the status of their job and not at the events of its Jobs."""
     limited(place, quota(pods=True))
     start()
 
@@ -65,12 +65,12 @@ def test_the_status_quotes_the_api_server_that_refuses_pods(place, start):
 
 
 def refused(replica):
-    """Return whether the pods of a replica are refused by its status."""
+    """Return whether the status of a replica reports refused pods."""
     return replica.get("reason") == "PodsRefused"
 
 
 def test_the_quota_of_the_examples_bounds_the_training_jobs_of_a_namespace(place):
-    """The API server refuses the next job at once; the operator never has to stop it."""
+    """The API server refuses a further job at once, so the operator need not stop it."""
     example, *_ = yaml.safe_load_all((PLATFORM / "quota.yaml").read_text())
     [counted] = [name for name in example["spec"]["hard"] if name.startswith("count/")]
     few = {"apiVersion": "v1", "kind": "ResourceQuota", "metadata": {"name": "few"}}
@@ -83,7 +83,7 @@ def test_the_quota_of_the_examples_bounds_the_training_jobs_of_a_namespace(place
 
 
 def pod(name, **spec):
-    """Return a pod as any controller may create it; keywords are fields of its spec."""
+    """Return a pod as another controller creates it; keywords are fields of its spec."""
     containers = [{"name": "main", "image": "theirs"}]
     return {
         "apiVersion": "v1",
@@ -100,9 +100,9 @@ def pod_apart(name, **term):
 
 
 def test_the_quota_of_the_examples_refuses_an_affinity_to_other_namespaces(place):
-    """The quota restricts pods of all controllers.
+    """The quota applies to the pods of all controllers.
 
-    The operator's own check is for TrainingJobs only.
+    The operator's own check applies only to TrainingJobs.
     """
     _, example, _ = yaml.safe_load_all((PLATFORM / "quota.yaml").read_text())
     place.create(QUOTAS, {**example, "metadata": {"name": "none-left"}})
@@ -120,7 +120,7 @@ ALONE = {"requiredDuringSchedulingIgnoredDuringExecution": [
 
 
 def test_what_affects_others_waits_until_it_is_allowed_and_stays_when_it_no_longer_is(place, start):
-    """An upgrade with stricter rules must not end a job or block new pods for it."""
+    """After an upgrade with stricter rules, an accepted job must still get new pods."""
     scheduling = {"affinity": {"podAntiAffinity": ALONE}, "runtimeClassName": "kata"}
     first = start("--allow-runtime-class=kata")
     place.train(scheduling=scheduling)
@@ -144,7 +144,7 @@ def uid(found):
     return found["metadata"]["uid"]
 
 
-# OpenShift's constraint restricted-v2 refuses users outside of the namespace's range.
+# OpenShift's constraint restricted-v2 refuses users outside of the namespace's range of ids.
 RANGE = "must be in the ranges: [1000660000, 1000669999]"
 LIKE_OPENSHIFT = {
     "apiVersion": "admissionregistration.k8s.io/v1",
@@ -167,7 +167,7 @@ LIKE_OPENSHIFT = {
 
 
 def user_is_refused(place):
-    """Return whether the API server would refuse a pod that names a user."""
+    """Return whether the API server refuses a pod that names a user by now."""
     of_a_user = pod("of-a-user", securityContext={"runAsUser": 1000})
     of_a_user["metadata"]["namespace"] = place.name
     try:
@@ -179,7 +179,7 @@ def user_is_refused(place):
 
 @pytest.fixture
 def like_openshift(place):
-    """Refuse pods of this namespace that name a user, as OpenShift does."""
+    """Make the API server refuse pods of this namespace that name a user, as OpenShift does."""
     name = f"like-openshift-{place.name}"
     chosen = {"namespaceSelector": {"matchLabels": {"kubernetes.io/metadata.name": place.name}}}
     place.api.create(POLICIES, LIKE_OPENSHIFT | {"metadata": {"name": name}})
@@ -192,7 +192,7 @@ def like_openshift(place):
             "spec": {"policyName": name, "validationActions": ["Deny"], "matchResources": chosen},
         },
     )
-    # The API server enforces a policy only a moment after it has stored it.
+    # The API server enforces a policy only some time after it has stored the policy.
     eventually(lambda: user_is_refused(place), 60)
     yield
     place.api.delete(POLICY_BINDINGS, None, name)
@@ -201,7 +201,7 @@ def like_openshift(place):
 
 @pytest.mark.usefixtures("like_openshift")
 def test_pods_run_where_the_cluster_chooses_their_user(place, start):
-    """Once, each pod was refused because it had the user of our images."""
+    """Such a cluster refuses the fixed user of our images, so an installation can leave this user out."""
     operator = start()
     place.train("named")
     eventually(lambda: RANGE in str(place.status("named").get("replicas", "")), 60)
@@ -219,7 +219,7 @@ HARD = {"requests.cpu": "8", "limits.cpu": "16", "requests.memory": "16Gi", "lim
 
 
 def confined(place):
-    """Make the API server refuse containers that have no limits, are too small, or are uneven."""
+    """Make the API server refuse containers without limits, with small requests or with uneven limits."""
     place.create(
         LIMITS,
         {
@@ -233,9 +233,9 @@ def confined(place):
 
 
 def test_a_job_fits_a_namespace_with_limits_by_fields_of_its_own(place, start):
-    """The ROS master needs such a field too.
+    """The author must be able to set resources for every container, including the ROS master.
 
-    Without one, its pod was refused for ever.
+    If one container has no limits, the namespace refuses the pod forever.
     """
     confined(place)
     start()
@@ -247,7 +247,7 @@ def test_a_job_fits_a_namespace_with_limits_by_fields_of_its_own(place, start):
 
 
 def test_the_shortest_job_fits_a_namespace_with_limits_by_the_installation(place, start):
-    """Neither `helm test` nor a first example knows the limits of a namespace."""
+    """The author of `helm test` or of a first example does not know the limits of the namespace."""
     confined(place)
     start(*(f"--{each}-resources={json.dumps(SIZES)}" for each in ("ros-master", "simulator", "trainer")))
 
@@ -257,7 +257,7 @@ def test_the_shortest_job_fits_a_namespace_with_limits_by_the_installation(place
 
 
 def test_a_refused_claim_is_reported_and_made_when_there_is_room(place, start):
-    """A quota on volumes is used up sooner than one on pods."""
+    """A namespace's quota of volumes is often smaller than its quota of pods."""
     limited(place, quota(persistentvolumeclaims=True))
     start()
     place.train()
@@ -273,7 +273,7 @@ def test_a_refused_claim_is_reported_and_made_when_there_is_room(place, start):
 
 
 def test_no_secret_is_looked_at_where_nobody_allowed_it(place, start, installed):
-    """RBAC has no rules for labels, so an administrator binds the role where jobs may use Secrets."""
+    """RBAC cannot select by label, so an administrator must bind the role in each namespace."""
     start()
     place.create(SECRETS, SECRET)
     place.train(trainer={"env": [TOKEN]})
@@ -286,7 +286,7 @@ def test_no_secret_is_looked_at_where_nobody_allowed_it(place, start, installed)
 
 
 def test_a_pull_secret_needs_the_label_and_is_looked_at_where_somebody_allowed_it(place, start, installed):
-    """Otherwise users could run and read its images without the owner's consent."""
+    """Otherwise an author could run and read private images without the consent of their owner."""
     open_secrets(installed, place)
     place.create(SECRETS, {**SECRET, "metadata": {"name": "token"}})
     start()
@@ -301,9 +301,9 @@ def test_a_pull_secret_needs_the_label_and_is_looked_at_where_somebody_allowed_i
 
 
 def test_the_content_of_a_secret_is_never_asked_for(place, start, installed, control_plane):
-    """Content that is not read cannot leak.
+    """Content that the operator never reads cannot leak.
 
-    The API server's audit log shows only responses with metadata.
+    The API server's audit log must show only responses with metadata.
     """
     open_secrets(installed, place)
     place.create(SECRETS, SECRET)
@@ -324,7 +324,7 @@ def test_the_content_of_a_secret_is_never_asked_for(place, start, installed, con
 
 
 def open_secrets(installed, place):
-    """Let the operator read the Secrets of a namespace, as an administrator does there."""
+    """Bind the role that reads Secrets to the operator, as an administrator does in a namespace."""
     installed.create(
         BINDINGS,
         {
@@ -339,7 +339,7 @@ def open_secrets(installed, place):
 
 @pytest.fixture
 def kueue(installed):
-    """Provide a cluster that has Kueue; the test plays it."""
+    """Make the cluster look as if it had Kueue; the test acts as Kueue."""
     installed.create(DEFINITIONS, local_queues())
     eventually(lambda: installed.serves("kueue.x-k8s.io"))
     yield
@@ -348,7 +348,7 @@ def kueue(installed):
 
 
 def test_a_queue_without_kueue_is_reported_until_kueue_is_there(place, start, request):
-    """Otherwise the job would stay Suspended without a reason."""
+    """Otherwise the job would stay suspended without a reason that the user can see."""
     start()
     place.train(scheduling={"queueName": "robots"})
     eventually(lambda: place.condition("Accepted").get("reason") == "NoKueue")
@@ -361,7 +361,7 @@ def test_a_queue_without_kueue_is_reported_until_kueue_is_there(place, start, re
 
 @pytest.mark.usefixtures("kueue")
 def test_what_kueue_does_to_a_job_is_never_undone(place, start):
-    """Only Kueue sets the suspension and the nodes of the quota that admitted the job."""
+    """Only Kueue decides about the suspension of such a Job, and about the nodes of its quota."""
     operator = start()
     place.train(scheduling={"queueName": "robots"})
     eventually(lambda: place.get(JOBS, "job-0"))
@@ -383,7 +383,7 @@ def test_what_kueue_does_to_a_job_is_never_undone(place, start):
 
 @pytest.mark.parametrize("field", ["seed", "replicas"])
 def test_the_api_server_refuses_to_change_a_running_job(field, place, start):
-    """A new job prolongs a run; an edit of this job does not."""
+    """A user prolongs a run with a new job, because a change of this job would falsify its result."""
     start()
     place.train()
     [pod] = place.pods()

@@ -1,4 +1,4 @@
-"""The roles of an installation have exactly the permissions that the operator uses, by the audit log."""
+"""The roles of an installation grant exactly the permissions that the operator uses, by the audit log."""
 
 from palaestra.cluster.resources import CONFIG_MAPS, JOBS, PODS, TRAINING_JOBS
 from palaestra.observe.jobs import REPLACED
@@ -11,20 +11,20 @@ from tests.integration.operator.cluster import stranger, world_map, world_of
 from tests.integration.operator.test_operator_refusals import limited, quota
 from tests.waiting import eventually
 
-# The audit log does not show this permission, which another request needs: with
-# OwnerReferencesPermissionEnforcement, only a client that may change an owner's finalizers can make the owner
-# wait for its objects. Without the permission the operator creates nothing here.
+# The audit log does not show this permission, because the API server checks it during another request. With
+# OwnerReferencesPermissionEnforcement, a client needs it to set blockOwnerDeletion for an owner. Without it,
+# the operator can create nothing here.
 UNSEEN = {Right("palaestra.dev", "trainingjobs/finalizers", "update")}
 
 
 def used(control_plane):
-    """Return the permissions that the operator's requests needed."""
+    """Return the permissions that the requests of the operator needed."""
     asked = uses(control_plane.audit_log.read_text())
     return {use.right for use in asked if (use.namespace, use.account) == (NAMESPACE, NAME)}
 
 
 def test_every_right_is_used_and_none_is_missing(place, start, control_plane):
-    """The test makes the operator do everything it can; an unused permission should not be granted."""
+    """The test makes the operator do all its work, so a permission that stays unused is only a risk."""
     operator = start(elect=True)
     place.create(JOBS, stranger("taken-0"))
     place.create(CONFIG_MAPS, world_map())
@@ -35,7 +35,7 @@ def test_every_right_is_used_and_none_is_missing(place, start, control_plane):
     stop_suspended(place)
     place.train()
     replace_pod(place)
-    for _ in range(2):  # the second operator finds the events of the first
+    for _ in range(2):  # the second operator finds events of the first
         suspend(place, flag=True)
         suspend(place, flag=False)
         operator.stop()
@@ -52,7 +52,7 @@ def test_every_right_is_used_and_none_is_missing(place, start, control_plane):
 
 
 def stop_suspended(place):
-    """Let a job pass its deadline while one of its Jobs is suspended, which is then deleted."""
+    """Let a job's deadline pass while one of its Jobs is suspended; the operator deletes that Job."""
     place.train("over", replicas=2, activeDeadlineSeconds=2)
     pods = place.pods("over", count=2)
     place.api.merge(JOBS, place.name, "over-0", {"spec": {"suspend": True}})
@@ -61,7 +61,7 @@ def stop_suspended(place):
 
 
 def replace_pod(place):
-    """Make the operator replace the pod, as after the mark of an operator that was killed."""
+    """Make the operator replace the pod, by the annotation of an operator that was killed."""
     [pod] = place.pods()
     mark = f"1 {pod['metadata']['uid']} Stalled: it stands still"
     place.api.merge(JOBS, place.name, "job-0", {"metadata": {"annotations": {REPLACED: mark}}})
@@ -70,9 +70,9 @@ def replace_pod(place):
 
 
 def wait_in_queue(place):
-    """Give a suspended Job a queue, as Kueue does with a namespace's default.
+    """Label a suspended Job with a queue, as Kueue does in a namespace with a default queue.
 
-    It is never admitted.
+    Kueue never admits the Job.
     """
     place.train("queued", suspend=True)
     eventually(lambda: place.get(JOBS, "queued-0"))
@@ -80,6 +80,6 @@ def wait_in_queue(place):
 
 
 def suspend(place, *, flag):
-    """Suspend or resume the job, and wait until its Job has the same state."""
+    """Suspend or resume the TrainingJob, and wait until its Job follows."""
     place.api.merge(TRAINING_JOBS, place.name, "job", {"spec": {"suspend": flag}})
     eventually(lambda: place.get(JOBS, "job-0")["spec"].get("suspend", False) is flag)

@@ -1,7 +1,7 @@
-"""Many TrainingJobs on one operator: it plans all of them with little memory, and then sends no requests.
+"""One operator with many TrainingJobs plans all of them, needs little memory, and then sends no requests.
 
-`make bench` has a thousand. The control plane has no nodes, so that only the operator is measured. It runs
-with exactly the permissions in manifests/install.yaml.
+`make bench` measures a thousand jobs. The control plane has no nodes, so that the test measures only the
+operator. The operator has exactly the permissions of manifests/install.yaml.
 """
 
 import os
@@ -48,7 +48,7 @@ LABEL = "palaestra.dev/job"
 
 @pytest.fixture(scope="module")
 def crowd(tmp_path_factory):
-    """Yield a separate control plane with Palaestra and many TrainingJobs, and its client."""
+    """Yield a separate control plane with Palaestra and many TrainingJobs, and a client."""
     with running(tmp_path_factory.mktemp("crowd")) as plane:
         installed = plane.kubectl("apply", "-f", str(ROOT / "manifests" / "install.yaml"))
         assert installed.returncode == 0, installed.stderr
@@ -64,7 +64,7 @@ def crowd(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def settled(crowd, tmp_path_factory):
-    """Yield an operator that has planned all jobs and no longer sends requests."""
+    """Yield an operator that has planned all jobs and is idle."""
     plane, api = crowd
     with operator(plane, tmp_path_factory.mktemp("operator") / "log") as first:
         wait_for(
@@ -75,7 +75,7 @@ def settled(crowd, tmp_path_factory):
 
 
 def create_job(api: Api, number: int) -> None:
-    """Create the smallest TrainingJob with two replicas."""
+    """Create the smallest TrainingJob with `REPLICAS` replicas."""
     job = yaml.safe_load((ROOT / "manifests" / "examples" / "minimal.yaml").read_text())
     job["metadata"] = {"name": f"job-{number:03d}", "namespace": NAMESPACE}
     job["spec"]["replicas"] = REPLICAS
@@ -83,19 +83,19 @@ def create_job(api: Api, number: int) -> None:
 
 
 def count(api: Api, resource) -> int:
-    """Return the number of objects of a kind that were made for TrainingJobs."""
+    """Return the number of objects of a kind that belong to TrainingJobs."""
     return len(api.within(60).list(resource.only_metadata(), NAMESPACE, labels=LABEL))
 
 
 def quiet(plane, seconds):
-    """Return whether only watches and requests for the Lease came in this time."""
+    """Wait, and return whether the operator sent only watches and requests for the Lease."""
     before = len([each for each in asked(plane) if each.counts])
-    time.sleep(seconds)  # no request may arrive in this time
+    time.sleep(seconds)  # a period without requests
     return len([each for each in asked(plane) if each.counts]) == before
 
 
 def test_every_job_gets_what_it_needs_exactly_once(crowd, settled):
-    """By the API server's audit log, no name was created twice."""
+    """The audit log of the API server must show that no object was created twice."""
     plane, api = crowd
     created = Counter((each.resource, each.name) for each in asked(plane) if each.verb == "create")
     made = Counter(resource for resource, _ in created if resource != "events")
@@ -108,7 +108,7 @@ def test_every_job_gets_what_it_needs_exactly_once(crowd, settled):
 
 
 def test_every_job_says_that_it_was_accepted(crowd, settled):
-    """The status contains the generation that the operator saw."""
+    """A user sees in the status that the operator has processed the current spec."""
     _, api = crowd
     jobs = api.list(TRAINING_JOBS, NAMESPACE)
     accepted = [
@@ -124,27 +124,27 @@ def test_every_job_says_that_it_was_accepted(crowd, settled):
 
 
 def test_nothing_is_asked_in_a_minute_in_which_nothing_changes(crowd, settled):
-    """This is without watches and the Lease.
+    """An idle operator must not load the API server, so it may send only watches and Lease requests.
 
-    The operator's metrics and the API server's audit log agree.
+    The operator's metrics and the audit log must agree.
     """
     plane, _ = crowd
     told, recorded = settled.requests(), [each for each in asked(plane) if each.counts]
-    time.sleep(QUIET_S)  # no request may arrive in this time
+    time.sleep(QUIET_S)  # a period without requests
 
     assert settled.requests() - told == Counter()
     assert [each for each in asked(plane) if each.counts][len(recorded) :] == []
 
 
 def test_the_operator_stays_small(settled):
-    """It caches all objects: the TrainingJobs and nine for each, pods included."""
+    """The cache holds every TrainingJob and about nine other objects for each, including pods."""
     assert settled.rss_bytes() < MOST_BYTES
 
 
 def test_one_that_follows_changes_nothing(crowd, settled, tmp_path):
-    """All work is done, so the first operator ends within two seconds, and the next writes nothing.
+    """All work is done, so the first operator ends within two seconds and the second one writes nothing.
 
-    The next operator lists all objects at once, which takes more memory than to watch them appear.
+    The second operator lists all objects at once, which takes more memory than watching their creation.
     """
     plane, api = crowd
     seconds = settled.end()
@@ -161,9 +161,9 @@ def test_one_that_follows_changes_nothing(crowd, settled, tmp_path):
 
 
 def test_the_figures_of_the_operator_can_be_measured(crowd, tmp_path):
-    """The functions of `make bench` run on the existing control plane.
+    """The functions of `make bench` must work, so this test runs them on the existing control plane.
 
-    On such a small scale the numbers mean nothing.
+    At this small size, the numbers have no meaning.
     """
     plane, api = crowd
     figures = bench.figures_of_a_crowd(plane, api.within(60), tmp_path, count=2, quiet_s=1)
@@ -179,6 +179,6 @@ def test_the_figures_of_the_operator_can_be_measured(crowd, tmp_path):
 
 
 def leader(api: Api) -> str:
-    """Return the holder of the operator's Lease, or "" if nobody holds it."""
+    """Return the holder of the operator's Lease, or "" if the Lease has none."""
     leases = api.list(LEASES, "palaestra-system")
     return next((each["spec"].get("holderIdentity", "") for each in leases), "")

@@ -1,4 +1,4 @@
-"""The operator's reports: progress from the trainers, metrics, and logs; and its few requests."""
+"""The operator's reports: progress of trainers, metrics and logs. All its requests are permitted."""
 
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -11,7 +11,7 @@ from tests.metrics import complaints, documented, served
 from tests.trainer_status import serving
 from tests.waiting import eventually
 
-WRITTEN_S = 60.0  # it requests every 10 s and writes every 30 s
+WRITTEN_S = 60.0  # the operator polls every 10 s and writes every 30 s
 STATUS = TrainerStatus(
     step=1200,
     target=5000,
@@ -27,13 +27,13 @@ STATUS = TrainerStatus(
 
 @pytest.fixture
 def trainer():
-    """Yield the address of a trainer that serves /status as a pod would."""
+    """Serve /status as a trainer in a pod does, and yield the address."""
     with serving(lambda: replace(STATUS, last_progress=f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}")) as address:
         yield address
 
 
 def test_the_numbers_of_a_trainer_come_into_the_status(place, start, trainer):
-    """`kubectl get tj` shows Step and Success while the job runs."""
+    """A user reads step and success in `kubectl get tj` while the job runs."""
     start()
     place.train()
     [pod] = place.pods()
@@ -52,13 +52,13 @@ def test_the_numbers_of_a_trainer_come_into_the_status(place, start, trainer):
 
 
 def test_the_metrics_count_jobs_by_phase(place, start):
-    """The name of a job is not among the labels."""
+    """Names of jobs as labels would create a new series for each job."""
     operator = start()
     place.train()
     place.pods()
 
-    # The metrics count a job once the operator has seen its own status, and a request once it has the
-    # response; the pods may exist sooner.
+    # The metrics count a job after the operator has seen its own status, and a request after its response.
+    # The pods may exist earlier.
     counted = {
         f'palaestra_jobs{{job_namespace="{place.name}",phase="Pending"}} 1.0',
         'palaestra_operator_requests_total{code="200",resource="jobs",verb="create"} 1.0',
@@ -69,7 +69,7 @@ def test_the_metrics_count_jobs_by_phase(place, start):
 
 
 def test_the_metrics_are_those_of_the_page(place, start):
-    """Each family in docs/reference/metrics.md has its type, there are no others, and promtool finds none."""
+    """A user relies on the page, so the operator must serve exactly its metric families, with their types."""
     operator = start()
     place.train()
     place.pods()
@@ -81,7 +81,7 @@ def test_the_metrics_are_those_of_the_page(place, start):
 
 
 def test_a_job_that_runs_and_ends_is_counted(place, start):
-    """The metrics count how long it took to begin and why it ended, once its status shows both."""
+    """A job's time to the start and its reason of the end are counted when its status shows them."""
     operator = start()
     place.train()
     [pod] = place.pods()
@@ -98,18 +98,18 @@ def test_a_job_that_runs_and_ends_is_counted(place, start):
 
 
 def test_log_lines_are_constant_messages_with_fields(place, start):
-    """A user can search with `grep applied`, and a log store can count messages by kind."""
+    """A user searches the log with `grep applied`, and a log store counts messages by text."""
     operator = start()
     place.train()
     place.pods()
 
     kinds = ["NetworkPolicy", "ConfigMap", "PersistentVolumeClaim", "Job"]
-    eventually(lambda: [each["kind"] for each in operator.said("applied")] == kinds)  # pods may exist sooner
+    eventually(lambda: [each["kind"] for each in operator.said("applied")] == kinds)  # pods may exist earlier
     assert operator.said("applied")[0]["job"] == [place.name, "job"]
 
 
 def test_nothing_that_the_operator_asks_for_is_forbidden(place, start, control_plane):
-    """The roles in install.yaml are sufficient; the unit tests check that they are not too large."""
+    """The roles of install.yaml must suffice. Unit tests check that the roles grant nothing else."""
     operator = start()
     place.train()
     place.pods()
@@ -118,7 +118,7 @@ def test_nothing_that_the_operator_asks_for_is_forbidden(place, start, control_p
     asked = [
         event
         for event in control_plane.audit(place.name)
-        if event["user"].get("username") == USER  # a request without credentials has no user
+        if event["user"].get("username") == USER  # the log has no user for a request without credentials
         and event.get("objectRef", {}).get("namespace") == place.name
     ]
     assert asked

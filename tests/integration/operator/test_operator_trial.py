@@ -1,4 +1,4 @@
-"""`palaestra try` shows whether an installation works, with a job that is deleted afterwards."""
+"""`palaestra try` tests an installation with a job that it deletes afterwards."""
 
 from concurrent.futures import ThreadPoolExecutor
 
@@ -23,7 +23,7 @@ spec: {{backoffLimit: 0}}
 def trial(place, control_plane, tmp_path):
     """Return a function that runs the command and returns its exit code.
 
-    Its argument runs in another thread, because the command needs this thread for signals.
+    The function runs its argument in another thread, because the command handles signals in this thread.
     """
     file = tmp_path / "job.yaml"
     file.write_text(JOB.format(namespace=place.name))
@@ -42,7 +42,7 @@ def trial(place, control_plane, tmp_path):
 
 @pytest.fixture
 def pod(place, start):
-    """Return a function that waits until the trial's pod runs, and returns that pod."""
+    """Return a function that waits until the pod of the trial runs, and returns the pod."""
     start()
 
     def running():
@@ -57,7 +57,7 @@ def pod(place, start):
 
 
 def test_a_trial_that_succeeds_says_so_and_leaves_nothing(place, trial, pod, capsys):
-    """`helm test` uses the exit code 0."""
+    """`helm test` reports success by exit code 0, and the namespace must be as before."""
     assert trial(lambda: place.end(pod(), word=DONE)) == 0
     phases = [line.rpartition(": ")[2] for line in capsys.readouterr().out.splitlines()]
     assert phases[-1] == "Succeeded"
@@ -65,7 +65,7 @@ def test_a_trial_that_succeeds_says_so_and_leaves_nothing(place, trial, pod, cap
 
 
 def test_a_trial_takes_its_claims_away_with_its_job(place, trial, pod):
-    """Otherwise a pipeline that tries each release would fill its namespace's quota of storage."""
+    """A pipeline that tests each release would otherwise fill its namespace's storage quota."""
 
     def see_claim():
         found = pod()
@@ -77,16 +77,16 @@ def test_a_trial_takes_its_claims_away_with_its_job(place, trial, pod):
 
 
 def test_a_trial_that_fails_says_why_and_leaves_nothing(place, trial, pod, capsys):
-    """The reason stays as the last line of the log after the job is deleted."""
+    """The job is deleted, so the reason must be in the output of the command."""
     assert trial(lambda: place.end(pod(), 2)) == 1
     assert "Failed; ConfigurationRefused: " in capsys.readouterr().err
     assert place.all(TRAINING_JOBS) == []
 
 
 def test_the_job_of_a_trial_that_is_killed_ends_and_goes_by_itself(place, trial, pod):
-    """After SIGKILL the command cannot delete it.
+    """After SIGKILL, the command cannot delete its job, so the job has a deadline and a TTL.
 
-    Fields that the author has set stay as they are.
+    Fields that the author has set keep their values.
     """
     seen = []
 

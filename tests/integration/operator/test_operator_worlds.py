@@ -1,4 +1,4 @@
-"""Worlds whose check is costly: a process with a budget checks them, and other tenants do not wait."""
+"""A process with a budget checks costly worlds, so that other tenants do not wait."""
 
 import os
 import signal
@@ -30,12 +30,12 @@ WorldCheckProcess(mebibytes=4096).check([GivenWorld(field="f", source=costly(30_
 
 
 def given(size: int) -> GivenWorld:
-    """Return a world of a given size whose check is costly."""
+    """Return a world of this size whose check is costly."""
     return GivenWorld(field=FIELD, source=costly(size))
 
 
 def test_a_process_returns_the_verdicts_on_several_worlds() -> None:
-    """The verdicts are the same as those of a check in the same process."""
+    """A separate process must give the same verdicts as a check in the operator itself."""
     wrong = GivenWorld(field=FIELD, source=b"#VRML_SIM R2023b utf8\n}")
 
     found = WorldCheckProcess().check([FINE, wrong])
@@ -52,9 +52,9 @@ def test_a_process_returns_the_verdicts_on_several_worlds() -> None:
     ],
 )
 def test_a_world_over_its_budget_is_refused(budget: dict[str, int], size: int, words: str) -> None:
-    """The message names the field, the budget and the remedy.
+    """The message must tell the author the field, the limit and the remedy.
 
-    The worlds before it keep their verdicts.
+    The worlds that were checked before keep their verdicts.
     """
     large = given(size)
 
@@ -68,12 +68,12 @@ def test_a_world_over_its_budget_is_refused(budget: dict[str, int], size: int, w
 
 
 def test_a_deadline_is_no_verdict() -> None:
-    """On a busy node a check may take too long for any world."""
+    """On a busy node, the check of any world may take too long, which is not the author's fault."""
     assert WorldCheckProcess(mebibytes=1024, deadline_s=0.01).check([given(900_000)]) == {}
 
 
 def test_a_check_ends_with_the_operator(tmp_path: Path) -> None:
-    """This also holds if a kubelet kills the operator."""
+    """If a kubelet kills the operator, the check must not continue to use memory."""
     folder = {"PYTHONPATH": str(Path(__file__).parents[3])}
     with (tmp_path / "log").open("wb") as log:
         parent = subprocess.Popen([sys.executable, "-c", PARENT], env=os.environ | folder, stderr=log)
@@ -89,9 +89,9 @@ def test_a_check_ends_with_the_operator(tmp_path: Path) -> None:
 
 
 def test_another_tenant_does_not_wait_for_costly_worlds(installed: Api, place: Place, start: Start) -> None:
-    """Only the author of the costly worlds waits.
+    """Only the author of the costly worlds may wait for their check.
 
-    The costly worlds are checked one by one, and the status of their jobs says so.
+    The operator checks these worlds one by one, and the status of their jobs shows it.
     """
     other = Place(installed, "other")
     operator = start(f"--namespace={other.name}", "--workers=1")
@@ -113,5 +113,5 @@ def test_another_tenant_does_not_wait_for_costly_worlds(installed: Api, place: P
 
 
 def reason(place: Place, number: int) -> str:
-    """Return the reason in a costly job's condition Accepted."""
+    """Return the reason in the condition Accepted of a costly job."""
     return str(place.condition("Accepted", f"evil-{number}").get("reason", ""))

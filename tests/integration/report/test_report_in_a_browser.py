@@ -1,4 +1,4 @@
-"""The report as a person sees it: in a real browser, light and dark, on a desk and on a phone."""
+"""The report in a real browser: light and dark, on a desktop and on a phone."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ LONG = "a_message_without_a_single_blank_" * 6
 
 
 def run(name):
-    """Return a run with something in every section, and with long words."""
+    """Return a run with content in every section, and with long words."""
     evaluated = [
         Evaluated(
             step=step, success_rate=step / 4000, low=0.0, high=1.0, returns=(0.1, 0.4), mean_length=30.0
@@ -58,7 +58,10 @@ def run(name):
 
 @pytest.mark.skipif(PROGRAM is None, reason="chromium is not installed (apt-get install chromium)")
 def test_a_report_is_shown_without_an_error_or_a_request_and_fits_a_phone(tmp_path):
-    """Only a browser shows how a browser renders a page. One start of it is enough for all checks."""
+    """Only a browser can show how a page renders.
+
+    One test makes all checks, because a browser starts slowly.
+    """
     one, two = tmp_path / "one.html", tmp_path / "two.html"
     one.write_text(page([run("arena / 0")]))
     two.write_text(page([run("arena / 0"), run("arena / 1")]))

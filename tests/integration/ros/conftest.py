@@ -1,4 +1,4 @@
-"""A node of the stub's kind in a thread, with a real ROS master."""
+"""A ROS node of the stub's kind, in a thread, with a real ROS master."""
 
 import threading
 
@@ -6,11 +6,11 @@ import pytest
 
 from palaestra_sim.ros import LATER, Loop, RosNode, ServiceFailed
 
-DEADLINE_S = 60.0  # the work takes milliseconds, but the machine may be busy
+DEADLINE_S = 60.0  # the waits take milliseconds on an idle machine
 
 
 class Peer:
-    """A node whose services respond, fail, or never respond; it runs in a separate thread."""
+    """A node in a separate thread, with services that respond, fail, or never respond."""
 
     def __init__(self, name, master_uri):
         self.name = name
@@ -33,13 +33,13 @@ class Peer:
         raise ServiceFailed("the handle is 0")
 
     def do(self, action):
-        """Run `action` in the node's thread and wait for its end."""
+        """Run `action` in the node's thread, and wait for its end."""
         done = threading.Event()
         self.loop.post(lambda: (action(), done.set()))
         assert done.wait(DEADLINE_S)
 
     def end(self, last=None):
-        """End the thread after `last`, which by default closes the node properly."""
+        """Run `last`, which by default closes the node properly, and end the thread."""
         if self.thread.is_alive():
             self.do(last or self.node.close)
             self.loop.post(self.loop.stop)
@@ -49,7 +49,7 @@ class Peer:
 
 @pytest.fixture
 def peer(master, request):
-    """Yield a new node with a name from the test's."""
+    """Yield a new node whose name comes from the name of the test."""
     node = Peer(request.node.name[:50].rstrip("_"), master)
     yield node
     node.end()

@@ -1,4 +1,4 @@
-"""Servers that send wrong XML-RPC responses cause a fault of one simulator only."""
+"""A server that sends wrong XML-RPC responses causes a fault of one simulator, and nothing worse."""
 
 import queue
 import socketserver
@@ -12,7 +12,7 @@ from palaestra_trainer.errors import MasterLost, SimulatorHung, WrongData
 from palaestra_trainer.ros import Master, RosService, RosSubscriber, ensure_node
 from palaestra_trainer.ros.tcpros_client import TcprosClient
 
-DEADLINE_S = 60.0  # the work takes moments, but the machine may be busy
+DEADLINE_S = 60.0  # the waits take moments on an idle machine
 HTTP = b"HTTP/1.0 200 OK\r\nContent-Type: text/xml\r\n\r\n"
 WHOLE = xmlrpc.client.dumps(([1, "", "rosrpc://localhost:1"],), methodresponse=True).encode()
 
@@ -43,7 +43,7 @@ GARBAGE = {
 
 @pytest.fixture
 def server():
-    """Yield `server(answer)`, which returns the address of a server that sends these bytes to each client."""
+    """Yield a function that starts a server with this response to every client and returns its address."""
     servers = []
 
     def begin(answer):
@@ -67,7 +67,7 @@ def server():
 def test_a_master_that_answers_garbage_is_a_fault_of_the_simulator_that_was_asked_for(
     master, server, monkeypatch, answer
 ):
-    """The attempt continues, because the next response may be correct."""
+    """The fault is counted and training continues, because the next response may be correct."""
     del master
     ensure_node()
     monkeypatch.setenv("ROS_MASTER_URI", server(answer))
@@ -82,7 +82,7 @@ def test_a_master_that_answers_garbage_is_a_fault_of_the_simulator_that_was_aske
 
 @pytest.mark.parametrize("answer", GARBAGE.values(), ids=GARBAGE.keys())
 def test_a_publisher_that_answers_garbage_is_a_fault_of_its_simulator(master, server, answer):
-    """The publisher is the node of that simulator."""
+    """The publisher is the node of one simulator, so only that simulator has the fault."""
     ensure_node()
     topic = f"/garbage/{threading.get_ident()}_{abs(hash(answer))}/value"
     with xmlrpc.client.ServerProxy(master) as ask_master:
@@ -95,7 +95,7 @@ def test_a_publisher_that_answers_garbage_is_a_fault_of_its_simulator(master, se
 
 
 def test_a_program_that_is_no_master_is_reported_as_a_lost_master(server, monkeypatch):
-    """A program outside a pod then starts a ROS master itself."""
+    """Outside of a pod, a program that finds no master starts one, so it must recognize a wrong program."""
     monkeypatch.setenv("ROS_MASTER_URI", server(GARBAGE["another document"]))
 
     with pytest.raises(MasterLost, match="is another program there"):
@@ -104,7 +104,7 @@ def test_a_program_that_is_no_master_is_reported_as_a_lost_master(server, monkey
 
 @pytest.fixture
 def connected():
-    """Yield `connected(deadline_s)`, which returns a wire after its handshake, and the peer's socket."""
+    """Yield a function that connects a client with a timeout, and returns it with the peer's socket."""
     peers = queue.Queue()
     wires = []
 
@@ -134,7 +134,7 @@ def connected():
 
 
 def test_the_memory_for_a_frame_grows_with_what_arrives_of_it(connected):
-    """Four bytes may announce 64 MiB."""
+    """Four wrong bytes may announce a frame of 64 MiB, which must not be allocated at once."""
     wire, peer = connected(0.2)
     peer.sendall((64 << 20).to_bytes(4, "little") + bytes(1000))
 
@@ -150,7 +150,7 @@ def test_the_memory_for_a_frame_grows_with_what_arrives_of_it(connected):
 
 
 def test_the_memory_of_a_long_frame_is_given_back_once_it_is_read(connected):
-    """One long message must not use its length in memory for ever."""
+    """After one long message, the connection must not hold a buffer of that length forever."""
     wire, peer = connected(DEADLINE_S)
     length = 16 << 20
     tracemalloc.start()

@@ -1,4 +1,4 @@
-"""The requests of our nodes to a ROS master, also to masters that support less than rosmaster."""
+"""The requests of our nodes to a ROS master, including masters with fewer methods than rosmaster."""
 
 import threading
 from contextlib import suppress
@@ -12,7 +12,7 @@ TAKEN = [("registerService", "/a"), ("registerPublisher", "/b"), ("registerServi
 
 
 class Recording(SimpleXMLRPCServer):
-    """A master that accepts registrations and refuses every other call; `requests` counts the requests."""
+    """A master that accepts registrations and refuses all other calls; `requests` counts all requests."""
 
     def __init__(self, *, multicall):
         super().__init__(("127.0.0.1", 0), logRequests=False)
@@ -35,7 +35,7 @@ class Recording(SimpleXMLRPCServer):
 
 @pytest.fixture(params=[True, False], ids=["multicall", "without multicall"])
 def recording(request):
-    """Yield a master of each kind."""
+    """Yield a master with `system.multicall`, and then one without."""
     with Recording(multicall=request.param) as server:
         thread = threading.Thread(target=server.serve_forever, args=(0.02,))
         thread.start()
@@ -46,14 +46,14 @@ def recording(request):
 
 @pytest.fixture
 def master(recording):
-    """Yield our client of that master."""
+    """Yield our client of the recording master."""
     made = Master(f"http://127.0.0.1:{recording.server_address[1]}", "/robot")
     yield made
     made.close()
 
 
 def test_registrations_of_a_block_are_sent_in_order_and_in_one_request_if_the_master_can(recording, master):
-    """When clients find the last service of a robot, they assume that all others exist."""
+    """Clients that find the last service of a robot assume that all earlier ones exist."""
     with master.together():
         for method, name in TAKEN:
             master.tell(method, name)
@@ -64,7 +64,7 @@ def test_registrations_of_a_block_are_sent_in_order_and_in_one_request_if_the_ma
 
 
 def test_a_refusal_among_several_calls_is_an_error(master):
-    """A single call that is refused raises the same error."""
+    """A caller must get the same error for a refused call in a block as for a single call."""
     block = master.together()
     block.__enter__()
     master.tell("registerService", "/a")
@@ -75,7 +75,7 @@ def test_a_refusal_among_several_calls_is_an_error(master):
 
 
 def test_a_block_that_fails_registers_nothing(recording, master):
-    """Clients must not find a simulator that could not be set up."""
+    """Clients must not find a simulator whose start has failed."""
     with suppress(ZeroDivisionError), master.together():
         master.tell("registerService", "/a")
         raise ZeroDivisionError

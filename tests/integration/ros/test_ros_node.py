@@ -1,4 +1,4 @@
-"""The stub's node, as programs of other projects use its connections."""
+"""The node of the stub, with connections like those of other projects' programs."""
 
 import gc
 import os
@@ -22,9 +22,9 @@ LONG_TEXT = "x" * 20_000_000  # longer than the buffers of a connection
 
 @pytest.fixture
 def dial(peer):
-    """Yield a function that opens raw TCPROS connections to the peer.
+    """Yield a function that opens TCPROS connections to the peer.
 
-    The function sends a header, and returns the socket and the response header.
+    The function sends a header, and returns the socket and the header of the response.
     """
     opened = []
 
@@ -41,7 +41,7 @@ def dial(peer):
 
 
 def read_exactly(connection, count):
-    """Return this many bytes."""
+    """Receive and return this many bytes."""
     data = b""
     while len(data) < count:
         piece = connection.recv(count - len(data))
@@ -51,36 +51,36 @@ def read_exactly(connection, count):
 
 
 def read_frame(connection):
-    """Return the payload of one frame."""
+    """Receive one frame, and return its payload."""
     return read_exactly(connection, struct.unpack("<I", read_exactly(connection, 4))[0])
 
 
 def service_header(peer, path, type_name, **more):
-    """Return the header of a client of a service."""
+    """Return the header that a client of a service sends."""
     return {"service": f"/{peer.name}/{path}", "md5sum": service_type(type_name).md5, **more}
 
 
 def slave_api(peer):
-    """Return the XML-RPC interface that the master lists for the peer."""
+    """Return the XML-RPC interface of the peer at the address that the master lists."""
     with xmlrpc.client.ServerProxy(os.environ["ROS_MASTER_URI"]) as master:
         return xmlrpc.client.ServerProxy(master.lookupNode("/raw", f"/{peer.name}")[2])
 
 
 def test_the_answer_header_tells_the_type(peer, dial):
-    """`rosservice type` reads the type from it."""
+    """`rosservice type` reads the type from the header of the response."""
     _, header = dial(**service_header(peer, "double", "webots_ros/set_float"))
 
     assert header["type"] == "webots_ros/set_float"
     assert header["callerid"] == f"/{peer.name}"
 
 
-# The checksum of `uint64 node; string fieldName; bool queryBaseNode --- uint64 field`, the type in Webots
+# The md5 sum of `uint64 node; string fieldName; bool queryBaseNode --- uint64 field`, the type in Webots
 # R2025a.
 GET_FIELD_2025A = "88d5309880e1463a89aff87d30e09f1c"
 
 
 def test_a_client_of_webots_r2025a_is_served_too(peer, dial):
-    """Webots R2025a renamed a field of three requests, so their checksums differ, but their bytes do not."""
+    """Webots R2025a renamed a field of three requests, which changes the md5 sum but not the bytes."""
     peer.do(
         lambda: peer.node.serve(
             "field", "webots_ros/node_get_field", lambda it: {"field": it.node + it.proto}
@@ -95,7 +95,7 @@ def test_a_client_of_webots_r2025a_is_served_too(peer, dial):
 
 
 def test_a_client_that_does_not_ask_for_more_is_hung_up_on(peer, dial):
-    """Without `persistent` a connection serves only one call."""
+    """Without the header field `persistent`, a connection serves only one call."""
     connection, _ = dial(**service_header(peer, "get_time", "webots_ros/get_float"))
     connection.sendall(frame(ASK) * 2)
 
@@ -105,13 +105,13 @@ def test_a_client_that_does_not_ask_for_more_is_hung_up_on(peer, dial):
 
 
 def test_a_client_hangs_up_before_the_node_does(peer, dial, monkeypatch):
-    """Roscpp drops a response that it has not read when the server closes (ros/ros_comm#1976)."""
+    """When a server closes first, roscpp drops a response that it has not read (ros/ros_comm#1976)."""
     monkeypatch.setattr(links, "LINGER_S", DEADLINE_S)
     connection, _ = dial(**service_header(peer, "get_time", "webots_ros/get_float"))
     connection.sendall(frame(ASK))
     read_exactly(connection, 1)
     read_frame(connection)
-    peer.do(lambda: None)  # the node has done everything that follows a response
+    peer.do(lambda: None)  # the node has finished all work after the response
 
     connection.setblocking(False)
     with pytest.raises(BlockingIOError):
@@ -120,9 +120,9 @@ def test_a_client_hangs_up_before_the_node_does(peer, dial, monkeypatch):
 
 @pytest.fixture
 def ask_for_much(peer, dial, monkeypatch):
-    """Return a function that returns a client's connection after the first byte of a long response.
+    """Return a function that requests a long response and returns the connection after its first byte.
 
-    The response is longer than the connection's buffers.
+    The response does not fit into the buffers of the connection.
     """
     monkeypatch.setattr(links, "LINGER_S", 0.01)
     peer.do(lambda: peer.node.serve("get_text", "webots_ros/get_string", lambda _: {"value": LONG_TEXT}))
@@ -137,7 +137,7 @@ def ask_for_much(peer, dial, monkeypatch):
 
 
 def test_an_answer_that_the_socket_cannot_take_at_once_arrives_whole(peer, ask_for_much):
-    """The picture of a camera may be that long."""
+    """An image of a camera may be that long."""
     connection = ask_for_much()
     peer.do(lambda: None)
 
@@ -145,7 +145,7 @@ def test_an_answer_that_the_socket_cannot_take_at_once_arrives_whole(peer, ask_f
 
 
 def test_a_client_that_reads_slowly_gets_the_whole_answer(peer, ask_for_much):
-    """The time limit begins after everything was sent, because a client may read over a slow network."""
+    """A client may read over a slow network, so the timeout starts only when all bytes are sent."""
     connection, later = ask_for_much(), threading.Event()
     peer.do(lambda: peer.node.later(10 * links.LINGER_S, later.set))
     assert later.wait(DEADLINE_S)
@@ -154,7 +154,7 @@ def test_a_client_that_reads_slowly_gets_the_whole_answer(peer, ask_for_much):
 
 
 def test_a_node_keeps_nothing_for_a_client_that_stops_reading(ask_for_much, monkeypatch):
-    """Otherwise it would keep a picture for each client that stopped in the middle of one."""
+    """Otherwise the node would hold an image in memory for each client that stopped reading."""
     monkeypatch.setattr(links, "SEND_S", 0.01)
     connection = ask_for_much()
     eventually(lambda: all(link.closed for link in links_there()))
@@ -164,7 +164,7 @@ def test_a_node_keeps_nothing_for_a_client_that_stops_reading(ask_for_much, monk
 
 
 def test_two_requests_in_one_packet_are_both_answered(peer, dial):
-    """The stream consists of frames, whatever its packets are."""
+    """The stream consists of frames, and TCP packets may contain several of them."""
     header = service_header(peer, "get_time", "webots_ros/get_float", persistent="1")
     connection, _ = dial(**header)
     connection.sendall(frame(ASK) * 2)
@@ -175,7 +175,7 @@ def test_two_requests_in_one_packet_are_both_answered(peer, dial):
 
 
 def test_a_request_that_cannot_be_read_fails_alone(peer, dial):
-    """The connection stays open, as with roscpp."""
+    """As with roscpp, the connection stays open for the next request."""
     header = service_header(peer, "double", "webots_ros/set_float", persistent="1")
     connection, _ = dial(**header)
     connection.sendall(frame(b"abc") + frame(struct.pack("<d", 1.0)))
@@ -196,7 +196,7 @@ def test_a_request_that_cannot_be_read_fails_alone(peer, dial):
     ],
 )
 def test_a_wrong_header_is_answered_with_an_error(dial, header, fact):
-    """The node also closes the connection."""
+    """The client can show the error to its user, and the node closes the connection."""
     connection, answer = dial(**header)
 
     assert answer["error"] == fact
@@ -204,7 +204,7 @@ def test_a_wrong_header_is_answered_with_an_error(dial, header, fact):
 
 
 def test_rosnode_info_lists_what_a_node_publishes_and_to_whom(peer, dial):
-    """The methods are `getPublications` and `getBusInfo`, and every roscpp node responds in the same way."""
+    """`rosnode info` calls `getPublications` and `getBusInfo`, and expects the results of a roscpp node."""
     topic = f"/{peer.name}/ir1/value"
     connection, _ = dial(topic=topic, md5sum="*")
     with slave_api(peer) as node:
@@ -216,7 +216,7 @@ def test_rosnode_info_lists_what_a_node_publishes_and_to_whom(peer, dial):
 
 
 def test_noise_on_the_port_disturbs_nobody(peer, dial):
-    """A port scanner must not end a training run."""
+    """A port scanner must not end a training."""
     connection, _ = dial(**service_header(peer, "get_time", "webots_ros/get_float"))
     connection.sendall(b"\xff" * 64)
 
@@ -226,22 +226,22 @@ def test_noise_on_the_port_disturbs_nobody(peer, dial):
 
 
 def test_a_node_keeps_nothing_of_connections_that_it_has_refused(peer, dial):
-    """A client of another release repeats its request every few seconds for days."""
+    """A client of another release repeats its request every few seconds, for days."""
     before, count = len(links_there()), 5
     for _ in range(count):
         _, answer = dial(**service_header(peer, "double", "webots_ros/get_float"))
         assert "error" in answer
 
-    eventually(lambda: len(links_there()) < before + count)  # the loop still holds the last connection
+    eventually(lambda: len(links_there()) < before + count)  # the loop holds the last connection
 
 
 def links_there():
-    """Return the connections of nodes in this process, open or closed."""
+    """Return all connections of nodes in this process, open or closed."""
     return [each for each in gc.get_objects() if isinstance(each, links.RosLink)]
 
 
 def test_requests_wait_while_the_controller_is_blocked(peer, dial):
-    """Webots locks a mutex during a step, so that all other requests to that robot wait."""
+    """Webots locks a mutex during a step, so other requests to the robot wait until the step ends."""
     blocked = []
     calls = []
 
@@ -275,7 +275,7 @@ def test_requests_wait_while_the_controller_is_blocked(peer, dial):
 
 
 def test_a_late_subscriber_of_a_latched_topic_gets_the_last_message(peer, dial):
-    """The topic /model_name shows in this way which robots exist."""
+    """A client learns from the topic /model_name which robots exist, even if it subscribes late."""
     peer.do(lambda: peer.node.advertise("name", "std_msgs/String", latched=True).send({"data": "robot"}))
 
     connection, header = dial(topic=f"/{peer.name}/name", md5sum="*", type="std_msgs/String")
@@ -285,7 +285,7 @@ def test_a_late_subscriber_of_a_latched_topic_gets_the_last_message(peer, dial):
 
 
 def test_a_subscriber_that_does_not_read_gets_the_newest(peer, dial):
-    """With the queue size 1 it loses old messages and delays nobody."""
+    """With queue size 1, a subscriber that does not read loses old messages and delays no other client."""
     topic = {"topic": f"/{peer.name}/ir1/value", "md5sum": "*", "type": "sensor_msgs/Range"}
     connection, _ = dial(**topic)
     count = 200_000
@@ -300,7 +300,7 @@ def test_a_subscriber_that_does_not_read_gets_the_newest(peer, dial):
 
 
 def test_the_slave_api_answers_what_tools_ask(peer):
-    """`rosnode info` and `rosnode ping` use these methods."""
+    """`rosnode info` and `rosnode ping` call these methods."""
     with slave_api(peer) as slave:
         assert slave.getPid("/raw")[2] == os.getpid()
         assert slave.getMasterUri("/raw")[2] == os.environ["ROS_MASTER_URI"]

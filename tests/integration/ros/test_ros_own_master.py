@@ -1,4 +1,4 @@
-"""Our ROS master as a program: its options and how it ends; and rosmaster in its place, as pods have it."""
+"""Our ROS master as a program: its options and its end. The last test uses rosmaster, as pods do."""
 
 import os
 import signal
@@ -36,13 +36,13 @@ with webots:
 
 
 def started(*words, **how):
-    """Start a program whose output is read."""
+    """Start a program with pipes for its outputs, and return the process."""
     how = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, **how}
     return subprocess.Popen([*map(str, words)], **how)
 
 
 def test_it_prints_its_address_and_ends_at_a_signal():
-    """With code 0: it is a container's process."""
+    """The program is a container's process, so a normal end must have exit code 0."""
     with started(PROGRAM) as program:
         uri = program.stdout.readline().strip()
         with xmlrpc.client.ServerProxy(uri) as master:
@@ -63,7 +63,7 @@ def test_it_prints_its_address_and_ends_at_a_signal():
     ],
 )
 def test_its_address_has_the_name_that_nodes_would_choose(address, named, variables):
-    """Programs on other machines are told that name."""
+    """Nodes on other machines connect to the name in this address."""
     own = {name: value for name, value in os.environ.items() if name not in ("ROS_HOSTNAME", "ROS_IP")}
     with started(PROGRAM, "--listen", address, env={**own, **variables}) as program:
         uri = program.stdout.readline().strip()
@@ -73,7 +73,7 @@ def test_its_address_has_the_name_that_nodes_would_choose(address, named, variab
 
 
 def test_a_port_in_use_is_one_line():
-    """A person chose the port, so no other one is tried."""
+    """The user has chosen the port, so the program must not try another one."""
     with socket.create_server(("127.0.0.1", 0)) as taken:
         address = f"127.0.0.1:{taken.getsockname()[1]}"
         with started(PROGRAM, "--listen", address) as program:
@@ -84,10 +84,10 @@ def test_a_port_in_use_is_one_line():
 
 
 def test_a_kill_of_its_owner_leaves_nothing():
-    """The kernel closes the pipe between them."""
+    """When the owner is killed, the kernel closes the pipe to the master, which then ends."""
     with started(sys.executable, "-c", OWNER, stdin=subprocess.PIPE) as owner:
         pid, uri = owner.stdout.readline().split()
-        with xmlrpc.client.ServerProxy(uri) as master:  # its connection stays open
+        with xmlrpc.client.ServerProxy(uri) as master:  # this connection stays open
             assert master.getPid("/test")[2] == int(pid)
             owner.kill()
 
@@ -96,7 +96,7 @@ def test_a_kill_of_its_owner_leaves_nothing():
 
 @pytest.fixture
 def rosmaster(tmp_path):
-    """The URI of rosmaster, started as in a pod."""
+    """Start rosmaster as in a pod, and yield its URI."""
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
     environment = {**os.environ, "ROS_HOSTNAME": "localhost", "ROS_LOG_DIR": str(tmp_path)}
@@ -107,7 +107,7 @@ def rosmaster(tmp_path):
 
 
 def test_trainer_and_simulators_work_with_rosmaster_too(rosmaster):
-    """Pods have it, and so may the machine of a user."""
+    """A pod runs rosmaster, and a user's machine may do so too."""
 
     def answers():
         with suppress(OSError), xmlrpc.client.ServerProxy(rosmaster) as master:

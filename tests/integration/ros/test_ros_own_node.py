@@ -1,4 +1,4 @@
-"""Our node, which the trainer uses where rospy is absent, and which of the two a program gets."""
+"""Our own ROS node, which a program uses if rospy is not installed; with rospy, it uses rospy's node."""
 
 import os
 import re
@@ -13,7 +13,7 @@ from palaestra_trainer.errors import ConfigurationError, MasterLost
 from palaestra_trainer.ros import Master, own_node
 from palaestra_trainer.ros.node_name import full_name
 
-# rospy then cannot be imported, as if it were not installed.
+# After this line, rospy cannot be imported, as if it were not installed.
 WITHOUT_ROSPY = "import sys; sys.modules['rospy'] = None\n"
 WHICH = "from palaestra_trainer.ros import node; print(node.ensure_node.__module__)"
 LISTEN = """
@@ -31,7 +31,7 @@ topic.close()
 
 
 def run(program, **variables):
-    """Return what a Python program prints."""
+    """Return the output of a Python program."""
     return subprocess.run(
         [sys.executable, "-c", program],
         env={**os.environ, **variables},
@@ -44,13 +44,13 @@ def run(program, **variables):
 
 @pytest.mark.usefixtures("master")
 def test_rospy_is_the_node_exactly_where_it_is_installed():
-    """A program's own publishers and services need it; a process has one node."""
+    """A program's own publishers and services need rospy's node, and a process can have only one node."""
     assert run(WHICH) == "palaestra_trainer.ros.rospy_node\n"
     assert run(WITHOUT_ROSPY + WHICH) == "palaestra_trainer.ros.own_node\n"
 
 
 def test_a_program_without_rospy_calls_listens_and_is_listed(peer):
-    """By the name that is in the log of a simulator, and in `rosnode list`."""
+    """A user finds the program under the same name in `rosnode list` and in the simulator's log."""
     with subprocess.Popen(
         [sys.executable, "-c", WITHOUT_ROSPY + LISTEN],
         env={**os.environ, "PEER": peer.name, "ROS_NAMESPACE": "lab"},
@@ -70,7 +70,7 @@ def test_a_program_without_rospy_calls_listens_and_is_listed(peer):
 
 
 def test_our_node_answers_the_master_and_tools(master):
-    """`rosnode info` and `rosnode ping` ask it."""
+    """`rosnode info` and `rosnode ping` call these methods."""
     name = own_node.ensure_node("tester")
     with xmlrpc.client.ServerProxy(own_node.node_uri()) as node:
         answers = {
@@ -118,7 +118,7 @@ ENSURE = "from palaestra_trainer.ros import ensure_node; print(ensure_node('test
     ],
 )
 def test_arguments_rename_our_node_as_they_rename_rospys(arguments, name):
-    """`roslaunch` adds them, and a program must have one name on every machine."""
+    """`roslaunch` adds such arguments, and a program must have the same name with and without rospy."""
     program = NAMED.format(arguments) + ENSURE
 
     assert re.fullmatch(name, run(program, ROS_NAMESPACE="lab").splitlines()[-1])
@@ -126,7 +126,7 @@ def test_arguments_rename_our_node_as_they_rename_rospys(arguments, name):
 
 
 def test_a_name_that_no_node_can_have_is_refused():
-    """The master would take it, and tools would not find the node."""
+    """The master would accept the name, but tools would not find the node."""
     with pytest.raises(ConfigurationError, match="__name:=my robot: is not a name of ROS; begin"):
         full_name("tester", ["__name:=my robot"], {})
 
@@ -155,7 +155,7 @@ with {} as interruption:
     ids=["a training", "a script"],
 )
 def test_rosnode_kill_ends_our_process_as_sigterm_does(listening, code, printed):
-    """The caller gets its response first, and asking twice does not take the checkpoint away."""
+    """The caller gets its response before the end, and a second request does not prevent the checkpoint."""
     with subprocess.Popen(
         [sys.executable, "-c", WITHOUT_ROSPY + UNTIL_KILLED.format(listening)],
         stdin=subprocess.PIPE,
@@ -168,7 +168,7 @@ def test_rosnode_kill_ends_our_process_as_sigterm_does(listening, code, printed)
 
     assert responses == [[1, 0], [1, 0]]
     assert program.returncode == code
-    assert ended.splitlines()[1:] == printed  # the first line is the log's
+    assert ended.splitlines()[1:] == printed  # the first line is from the log
 
 
 NO_MASTER = (
@@ -185,7 +185,7 @@ except MasterLost as error:
 
 
 def test_without_a_master_there_is_no_node():
-    """As with rospy, which is not asked before the master has answered."""
+    """A node of rospy would wait forever, so the trainer checks first that the master responds."""
     assert issubclass(MasterLost, ConnectionError)
     assert "no ROS master responds at http://localhost:1" in run(
         NO_MASTER, ROS_MASTER_URI="http://localhost:1"

@@ -1,4 +1,4 @@
-"""Services over a real master and real sockets: they respond, or the fault has a kind."""
+"""Service calls over a real ROS master and real sockets: each returns a response or raises a fault."""
 
 import contextlib
 import gc
@@ -16,7 +16,7 @@ from palaestra_trainer.ros import Master, RosService, call_together, ensure_node
 from palaestra_trainer.waiting import shutdown_deadline
 from palaestra_trainer.waiting.wait_time import waited_s
 
-DEADLINE_S = 60.0  # the work takes milliseconds, but the machine may be busy
+DEADLINE_S = 60.0  # the waits take milliseconds on an idle machine
 
 PROGRAM_WITH_A_NODE = """\
 import json, os, sys
@@ -41,7 +41,7 @@ print(json.dumps({
 
 @pytest.fixture
 def service(peer):
-    """Yield a function that makes services of the peer, and close them at the end."""
+    """Yield a function that returns services of the peer; they are closed at the end."""
     made = []
 
     def make(path, type_name="webots_ros/get_float", **options):
@@ -55,7 +55,7 @@ def service(peer):
 
 @pytest.mark.parametrize("length", [0, 430, 439, 440, 449, 5_000, 100_000])
 def test_an_answer_of_any_length_comes_whole_also_after_short_ones(peer, service, length):
-    """The first read is short, and the rest of a longer response comes in parts."""
+    """The first read is short, so a longer response arrives in several parts."""
     texts = []
     peer.do(lambda: peer.node.serve("text", "webots_ros/get_string", lambda _: {"value": texts.pop()}))
     ask = service("text", "webots_ros/get_string")
@@ -69,7 +69,7 @@ def test_an_answer_of_any_length_comes_whole_also_after_short_ones(peer, service
 
 @pytest.mark.parametrize("length", [0, 439, 440, 441, 5_000, 100_000])
 def test_a_request_of_any_length_arrives_whole(peer, service, length):
-    """A single request can contain a whole world."""
+    """A request may contain a whole world file."""
     heard = []
     peer.do(lambda: peer.node.serve("hear", "webots_ros/set_string", lambda it: heard.append(it.value) or {}))
 
@@ -80,12 +80,12 @@ def test_a_request_of_any_length_arrives_whole(peer, service, length):
 
 
 def test_a_call_returns_the_response(service):
-    """The fields of the response are attributes."""
+    """A caller reads the fields of the response as attributes."""
     assert service("get_time")(ask=True).value == 1.25
 
 
 def test_one_connection_serves_all_calls(peer, service):
-    """A new look-up of the service for each call would cost forty times as much."""
+    """With a new look-up and a new connection, each call would take forty times as long."""
     double = service("double", "webots_ros/set_float")
 
     assert [double(value=value).success for value in (1.0, -1.0, 2.0)] == [True, False, True]
@@ -93,7 +93,7 @@ def test_one_connection_serves_all_calls(peer, service):
 
 
 def test_calls_together_are_all_answered(service):
-    """Three wheels receive their commands in the time of one round trip."""
+    """Three wheels receive their commands in the time of a single round trip."""
     double = service("double", "webots_ros/set_float")
     time = service("get_time")
 
@@ -103,7 +103,7 @@ def test_calls_together_are_all_answered(service):
 
 
 def test_both_ends_are_set_up_for_small_messages(service):
-    """BBR, a common default, has a timer for each connection, and four simulators are slower with it."""
+    """BBR, a common default, needs a timer for each connection, which slows four simulators down."""
     double = service("double", "webots_ros/set_float")
     double.begin(value=1.0)
 
@@ -115,9 +115,9 @@ def test_both_ends_are_set_up_for_small_messages(service):
 
 
 def connected_to(address):
-    """Return this process's socket whose peer has that address.
+    """Return the socket in this process whose peer has this address.
 
-    It is in this process because the node runs in a thread.
+    The node runs in a thread, so its sockets belong to this process.
     """
     for it in gc.get_objects():
         if isinstance(it, socket.socket):
@@ -128,25 +128,25 @@ def connected_to(address):
 
 
 def test_a_service_nobody_offers_means_a_dead_simulator(service):
-    """The master does not know such a name."""
+    """The master lists no node for the service, so the simulator must have ended."""
     with pytest.raises(SimulatorDead, match="no node serves"):
         service("nothing")(ask=True)
 
 
 def test_a_failed_call_is_wrong_data_with_the_servers_words(service):
-    """The server responded, so it neither hangs nor is dead."""
+    """The server has responded, so the simulator neither hangs nor has ended."""
     with pytest.raises(WrongData, match="the handle is 0"):
         service("fail")(ask=True)
 
 
 def test_a_service_that_does_not_answer_hangs(service):
-    """The proxy of rospy would wait for ever here."""
+    """A proxy of rospy would wait forever here, and training would stop."""
     with pytest.raises(SimulatorHung, match=r"does not answer within 0\.2 s"):
         service("never", deadline_s=0.2)(ask=True)
 
 
 def test_when_patience_is_over_nobody_is_waited_for(service):
-    """Sixteen simulators that hang would delay the end of a trainer by sixteen deadlines."""
+    """Otherwise sixteen hanging simulators would delay the end of a trainer by sixteen timeouts."""
     never = [service("never", deadline_s=30.0) for _ in range(16)]
     get_time = service("get_time")
     get_time(ask=True)
@@ -167,7 +167,7 @@ def test_when_patience_is_over_nobody_is_waited_for(service):
 
 
 def test_what_a_call_waited_for_its_answer_is_counted(service):
-    """A run can then separate the time of its simulators from its own."""
+    """From this counter, a user learns how much of a run's time its simulators needed."""
     before = waited_s()
     with pytest.raises(SimulatorHung):
         service("never", deadline_s=0.2)(ask=True)
@@ -176,7 +176,7 @@ def test_what_a_call_waited_for_its_answer_is_counted(service):
 
 
 def test_a_killed_node_is_dead(peer, service):
-    """Its sockets are closed without a message, and the master still lists it."""
+    """The kernel closes a killed node's sockets without a message, and the master still lists the node."""
     get_time = service("get_time")
     get_time(ask=True)
     peer.end(peer.node.abandon)
@@ -188,7 +188,7 @@ def test_a_killed_node_is_dead(peer, service):
 
 
 def test_after_a_failure_the_connection_is_made_anew(peer, master, service):
-    """A restarted simulator has another port under the same name."""
+    """A restarted simulator has the same name but another port."""
     get_time = service("get_time")
     get_time(ask=True)
     peer.end(peer.node.abandon)
@@ -203,13 +203,13 @@ def test_after_a_failure_the_connection_is_made_anew(peer, master, service):
 
 
 def test_another_type_is_refused(service):
-    """The md5 of the definition is compared before the first call."""
+    """Before the first call, the node compares the md5 sums of the definitions."""
     with pytest.raises(WrongData, match="md5sum"):
         service("get_time", "webots_ros/set_int")(value=1)
 
 
 def test_a_service_known_to_the_master_can_be_asked_for_its_type(peer):
-    """`rosservice type` sends the md5 `*`."""
+    """`rosservice type` sends `*` instead of an md5 sum."""
     host, port = Master("/probe").service_address(f"/{peer.name}/double")
 
     assert (host, port > 0) == (os.environ["ROS_HOSTNAME"], True)
@@ -223,9 +223,9 @@ def test_the_node_is_listed_by_the_master(peer):
 
 
 def test_a_program_that_is_a_node_already_stays_the_one_it_is(peer):
-    """A process has only one node.
+    """A process can have only one node.
 
-    Scripts begin with their own `init_node`, and others find them by its name.
+    A script may call `init_node` first, and other programs find it under that name.
     """
     program = [sys.executable, "-c", PROGRAM_WITH_A_NODE, f"/{peer.name}"]
 
@@ -239,7 +239,7 @@ def test_a_program_that_is_a_node_already_stays_the_one_it_is(peer):
 
 
 def test_a_node_that_ends_in_good_order_is_unregistered(peer):
-    """Otherwise the next simulator with that name would be found at the old address."""
+    """Otherwise clients would look for the next simulator of that name at the old address."""
     peer.end()
 
     assert Master("/probe").service_address(f"/{peer.name}/double") is None

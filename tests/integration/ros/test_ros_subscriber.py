@@ -1,4 +1,4 @@
-"""Topics over a real master and real sockets: a message is read when a program requests it."""
+"""Topics over a real ROS master and real sockets; a message is read when the program requests it."""
 
 import struct
 
@@ -10,7 +10,7 @@ from palaestra_trainer.ros import RosSubscriber
 
 @pytest.fixture
 def ranges(peer):
-    """Yield a connected subscriber of the peer's distance sensor."""
+    """Yield a connected subscriber to the peer's distance sensor."""
     subscriber = RosSubscriber(f"/{peer.name}/ir1/value", "sensor_msgs/Range", deadline_s=0.3)
     subscriber.connect()
     yield subscriber
@@ -18,12 +18,12 @@ def ranges(peer):
 
 
 def send(peer, *values):
-    """Publish readings one after another."""
+    """Publish these readings one after another."""
     peer.do(lambda: [peer.publisher.send_value(value) for value in values])
 
 
 def test_connected_means_that_the_publisher_sends_to_us(peer, ranges):
-    """A message that was sent earlier would be lost."""
+    """Without a connection, the publisher would drop the first messages."""
     seen = []
 
     peer.do(lambda: seen.append(len(peer.publisher.topic.links)))
@@ -33,14 +33,14 @@ def test_connected_means_that_the_publisher_sends_to_us(peer, ranges):
 
 
 def test_the_next_message_is_the_oldest_unread(peer, ranges):
-    """No message is skipped, because each step has one message."""
+    """Each step publishes one message, so a skipped message would shift all later readings."""
     send(peer, 0.25, 0.5)
 
     assert [ranges.next().range for _ in range(2)] == [0.25, 0.5]
 
 
 def test_the_newest_message_ends_a_backlog(peer, ranges):
-    """After a late message, the last one describes the present."""
+    """After a delay, only the last message describes the current state."""
     send(peer, 0.25, 0.5, 0.75)
     ranges.next()
 
@@ -48,12 +48,12 @@ def test_the_newest_message_ends_a_backlog(peer, ranges):
 
 
 def test_with_nothing_new_the_old_value_stays(ranges):
-    """The call does not wait."""
+    """The call must return at once if no message has arrived."""
     assert ranges.newest("old") == "old"
 
 
 def test_a_message_that_does_not_come_raises_an_error_in_time(peer, ranges):
-    """The connection stays open, because a message may be late."""
+    """The message may only be late, so the connection stays open."""
     with pytest.raises(SimulatorHung):
         ranges.next()
     send(peer, 1.0)
@@ -62,7 +62,7 @@ def test_a_message_that_does_not_come_raises_an_error_in_time(peer, ranges):
 
 
 def test_a_killed_publisher_is_dead(peer, ranges):
-    """The publisher's connection is closed."""
+    """The kernel closes the connection of a killed publisher."""
     peer.end(peer.node.abandon)
 
     with pytest.raises(SimulatorDead):
@@ -70,13 +70,13 @@ def test_a_killed_publisher_is_dead(peer, ranges):
 
 
 def test_a_topic_without_a_publisher_raises_an_error_at_once(peer):
-    """The sensor was never enabled."""
+    """No node publishes the topic of a sensor that was never enabled."""
     with pytest.raises(SimulatorDead, match="no node publishes"):
         RosSubscriber(f"/{peer.name}/ir2/value", "sensor_msgs/Range").connect()
 
 
 def test_a_decoder_of_ones_own_gets_the_bytes(peer):
-    """The reading is the message's last field, and the rest is not worth the time to decode it."""
+    """The trainer needs only the last field, and decoding the whole message would cost time."""
     last = struct.Struct("<f")
     subscriber = RosSubscriber(
         f"/{peer.name}/ir1/value", "sensor_msgs/Range", lambda data: last.unpack(data[-4:])[0]
@@ -91,7 +91,7 @@ def test_a_decoder_of_ones_own_gets_the_bytes(peer):
 
 
 def test_stamps_and_numbers_of_messages_advance(peer, ranges):
-    """Subscribers that match messages by their stamps need this."""
+    """Some subscribers match the messages of several topics by their stamps."""
     peer.do(lambda: [peer.publisher.send_value(0.0, stamp_ns=ns) for ns in (1, 2_000_000_003)])
 
     first, second = ranges.next().header, ranges.next().header
@@ -101,7 +101,7 @@ def test_stamps_and_numbers_of_messages_advance(peer, ranges):
 
 
 def test_a_withdrawn_topic_closes_its_connections(peer, ranges):
-    """`enable(0)` does the same with the topic of a sensor."""
+    """`enable(0)` withdraws the topic of a sensor in this way."""
     peer.do(lambda: peer.node.withdraw(peer.publisher))
 
     with pytest.raises(SimulatorDead):

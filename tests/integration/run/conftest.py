@@ -1,4 +1,4 @@
-"""`palaestra run` as a user types it, with real master, sidecars, stubs and trainer."""
+"""`palaestra run` as a user types it, with a real ROS master, sidecars, stubs and trainer."""
 
 import pytest
 
@@ -8,7 +8,7 @@ from tests.local_run import LocalRun
 
 @pytest.fixture
 def run(tmp_path):
-    """Yield a function that makes runs of an example in a separate folder, and end them with the test."""
+    """Yield a function that returns runs of an example in a separate folder; all end with the test."""
     made = []
 
     def make(name="move-to-target", **trainer):

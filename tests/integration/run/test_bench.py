@@ -1,8 +1,8 @@
-"""Each part of `make bench`, and the parts of `make soak` without another test, at the smallest scale.
+"""Every part of `make bench`, and some parts of `make soak`, at the smallest scale.
 
-The figures mean nothing here. Without these tests, a changed name could break a measurement, and nobody would
-notice for months, until a change has to be measured. The parts `recovery`, `shutdown` and `memory` are in
-test_run_unattended.py, and `operator` is in test_operator_scale.py.
+The figures have no meaning at this scale. These tests run the code of the parts, because nobody runs the full
+measurements for months. The parts `recovery`, `shutdown` and `memory` are tested in test_run_unattended.py,
+and `operator` in test_operator_scale.py.
 """
 
 import json
@@ -18,20 +18,20 @@ from tests.soak import chaos
 
 SMALL = ("newcomer", "parallel", "planning", "simulators", "stepping", "watched")
 OF_A_CLUSTER = ("hostile",)
-# They run the examples that MEASURED names in test_run_from_file_to_policy.py.
+# These parts run the examples in MEASURED of test_run_from_file_to_policy.py.
 OF_WHOLE_RUNS = ("learning", "plain", "seeing", "sparse", "transfer")
 ELSEWHERE = ("memory", "operator", "recovery", "shutdown")
-DEADLINE_S = 800  # the work takes a minute or two, but the machine may be busy
+DEADLINE_S = 800  # the work takes a minute or two on an idle machine
 
 
 def numbers(found):
-    """Yield all numbers in the results of a part."""
+    """Yield all values in the results of a part, including nested ones."""
     for value in found.values():
         yield from numbers(value) if isinstance(value, dict) else [value]
 
 
 def test_every_part_is_run_by_a_test():
-    """A new part must come with its test."""
+    """A new part without a test could break unnoticed."""
     assert PARTS.keys() == {*SMALL, *OF_A_CLUSTER, *OF_WHOLE_RUNS, *ELSEWHERE}
 
 
@@ -39,7 +39,7 @@ def test_every_part_is_run_by_a_test():
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize("parts", [SMALL, OF_WHOLE_RUNS], ids=["small", "of whole runs"])
 def test_the_benchmark_measures(parts, tmp_path):
-    """It prints one line of JSON for each part, and every value in it is a number."""
+    """Each part must print one line of JSON that contains only numbers."""
     command = [sys.executable, "-m", "tests.bench", "--scale", "0", *parts]
     with (tmp_path / "errors").open("w+") as errors:
         done = subprocess.run(
@@ -59,7 +59,7 @@ def test_the_benchmark_measures(parts, tmp_path):
 @pytest.mark.minutes(1)
 @pytest.mark.timeout(900)
 def test_the_costly_worlds_of_one_tenant_beside_jobs_of_another_are_measured():
-    """There is one job of each tenant on a separate control plane.
+    """The test runs one job of each tenant on a separate control plane.
 
     The operator has the permissions of an installation.
     """
@@ -73,7 +73,7 @@ def test_the_costly_worlds_of_one_tenant_beside_jobs_of_another_are_measured():
 @pytest.mark.minutes(1)
 @pytest.mark.timeout(900)
 def test_the_soak_of_a_training_amid_chaos_comes_to_its_figures():
-    """The soak uses the example chaos with 1,000 of its steps."""
+    """The part runs the example chaos, here with only 1,000 steps."""
     found = chaos.measure(0.0)
 
     assert found["summary"]["steps"] >= chaos.LEAST_STEPS

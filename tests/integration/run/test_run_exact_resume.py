@@ -1,7 +1,7 @@
-"""An interrupted and resumed run equals an uninterrupted one, bit for bit, with deterministic simulators.
+"""A run that is interrupted and resumed has the same results as an uninterrupted run, bit by bit.
 
-Each variant does the same with another world, simulator and environment; `make soak` does it with every
-algorithm.
+The simulators are deterministic. Each variant has another world, simulator and environment. `make soak` does
+this with every algorithm.
 """
 
 import os
@@ -34,7 +34,7 @@ class Variant:
 
 
 def learning(environment: dict[str, Any], steps: int, driver: str) -> Variant:
-    """Return DQN in a world that changes in every episode; it learns from step 100 on."""
+    """Return a DQN training in a world that changes in every episode; learning starts at step 100."""
     job = resume.job("DQN", 1)
     job["spec"]["trainer"] |= {
         "environment": environment,
@@ -48,7 +48,7 @@ def learning(environment: dict[str, Any], steps: int, driver: str) -> Variant:
 
 
 def seeing() -> Variant:
-    """Return PPO on pictures, which a new simulator must draw exactly as the first one would."""
+    """Return a PPO training on images, which a new simulator must render exactly like the first one."""
     job = tiny_job(
         collect=SEEING,
         evaluate=SEEING,
@@ -65,7 +65,7 @@ VARIANTS = {
     "the page's scattered cylinders": learning(
         yaml.safe_load(PAGE["yaml"])["spec"]["trainer"]["environment"], 360, "stub"
     ),
-    # Each episode is replayed with the progress at which it began.
+    # On resume, an episode is replayed with the training progress at its beginning.
     "the example's curriculum in MuJoCo": learning(
         {"id": "curriculum:Curriculum-v0", "options": {"max_steps": 40}}, 240, "mujoco"
     ),
@@ -75,7 +75,7 @@ VARIANTS = {
 
 @pytest.fixture
 def modules(tmp_path, monkeypatch):
-    """Put the modules of page and example on the path of every process of the test."""
+    """Put the modules of the page and of the example on the import path of every process."""
     folder = tmp_path / "modules"
     folder.mkdir()
     (folder / "scattered.py").write_text(PAGE["python in-a-job"])
@@ -86,7 +86,10 @@ def modules(tmp_path, monkeypatch):
 @pytest.mark.usefixtures("modules")
 @pytest.mark.parametrize("variant", VARIANTS.values(), ids=VARIANTS)
 def test_an_interrupted_run_ends_as_one_that_was_not(tmp_path, variant):
-    """The test compares world, experience, parameters and evaluations; the signal comes during an episode."""
+    """The signal arrives during an episode.
+
+    The test compares world, experience, parameters and evaluations.
+    """
     whole, parts = (begun(tmp_path / name, variant.job) for name in ("whole", "parts"))
     with whole:
         code, output = whole.end()
@@ -101,11 +104,11 @@ def test_an_interrupted_run_ends_as_one_that_was_not(tmp_path, variant):
     first, second = parts.attempts()
     assert (first, second.rpartition(" ")[0]) == ("new run", "resumed at step")
     assert "do not repeat" not in parts.log()
-    assert "simulator fault" not in whole.log() + parts.log()  # such as a hang of 5 s on a busy machine
+    assert "simulator fault" not in whole.log() + parts.log()  # e.g. a step of 5 s on a busy machine
     assert resume.results(parts.directory) == resume.results(whole.directory)
 
 
 def begun(folder: Path, job: dict[str, Any]) -> LocalRun:
-    """Return a run of a job in a separate folder."""
+    """Return a run of a job in a new folder, which has not been started."""
     folder.mkdir()
     return LocalRun(folder, job)

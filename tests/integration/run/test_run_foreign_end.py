@@ -1,4 +1,4 @@
-"""Code of a job's author that ends the process itself: the run is not complete."""
+"""If a job author's code ends the trainer's process, the run is not complete."""
 
 from tests.local_run import LocalRun
 from tests.soak.jobs import LITTLE_PPO, tiny_job
@@ -19,7 +19,7 @@ gymnasium.register("Leaves-v0", Leaves)
 
 
 def test_a_library_that_ends_the_process_does_not_complete_the_run(tmp_path, monkeypatch):
-    """The exit code is 0, as of a program that has finished its work, but there is no model."""
+    """Exit code 0 looks like a success, but the run has no model."""
     (tmp_path / "leaves.py").write_text(LEAVES)
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     environment = {"id": "leaves:Leaves-v0"}

@@ -1,4 +1,4 @@
-"""From a TrainingJob file to a policy on one machine."""
+"""`palaestra run` leads from the file of a TrainingJob to a policy on one machine."""
 
 import json
 import os
@@ -30,7 +30,7 @@ FEWEST = {
     "evaluation": {"everySteps": 200, "episodes": 1, "confirmEpisodes": 1},
     "checkpoint": {"everySteps": 200, "keep": 2},
 }
-# The tests in test_bench.py run these.
+# The tests in test_bench.py run these examples.
 MEASURED = {
     "chaos",
     "move-to-target",
@@ -40,13 +40,13 @@ MEASURED = {
     "see-target",
     "sparse-reward",
 }
-# The example two-collectors runs with rollouts of this length; its own are eight times as long.
+# The length of a rollout for the example two-collectors, an eighth of the example's own.
 ROLLOUT_STEPS = 64
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finished:
-    """A complete run whose collecting simulator was killed during training."""
+    """A finished run whose collecting simulator was killed during training."""
 
     run: LocalRun
     code: int
@@ -55,9 +55,9 @@ class Finished:
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory):
-    """Return one run for the tests of a run's results."""
+    """Return a finished run for the tests of results."""
     job = example("move-to-target")
-    job["spec"]["trainer"].update(FEW | {"steps": 1000})  # enough for the test to find it during training
+    job["spec"]["trainer"].update(FEW | {"steps": 1000})  # enough for the kill to come during training
     with LocalRun(tmp_path_factory.mktemp("finished"), job) as run:
         run.wait_for_step(200)
         os.kill(run.pid_of("palaestra-stub", "collect-0"), signal.SIGKILL)
@@ -67,13 +67,13 @@ def finished(tmp_path_factory):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Unplugged:
-    """The state of a run during training, and of its processes after its runner was killed.
+    """The state of a run during training, and its processes after a kill of its runner.
 
     Attributes:
-        nodes: the robots that the ROS master knew.
-        named: the robots in the worlds that its sidecars made.
-        pids: every process below the runner.
-        left: the processes that still ran.
+        nodes: the robots that were registered at the ROS master.
+        named: the robots in the worlds of the sidecars.
+        pids: the ids of all processes below the runner.
+        left: the ids of processes that still ran after the kill.
     """
 
     nodes: set[str]
@@ -84,7 +84,7 @@ class Unplugged:
 
 @pytest.fixture(scope="module")
 def unplugged(tmp_path_factory):
-    """Return one run with two simulators in a group, for the tests of its state during training."""
+    """Kill the runner of a run with two collecting simulators, and return the observations."""
     job = example("two-collectors")
     job["spec"]["trainer"].update(FEW | {"steps": 50_000})
     run = LocalRun(tmp_path_factory.mktemp("unplugged"), job)
@@ -106,9 +106,9 @@ def unplugged(tmp_path_factory):
 
 
 def registered(run):
-    """Return the names of the robots that the ROS master of a run knows.
+    """Return the names of the robots that are registered at a run's ROS master.
 
-    The run's output has the master's address.
+    The address of the master is in the run's output.
     """
     master = Master("/test")
     master.uri = re.search("ROS_MASTER_URI=(.+)", run.output())[1]
@@ -117,9 +117,9 @@ def registered(run):
 
 @pytest.mark.parametrize("name", sorted({path.stem for path in EXAMPLES.glob("*.yaml")} - MEASURED))
 def test_every_example_runs(run, name):
-    """The number of steps is small here.
+    """Users copy the examples, so every example must work.
 
-    Users copy the examples, so they must work.
+    The test reduces the number of steps.
     """
     code, output = run(name, **FEWEST).start().end()
 
@@ -128,19 +128,19 @@ def test_every_example_runs(run, name):
 
 
 def test_each_simulator_has_a_legal_name_of_its_own(unplugged):
-    """The names are those in `rosnode list` and in the worlds of the simulators."""
+    """Two simulators with one name would remove each other from the ROS master."""
     assert len(unplugged.nodes) == 3
     assert unplugged.nodes == unplugged.named
 
 
 def test_after_a_sigkill_of_the_runner_nothing_is_left(unplugged):
-    """The sudden end of the runner must not leave simulators behind."""
+    """If the runner is killed, no simulator may keep a processor busy."""
     assert len(unplugged.pids) >= 8
     assert unplugged.left == []
 
 
 def test_a_killed_simulator_is_one_fault_and_training_goes_on(finished):
-    """Only this simulator is restarted, and the run ends as it would have without the fault."""
+    """Only the killed simulator restarts, and the run completes all its steps."""
     assert finished.code == 0, finished.output
     assert finished.run.summary()["steps"] == 1000
     assert finished.run.summary()["faults"] == 1
@@ -148,7 +148,7 @@ def test_a_killed_simulator_is_one_fault_and_training_goes_on(finished):
 
 
 def test_a_person_reads_how_the_run_goes(finished):
-    """Warnings are sentences, and nobody has to know the fields of a log line."""
+    """A user must understand the output without knowledge of the log's fields."""
     lines = finished.output.splitlines()
 
     assert any(line.startswith("step ") and " of 1,000 · " in line for line in lines), lines
@@ -158,7 +158,7 @@ def test_a_person_reads_how_the_run_goes(finished):
 
 
 def test_the_demo_plays_a_policy_until_it_is_interrupted(finished, tmp_path):
-    """While it plays, the policy learns nothing; the same command plays it again."""
+    """The policy does not learn during the demo, and the same command starts the demo again."""
     job = data_of(playing_job(job_of(finished.run.file), finished.run.directory))
 
     with LocalRun(tmp_path, job) as run:
@@ -172,7 +172,7 @@ def test_the_demo_plays_a_policy_until_it_is_interrupted(finished, tmp_path):
 
 
 def test_a_finished_run_is_reported_and_not_repeated(finished):
-    """A second `make run` prints the result within seconds."""
+    """A user who runs `make run` twice sees the result again at once."""
     before = (finished.run.directory / "attempts.jsonl").read_text()
 
     code, output = finished.run.start().end()
@@ -183,7 +183,7 @@ def test_a_finished_run_is_reported_and_not_repeated(finished):
 
 
 def test_a_policy_can_be_measured_afterwards(finished):
-    """The runner names this command at its end."""
+    """The runner prints this command at its end, so it must work."""
     result = subprocess.run(
         [EVAL, finished.run.directory, "--episodes", "3"],
         capture_output=True,
@@ -196,7 +196,7 @@ def test_a_policy_can_be_measured_afterwards(finished):
 
 
 def test_a_policy_is_measured_on_the_same_episodes_in_each_simulator(finished):
-    """A policy may succeed in the simulator that it knows, and fail in another one."""
+    """A user learns whether a policy depends on the simulator in which it was trained."""
     result = subprocess.run(
         [EVAL, finished.run.directory, "--episodes", "2", "--in", "stub,mujoco"],
         capture_output=True,
@@ -212,7 +212,7 @@ def test_a_policy_is_measured_on_the_same_episodes_in_each_simulator(finished):
 
 
 def test_a_policy_is_compared_with_itself_in_two_simulators(finished):
-    """In a deterministic simulator no episode tells a policy from itself."""
+    """In a deterministic simulator, equal policies must have equal results in every episode."""
     result = subprocess.run(
         [PALAESTRA, "compare", *[finished.run.directory] * 2, "--episodes", "20", "--json"],
         capture_output=True,
@@ -228,9 +228,9 @@ def test_a_policy_is_compared_with_itself_in_two_simulators(finished):
 
 
 def test_an_interrupted_run_goes_on_and_ends_where_it_would_have(tmp_path):
-    """It ends at the boundary of PPO's rollout, as without an interruption; test_run_exact_resume.py has DQN.
+    """The run ends at the boundary of a PPO rollout, as an uninterrupted run would.
 
-    Between the two commands no process of the run exists: no simulator, no sidecar, no master.
+    Between the two commands, no process of the run exists: no simulator, no sidecar and no master.
     """
     job = example("two-collectors")
     trainer = job["spec"]["trainer"]

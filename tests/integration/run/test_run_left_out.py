@@ -1,4 +1,4 @@
-"""`palaestra run` of a job whose simulators omit a part of their world."""
+"""`palaestra run` of a job whose simulators leave out a part of their world."""
 
 import re
 
@@ -10,7 +10,7 @@ LINE = r"{0}: the stub simulates no Colosseum: 2 nodes left out \({0}-0.wbt, lin
 
 
 def test_what_simulators_leave_out_reaches_the_person_who_reads_the_run():
-    """It is in the trainer's /status, which the operator reads, and once in the output."""
+    """The user sees each omission once in the output, and the trainer's /status contains it."""
     part = {
         "world": {"inline": builtin("arena").decode() + "Colosseum { }\nColosseum { }\n"},
         "options": ["--leave-out", "Colosseum"],

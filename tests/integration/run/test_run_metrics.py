@@ -1,6 +1,6 @@
-"""The metrics of a real run's programs, compared with docs/reference/metrics.md.
+"""The metrics of a real run's trainer and sidecar agree with docs/reference/metrics.md.
 
-The operator's metrics have their test with the operator.
+The operator's tests compare the metrics of the operator.
 """
 
 import re
@@ -17,14 +17,14 @@ HEALTH = re.compile(r"health=(\S+)")
 
 
 def scrape(address):
-    """Return the text of /metrics."""
+    """Return the text of /metrics at an address."""
     with urllib.request.urlopen(f"http://{address}/metrics", timeout=10) as answer:
         return answer.read().decode()
 
 
 @pytest.fixture(scope="module")
 def texts(tmp_path_factory):
-    """Return the metrics of a run's trainer and sidecar, after an evaluation and a checkpoint."""
+    """Return the metrics of a run's trainer and sidecar after an evaluation and a checkpoint."""
     job = tiny_job(
         environment={"id": "MoveToTargetEnv-v0", "options": {"max_steps": 20}},
         algorithm=LITTLE_DQN,
@@ -33,7 +33,7 @@ def texts(tmp_path_factory):
         checkpoint={"everySteps": 200, "keep": 2},
     )
     with LocalRun(tmp_path_factory.mktemp("run"), job) as run:
-        run.wait_for_step(800)  # DQN learns from step 40 on, and logs every ten episodes
+        run.wait_for_step(800)  # DQN learns from step 40 and logs every ten episodes
         return {
             "trainer": scrape(run.training()["statusAddress"]),
             "sidecar": scrape(HEALTH.search(run.log("sim-collect-0"))[1]),
@@ -41,7 +41,7 @@ def texts(tmp_path_factory):
 
 
 def test_a_run_serves_the_page(texts):
-    """The programs serve exactly the families of the page, each with its type and, by then, a value."""
+    """A user relies on the page: each of its metrics must exist with its type and have a value."""
     assert served(texts["trainer"]) == documented("trainer")
     assert served(texts["sidecar"]) == documented("sidecar")
     silent = {
@@ -55,12 +55,12 @@ def test_a_run_serves_the_page(texts):
 
 @pytest.mark.parametrize("program", ["trainer", "sidecar"])
 def test_promtool_has_nothing_to_say_of_it(texts, program):
-    """Promtool checks Prometheus' own rules about names, types and texts."""
+    """Other tools rely on Prometheus' conventions about names, types and texts."""
     assert complaints(texts[program]) == ""
 
 
 def test_a_run_tells_numbers_that_fit_together(texts):
-    """The numbers come from different parts of the trainer, and from the process of its simulator."""
+    """The numbers come from several modules of the trainer and from the sidecar, and must be consistent."""
     values = {
         (sample.name, *sorted(sample.labels.values())): sample.value
         for text in texts.values()
@@ -71,8 +71,8 @@ def test_a_run_tells_numbers_that_fit_together(texts):
     taken = values["palaestra_simulator_step_duration_seconds_count", "collect-0"]
     simulated_s = values["palaestra_simulator_simulated_seconds_total", "collect-0"]
 
-    assert steps <= taken < 2 * steps  # they are read one after the other, while the simulator steps
-    assert simulated_s >= 0.192 * steps  # and the steps of each reset
+    assert steps <= taken < 2 * steps  # read one after the other, while the simulator steps
+    assert simulated_s >= 0.192 * steps  # resets take steps too
     episodes = values["palaestra_trainer_episodes_total",]
     assert 0 <= values["palaestra_trainer_episode_return_bucket", "+Inf"] - episodes <= 3
     assert values["palaestra_trainer_evaluations_total",] >= 2

@@ -8,18 +8,18 @@ from tests.local_run import running
 from tests.soak.jobs import tiny_job
 
 SCRIPT = Path(__file__).parents[3] / "examples" / "own_training_script.py"
-ROLLOUT = 512  # the script's PPO learns from this many steps at once
+ROLLOUT = 512  # the script's PPO learns after this many steps
 CRASH_AT = 200
 
 
 def mended(training):
-    """Return the status of a run after a fault was repaired."""
+    """Return the status of a run in which a simulator was restarted, or None."""
     status = training.status()
     return status if status and status["simulators"] and status["simulators"][0]["restarts"] else None
 
 
 def test_a_script_of_one_s_own_trains_in_the_simulators_of_its_job_through_their_faults():
-    """Users copy this script, so it must work; the summary at its end must match the run directory."""
+    """Users copy the script, so it must survive faults and report the same result as the run directory."""
     job = tiny_job(
         faults=f"crash:step={CRASH_AT}",
         command=["python", str(SCRIPT)],
@@ -37,7 +37,7 @@ def test_a_script_of_one_s_own_trains_in_the_simulators_of_its_job_through_their
     said = output.splitlines()[-4:]
     assert "mean return" in said[0]
     assert said[0].endswith("over 2 episodes")
-    assert said[1].split() == ["steps", str(ROLLOUT)]  # the script reported this
+    assert said[1].split() == ["steps", str(ROLLOUT)]  # the script reported these steps
     assert said[2].split() == ["run", "directory", str(training.directory)]
     assert said[3].endswith(f"tensorboard --logdir {training.directory / 'tensorboard'}")
     assert [(it["name"], it["role"]) for it in status["simulators"]] == [("collect-0", "Collect")]

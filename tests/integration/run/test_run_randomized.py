@@ -1,6 +1,6 @@
-"""The worlds of docs/howto/randomization.md, which change in every episode, with its seed and with training.
+"""The worlds of docs/howto/randomization.md change in every episode, by the seed and by the progress.
 
-The tests in test_run_exact_resume.py train, interrupt and resume their jobs.
+The tests in test_run_exact_resume.py train, interrupt and resume the page's jobs.
 """
 
 import importlib.util
@@ -21,14 +21,14 @@ CYLINDERS = [f"CYLINDER_{number}" for number in range(4)]
 
 @pytest.fixture
 def module(tmp_path):
-    """Return the file with the page's module."""
+    """Write the page's module, and return the file."""
     path = tmp_path / "scattered.py"
     path.write_text(PAGE["python in-a-job"])
     return path
 
 
 def module_at(path):
-    """Return the module in a file."""
+    """Import a file, and return the module."""
     spec = importlib.util.spec_from_file_location(path.stem, path)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
@@ -36,12 +36,12 @@ def module_at(path):
 
 
 def places(scene):
-    """Return the positions of the cylinders."""
+    """Return the positions of all cylinders in a scene."""
     return [scene.supervisor.get_field(name, "translation") for name in CYLINDERS]
 
 
 def test_the_same_seed_places_the_same_cylinders(master, module):
-    """Another seed places others."""
+    """A user can repeat an episode by its seed, and another seed gives another world."""
     del master
     scattered = module_at(module)
     webots = Webots("robotino", "arena")
@@ -65,12 +65,12 @@ def test_the_same_seed_places_the_same_cylinders(master, module):
 
 @pytest.fixture
 def curriculum():
-    """Return the module of the example."""
+    """Return the module of the example curriculum."""
     return module_at(EXAMPLE)
 
 
 def test_the_example_changes_world_and_robot_with_the_progress_of_training(master, curriculum):
-    """At first there are no cylinders and no noise; the same episode is equal when it is repeated."""
+    """At progress 0 the episode has no cylinders and no noise, and a repeated episode is equal."""
     del master
     webots = Webots("robotino", "arena")
     robot = Robotino(webots)

@@ -1,4 +1,4 @@
-"""`palaestra run` of a job whose simulators have a spare."""
+"""`palaestra run` of a job whose collecting simulators have spares."""
 
 from dataclasses import dataclass
 
@@ -17,21 +17,21 @@ READY = {"collect-0": "ready", "collect-1": "ready", "evaluate-0": None}
 
 
 def job(steps, **collect):
-    """Return a job of two simulators with spares, and one for evaluation without a spare."""
+    """Return a job: two collecting simulators with spares, and one for evaluation without a spare."""
     pair = {"count": 2, "standby": True} | collect
     return tiny_job(collect=pair, algorithm=LITTLE_DQN, steps=steps, **SELDOM)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Replaced:
-    """The observations of a simulator that was killed while its spare was ready.
+    """Observations of a run in which a simulator was killed while its spare was ready.
 
     Attributes:
-        waited: whether the simulator now in use was the spare when the other one was killed.
-        faults: of the run, by kind.
-        took_over: the lines of the trainer's log about the change.
-        spares: the processes that the first slot of the pair, which was killed, runs again.
-        left: the simulators that still ran after the run's end.
+        waited: whether the simulator in use afterwards was the spare at the time of the kill.
+        faults: the run's faults by kind.
+        took_over: the lines about the change in the trainer's log.
+        spares: the processes in the slot of the killed simulator afterwards.
+        left: the simulators that still ran after the end of the run.
     """
 
     waited: bool
@@ -43,7 +43,7 @@ class Replaced:
 
 @pytest.fixture(scope="module")
 def replaced():
-    """Return one run that continues after the fault until all of its spares are ready again."""
+    """Kill a simulator of a run, wait until all spares are ready again, and return the observations."""
     with running(job(1_000_000, recycle={"afterResets": 0})) as run:
         run.wait_for_step(recovery.WARM_STEPS)
         run.until(lambda: recovery.is_ready(run, standby=True), recovery.SPARE_READY_S)
@@ -65,14 +65,14 @@ def replaced():
 
 
 def test_a_crash_waits_for_no_start(replaced):
-    """A crash costs next to no time, like recycling, as `make soak` measures."""
+    """The spare must already run, so that a crash costs almost no time. `make soak` measures that time."""
     assert replaced.waited
 
 
 def test_a_killed_simulator_is_replaced_by_its_spare_and_becomes_the_next_one(replaced):
-    """It costs one fault and no wait for a start.
+    """A crash costs one fault and no wait for a start.
 
-    The ROS name shows which of the two is in use.
+    The ROS name in the log shows which of the two simulators is in use.
     """
     (took_over,) = replaced.took_over
 
@@ -82,12 +82,12 @@ def test_a_killed_simulator_is_replaced_by_its_spare_and_becomes_the_next_one(re
 
 
 def test_spares_end_with_their_run(replaced):
-    """All simulators end with their run."""
+    """A spare that stays would keep a processor busy after the run."""
     assert replaced.left == []
 
 
 def test_a_simulator_with_a_spare_is_recycled_before_it_would_die_and_without_a_fault():
-    """Here it is recycled every 24 resets, because it survives no more.
+    """The simulator dies in its 25th reset, so it must be recycled every 24 resets.
 
     `make soak` does the same for 2,500 episodes.
     """

@@ -1,4 +1,4 @@
-"""Real sidecars with small programs as simulators. Every wait has a deadline."""
+"""Real sidecars with small programs as simulators; every wait has a timeout."""
 
 import contextlib
 import http.client
@@ -19,18 +19,18 @@ from tests import waiting
 
 PROGRAM = str(Path(sys.executable).with_name("palaestra-sidecar"))
 ADDRESSES = re.compile(r"^palaestra-sidecar: control=(\S+) health=(\S+)$")
-DEADLINE_S = 20.0  # the work takes milliseconds, but the machine may be busy
-ENDS = {0, EXIT_HUNG}  # exit codes after a signal: without or with its alarm
+DEADLINE_S = 20.0  # the waits take milliseconds on an idle machine
+ENDS = {0, EXIT_HUNG}  # exit codes after a signal; on a busy machine, the alarm ends the sidecar
 PACE_S = 0.005  # between two polls of a state without events
 
 
 def eventually(seen, deadline_s=DEADLINE_S):
-    """Return the first true value of `seen`; fail at the deadline."""
+    """Return the first true value of `seen`; fail after the timeout."""
     return waiting.eventually(seen, deadline_s, PACE_S)
 
 
 def processes_with(mark):
-    """Return the processes with `mark` in their command line, without zombies."""
+    """Return the ids of processes whose command line contains `mark`; a zombie's is empty."""
     found = set()
     for folder in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError):
@@ -40,15 +40,15 @@ def processes_with(mark):
 
 
 def was_seen(state):
-    """Return whether a sidecar knows that its simulator ran.
+    """Return whether a sidecar has noticed that its simulator runs.
 
-    The simulator itself may write that it runs before the sidecar knows it.
+    The simulator may print `up` before the sidecar notices that.
     """
     return state.pid is not None or state.state is not SidecarState.STARTING
 
 
 class Sidecar:
-    """A running sidecar; tests use its ports and read its lines."""
+    """A running sidecar, whose ports and output a test uses."""
 
     def __init__(self, command) -> None:
         self.process = subprocess.Popen(
@@ -66,7 +66,7 @@ class Sidecar:
             self.lines.append(line.decode().rstrip("\n"))
 
     def ask(self, method, path, body=None, address=None):
-        """Return status and text of a response, by default from the control port."""
+        """Return status and text of a response, by default of the control port."""
         connection = http.client.HTTPConnection(address or self.control, timeout=DEADLINE_S)
         try:
             connection.request(method, path, None if body is None else json.dumps(body))
@@ -76,20 +76,20 @@ class Sidecar:
             connection.close()
 
     def request(self, path, body=None):
-        """Return the state after an accepted request."""
+        """Send a request that must be accepted, and return the new state."""
         status, text = self.ask("POST", path, body or {})
         assert status == 200, text
         return SimulatorState.from_json(json.loads(text))
 
     @property
     def state(self):
-        """Return the state that it reports for its simulator."""
+        """The state that the sidecar reports for its simulator."""
         status, text = self.ask("GET", "/state")
         assert status == 200, text
         return SimulatorState.from_json(json.loads(text))
 
     def until(self, wanted, deadline_s=DEADLINE_S):
-        """Return the state as soon as it is `wanted`."""
+        """Wait until the simulator is in the state `wanted`, and return the full state."""
 
         def seen():
             state = self.state
@@ -98,25 +98,28 @@ class Sidecar:
         return eventually(seen, deadline_s)
 
     def until_said(self, text, times=1):
-        """Return once it or its simulator has printed lines with `text`."""
+        """Wait until the sidecar or its simulator has printed `text` this many times."""
         eventually(lambda: sum(text in line for line in list(self.lines)) >= times)
 
     def start(self):
-        """Start the simulator, and return the state once it has printed `up` and is known to run."""
+        """Start the simulator, and return its state.
+
+        The method waits until the simulator has printed `up` and the sidecar has noticed that it runs.
+        """
         ups = self.lines.count("up") + 1
         self.request("/start")
         eventually(lambda: self.lines.count("up") >= ups and was_seen(self.state))
         return self.state
 
     def end(self, number=signal.SIGTERM):
-        """Send a signal, wait for the end and return the exit code."""
+        """Send a signal to the sidecar, wait for its end, and return the exit code."""
         self.process.send_signal(number)
         return self.process.wait(DEADLINE_S)
 
 
 @pytest.fixture
 def world(tmp_path):
-    """Return the path of an included world, which also marks all processes of the test."""
+    """Return the path of an included world; processes of the test have this path in their command line."""
     path = tmp_path / "arena.wbt"
     path.write_bytes(builtin("arena"))
     return path
@@ -124,9 +127,9 @@ def world(tmp_path):
 
 @pytest.fixture
 def arguments(tmp_path, world):
-    """Return a function that makes a sidecar's command line.
+    """Return a function that returns the command line of a sidecar.
 
-    Its simulator is a Python program as text, or a command line.
+    The simulator is given as the text of a Python program, or as a command line.
     """
 
     def make(program, *options, executable=PROGRAM):
@@ -144,7 +147,7 @@ def arguments(tmp_path, world):
 
 @pytest.fixture
 def run_sidecar(tmp_path):
-    """Yield a function that runs a sidecar's command line; at the end no process of it may exist."""
+    """Yield a function that starts a sidecar; at the end, no process of it may exist."""
     running = []
 
     def run(command):
@@ -163,7 +166,7 @@ def run_sidecar(tmp_path):
 
 @pytest.fixture
 def sidecar(arguments, run_sidecar):
-    """Return a function that runs a sidecar whose simulator is a program."""
+    """Return a function that starts a sidecar with a program as its simulator."""
 
     def run(program, *options, before=(), executable=PROGRAM):
         return run_sidecar([*before, *arguments(program, *options, executable=executable)])
@@ -173,13 +176,13 @@ def sidecar(arguments, run_sidecar):
 
 @pytest.fixture
 def left(tmp_path):
-    """Return a function that returns the running processes of this test."""
+    """Return a function that returns the ids of this test's running processes."""
     return lambda: processes_with(str(tmp_path))
 
 
 @pytest.fixture
 def eventually_true():
-    """Return a function that waits for a condition, with a deadline."""
+    """Return a function that waits for a true value, with a timeout."""
     return eventually
 
 
@@ -198,8 +201,8 @@ while True:
     signal.pause()
 """
 
-# This is like a launcher that starts a server, which starts workers: they have their own sessions and groups,
-# no parent, no environment, and all of them ignore SIGTERM.
+# This program acts like a launcher that starts a server, which starts workers. The processes have their own
+# sessions and groups, no parent and no environment, and all of them ignore SIGTERM.
 FAMILY = """
 import os, signal, sys
 signal.signal(signal.SIGTERM, signal.SIG_IGN)
@@ -224,23 +227,23 @@ while True:
 
 @pytest.fixture
 def waits():
-    """Return a simulator that waits until a signal ends it."""
+    """Return a simulator that waits for a signal."""
     return WAITS
 
 
 @pytest.fixture
 def stubborn():
-    """Return a simulator that only SIGKILL ends."""
+    """Return a simulator that ends only by SIGKILL."""
     return STUBBORN
 
 
 @pytest.fixture
 def family():
-    """Return a simulator that has started three processes, two of which have left its session."""
+    """Return a simulator with three child processes, two of which have left its session."""
     return FAMILY
 
 
 @pytest.fixture
 def ends():
-    """Return a function that makes a simulator which prints `up` and runs one statement at its end."""
+    """Return a function that returns a simulator which prints `up` and then executes a statement."""
     return lambda statement: f"import os, signal, sys\nprint('up')\n{statement}\n"

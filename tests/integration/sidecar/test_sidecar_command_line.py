@@ -1,4 +1,4 @@
-"""The command line of the sidecar, and the mistakes in it."""
+"""The command line of the sidecar, and the errors for mistakes in it."""
 
 import signal
 import subprocess
@@ -11,18 +11,18 @@ from palaestra_sim.world import RunIdentity, ros_name
 from tests.integration.sidecar.conftest import DEADLINE_S
 
 PROGRAM = str(Path(sys.executable).with_name("palaestra-sidecar"))
-STANDARD = (1 << 31) - 1  # the signals that are not real-time signals
+STANDARD = (1 << 31) - 1  # without the real-time signals
 
 
 def run(*arguments):
-    """Return the result of a sidecar that ends by itself."""
+    """Run a sidecar that ends by itself, and return the result."""
     return subprocess.run(
         [PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=20, check=False
     )
 
 
 def test_help_says_what_it_reads_and_writes_and_how_it_ends() -> None:
-    """This is the first page that a user sees."""
+    """A user who starts the program without knowledge of it reads the help first."""
     told = run("--help")
 
     assert told.returncode == 0
@@ -47,7 +47,7 @@ def test_help_says_what_it_reads_and_writes_and_how_it_ends() -> None:
     ],
 )
 def test_a_mistake_is_one_line_and_nothing_is_started(world, arguments, line) -> None:
-    """The exit code is 2, and the mistake is found before a port is open."""
+    """The user gets one line and exit code 2, before the sidecar opens a port."""
     told = run("--driver=stub", f"--world={world}", "--control=127.0.0.1:0", *arguments)
 
     assert (told.returncode, told.stdout) == (2, "")
@@ -56,7 +56,7 @@ def test_a_mistake_is_one_line_and_nothing_is_started(world, arguments, line) ->
 
 
 def test_the_error_for_a_broken_world_has_line_and_column(tmp_path) -> None:
-    """Compilers also give line and column."""
+    """With line and column, an editor can open the place of the mistake."""
     world = tmp_path / "broken.wbt"
     world.write_text("#VRML_SIM R2023b utf8\nRobot { name \n}\n")
 
@@ -67,7 +67,7 @@ def test_the_error_for_a_broken_world_has_line_and_column(tmp_path) -> None:
 
 
 def test_the_simulator_gets_a_world_with_its_own_names(sidecar, tmp_path) -> None:
-    """The trainer reads the names from /state."""
+    """The trainer finds its robots by the names in /state, so these must be the names in the world."""
     program = "import sys\nprint('world', sys.argv[2])\nprint('up')\nsys.stdin.read()"
     it = sidecar(program, f"--work={tmp_path}/work", "--job=j", "--uid=u", "--replica=1", "--group=eval")
     identity = RunIdentity(job="j", uid="u", replica=1, group="eval", index=0)
@@ -80,7 +80,7 @@ def test_the_simulator_gets_a_world_with_its_own_names(sidecar, tmp_path) -> Non
 
 
 def test_without_a_job_the_world_runs_as_it_is(sidecar, waits, world) -> None:
-    """A user tries a simulator by hand in this way."""
+    """A user who tries a simulator by hand expects the robot names of the world file."""
     state = sidecar(waits).state
 
     assert state.world == str(world)
@@ -88,7 +88,7 @@ def test_without_a_job_the_world_runs_as_it_is(sidecar, waits, world) -> None:
 
 
 def test_a_world_that_ships_needs_no_path(sidecar, waits) -> None:
-    """A notebook starts with such a world."""
+    """A notebook names an included world without a path."""
     state = sidecar(waits, "--world=arena").state
 
     assert Path(state.world).name == "arena.wbt"
@@ -96,7 +96,7 @@ def test_a_world_that_ships_needs_no_path(sidecar, waits) -> None:
 
 
 def test_a_sidecar_may_end_with_its_standard_input(arguments, waits) -> None:
-    """A killed notebook cannot send a signal."""
+    """A notebook that is killed cannot send a signal, but the kernel closes its pipes."""
     command = arguments(waits, "--until-stdin-closes")
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
         process.stdout.readline()
@@ -107,7 +107,7 @@ def test_a_sidecar_may_end_with_its_standard_input(arguments, waits) -> None:
 
 
 def test_options_come_last_on_the_simulators_command_line(sidecar) -> None:
-    """The option may be repeated, keeps its order, and may begin with two dashes."""
+    """A simulator's option may occur several times, in order, and may begin with two dashes."""
     program = "import sys\nprint('got', sys.argv[2:])\nprint('up')\nsys.exit(0)"
     it = sidecar(program, "--option=--a=1", "--option=b c")
 
@@ -117,9 +117,9 @@ def test_options_come_last_on_the_simulators_command_line(sidecar) -> None:
 
 
 def test_a_simulator_has_its_signals_as_a_shell_would_give_them(sidecar) -> None:
-    """With an ignored SIGPIPE, as in Python, a simulator would write to a closed pipe for ever.
+    """With an ignored SIGPIPE, as in Python, a simulator would write to a closed pipe forever.
 
-    A signal that our parent ignores, as nohup ignores SIGHUP, stays ignored, as in a shell.
+    A signal that the sidecar's parent ignores, as nohup ignores SIGHUP, stays ignored, as in a shell.
     """
     it = sidecar(["sh", "-c", "grep -E '^Sig(Ign|Blk)' /proc/self/status; echo up; sleep 60"])
 
@@ -130,9 +130,9 @@ def test_a_simulator_has_its_signals_as_a_shell_would_give_them(sidecar) -> None
 
 
 def _ignored_around_us():
-    """Return the signals that this process ignored from its start.
+    """Return the mask of signals that this process has ignored since its start.
 
-    Python itself adds two.
+    Two signals that Python itself ignores are excluded.
     """
     (line,) = (
         line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith("SigIgn")
@@ -142,7 +142,7 @@ def _ignored_around_us():
 
 
 def test_a_simulator_gets_none_of_our_files(sidecar) -> None:
-    """A simulator with the reaper's pipe would keep itself alive."""
+    """A simulator with the reaper's pipe open would keep itself alive."""
     it = sidecar(["sh", "-c", "for fd in /proc/$$/fd/*; do readlink $fd; done; echo up; sleep 60"])
 
     it.start()

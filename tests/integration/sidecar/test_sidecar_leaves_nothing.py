@@ -1,4 +1,4 @@
-"""All processes that the simulator started end with it, and with the sidecar, however that ended."""
+"""All processes of a simulator end with the simulator or the sidecar, in whatever way either ends."""
 
 import http.client
 import os
@@ -18,7 +18,7 @@ IN_A_NAMESPACE = ["unshare", "--pid", "--fork", "--mount-proc", "--kill-child"]
 
 
 def namespaces_work():
-    """Return whether this machine allows us to be process 1."""
+    """Return whether this machine permits a new pid namespace."""
     if shutil.which("unshare") is None:
         return False
     return subprocess.run([*IN_A_NAMESPACE, "true"], capture_output=True, check=False).returncode == 0
@@ -28,10 +28,10 @@ as_process_1 = pytest.mark.skipif(not namespaces_work(), reason="no pid namespac
 
 
 def test_a_simulator_takes_its_family_along(sidecar, family, left, eventually_true) -> None:
-    """A child that left group, session, parent and environment is found like one that stayed."""
+    """A child process that has left the simulator's group and session, and lost its parent, must end too."""
     it = sidecar(family)
     it.start()
-    eventually_true(lambda: len(left()) == 6)  # sidecar, reaper, simulator, and three more
+    eventually_true(lambda: len(left()) == 6)  # sidecar, reaper, simulator and its three children
 
     it.request("/stop", {"deadline_s": 0})
     it.until(SidecarState.IDLE)
@@ -40,7 +40,7 @@ def test_a_simulator_takes_its_family_along(sidecar, family, left, eventually_tr
 
 
 def test_a_simulator_that_dies_takes_its_family_along(sidecar, family, left, eventually_true) -> None:
-    """Otherwise a worker would keep the ROS name and the graphics card."""
+    """A worker that stays would keep the ROS name and the graphics card."""
     it = sidecar(family)
     pid = it.start().pid
 
@@ -54,7 +54,7 @@ def test_a_simulator_that_dies_takes_its_family_along(sidecar, family, left, eve
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 @pytest.mark.parametrize("what", ["waits", "stubborn", "family"])
 def test_a_signal_ends_everything(sidecar, request, left, eventually_true, number, what) -> None:
-    """Where the machine is too busy, the sidecar ends by its alarm."""
+    """If the machine is too busy for the normal end, an alarm ends the sidecar."""
     it = sidecar(request.getfixturevalue(what))
     it.start()
 
@@ -63,20 +63,20 @@ def test_a_signal_ends_everything(sidecar, request, left, eventually_true, numbe
 
 
 def test_the_end_takes_less_than_two_seconds() -> None:
-    """The sidecars of a pod that stop last have only this time.
+    """Sidecars that stop last in a pod have only two seconds.
 
-    The simulator's SIGKILL comes first, and the alarm after it.
+    First the simulator gets SIGKILL, and later the alarm ends the sidecar.
     """
     assert SHUTDOWN_GRACE_S < SHUTDOWN_S < 2
 
 
 def test_a_signal_ends_a_sidecar_whose_simulator_does_not_run(sidecar, waits) -> None:
-    """There is no process to wait for."""
+    """Without a simulator, the sidecar has no process to wait for."""
     assert sidecar(waits).end() == 0
 
 
 def test_a_signal_during_a_stop_does_not_wait_for_its_deadline(sidecar, stubborn) -> None:
-    """The container must end sooner than the trainer's deadline."""
+    """The trainer may have set a long deadline, but the container must end soon."""
     it = sidecar(stubborn)
     it.start()
     it.request("/stop", {"deadline_s": 3600})
@@ -85,7 +85,7 @@ def test_a_signal_during_a_stop_does_not_wait_for_its_deadline(sidecar, stubborn
 
 
 def test_a_simulator_gets_the_chance_to_end_by_itself(sidecar, ends) -> None:
-    """SIGTERM comes first, because Webots' launcher then removes its temporary files."""
+    """After SIGTERM, Webots' launcher removes its temporary files, so SIGKILL must come later."""
     it = sidecar(
         ends("signal.signal(signal.SIGTERM, lambda *_: (print('bye'), sys.exit(0)))\nsignal.pause()")
     )
@@ -99,7 +99,7 @@ def test_a_simulator_gets_the_chance_to_end_by_itself(sidecar, ends) -> None:
 
 @pytest.mark.parametrize("what", ["waits", "stubborn", "family"])
 def test_a_killed_sidecar_leaves_no_process(sidecar, request, left, eventually_true, what) -> None:
-    """After SIGKILL it can do nothing, but the reaper sees the end of its pipe."""
+    """A killed sidecar cannot act, but its reaper notices the end of the pipe."""
     it = sidecar(request.getfixturevalue(what))
     it.start()
 
@@ -108,7 +108,7 @@ def test_a_killed_sidecar_leaves_no_process(sidecar, request, left, eventually_t
 
 
 def test_a_killed_reaper_is_a_fault_and_leaves_no_process(sidecar, family, left, eventually_true) -> None:
-    """The reaper's processes become children of the sidecar, which ends them and can start again."""
+    """The kernel makes the reaper's processes children of the sidecar, which must end them."""
     it = sidecar(family)
     it.start()
     (reaper,) = children({it.process.pid})
@@ -122,7 +122,7 @@ def test_a_killed_reaper_is_a_fault_and_leaves_no_process(sidecar, family, left,
 
 
 def test_a_sidecar_whose_log_nobody_reads_still_ends(arguments, ends, left, eventually_true) -> None:
-    """A full pipe blocks every write into it, and the alarm does not write."""
+    """A full pipe blocks every write, so the sidecar must be able to end without a write."""
     source, sink = os.pipe()
     program = "while True: print('x' * 1000)"
     process = subprocess.Popen(arguments(ends(program)), stdout=sink, stdin=subprocess.DEVNULL)
@@ -144,13 +144,13 @@ def test_a_sidecar_whose_log_nobody_reads_still_ends(arguments, ends, left, even
 
 @pytest.fixture
 def inside():
-    """Return a function that returns the outer id of a sidecar that is process 1 of a namespace."""
+    """Return a function that returns the outer pid of a sidecar that is process 1 in a namespace."""
     return lambda it: next(iter(children({it.process.pid})))
 
 
 @as_process_1
 def test_process_1_reaps_the_orphans_of_the_container(sidecar, waits, inside, eventually_true) -> None:
-    """Only process 1 can reap them, even those of a shell that a user opened in the container."""
+    """Only process 1 can reap orphans, such as those of a shell that a user opens in the container."""
     it = sidecar(waits, before=IN_A_NAMESPACE)
     it.start()
     before = children({inside(it)})
@@ -167,7 +167,7 @@ def test_process_1_reaps_the_orphans_of_the_container(sidecar, waits, inside, ev
 def test_process_1_ends_by_sigterm_as_any_other(
     sidecar, request, left, eventually_true, inside, what
 ) -> None:
-    """The kernel gives process 1 only the signals for which it has a handler."""
+    """The kernel delivers to process 1 only signals for which it has a handler."""
     it = sidecar(request.getfixturevalue(what), before=IN_A_NAMESPACE)
     it.start()
 

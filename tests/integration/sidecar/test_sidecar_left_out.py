@@ -1,4 +1,4 @@
-"""The parts of a world that a simulator leaves out, from its report to the sidecar's /state."""
+"""Nodes of a world that a simulator leaves out: the sidecar shows the simulator's report in /state."""
 
 import pytest
 
@@ -23,12 +23,12 @@ signal.pause()
 
 @pytest.fixture
 def named(tmp_path):
-    """Return the options for the names of a job, with a work folder."""
+    """Return options that give the simulators the names of a job, and a work folder."""
     return ("--job=j", f"--work={tmp_path / 'work'}")
 
 
 def test_the_state_has_what_the_simulator_left_out_once_it_is_ready(sidecar, named) -> None:
-    """Before that the report may not exist yet. The next start may have another report, or none."""
+    """The report may be missing before the simulator is ready, and may differ in the next start."""
     it = sidecar(REPORTS, *named)
     assert it.start().left_out == ()
 
@@ -43,7 +43,7 @@ def test_the_state_has_what_the_simulator_left_out_once_it_is_ready(sidecar, nam
 
 
 def test_a_standby_reports_for_itself(sidecar, named) -> None:
-    """The two may start at the same time."""
+    """Both simulators may start at the same time, so their reports need different files."""
     it = sidecar(REPORTS, *named, "--standby")
     it.request("/standby/start")
     it.until_said("b: up")
@@ -52,7 +52,7 @@ def test_a_standby_reports_for_itself(sidecar, named) -> None:
 
 
 def test_a_simulator_without_a_work_folder_is_not_asked(sidecar) -> None:
-    """Without the folder there is no place where a file can certainly be written."""
+    """Only the work folder is certainly writable, so without it no report is requested."""
     it = sidecar(UNASKED)
     it.start()
 

@@ -1,4 +1,4 @@
-"""The responses of the two ports, and the requests that they refuse."""
+"""The responses of the sidecar's two ports, and the requests that they refuse."""
 
 import re
 import socket
@@ -24,7 +24,7 @@ signal.pause()
 
 
 def raw(address, text):
-    """Return the first line of the response to bytes that need not be HTTP."""
+    """Send bytes, which need not be HTTP, and return the first line of the response."""
     host, port = address.split(":")
     with socket.create_connection((host, int(port)), 10) as connection:
         connection.sendall(text)
@@ -32,7 +32,7 @@ def raw(address, text):
 
 
 def test_health_answers_whatever_the_simulator_does(sidecar, ends) -> None:
-    """The liveness probe is for the sidecar; the trainer restarts a dead simulator."""
+    """The kubelet must not restart a healthy sidecar, because the trainer restarts a failed simulator."""
     it = sidecar(ends("sys.exit(1)"))
     it.request("/start")
     it.until(SidecarState.FAILED)
@@ -41,7 +41,7 @@ def test_health_answers_whatever_the_simulator_does(sidecar, ends) -> None:
 
 
 def test_a_driver_that_shows_nothing_says_so_on_both_ports(sidecar, waits) -> None:
-    """A person who asks to see it learns which drivers can be seen."""
+    """A user who opens the view learns which drivers support it."""
     it = sidecar(waits)
 
     answers = {
@@ -55,7 +55,7 @@ def test_a_driver_that_shows_nothing_says_so_on_both_ports(sidecar, waits) -> No
 
 
 def test_both_ports_tell_the_same_state(sidecar, waits) -> None:
-    """The trainer reads one port, users and the operator read the other."""
+    """The trainer reads one port, and users and the operator read the other."""
     it = sidecar(waits)
     it.start()
 
@@ -64,7 +64,7 @@ def test_both_ports_tell_the_same_state(sidecar, waits) -> None:
 
 @pytest.mark.parametrize("path", ["/start", "/ready", "/stop"])
 def test_the_health_port_takes_no_orders(sidecar, waits, path) -> None:
-    """Every client that reaches the pod can use this port."""
+    """Every client that can reach the pod can use this port."""
     it = sidecar(waits)
 
     status, _ = it.ask("POST", path, {"deadline_s": 0}, it.health)
@@ -74,7 +74,7 @@ def test_the_health_port_takes_no_orders(sidecar, waits, path) -> None:
 
 
 def test_the_metrics_count_starts_faults_and_states(sidecar, ends) -> None:
-    """All labels exist from the start, so that a rate of them is right."""
+    """All labels exist from the start, because Prometheus computes no rate for a new series."""
     it = sidecar(ends("os.kill(os.getpid(), signal.SIGBUS)"))
     it.request("/start")
     it.until(SidecarState.FAILED)
@@ -100,7 +100,7 @@ def test_the_metrics_count_starts_faults_and_states(sidecar, ends) -> None:
 
 
 def test_the_metrics_know_the_memory_of_the_whole_family(sidecar, family) -> None:
-    """A launcher is small, but the processes that it launched are not."""
+    """A launcher is small, but the processes that it starts are large."""
     it = sidecar(family)
     it.start()
 
@@ -108,18 +108,18 @@ def test_the_metrics_know_the_memory_of_the_whole_family(sidecar, family) -> Non
 
     (rss,) = re.findall(r"^palaestra_simulator_rss_bytes{slot=\"a\"} (\S+)$", text, re.MULTILINE)
     assert 'palaestra_simulator_up{slot="a"} 1.0' in text
-    assert float(rss) > 4 * 4e6  # room for four processes of Python
+    assert float(rss) > 4 * 4e6  # more than four Python processes need at least
 
 
 def test_the_metrics_know_the_processor_time_of_the_whole_family(sidecar) -> None:
-    """The time of ended processes is included, because it then belongs to their parent."""
+    """The kernel adds the time of ended processes to their parent, so the sum must include it."""
     it = sidecar(BUSY)
     it.start()
 
     _, text = it.ask("GET", "/metrics", address=it.health)
 
     (used,) = re.findall(r"^palaestra_simulator_cpu_seconds_total{slot=\"a\"} (\S+)$", text, re.MULTILINE)
-    assert 0.35 < float(used) < 1.0  # two times 0.2 s, in ticks of 0.01 s
+    assert 0.35 < float(used) < 1.0  # twice 0.2 s, in ticks of 0.01 s
 
 
 @pytest.mark.parametrize(
@@ -132,7 +132,7 @@ def test_the_metrics_know_the_processor_time_of_the_whole_family(sidecar) -> Non
     ],
 )
 def test_a_wrong_body_is_named_and_changes_nothing(sidecar, waits, body, error) -> None:
-    """The status is 400, so that no client takes the error for one of the state."""
+    """With status 400, no client takes the error for a refusal by the current state."""
     it = sidecar(waits)
     it.start()
 
@@ -158,7 +158,7 @@ def test_a_wrong_body_is_named_and_changes_nothing(sidecar, waits, body, error) 
     ],
 )
 def test_a_request_of_the_wrong_size_or_kind_is_refused(sidecar, waits, request_, status) -> None:
-    """The sidecar reads only what it needs."""
+    """The sidecar must not read or execute more than a valid request."""
     it = sidecar(waits)
 
     assert raw(it.control, request_).split()[1] == str(status)
@@ -166,7 +166,7 @@ def test_a_request_of_the_wrong_size_or_kind_is_refused(sidecar, waits, request_
 
 
 def test_many_silent_connections_do_not_take_the_port_away(sidecar, waits, eventually_true) -> None:
-    """The connections beyond the limit are closed and the others time out, so the port responds again."""
+    """The sidecar closes connections beyond its limit, and the others time out."""
     it = sidecar(waits)
     host, port = it.health.split(":")
     silent = [socket.create_connection((host, int(port)), 10) for _ in range(60)]
@@ -183,7 +183,7 @@ def test_many_silent_connections_do_not_take_the_port_away(sidecar, waits, event
 
 
 def test_a_port_in_use_is_one_clear_line_and_nothing_is_started(sidecar, arguments, waits) -> None:
-    """The exit code is 2, because another attempt cannot help."""
+    """A second attempt cannot help, so the exit code is 2."""
     taken = sidecar(waits).control
 
     second = subprocess.run(
@@ -198,7 +198,7 @@ def test_a_port_in_use_is_one_clear_line_and_nothing_is_started(sidecar, argumen
 
 
 def test_a_sidecar_is_small(sidecar, family) -> None:
-    """It takes less than 40 MB with its reaper, so that a laptop or a node can run many."""
+    """Sidecar and reaper need less than 40 MB, so that a laptop or a node can run many."""
     it = sidecar(family)
     it.start()
     it.ask("GET", "/metrics", address=it.health)

@@ -1,4 +1,4 @@
-"""The folder with the sidecar for users' own images contains only Python code and prometheus_client."""
+"""The folder with the sidecar for a user's own image contains only Python code and prometheus_client."""
 
 import shutil
 import subprocess
@@ -15,7 +15,7 @@ SIM_IMAGE = Path(__file__).parents[3] / "sim_image"
 
 @pytest.fixture
 def standalone(tmp_path):
-    """Return the folder that the image's own script makes of the wheel's packages."""
+    """Return the folder that the image's own script creates from the wheel's packages."""
     wheel = tomllib.loads((SIM_IMAGE / "pyproject.toml").read_text())["tool"]["hatch"]["build"]["targets"]
     installed = tmp_path / "installed"
     for package in wheel["wheel"]["packages"]:
@@ -30,7 +30,7 @@ def standalone(tmp_path):
 
 
 def test_the_sidecar_runs_from_a_copied_folder(standalone, sidecar, waits, tmp_path) -> None:
-    """It uses no environment, no installed package and no Python of the image."""
+    """The sidecar must need no environment and no installed package of the user's image."""
     moved = standalone.rename(tmp_path / "moved")
 
     it = sidecar(waits, before=("env", "-i"), executable=str(moved / "palaestra-sidecar"))
@@ -41,7 +41,7 @@ def test_the_sidecar_runs_from_a_copied_folder(standalone, sidecar, waits, tmp_p
 
 
 def test_the_folder_has_nothing_that_speaks_ros(standalone) -> None:
-    """A sidecar only starts and stops a process; every image of a simulator would contain the rest."""
+    """A sidecar only starts and stops a process, and other code would only enlarge every image."""
     packages = standalone / "lib/python3/dist-packages"
 
     assert {path.name.partition("-")[0] for path in packages.iterdir()} == {

@@ -1,4 +1,4 @@
-"""Two simulators in one sidecar, so that one can start while the other works: they share nothing."""
+"""Two independent simulators in one sidecar, so that one can start while the other works."""
 
 import json
 import os
@@ -18,20 +18,23 @@ FIRST, SECOND = "", "/standby"
 
 
 class Two:
-    """A sidecar with two simulators, each identified by the prefix of its paths."""
+    """A sidecar with two simulators; the prefix of the request paths selects one of them."""
 
     def __init__(self, sidecar, eventually) -> None:
         self.it = sidecar
         self._eventually = eventually
 
     def state(self, above, address=None):
-        """Return the state that it reports for one of them."""
+        """Return the state that the sidecar reports for one simulator."""
         status, text = self.it.ask("GET", f"{above}/state", address=address)
         assert status == 200, text
         return SimulatorState.from_json(json.loads(text))
 
     def start(self, above):
-        """Start one, and return its state once it has printed `up` and is known to run."""
+        """Start one simulator, and return its state.
+
+        The method waits until the simulator has printed `up` and the sidecar has noticed that it runs.
+        """
         line = {FIRST: "a: up", SECOND: "b: up"}[above]
         ups = self.it.lines.count(line) + 1
         self.it.request(f"{above}/start")
@@ -39,14 +42,14 @@ class Two:
         return self.state(above)
 
     def until(self, above, wanted):
-        """Return the state of one as soon as it is `wanted`."""
+        """Wait until one simulator is in the state `wanted`, and return the full state."""
         self._eventually(lambda: self.state(above).state is wanted)
         return self.state(above)
 
 
 @pytest.fixture
 def two(sidecar, tmp_path, eventually_true):
-    """Return a function that runs a sidecar whose two simulators are the same program."""
+    """Return a function that starts a sidecar whose two simulators are the same program."""
 
     def run(program):
         given = (f"--work={tmp_path}/work", "--job=j", "--uid=u", "--clock", "--standby")
@@ -56,9 +59,9 @@ def two(sidecar, tmp_path, eventually_true):
 
 
 def test_each_has_a_world_with_names_of_its_own(two, waits) -> None:
-    """Slot b needs another readable part and another hash.
+    """The name for slot b has another readable part and another hash.
 
-    With equal names each would remove the other from the ROS master.
+    With equal names, each simulator would remove the other from the ROS master.
     """
     it = two(waits)
 
@@ -71,7 +74,7 @@ def test_each_has_a_world_with_names_of_its_own(two, waits) -> None:
 
 
 def test_the_one_that_stands_by_keeps_no_clock(two, waits) -> None:
-    """Only one simulator per ROS master publishes /clock, even when both run."""
+    """Only one simulator per ROS master may publish /clock, even while both run."""
     it = two(waits)
 
     assert b"--clock" in Path(it.state(FIRST).world).read_bytes()
@@ -79,7 +82,7 @@ def test_the_one_that_stands_by_keeps_no_clock(two, waits) -> None:
 
 
 def test_each_is_started_and_stopped_by_itself(two, waits) -> None:
-    """The trainer decides which of them is in use; for the sidecar both are equal."""
+    """The trainer decides which simulator is in use, so the sidecar treats both in the same way."""
     it = two(waits)
 
     first, second = it.start(FIRST), it.start(SECOND)
@@ -94,7 +97,7 @@ def test_each_is_started_and_stopped_by_itself(two, waits) -> None:
 
 @pytest.mark.parametrize(("broken", "whole"), [(FIRST, SECOND), (SECOND, FIRST)])
 def test_one_that_dies_is_no_matter_of_the_other(two, waits, broken, whole) -> None:
-    """Each simulator has its own fault, its own count of faults, and its own next start."""
+    """A crash of one simulator must not change the state and the counts of the other."""
     it = two(waits)
     pid, other = it.start(broken).pid, it.start(whole).pid
 
@@ -110,7 +113,7 @@ def test_one_that_dies_is_no_matter_of_the_other(two, waits, broken, whole) -> N
 def test_a_killed_reaper_takes_its_own_simulator_along_and_no_other(
     two, family, left, eventually_true
 ) -> None:
-    """The sidecar inherits the simulator's processes. The other reaper is its child, but not an orphan."""
+    """The sidecar inherits the processes of one simulator, and must not end the other one's reaper."""
     it = two(family)
     sidecar = it.it.process.pid
     it.start(FIRST)
@@ -120,14 +123,14 @@ def test_a_killed_reaper_takes_its_own_simulator_along_and_no_other(
     os.kill(reaper, signal.SIGKILL)
     it.until(FIRST, FAILED)
 
-    eventually_true(lambda: len(left()) == 6)  # the sidecar, and reaper, simulator and three more
+    eventually_true(lambda: len(left()) == 6)  # sidecar; reaper, simulator and three children
     assert it.state(SECOND).state is STARTING
     assert len(children({sidecar})) == 1
 
 
 @pytest.mark.parametrize("what", ["waits", "stubborn", "family"])
 def test_a_signal_ends_both(two, request, left, eventually_true, what) -> None:
-    """A signal ends one simulator in the same way."""
+    """The end of the pod must end both simulators within the same time as one."""
     it = two(request.getfixturevalue(what))
     it.start(FIRST)
     it.start(SECOND)
@@ -137,7 +140,7 @@ def test_a_signal_ends_both(two, request, left, eventually_true, what) -> None:
 
 
 def test_a_killed_sidecar_leaves_neither(two, family, left, eventually_true) -> None:
-    """Each reaper sees the end of its own pipe."""
+    """The reaper of each simulator notices the end of its own pipe."""
     it = two(family)
     it.start(FIRST)
     it.start(SECOND)
@@ -148,7 +151,7 @@ def test_a_killed_sidecar_leaves_neither(two, family, left, eventually_true) -> 
 
 
 def test_the_log_says_whose_line_it_is(two, waits) -> None:
-    """Two simulators print at the same time."""
+    """Both simulators print at the same time, so each line needs the slot of its simulator."""
     it = two(waits)
 
     it.start(FIRST)
@@ -160,7 +163,7 @@ def test_the_log_says_whose_line_it_is(two, waits) -> None:
 
 
 def test_the_environment_of_a_simulator_has_its_slot(two) -> None:
-    """A program that needs its own port can choose it by the slot."""
+    """A program that needs a port of its own can choose the port by the slot."""
     it = two("import os; print('up', os.environ['PALAESTRA_SIMULATOR_SLOT'])")
 
     it.it.request("/start")
@@ -171,7 +174,7 @@ def test_the_environment_of_a_simulator_has_its_slot(two) -> None:
 
 
 def test_the_metrics_tell_the_two_apart(two, waits) -> None:
-    """A label separates them, which has only one value for a sidecar with one simulator."""
+    """A label names the simulator. For a sidecar with one simulator, the label always has the same value."""
     it = two(waits)
     it.start(SECOND)
 
@@ -185,7 +188,7 @@ def test_the_metrics_tell_the_two_apart(two, waits) -> None:
 
 
 def test_the_health_port_shows_both_and_takes_no_orders(two, waits) -> None:
-    """Users and the operator also see the standby."""
+    """Users and the operator must be able to see the standby, but not to control it."""
     it = two(waits)
     it.start(SECOND)
 
@@ -195,7 +198,7 @@ def test_the_health_port_shows_both_and_takes_no_orders(two, waits) -> None:
 
 
 def test_without_the_option_there_is_no_second_one(sidecar, waits) -> None:
-    """A trainer that expects a standby gets an error at once."""
+    """A trainer that expects a standby must get an error at once."""
     status, text = sidecar(waits).ask("GET", "/standby/state")
 
     assert status == 404
@@ -203,9 +206,9 @@ def test_without_the_option_there_is_no_second_one(sidecar, waits) -> None:
 
 
 def test_the_memory_of_a_simulator_is_reported_while_it_is_ready(sidecar, family) -> None:
-    """The figure is the memory of all processes of the simulator.
+    """The trainer needs the memory of all processes of the simulator to decide about recycling.
 
-    Before that, the state is read fifty times a second.
+    During a start, the trainer reads the state fifty times per second, so the figure is left out.
     """
     it = sidecar(family)
     before = it.start().rss_bytes
@@ -213,4 +216,4 @@ def test_the_memory_of_a_simulator_is_reported_while_it_is_ready(sidecar, family
     it.request("/ready")
 
     assert before is None
-    assert it.state.rss_bytes > 4 * 4e6  # room for four processes of Python
+    assert it.state.rss_bytes > 4 * 4e6  # more than four Python processes need at least

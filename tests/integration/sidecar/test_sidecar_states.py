@@ -1,4 +1,4 @@
-"""The states that other threads see of a simulator while its only owner changes it."""
+"""The states of a simulator that other threads see while its owner changes them."""
 
 import os
 import sys
@@ -14,7 +14,7 @@ from tests.integration.sidecar.conftest import DEADLINE_S, eventually
 
 
 class Watched(SupervisedSimulator):
-    """A simulator that records every state which others can see."""
+    """A simulator that records every state that other threads can see."""
 
     def __setattr__(self, name, value):
         super().__setattr__(name, value)
@@ -24,9 +24,9 @@ class Watched(SupervisedSimulator):
 
 @pytest.mark.parametrize("statement", ["sys.exit(0)", "os.kill(os.getpid(), signal.SIGKILL)"])
 def test_no_state_is_seen_half_made(statement) -> None:
-    """A trainer may read at any moment.
+    """The trainer may read the state at any time.
 
-    A failure is visible only together with how the simulator ended.
+    A failed state must always show how the simulator ended.
     """
     program = (sys.executable, "-I", "-S", "-c", f"import os, signal, sys; {statement}")
     simulator = Watched(

@@ -1,4 +1,4 @@
-"""All transitions from one state to another, with real processes."""
+"""All transitions between the states of a simulator, with real processes."""
 
 import json
 import os
@@ -12,14 +12,17 @@ IDLE, STARTING, READY, STOPPING, FAILED = SidecarState
 
 
 def test_a_sidecar_begins_idle_and_starts_nothing_by_itself(sidecar, waits) -> None:
-    """Only the trainer starts simulators, several at a time."""
+    """The trainer starts its simulators, because it starts several at the same time."""
     state = sidecar(waits).state
 
     assert (state.state, state.pid, state.starts, state.last_exit) == (IDLE, None, 0, None)
 
 
 def test_a_life_that_goes_well(sidecar, waits) -> None:
-    """The requests are start, ready, announced stop and exit, and each response has the new state."""
+    """The requests are start, ready and stop, and then the simulator ends.
+
+    Each response has the new state.
+    """
     it = sidecar(waits)
 
     pid = it.start().pid
@@ -34,7 +37,7 @@ def test_a_life_that_goes_well(sidecar, waits) -> None:
 
 
 def test_the_environment_of_a_simulator_has_the_number_of_its_start(sidecar) -> None:
-    """A simulator that fails by chance must not fail at the same step again and again."""
+    """A simulator that fails by chance must not fail at the same step in each life."""
     it = sidecar("import os; print('start', os.environ['PALAESTRA_SIMULATOR_START'])")
 
     it.request("/start")
@@ -45,12 +48,12 @@ def test_the_environment_of_a_simulator_has_the_number_of_its_start(sidecar) -> 
 
 
 def test_a_simulator_lets_a_trainer_on_its_processor_go_on(sidecar, waits) -> None:
-    """Otherwise a request would wake it, and it would interrupt the trainer before the next request."""
+    """With the normal scheduling policy, a simulator that gets a request would interrupt the trainer."""
     assert os.sched_getscheduler(sidecar(waits).start().pid) == os.SCHED_BATCH
 
 
 def test_a_start_is_answered_before_the_simulator_is_there(sidecar, waits) -> None:
-    """The trainer starts several at once and has a deadline for each."""
+    """The trainer starts several simulators at once, so a start request must not block."""
     state = sidecar(waits).request("/start")
 
     assert (state.state, state.starts) == (STARTING, 1)
@@ -68,7 +71,7 @@ def test_a_start_is_answered_before_the_simulator_is_there(sidecar, waits) -> No
     ],
 )
 def test_an_end_that_nobody_asked_for_is_a_fault(sidecar, ends, tmp_path, statement, how, ready) -> None:
-    """This holds for every exit code, and for both states: no simulator has a reason to end by itself."""
+    """A simulator has no reason to end by itself, so every exit code is a fault."""
     os.mkfifo(gate := tmp_path / "gate")
     it = sidecar(ends(f"open(sys.argv[1] + '/gate').read()\n{statement}"))
     it.start()
@@ -83,7 +86,7 @@ def test_an_end_that_nobody_asked_for_is_a_fault(sidecar, ends, tmp_path, statem
 
 
 def test_a_failure_says_how_it_ended_and_its_last_words(sidecar, ends) -> None:
-    """A trainer's /status and a job's message will show them."""
+    """The trainer's /status and a job's message show this text to a user."""
     it = sidecar(ends("sys.exit('cannot open display')"))
 
     it.request("/start")
@@ -92,7 +95,7 @@ def test_a_failure_says_how_it_ended_and_its_last_words(sidecar, ends) -> None:
 
 
 def test_a_simulator_that_failed_is_started_again(sidecar, ends, tmp_path) -> None:
-    """Only the counts of the first life stay."""
+    """After a failure, the counts continue, and the rest of the state starts afresh."""
     it = sidecar(ends("os._exit(4) if not os.path.exists(p := sys.argv[1] + '/again') else signal.pause()"))
     it.request("/start")
     it.until(FAILED)
@@ -104,7 +107,7 @@ def test_a_simulator_that_failed_is_started_again(sidecar, ends, tmp_path) -> No
 
 
 def test_a_stopped_simulator_is_started_again_with_a_new_process(sidecar, waits) -> None:
-    """A recycled simulator needs this."""
+    """Recycling stops and starts a simulator, and the sidecar must be able to do so."""
     it = sidecar(waits)
     first = it.start().pid
     it.request("/stop", {"deadline_s": 0})
@@ -129,7 +132,7 @@ def test_a_second_start_is_refused_and_starts_nothing(sidecar, waits) -> None:
 
 @pytest.mark.parametrize(("path", "body"), [("/ready", {}), ("/stop", {"deadline_s": 1})])
 def test_what_an_idle_simulator_cannot_do_is_refused(sidecar, waits, path, body) -> None:
-    """The response is the state, so that the trainer sees the cause."""
+    """The refusal contains the state, so that the trainer sees the cause."""
     it = sidecar(waits)
 
     status, text = it.ask("POST", path, body)
@@ -139,7 +142,7 @@ def test_what_an_idle_simulator_cannot_do_is_refused(sidecar, waits, path, body)
 
 
 def test_a_stop_with_no_time_kills_at_once(sidecar, stubborn) -> None:
-    """A simulator that hangs does not react to other signals."""
+    """A simulator that hangs does not react to SIGTERM."""
     it = sidecar(stubborn)
     it.start()
 
@@ -149,7 +152,7 @@ def test_a_stop_with_no_time_kills_at_once(sidecar, stubborn) -> None:
 
 
 def test_a_stop_kills_when_its_deadline_has_passed(sidecar, stubborn) -> None:
-    """Before that it waits for the trainer's supervisor to end the simulation."""
+    """Until the deadline, the simulator may end by the request of the trainer's supervisor."""
     it = sidecar(stubborn)
     it.start()
 
@@ -160,7 +163,7 @@ def test_a_stop_kills_when_its_deadline_has_passed(sidecar, stubborn) -> None:
 
 
 def test_a_second_stop_brings_the_deadline_forward(sidecar, stubborn) -> None:
-    """The trainer saw that the supervisor does not respond either."""
+    """The trainer sets a second deadline when it sees that the supervisor does not respond."""
     it = sidecar(stubborn)
     it.start()
     it.request("/stop", {"deadline_s": 3600})
@@ -171,7 +174,7 @@ def test_a_second_stop_brings_the_deadline_forward(sidecar, stubborn) -> None:
 
 
 def test_a_second_stop_does_not_put_the_deadline_off(sidecar, stubborn) -> None:
-    """Another client relies on the first deadline."""
+    """The client that set the first deadline relies on that deadline."""
     it = sidecar(stubborn)
     it.start()
     it.request("/stop", {"deadline_s": 0.2})
@@ -182,7 +185,7 @@ def test_a_second_stop_does_not_put_the_deadline_off(sidecar, stubborn) -> None:
 
 
 def test_a_program_that_cannot_be_run_is_a_fault_with_its_reason(sidecar, tmp_path) -> None:
-    """It existed when the sidecar checked, but it was not a program."""
+    """The file exists when the sidecar checks the command line, but it is not executable code."""
     broken = tmp_path / "broken"
     broken.write_bytes(b"\x7fELF, almost")
     broken.chmod(0o755)

@@ -1,4 +1,4 @@
-"""The driver webots, with a program that looks for controllers as Webots does."""
+"""The driver webots, with a program that looks for controllers in the same folders as Webots."""
 
 import os
 import sys
@@ -14,7 +14,8 @@ WORLD = """#VRML_SIM R2023b utf8
 Robot { name "robotino" controller "ros" supervisor TRUE }
 Robot { name "ball" controller "roll" }
 """
-# Source: WbRobot.cpp, updateControllerDir: controllers/<name> next to the world's folder, else <generic>.
+# Webots looks in controllers/<name> next to the world's folder, and otherwise uses <generic>.
+# Source: WbRobot.cpp, updateControllerDir.
 WEBOTS = f"""#!{os.path.realpath(sys.executable)} -ISu
 import pathlib, signal, sys
 world = next(pathlib.Path(option) for option in sys.argv if option.endswith(".wbt"))
@@ -27,7 +28,7 @@ signal.pause()
 
 @pytest.fixture
 def webots(run_sidecar, tmp_path):
-    """Return a function that runs a sidecar with driver webots on the world `source/worlds/arena.wbt`."""
+    """Return a function that starts a sidecar with driver webots and the world `source/worlds/arena.wbt`."""
     program = tmp_path / "bin" / "webots"
     program.parent.mkdir()
     program.write_text(WEBOTS)
@@ -50,7 +51,7 @@ def webots(run_sidecar, tmp_path):
 
 @pytest.fixture
 def roll(tmp_path):
-    """Write the controller `roll` into the project of the world."""
+    """Write the controller `roll` into the Webots project of the world."""
     path = tmp_path / "source" / "controllers" / "roll" / "roll.py"
     path.parent.mkdir(parents=True)
     path.write_text("roll.py")
@@ -58,7 +59,7 @@ def roll(tmp_path):
 
 @pytest.mark.usefixtures("roll")
 def test_webots_finds_the_controllers_of_the_project(webots) -> None:
-    """This also holds after a restart of the simulator and of the container."""
+    """The controllers must be found again after a restart of the simulator or of the container."""
     it = webots("--job=j")
     it.start()
     it.request("/stop", {"deadline_s": 0})
@@ -76,7 +77,7 @@ def test_webots_finds_the_controllers_of_the_project(webots) -> None:
 
 @pytest.mark.usefixtures("roll")
 def test_webots_finds_them_for_a_standby_as_well(webots) -> None:
-    """Both simulators have their worlds in one project."""
+    """The worlds of both simulators are in one copy of the project."""
     it = webots("--job=j", "--standby")
 
     it.request("/start")
@@ -87,9 +88,9 @@ def test_webots_finds_them_for_a_standby_as_well(webots) -> None:
 
 
 def test_a_controller_without_a_project_is_named_once(webots) -> None:
-    """One line after the addresses names it, because programs read the addresses.
+    """The user gets one warning after the line with the addresses, which programs read first.
 
-    Webots warns about it at every start, if at all.
+    Webots itself would warn at every start, or not at all.
     """
     it = webots("--job=j", "--standby")
     it.request("/start")
@@ -101,7 +102,7 @@ def test_a_controller_without_a_project_is_named_once(webots) -> None:
 
 
 def test_a_world_for_ros_gets_the_name_and_the_option_that_it_lacks(webots) -> None:
-    """Most worlds for the ros controller have neither."""
+    """Most worlds for the ros controller have neither a ROS name nor `--synchronize`."""
     it = webots("--job=j", "--uid=u")
 
     state = it.state

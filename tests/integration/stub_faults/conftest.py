@@ -1,4 +1,4 @@
-"""Stubs that fail, and Palaestra's own robot as the client that has to handle it."""
+"""Stubs with faults, and Palaestra's own robot as their client."""
 
 import os
 import subprocess
@@ -17,17 +17,17 @@ from palaestra_trainer.ros import Master, RosService
 from palaestra_trainer.webots import Mode, Webots
 from palaestra_trainer.webots.launching.local_simulator import ProcessLauncher
 
-DEADLINE_S = 60.0  # the work takes moments, but the machine may be busy
+DEADLINE_S = 60.0  # the waits take moments on an idle machine
 STUB = Path(sys.executable).with_name("palaestra-stub")
 ARENA = Path(__file__).parents[3] / "sim_image/src/palaestra_sim/worlds/arena.wbt"
 
 
 class Player:
-    """A simulator with faults, run by a sidecar, and the robot in it.
+    """A simulator with faults in a sidecar, and the robot in it.
 
     Attributes:
-        fault: the facade's error for the first failure; None if nothing failed.
-        durations_s: of the steps with a response.
+        fault: the facade's error at the first failure, or None if no failure occurred.
+        durations_s: the durations of all steps with a response.
         extra_steps: the number of extra steps among them.
     """
 
@@ -42,7 +42,7 @@ class Player:
         self.memory_mib = []
 
     def play(self, episodes=26, steps=2):
-        """Start, run episodes until something fails, and connect once more."""
+        """Start the simulator, run episodes until a failure occurs, and connect once more."""
         try:
             self.start()
             for number in range(episodes):
@@ -61,7 +61,7 @@ class Player:
         self.memory_mib.append(self.resident_mib())
 
     def step(self):
-        """Take one step, and record how long it took."""
+        """Take one step, and record its duration."""
         began = time.monotonic()
         self.extra_steps += self.robot.advance()
         self.robot.pose()
@@ -69,7 +69,7 @@ class Player:
         self.memory_mib.append(self.resident_mib())
 
     def resident_mib(self):
-        """Return the memory of the simulator's first process."""
+        """Return the resident memory, in MiB, of the simulator's first process."""
         pages = int(Path(f"/proc/{self.pid}/statm").read_text().split()[1])
         return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
 
@@ -79,7 +79,7 @@ class Player:
         return self.launcher.state().pid
 
     def ended(self):
-        """Wait for the end of the simulator, and return its exit code or its signal."""
+        """Wait for the end of the simulator, and return its exit code or the name of its signal."""
         self.launcher.wait_stopped(DEADLINE_S)
         last = self.launcher.state().last_exit
         return last.code if last.signal is None else last.signal
@@ -93,9 +93,9 @@ class Player:
 
 @pytest.fixture
 def player(master):
-    """Yield `player("crash:step=20", ...)`, which returns a Player.
+    """Yield `player("crash:step=20", ...)`, which returns a `Player`.
 
-    By default the simulator is in its first life.
+    By default, the simulator is in its first life.
     """
     del master
     made = []
@@ -111,10 +111,10 @@ def player(master):
 
 
 class Stubs:
-    """Stubs without a sidecar, with a name that no other test has left at the master.
+    """Starts stubs without a sidecar; no other test has registered their name at the master.
 
     Attributes:
-        name: of their robot.
+        name: the name of their robot.
     """
 
     def __init__(self, master, folder):
@@ -127,22 +127,22 @@ class Stubs:
         self._started = []
 
     def __call__(self, *options, **variables):
-        """Start a stub."""
+        """Start a stub, and return the process."""
         command = [STUB, *options, self._world]
         environment = {**self._variables, **variables}
         self._started.append(subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True))
         return self._started[-1]
 
     def service(self, path, type_name):
-        """Return one of its services."""
+        """Return a service of the stubs' robot."""
         return RosService(f"/{self.name}/{path}", f"webots_ros/{type_name}")
 
     def registered(self):
-        """Return whether the master knows its services."""
+        """Return whether the master lists a service of the robot."""
         return Master("/test").service_address(f"/{self.name}/robot/get_time") is not None
 
     def close(self):
-        """Kill the processes that still run."""
+        """Kill the stubs that still run."""
         for process in self._started:
             process.kill()
             process.communicate()
@@ -152,7 +152,7 @@ class Stubs:
 def stub(master, tmp_path):
     """Yield `stub("--fault=...", PALAESTRA_SIMULATOR_START="2")`, which starts a process.
 
-    It is killed when the test ends.
+    The process is killed at the end of the test.
     """
     stubs = Stubs(master, tmp_path)
     yield stubs

@@ -1,4 +1,4 @@
-"""The stub's process with faults: how it ends, when it does not start, and what it does not change."""
+"""A stub's process with faults: how it ends, when it does not start, and what it leaves unchanged."""
 
 import os
 import signal
@@ -13,7 +13,7 @@ from tests.waiting import eventually
 
 
 def up(process):
-    """Wait for the line about the running controllers, which comes after the one about faults."""
+    """Wait for the line about running controllers, which follows the line about faults."""
     lines = iter(process.stderr.readline, "")
     assert any("arena.wbt: faulty_" in line for line in lines)
 
@@ -36,7 +36,7 @@ def is_stopped(pid):
     ],
 )
 def test_the_sidecar_sees_the_end_that_was_ordered(player, fault, how):
-    """A user reads it in the log, and the operator uses it to recognize a crash."""
+    """A user reads the exit code or signal in the log, and the operator recognizes a crash by it."""
     played = player(fault).play(episodes=1)
 
     assert played.ended() == how
@@ -44,7 +44,7 @@ def test_the_sidecar_sees_the_end_that_was_ordered(player, fault, how):
 
 
 def test_the_step_that_is_named_is_the_first_that_is_not_answered(player):
-    """A test can then say which transition is lost."""
+    """The author of a test must know which transition is lost."""
     played = player("crash:step=5")
     played.start()
     for _ in range(4):
@@ -55,7 +55,7 @@ def test_the_step_that_is_named_is_the_first_that_is_not_answered(player):
 
 
 def test_24_resets_go_well_and_the_next_ends_in_a_bus_error(player):
-    """The paper reports this for its simulator."""
+    """The paper reports this behavior of its simulator."""
     played = player("crash:signal=SIGBUS,reset=25").play()
 
     assert played.scene.resets == 25
@@ -63,7 +63,7 @@ def test_24_resets_go_well_and_the_next_ends_in_a_bus_error(player):
 
 
 def test_steps_are_counted_anew_after_a_restart(player):
-    """A fault at a step occurs in each life."""
+    """A fault at a step occurs in each life of the simulator."""
     played = player("crash:step=4").play(episodes=2)
     played.webots.stop()
     answered = len(played.durations_s)
@@ -78,7 +78,7 @@ def test_steps_are_counted_anew_after_a_restart(player):
 
 
 def test_a_simulator_that_never_starts_is_tried_again_in_vain(player):
-    """Each start is refused, and the error says so."""
+    """The error must show that each start was refused."""
     played = player("start_refused")
     for _ in range(2):
         with pytest.raises(SimulatorDead, match="code 1"):
@@ -88,7 +88,7 @@ def test_a_simulator_that_never_starts_is_tried_again_in_vain(player):
 
 
 def test_one_start_can_be_refused_and_the_next_allowed(stub):
-    """The sidecar counts the starts."""
+    """The sidecar counts the starts and passes the number to the stub."""
     refused = stub("--fault=start_refused:start=1", PALAESTRA_SIMULATOR_START="1")
 
     assert refused.wait(20) == 1
@@ -99,7 +99,7 @@ def test_one_start_can_be_refused_and_the_next_allowed(stub):
 
 
 def test_a_slow_start_can_be_ended_at_once(stub):
-    """During the wait, SIGTERM still ends it properly."""
+    """During a slow start, SIGTERM must end the stub properly."""
     process = stub("--fault=slow_start:latency_ms=60000", "--fault-life=1")
     assert "faults: slow_start:latency_ms=60000 (seed 0, life 1)" in process.stderr.readline()
 
@@ -110,7 +110,7 @@ def test_a_slow_start_can_be_ended_at_once(stub):
 
 
 def test_a_hanging_process_is_stopped_and_can_be_continued(player):
-    """After SIGCONT the step continues, so that a late end of a hang can also be tested."""
+    """After SIGCONT the step completes, so a test can also cover a hang that ends."""
     played = player("hang:step=2")
     played.start()
     played.step()
@@ -125,7 +125,7 @@ def test_a_hanging_process_is_stopped_and_can_be_continued(player):
 
 
 def test_names_that_are_lost_are_gone_while_the_process_lives(stub):
-    """Open connections continue to work."""
+    """Connections that are already open must continue to work."""
     process = stub("--fault=names_lost:step=1")
     up(process)
     get_time = stub.service("robot/get_time", "get_float")
@@ -141,7 +141,7 @@ def test_names_that_are_lost_are_gone_while_the_process_lives(stub):
 
 
 def test_memory_grows_up_to_its_limit(player):
-    """The process really uses it, so a container's limit would end it."""
+    """The process must really use the memory, so that a container's limit can end it."""
     played = player("memory_growth:mib=10,most_mib=60")
     played.start()
     before = played.memory_mib[-1]
@@ -153,7 +153,7 @@ def test_memory_grows_up_to_its_limit(player):
 
 
 def test_the_environment_orders_faults_for_a_job(stub):
-    """`spec.simulators[].env` reaches the stub through its sidecar."""
+    """`spec.simulators[].env` of a job reaches the stub through the sidecar."""
     process = stub(
         PALAESTRA_STUB_FAULTS="crash:step=9 \n hang:step=8",
         PALAESTRA_STUB_FAULT_SEED="7",
@@ -176,7 +176,7 @@ def test_the_environment_orders_faults_for_a_job(stub):
     ],
 )
 def test_what_is_written_wrongly_is_refused_before_anything_starts(stub, text, words):
-    """A fault that never happens would look as if the code could handle it."""
+    """If a wrong fault were ignored, its author would believe that the code survives it."""
     process = stub(f"--fault={text}")
 
     _, said = process.communicate(timeout=20)
@@ -187,7 +187,7 @@ def test_what_is_written_wrongly_is_refused_before_anything_starts(stub, text, w
 
 
 def test_without_a_count_the_life_is_drawn_and_printed(stub):
-    """A restarted process must not repeat the same faults, and a run must be repeatable."""
+    """Two processes must not have the same faults, but a printed life can be repeated."""
     first, second = (stub("--fault=crash:probability=0.5").stderr.readline() for _ in range(2))
 
     assert "drawn" in first
@@ -195,28 +195,28 @@ def test_without_a_count_the_life_is_drawn_and_printed(stub):
 
 
 def steps_of_a_life(played):
-    """Return the number of steps in one long episode before a simulator dies."""
+    """Return the number of steps until a simulator fails in one long episode, and stop it."""
     played.play(episodes=1, steps=400)
     played.webots.stop()
     return len(played.durations_s)
 
 
 def test_lives_do_not_end_at_the_same_step(player):
-    """A crash by chance occurs at another step in each life, however often the simulator is restarted."""
+    """A simulator that always crashed at the same step would never pass that step."""
     lengths = [steps_of_a_life(player("crash:probability=0.05", life=life)) for life in (1, 2, 3)]
 
     assert len(set(lengths)) == 3
 
 
 def test_a_life_can_be_repeated(player):
-    """The same life of the same simulator with the same seed has the same faults."""
+    """The same seed and life must give the same faults, so that a user can repeat a failure."""
     lengths = [steps_of_a_life(player("crash:probability=0.05", life=2)) for _ in range(2)]
 
     assert lengths[0] == lengths[1]
 
 
 def test_the_end_by_a_fault_leaves_no_core_file(stub, tmp_path):
-    """A work folder is small, and nobody looks into it."""
+    """A work folder is small, and core files would fill it."""
     process = stub("--fault=crash:step=1")
     up(process)
     step = stub.service("robot/time_step", "set_int")

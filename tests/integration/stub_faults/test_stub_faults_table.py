@@ -1,4 +1,4 @@
-"""The table of faults in docs/reference/faults.md: each line occurs, with the report in the table."""
+"""Each fault in the table of docs/reference/faults.md occurs, and Palaestra reports it as the table says."""
 
 import re
 from pathlib import Path
@@ -16,13 +16,13 @@ DELAY_S = 0.05
 
 
 def rows():
-    """Return the lines of the table as fault and report."""
+    """Return fault and report of each row of the table, as parameters."""
     text = PAGE.read_text().partition("## The kinds")[2].partition("## When")[0]
     return [pytest.param(row["fault"], row["report"], id=row["fault"]) for row in ROW.finditer(text)]
 
 
 def test_the_table_names_every_kind_of_the_language():
-    """Users must find every kind of fault in the table."""
+    """A user must find every kind of fault in the table."""
     written = {row.values[0].partition(":")[0] for row in rows()}
 
     assert written == set(KINDS)
@@ -30,7 +30,7 @@ def test_the_table_names_every_kind_of_the_language():
 
 @pytest.mark.parametrize(("fault", "report"), rows())
 def test_palaestra_reports_a_fault_as_the_table_says(player, fault, report):
-    """The author of another client can compare it with this table line by line."""
+    """The author of another client can test that client against this table, row by row."""
     played = player(fault).play()
 
     kind = None if played.fault is None else played.fault.kind

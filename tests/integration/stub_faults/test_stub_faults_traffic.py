@@ -1,4 +1,4 @@
-"""The requests, responses and messages of a stub with faults, as a client sees them."""
+"""The responses and messages that a client gets from a stub with faults."""
 
 import math
 import select
@@ -13,12 +13,12 @@ from tests.integration.stub_faults.conftest import DEADLINE_S
 from tests.waiting import eventually
 
 PERIOD_MS = 192
-SLOW_MS = 3000  # so long that all other requests are faster, on a busy machine
+SLOW_MS = 3000  # so long that all other requests are faster
 
 
 @pytest.fixture
 def connected(player):
-    """Yield `connected("slow:...")`, which returns a started Player and a function for its services."""
+    """Yield `connected("slow:...")`, which returns a started `Player` and a function for its services."""
     services = []
 
     def make(*faults):
@@ -37,7 +37,7 @@ def connected(player):
 
 
 def test_everything_else_waits_behind_a_slow_step(connected):
-    """Webots locks a mutex while it steps, so a slow step looks to clients like a busy simulator."""
+    """Webots holds a mutex during a step, so all clients wait for a slow step."""
     _, service = connected("slow:latency_ms=300,step=1")
     step, get_time = service("robot/time_step", "set_int"), service("robot/get_time")
     get_time(ask=True)
@@ -50,7 +50,7 @@ def test_everything_else_waits_behind_a_slow_step(connected):
 
 
 def test_only_its_own_client_waits_for_a_slow_service(connected):
-    """The service does not block the controller."""
+    """A slow service must not delay the controller."""
     _, service = connected(f"slow:service=robot/get_model,latency_ms={SLOW_MS}")
     get_model, get_time = service("robot/get_model", "get_string", DEADLINE_S), service("robot/get_time")
     get_time(ask=True)
@@ -62,7 +62,7 @@ def test_only_its_own_client_waits_for_a_slow_service(connected):
 
 
 def test_a_service_that_hangs_leaves_the_others_alone(connected):
-    """A new connection to this service also hangs."""
+    """A second connection to this service must hang too, and other services must respond."""
     played, service = connected("hang:service=robot/get_model")
     for _ in range(2):
         with pytest.raises(SimulatorHung):
@@ -73,7 +73,7 @@ def test_a_service_that_hangs_leaves_the_others_alone(connected):
 
 
 def test_one_call_can_go_wrong(connected):
-    """The first and the third call do not fail."""
+    """Only the second call has the fault, so a test can choose the call."""
     _, service = connected("wrong_value:service=robot/get_basic_time_step,call=2,value=inf")
     ask = service("robot/get_basic_time_step")
 
@@ -81,7 +81,7 @@ def test_one_call_can_go_wrong(connected):
 
 
 def test_numbers_inside_of_an_answer_go_wrong_too(connected):
-    """A position is a point, whose numbers are one level deeper."""
+    """The numbers of a position are one level deeper in the response."""
     _, service = connected("wrong_value:service=supervisor/node/get_position,value=-inf")
     node = service("supervisor/get_from_def", "supervisor_get_from_def")(name="ROBOTINO").node
 
@@ -91,7 +91,7 @@ def test_numbers_inside_of_an_answer_go_wrong_too(connected):
 
 
 def test_an_answer_cut_short_cannot_be_read(connected):
-    """Its frame is complete, so the stream stays in step and the next response is right."""
+    """The frame is complete, so the client can read the next response."""
     _, service = connected("wrong_shape:service=robot/get_basic_time_step,call=1")
     ask = service("robot/get_basic_time_step")
 
@@ -101,7 +101,7 @@ def test_an_answer_cut_short_cannot_be_read(connected):
 
 
 def test_a_message_cut_short_cannot_be_read(connected):
-    """A reader that decodes only the last bytes of a message must also check its length."""
+    """A reader that decodes only the last bytes of a message must also check the length."""
     _, service = connected("wrong_shape:topic=ir1/value,step=1")
     subscriber = RosSubscriber("/robotino/ir1/value", "sensor_msgs/Range")
     subscriber.connect()
@@ -116,7 +116,7 @@ def test_a_message_cut_short_cannot_be_read(connected):
 
 
 def test_late_messages_come_after_newer_ones(connected):
-    """The order of a topic then differs from the order of the steps, as with a slow subscriber."""
+    """With a slow subscriber, too, messages may arrive in another order than the steps."""
     _, service = connected(f"late:topic=ir1/value,latency_ms={SLOW_MS},step=1")
     subscriber = RosSubscriber("/robotino/ir1/value", "sensor_msgs/Range", deadline_s=DEADLINE_S)
     subscriber.connect()
@@ -148,7 +148,7 @@ def test_messages_of_other_sensors_are_left_alone(connected):
 
 
 def test_a_client_that_gave_up_a_slow_step_does_not_block_the_next(connected):
-    """Its step is not made, and the robot is free again."""
+    """The stub must drop the step of the client that left, and serve the next client."""
     _, service = connected("slow:latency_ms=500,step=1")
     impatient = service("robot/time_step", "set_int", deadline_s=0.1)
     with pytest.raises(SimulatorHung):
@@ -159,7 +159,7 @@ def test_a_client_that_gave_up_a_slow_step_does_not_block_the_next(connected):
 
 
 def test_two_clients_are_served_after_a_slow_step(connected):
-    """Each client that waited gets a response, in order."""
+    """Each waiting client must get its response after the step."""
     _, service = connected("slow:latency_ms=300,step=1")
     step = service("robot/time_step", "set_int")
     answers = []
@@ -178,7 +178,7 @@ def test_two_clients_are_served_after_a_slow_step(connected):
 
 
 def test_a_subscriber_that_has_gone_is_listed_no_more(connected, master):
-    """Once, `rosnode info` of a stub with faults listed every subscriber since its start."""
+    """`rosnode info` must not list the subscribers that have disconnected."""
     connected("lost:topic=ir1/value,every=20")
     with xmlrpc.client.ServerProxy(master) as names:
         node = xmlrpc.client.ServerProxy(names.lookupNode("/test", "/robotino")[2])

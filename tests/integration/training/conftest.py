@@ -1,4 +1,4 @@
-"""Runs on fakes: in this process, or as a separate program, which has to import PyTorch first."""
+"""Trainings with fake simulators, in this process or in a separate program that imports PyTorch first."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ROLES = {"collect-0": "Collect", "collect-1": "Collect", "evaluate-0": "Evaluate
 
 @pytest.fixture(scope="session")
 def fakes() -> ModuleType:
-    """Return the module with the fake simulators, which is also a program."""
+    """Return the module of the fake simulators, which is also a program."""
     spec = importlib.util.spec_from_file_location("fakes", PROGRAM)
     assert spec
     assert spec.loader
@@ -36,7 +36,7 @@ def fakes() -> ModuleType:
 
 @pytest.fixture
 def write_job(tmp_path):
-    """Return a function that writes a training.yaml; the test gives the fields that matter."""
+    """Return a function that writes a training.yaml; a test passes only the fields that it needs."""
 
     def write(*, collectors: int = 1, **changes: Any) -> Path:
         groups = [("collect", "Collect", index) for index in range(collectors)]
@@ -62,9 +62,9 @@ def write_job(tmp_path):
 
 @pytest.fixture
 def play(fakes, tmp_path, monkeypatch, capsys):
-    """Return a function that runs an attempt in this process and returns its exit code and log.
+    """Return a function that runs an attempt in this process and returns exit code and log.
 
-    The first simulator dies at its steps `deaths`. At its step `at`, this process gets a signal.
+    The first simulator dies at the steps `deaths`. At its step `at`, this process gets the signal `number`.
     """
     monkeypatch.setenv("PALAESTRA_TERMINATION_LOG", str(tmp_path / "word"))
     configure_logs()
@@ -83,7 +83,7 @@ def play(fakes, tmp_path, monkeypatch, capsys):
 
 @pytest.fixture
 def start(tmp_path):
-    """Yield a function that starts the program on a configuration, and kill the programs at the end."""
+    """Yield a function that starts the program with a configuration; all programs are killed at the end."""
     started = []
 
     def begin(job: Path, deaths: str = "") -> subprocess.Popen[str]:
@@ -108,9 +108,9 @@ def start(tmp_path):
 
 @pytest.fixture
 def simulators(master, tmp_path, monkeypatch):
-    """Yield the sidecars of a job with two collecting simulators and one evaluating simulator.
+    """Yield the sidecars of a job with two collecting simulators and one for evaluation.
 
-    PALAESTRA_CONFIG names the job.
+    The variable PALAESTRA_CONFIG names the job's file.
     """
     del master
     launchers = {

@@ -1,8 +1,8 @@
-"""A trainer whose simulators are fakes in its own process: `fakes.py CONFIG RUN [DEATHS]`.
+"""A trainer whose simulators are fakes in the same process: `fakes.py CONFIG RUN [DEATHS]`.
 
-It is `palaestra-train` with other simulators, so that tests can use a real process for signals, exit codes
-and resumed runs. DEATHS are the numbers of the steps, separated by commas, at which `collect-0` dies. With 0
-it does not even start.
+Tests run it as a real process for signals, exit codes and resumed runs. It differs from `palaestra-train`
+only in its simulators. DEATHS are the numbers of steps, separated by commas, at which `collect-0` dies. With
+0, `collect-0` does not start.
 """
 
 from __future__ import annotations
@@ -27,18 +27,18 @@ from palaestra_trainer.testing import fake_arena, fake_seeing
 
 
 class CountedResets(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """An environment that counts its resets."""
+    """An environment that counts its resets, because a fake reports them."""
 
     resets = 0
 
     def reset(self, **options: Any) -> Any:
-        """Count the reset."""
+        """Count the reset, and reset the environment."""
         self.resets += 1
         return super().reset(**options)
 
 
 class FakeSimulator:
-    """A member of a run, without a simulator."""
+    """A member of a run that simulates the task without a simulator."""
 
     def __init__(self, name: str, configuration: Configuration, deaths: Collection[int]) -> None:
         self.name = name
@@ -51,14 +51,14 @@ class FakeSimulator:
 
     @property
     def resets(self) -> int:
-        """Return the resets since the last restart."""
+        """Return the number of resets since the last restart."""
         return self.env.resets
 
     def due(self, episodes: int = 1) -> None:
-        """Do nothing, because a fake does not wear out."""
+        """Return None, because a fake needs no recycling."""
 
     def start(self) -> None:
-        """Start, or never become ready."""
+        """Start, or wait until `abandon` if the fake is to hang."""
         self.log.append("start")
         if self._hangs:
             sys.stderr.write("never comes up\n")
@@ -74,13 +74,13 @@ class FakeSimulator:
         self.log.append("close")
 
     def restart(self) -> None:
-        """Begin another life."""
+        """Restart the robot, and count resets from 0."""
         self.log.append("restart")
         self.robot.restart()
         self.env.resets = 0
 
     def abandon(self) -> None:
-        """End the start, which then fails."""
+        """End a start that hangs; `start` then raises an error."""
         self._abandoned.set()
 
     def pause(self) -> None:
@@ -93,7 +93,7 @@ class FakeSimulator:
 
 
 def make_members(configuration: Configuration, deaths: Collection[int] = ()) -> list[FakeSimulator]:
-    """Return a fake for each simulator; the first one dies at `deaths`."""
+    """Return a fake for each simulator of a job; the first one dies at the steps `deaths`."""
     first = configuration.simulators[0].name
     return [
         FakeSimulator(entry.name, configuration, deaths if entry.name == first else ())
@@ -102,7 +102,7 @@ def make_members(configuration: Configuration, deaths: Collection[int] = ()) -> 
 
 
 def before_step(robot: Any, step: int, act: Callable[[], Any]) -> None:
-    """Make a robot call `act` before the given step, counted from 1; with 0 it never does."""
+    """Make a robot call `act` before a step, counted from 1; with `step=0`, never."""
     steps, advance = itertools.count(1), robot.advance
     robot.advance = lambda: (next(steps) == step and act(), advance())[1]
 

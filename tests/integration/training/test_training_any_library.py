@@ -1,4 +1,4 @@
-"""Loops of other libraries on real stubs that crash: all steps are done, and no row is invalid."""
+"""Training loops of other libraries complete all steps with stubs that crash, and get only valid rows."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ while True:
 
 @pytest.fixture
 def stubs(master, monkeypatch):
-    """Return a function that gives stubs the faults of the test, as in a notebook.
+    """Return a function that sets the faults of the stubs that a notebook starts.
 
-    The faults are the same ones each time.
+    The seed is fixed, so the faults are the same in each run.
     """
     del master
     monkeypatch.delenv("PALAESTRA_CONFIG", raising=False)
@@ -46,7 +46,7 @@ def stubs(master, monkeypatch):
 
 
 class Checked(gymnasium.vector.VectorWrapper):
-    """A vector environment that checks all rows, and counts steps and episodes that a fault ended."""
+    """A vector environment that checks all rows, and counts steps and episodes ended by a fault."""
 
     def __init__(self, env):
         super().__init__(env)
@@ -70,7 +70,7 @@ class Checked(gymnasium.vector.VectorWrapper):
 
 @pytest.mark.parametrize("script", ["ppo_in_one_file.py", "skrl_ppo.py"])
 def test_a_loop_of_another_library_survives_crashes(stubs, script, monkeypatch, tmp_path, capsys):
-    """The loop is unmodified: it accepts an environment, and knows nothing about simulators."""
+    """An author's loop knows only the interface of environments, and must not need a change."""
     stubs("crash:probability=0.02")
     make, made = palaestra_trainer.make_vec_env, []
     monkeypatch.setattr(
@@ -88,7 +88,7 @@ def test_a_loop_of_another_library_survives_crashes(stubs, script, monkeypatch, 
 
 
 def test_stable_baselines3_survives_crashes(stubs):
-    """The library's own check examines every number."""
+    """Stable-Baselines3's own wrapper checks every number for NaN."""
     stubs("crash:probability=0.02")
     env = palaestra_trainer.make_sb3_vec_env(TASK, 2, max_steps=30)
     try:
@@ -103,7 +103,7 @@ def test_stable_baselines3_survives_crashes(stubs):
 
 @pytest.mark.filterwarnings("ignore:.*different from the unwrapped version")
 def test_the_checkers_accept_an_environment_of_one_simulator(stubs):
-    """The checkers of gymnasium and Stable-Baselines3 run on a real stub."""
+    """Users run the checkers of gymnasium and Stable-Baselines3 on their environments."""
     stubs("")
     env = palaestra_trainer.make_env(TASK)
     try:
@@ -115,7 +115,7 @@ def test_the_checkers_accept_an_environment_of_one_simulator(stubs):
 
 @pytest.mark.usefixtures("stubs")
 def test_an_environment_without_a_name_needs_a_job():
-    """In a notebook nothing else names the environment."""
+    """In a notebook, no job names the environment, so the error must say what to pass."""
     with pytest.raises(
         ConfigurationError, match="environment: none was given, and PALAESTRA_CONFIG is not set"
     ):
@@ -127,9 +127,9 @@ def test_an_environment_without_a_name_needs_a_job():
 
 
 def test_the_simulators_of_a_job_are_used_and_released(simulators):
-    """The environment uses all collecting simulators and no evaluating one.
+    """An environment uses all collecting simulators, and leaves the evaluating one to another environment.
 
-    After `close` another environment may have them.
+    After `close`, another environment can use the simulators.
     """
     envs = palaestra_trainer.make_vec_env()
     envs.reset(seed=1)
@@ -145,12 +145,12 @@ def test_the_simulators_of_a_job_are_used_and_released(simulators):
 
 
 def test_ctrl_c_ends_everything_that_was_started(stubs):
-    """A simulator that stays would keep a core busy."""
+    """A simulator that stays would keep a processor busy."""
     stubs("")
     with subprocess.Popen(
         [sys.executable, "-c", LOOP], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as program:
-        assert "steps\n" in iter(program.stdout.readline, "")  # after the log lines of a busy machine
+        assert "steps\n" in iter(program.stdout.readline, "")  # on a busy machine, log lines come first
         started = [pid for pid, _ in below(program.pid) if pid != program.pid]
         program.send_signal(signal.SIGINT)
         _, said = program.communicate(timeout=PATIENCE_S)

@@ -1,4 +1,4 @@
-"""An interrupted and resumed run is equal to an uninterrupted one, bit for bit, on fakes."""
+"""A run that is interrupted and resumed equals an uninterrupted run, bit by bit, with fake simulators."""
 
 from __future__ import annotations
 
@@ -28,28 +28,28 @@ SMALL = {"policy_kwargs": {"net_arch": [16]}}
 OFF_POLICY = SMALL | {"learning_starts": 50, "batch_size": 16, "buffer_size": 300}
 ON_POLICY = SMALL | {"learning_rate": "lin_1e-3"}
 ALGORITHMS = {
-    # The target network changes during a rollout; epsilon and learning rate change with progress.
+    # The target network changes during a rollout, and epsilon and the learning rate change with progress.
     "DQN": OFF_POLICY | {"exploration_fraction": 0.7},
     "PPO": ON_POLICY | {"n_steps": 64, "batch_size": 16, "n_epochs": 2},
     "A2C": ON_POLICY,
-    # Another optimizer learns its entropy coefficient.
+    # SAC has a second optimizer, for its entropy coefficient.
     "SAC": OFF_POLICY,
     "REINFORCE": ON_POLICY | {"episodes_per_update": 2},
 }
 
 
 def terminate():
-    """Interrupt the run at any point."""
+    """Interrupt the run with SIGTERM."""
     os.kill(os.getpid(), signal.SIGTERM)
 
 
 def lose_the_master():
-    """End the run during a rollout; it saves its last complete state."""
+    """End the run during a rollout; it then saves its last complete state."""
     raise MasterLost("gone")
 
 
 def kill():
-    """End the run suddenly."""
+    """End the run without a checkpoint."""
     raise ZeroDivisionError("as good as a kill")
 
 
@@ -57,14 +57,14 @@ INTERRUPTIONS = {terminate: 75, lose_the_master: 75, kill: 1}
 
 
 class Listening(Progress):
-    """A display that keeps step, return and length of each episode."""
+    """A progress display that records step, return and length of each episode."""
 
     def __init__(self, configuration):
         super().__init__(configuration.steps, [(it.name, it.role) for it in configuration.simulators])
         self.ended = []
 
     def collected(self, step, infos):
-        """Keep the episodes that ended in this step."""
+        """Record the episodes that ended in this step."""
         super().collected(step, infos)
         self.ended += [(step, *(info["episode"][key] for key in "rl")) for info in infos if "episode" in info]
 
@@ -73,8 +73,8 @@ class Listening(Progress):
 def attempt(fakes):
     """Return a function that runs one attempt and returns its exit code.
 
-    It calls `interrupt` at one step of the first robot. `episodes` becomes those up to the checkpoint from
-    which the attempt began, and the attempt's own.
+    The function calls `interrupt` at one step of the first robot. It removes from `episodes` those after the
+    checkpoint from which the attempt starts, and appends the attempt's own episodes.
     """
     configure_logs()
 
@@ -98,7 +98,7 @@ def attempt(fakes):
 
 
 def tensors(path):
-    """Return every tensor of a model and its optimizers by name, and the statistics of its normalization."""
+    """Return all tensors of a model and its optimizers by name, and the statistics of its normalization."""
     _, parameters, variables = load_from_zip_file(path, device="cpu", load_data=False)
 
     def walk(name, value):
@@ -115,7 +115,7 @@ def tensors(path):
 
 
 def outcome(directory):
-    """Return the results of a run by name: all data that its next step uses, and its evaluations."""
+    """Return, by name, the evaluations of a run and all data that its next step would use."""
     found = checkpoint.newest(directory.checkpoints)
     state = json.loads((found.path / "state.json").read_text())
     for episode in state["episodes"]:
@@ -128,14 +128,14 @@ def outcome(directory):
 
 
 def differences(one, other):
-    """Return the names of the data that differ between two runs."""
+    """Return the names of the results in which two runs differ."""
     this, that = outcome(one), outcome(other)
     return [name for name in this.keys() | that.keys() if this.get(name) != that.get(name)]
 
 
 @pytest.fixture
 def job(write_job):
-    """Return a function that writes the job of a short run of an algorithm."""
+    """Return a function that writes the job of a short run with an algorithm."""
 
     def write(name, collectors=1, actions="discrete", normalize=None, **hyperparameters):
         options = {"max_steps": 30, "actions": "continuous" if name == "SAC" else actions}
@@ -155,10 +155,10 @@ def job(write_job):
 @pytest.mark.parametrize("collectors", [1, 2])
 @pytest.mark.parametrize("name", ALGORITHMS)
 def test_an_interrupted_run_is_the_run_that_was_not(attempt, job, tmp_path, name, collectors):
-    """A signal, the loss of the master and a kill interrupt runs at random points.
+    """A signal, the loss of the ROS master and a kill interrupt the run at random steps.
 
-    The test compares returns, evaluations, parameters, optimizers, experience and random generators, to the
-    last bit.
+    Returns, evaluations, parameters, optimizers, experience and random generators must be equal to the last
+    bit.
     """
     whole, parts = RunDirectory(tmp_path / "whole"), RunDirectory(tmp_path / "parts")
     points = random.Random(f"{name} {collectors}")
@@ -185,7 +185,7 @@ def test_an_interrupted_run_is_the_run_that_was_not(attempt, job, tmp_path, name
     ],
 )
 def test_what_a_run_normalizes_by_goes_on_where_it_was(attempt, job, tmp_path, name, collectors, normalize):
-    """The statistics change with every step, also during a rollout that is repeated."""
+    """The statistics change at every step, even during a rollout that is repeated after a resume."""
     whole, parts = RunDirectory(tmp_path / "whole"), RunDirectory(tmp_path / "parts")
     normalizing = job(name, collectors, normalize=normalize)
     ended, played = [], []
@@ -202,9 +202,9 @@ def test_what_a_run_normalizes_by_goes_on_where_it_was(attempt, job, tmp_path, n
 
 @pytest.mark.parametrize("name", ALGORITHMS)
 def test_an_update_that_takes_too_long_is_left_in_its_middle(attempt, job, tmp_path, name):
-    """A signal does not wait minutes for an update; its changes so far are undone.
+    """The end of the pod must not wait minutes for an update, so the update is aborted and undone.
 
-    The signal comes in the second gradient step of an optimizer that makes many, and no further step follows.
+    The signal arrives in the second of many gradient steps, and no further gradient step follows.
     """
     whole, parts = RunDirectory(tmp_path / "whole"), RunDirectory(tmp_path / "parts")
     asked_at = 1 if name in {"A2C", "REINFORCE"} else 2
@@ -228,7 +228,7 @@ def test_an_update_that_takes_too_long_is_left_in_its_middle(attempt, job, tmp_p
 
 @pytest.mark.parametrize("name", ["DQN", "SAC"])
 def test_the_first_update_of_a_run_may_be_left_too(attempt, job, tmp_path, name):
-    """Before an off-policy run learns, its updates take no time, which says nothing about the first one."""
+    """An off-policy run has no measured time for its first update, and must not wait for it either."""
     whole, parts = RunDirectory(tmp_path / "whole"), RunDirectory(tmp_path / "parts")
     thorough = job(name, gradient_steps=4)
     ended, played, steps = [], [], itertools.count(1)
@@ -250,7 +250,7 @@ def test_the_first_update_of_a_run_may_be_left_too(attempt, job, tmp_path, name)
 
 @pytest.mark.parametrize("name", ["PPO", "SAC"])
 def test_state_dependent_exploration_goes_on_with_its_noise(attempt, job, tmp_path, name):
-    """The noise is drawn once per rollout, before the boundary."""
+    """The noise is drawn once at the start of a rollout, so a resumed rollout needs the same noise."""
     whole, parts = RunDirectory(tmp_path / "whole"), RunDirectory(tmp_path / "parts")
     noisy = job(name, actions="continuous", use_sde=True, sde_sample_freq=7)
 

@@ -1,4 +1,4 @@
-"""The script `examples/own_training_script.py`, on fakes."""
+"""The script `examples/own_training_script.py` with fake simulators."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SCRIPT = Path(__file__).parents[3] / "examples" / "own_training_script.py"
 
 
 class Hall(gymnasium.Env):
-    """An environment with only the two arguments that it needs, without role or reward."""
+    """An environment that accepts only robot and scene, and neither role nor reward."""
 
     observation_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
     action_space = spaces.Discrete(2)
@@ -29,14 +29,14 @@ class Hall(gymnasium.Env):
         self._steps = 0
 
     def reset(self, *, seed=None, options=None):
-        """Return the only observation."""
+        """Reset the step count, and return an observation of zeros."""
         del options
         super().reset(seed=seed)
         self._steps = 0
         return np.zeros(2, np.float32), {}
 
     def step(self, action):
-        """End after five steps."""
+        """Take a step; the episode ends after five."""
         del action
         self._steps += 1
         return np.zeros(2, np.float32), 1.0, self._steps == 5, False, {}
@@ -52,9 +52,9 @@ def hall():
 
 @pytest.fixture
 def script(write_job, fakes, tmp_path, monkeypatch):
-    """Yield a function that runs the script with two simulators and one for evaluation.
+    """Yield a function that runs the script with two collecting simulators and one for evaluation.
 
-    It returns the names of the simulators that the script started.
+    The function returns the names of the simulators that the script started.
     """
     before = signal.getsignal(signal.SIGTERM)
     (tmp_path / "run").mkdir()
@@ -81,7 +81,7 @@ def script(write_job, fakes, tmp_path, monkeypatch):
 
 
 def test_a_script_of_one_s_own_trains_in_the_configured_simulators(script, tmp_path, capsys):
-    """It needs only gymnasium, Stable-Baselines3 and the two variables."""
+    """The script needs only gymnasium, Stable-Baselines3 and two environment variables."""
     started = script("first")
 
     assert PPO.load(tmp_path / "run" / "model.zip").num_timesteps == 1024
@@ -90,14 +90,14 @@ def test_a_script_of_one_s_own_trains_in_the_configured_simulators(script, tmp_p
 
 
 def test_a_script_of_one_s_own_trains_in_an_environment_without_reward_and_role(script, hall, capsys):
-    """Users copy the script, so it must accept any environment that the built-in loop accepts."""
+    """Users copy the script, so it must accept every environment that the built-in loop accepts."""
     script("first", environment={"id": hall})
 
     assert "mean return 5.00 over 4 episodes" in capsys.readouterr().out
 
 
 def test_a_script_that_is_interrupted_goes_on_from_its_model(script, tmp_path, capsys):
-    """Its exit code requests a restart, which would be useless if the script lost its work."""
+    """Exit code 75 requests a restart, and the script must then not begin at step 0."""
     with pytest.raises(SystemExit) as ended:
         script("first", on_start=lambda: os.kill(os.getpid(), signal.SIGTERM))
     first = PPO.load(tmp_path / "run" / "model.zip").num_timesteps

@@ -1,4 +1,4 @@
-"""A policy leaves its run as one file, which acts like the policy in the run."""
+"""An exported policy is one file, and its actions equal those of the policy in its run."""
 
 import json
 import os
@@ -37,9 +37,9 @@ CASES = {
 
 @pytest.fixture
 def trained(write_job, play, tmp_path):
-    """Return a function that trains a short run and returns its run directory.
+    """Return a function that trains a short run and returns the run directory.
 
-    The arguments change fields of the usual job.
+    Its keywords are fields of the job.
     """
 
     def run(**changes):
@@ -52,7 +52,7 @@ def trained(write_job, play, tmp_path):
 
 @pytest.mark.parametrize("case", CASES)
 def test_onnxruntime_acts_as_the_policy_in_the_environment(trained, case):
-    """The observations here come from the environment, while the export compares a thousand random ones."""
+    """The export compares random observations, but a robot sees those of an environment."""
     run = trained(**CASES[case])
 
     written = exporting.export(run, "onnx")
@@ -71,7 +71,7 @@ def test_onnxruntime_acts_as_the_policy_in_the_environment(trained, case):
 
 
 def test_the_data_sheet_explains_numbers_actions_and_origin(trained):
-    """The file alone describes the policy's input, its units, and its success."""
+    """A user who has only the file must learn the inputs, their units and the success rate."""
     run = trained(**CASES["PPO"])
 
     written = exporting.export(run, "onnx")
@@ -97,7 +97,7 @@ def test_the_data_sheet_explains_numbers_actions_and_origin(trained):
 
 
 def test_safetensors_have_the_names_of_the_policy_and_its_normalizer(trained):
-    """A user can then load them into the same network elsewhere."""
+    """A user can load the tensors by name into the same network in another program."""
     run = trained(**CASES["PPO"])
 
     written = exporting.export(run, "safetensors", run / "of my own.safetensors")
@@ -111,9 +111,9 @@ def test_safetensors_have_the_names_of_the_policy_and_its_normalizer(trained):
 
 
 def test_a_file_that_acts_differently_is_not_written(trained, monkeypatch):
-    """A converter's fault ends here and not on a robot.
+    """The export must detect an error of a converter before the policy reaches a robot.
 
-    The earlier file stays.
+    An earlier file stays unchanged.
     """
     run = trained(**CASES["A2C"])
     (run / "policy.onnx").write_bytes(b"before")
@@ -132,7 +132,7 @@ def test_a_file_that_acts_differently_is_not_written(trained, monkeypatch):
 
 
 def test_the_program_prints_where_the_file_is(trained, capsys):
-    """The output is JSON, for scripts."""
+    """A script reads the path and the largest difference as JSON."""
     run = trained(**CASES["A2C"])
 
     assert export([str(run), "--to", "safetensors"]) == 0
@@ -143,14 +143,14 @@ def test_the_program_prints_where_the_file_is(trained, capsys):
 
 
 def test_a_folder_without_a_model_is_refused(tmp_path, capsys):
-    """The error gives the remedy, and the exit code is that of wrong input."""
+    """The user gets the remedy, and the exit code for wrong input."""
     assert export([str(tmp_path), "--to", "onnx"]) == 2
 
     assert "model.zip: does not exist; train first" in capsys.readouterr().err
 
 
 def test_the_example_drives_a_simulated_robot_without_pytorch(trained):
-    """It uses onnxruntime and the robot's facades; the process never imports the library that trained."""
+    """The user's robot needs only onnxruntime and the facades, and not the library of the training."""
     written = exporting.export(trained(**CASES["PPO"]), "onnx")
     environment = {name: value for name, value in os.environ.items() if not name.startswith("ROS_")}
     alone = (

@@ -1,4 +1,4 @@
-"""Runs with hindsight experience replay, on fakes."""
+"""Runs with hindsight experience replay, on fake simulators."""
 
 from __future__ import annotations
 
@@ -41,9 +41,9 @@ def job(write_job):
 
 @pytest.fixture
 def attempt(fakes, tmp_path):
-    """Return a function that runs one attempt into a folder.
+    """Return a function that runs one attempt in a folder.
 
-    A signal comes at step `at` of the first robot.
+    At step `at` of the first robot, this process gets SIGTERM.
     """
 
     def play(job, folder, at=0, deaths=(90, 150)):
@@ -59,7 +59,7 @@ def attempt(fakes, tmp_path):
 
 
 def digests(directory):
-    """Return the step of the newest checkpoint and the digests of its experience."""
+    """Return the step of the newest checkpoint, and the digests of its replay buffer."""
     newest = checkpoint.newest(directory.checkpoints)
     files = newest.manifest.files
     return newest.manifest.step, {name: files[name] for name in files if name.startswith("experience")}
@@ -67,7 +67,7 @@ def digests(directory):
 
 @pytest.mark.parametrize(("name", "more"), [("DQN", {}), ("SAC", {}), ("DQN", {"normalize": {}})])
 def test_a_run_with_hindsight_survives_faults_and_ends(job, attempt, name, more):
-    """It has several members, of which one dies twice; its model is one of Stable-Baselines3."""
+    """One of two simulators dies twice, and the model can be loaded afterwards."""
     algorithm = {"name": name, "hyperparameters": HINDSIGHT} | more
     code, directory = attempt(job(name, algorithm=algorithm), "run")
 
@@ -77,16 +77,16 @@ def test_a_run_with_hindsight_survives_faults_and_ends(job, attempt, name, more)
         ("achieved_goal", "desired_goal"), np.zeros(2, np.float32)
     )
     assert code == 0
-    # Two simulators take two steps at once, but only one step while one of them restarts.
+    # Two simulators take two steps at once; while one of them restarts, only one step is counted.
     assert (summary["faults"], summary["steps"]) in {(2, 500), (2, 501)}
     assert policy.predict(seen)[0].shape == (() if name == "DQN" else (3,))
 
 
 @pytest.mark.parametrize("at", [20, 77, 120, 201])
 def test_an_interrupted_run_ends_as_one_that_was_not(job, attempt, at):
-    """The signal comes before the end of the first episode, during episodes, or after the buffer is full.
+    """The signal arrives before the end of the first episode, during episodes, or after the buffer is full.
 
-    The ends are equal, bit for bit.
+    The results must be equal, bit by bit.
     """
     written = job(steps=600, evaluation={"everySteps": 300, "episodes": 2, "confirmEpisodes": 0})
 
@@ -100,7 +100,7 @@ def test_an_interrupted_run_ends_as_one_that_was_not(job, attempt, at):
 
 
 def test_a_task_without_goals_is_refused(job, play):
-    """The error comes before a simulator starts."""
+    """The author must get the error before a simulator starts."""
     plain = {"id": "MoveToTargetEnv-v0", "options": {}}
 
     code, log = play(job(environment=plain))

@@ -1,4 +1,4 @@
-"""Signals that arrive before a run handles them, or after its end."""
+"""Signals before a run can handle them, and after its end."""
 
 import subprocess
 import sys
@@ -20,7 +20,7 @@ with leaving_when_asked():
 
 
 def test_a_trainer_that_is_asked_to_end_before_its_run_begins_was_interrupted():
-    """The imports take seconds, and an eviction during them must not count as a failure of the trainer."""
+    """Imports take seconds, and an eviction at that time must not count as a failure of the trainer."""
     ended = subprocess.run(
         [sys.executable, "-c", ASKED_DURING_IMPORTS], capture_output=True, text=True, check=False
     )
@@ -30,7 +30,7 @@ def test_a_trainer_that_is_asked_to_end_before_its_run_begins_was_interrupted():
 
 
 def test_a_trainer_that_is_asked_to_end_after_its_run_keeps_its_exit_code():
-    """Python needs a second to exit, and a finished run must not count as a killed one."""
+    """Python needs a second to exit, and a completed run must not count as killed."""
     ended = subprocess.run([sys.executable, "-c", ASKED_AT_EXIT], capture_output=True, text=True, check=False)
 
     assert ended.returncode == 0, ended.stderr

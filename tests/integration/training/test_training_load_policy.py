@@ -1,4 +1,4 @@
-"""A trained policy, loaded for use outside of its run."""
+"""A trained policy can be loaded and used outside of its run."""
 
 import zipfile
 
@@ -25,7 +25,7 @@ PPO = {"name": "PPO", "hyperparameters": {"n_steps": 64, "batch_size": 32, "n_ep
 def test_a_loaded_policy_acts_on_raw_observations_as_it_did_in_its_run(
     write_job, play, fakes, tmp_path, normalize
 ):
-    """It uses the options of its environment, and normalizes them as plain Stable-Baselines3 would not."""
+    """The loaded policy must normalize observations, which plain Stable-Baselines3 would not do."""
     algorithm = PPO if normalize is None else PPO | {"normalize": normalize}
     job = write_job(algorithm=algorithm, steps=128)
     assert play(job)[0] == 0
@@ -47,7 +47,7 @@ def test_a_loaded_policy_acts_on_raw_observations_as_it_did_in_its_run(
 
 
 def test_a_policy_that_sees_is_trained_and_loaded(write_job, play, tmp_path):
-    """The test goes from a job with images to actions, with the small network."""
+    """A user trains with images and the small network, loads the policy, and gets valid actions."""
     environment = {"id": "SeeTarget-v0", "options": {"frames": 3, "max_steps": 20}}
     job = write_job(environment=environment, algorithm=PPO | {"cnn": "small"}, steps=128)
     assert play(job)[0] == 0
@@ -63,10 +63,10 @@ def test_a_policy_that_sees_is_trained_and_loaded(write_job, play, tmp_path):
 
 @pytest.fixture
 def stored_by_value(write_job, play, tmp_path):
-    """Train with a network that the file holds as byte code, as one that nobody can import by its name.
+    """Return a function that trains a model whose file contains a network's class as byte code.
 
-    The model has the small network and a schedule. The file names Python `version` as its writer; None keeps
-    the true one.
+    A class that no module defines is stored in this way. With `version`, the file names this version of
+    Python as its writer.
     """
     cloudpickle.register_pickle_by_value(small_cnn)
 
@@ -89,14 +89,14 @@ def stored_by_value(write_job, play, tmp_path):
 
 
 def test_byte_code_is_read_by_the_python_that_wrote_it(stored_by_value):
-    """The Python that trained can execute the byte code."""
+    """The version of Python that trained can execute the byte code."""
     model = load_policy(stored_by_value()).model
 
     assert type(model.policy.features_extractor).__name__ == "SmallCnn"
 
 
 def test_a_network_of_another_python_is_refused_with_the_remedy(stored_by_value):
-    """The file lacks its name, so nothing else could take its place."""
+    """No module defines the network's class, so the user needs that version of Python or an export."""
     fact = (
         r"model\.zip: policy_kwargs has byte code of Python 3\.99, and this .*; use Python 3\.99, or export"
     )
@@ -106,7 +106,7 @@ def test_a_network_of_another_python_is_refused_with_the_remedy(stored_by_value)
 
 
 def test_a_policy_of_a_wrapped_environment_brings_the_wrappers(write_job, play, tmp_path):
-    """Without the wrappers it would receive observations that it has never seen, or that do not fit."""
+    """Without the wrappers, the policy's observations would differ from those in training."""
     wrapper = {"name": "gymnasium.wrappers:ClipReward", "options": {"max_reward": 0.5}}
     environment = {"id": "MoveToTargetEnv-v0", "wrappers": [wrapper], "frameStack": 2}
     assert play(write_job(environment=environment, algorithm=PPO, steps=128))[0] == 0
@@ -120,6 +120,6 @@ def test_a_policy_of_a_wrapped_environment_brings_the_wrappers(write_job, play, 
 
 
 def test_a_folder_without_a_model_is_refused(tmp_path):
-    """The error gives the remedy."""
+    """The user must learn that a training comes first."""
     with pytest.raises(ConfigurationError, match=r"model.zip: does not exist; train first"):
         load_policy(tmp_path)

@@ -1,4 +1,4 @@
-"""Runs in an environment from the author, on fakes."""
+"""Runs in an environment of the job's author, with fake simulators."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ PPO = {"name": "PPO", "hyperparameters": {"n_steps": 64, "batch_size": 32, "n_ep
 
 @pytest.fixture
 def train(write_job, play, tmp_path, monkeypatch):
-    """Yield a function that trains in a hall whose class the test writes, and returns exit code and log."""
+    """Yield a function that writes an environment, trains in it, and returns exit code and log."""
     monkeypatch.syspath_prepend(str(tmp_path))
 
     def run(arguments="robot, scene", seen="self.SEEN", number=0, **changes):
@@ -56,7 +56,7 @@ def train(write_job, play, tmp_path, monkeypatch):
 
 
 def test_an_own_environment_without_reward_trains(train):
-    """The included environments have this argument, but another one need not have it."""
+    """The included environments accept `reward`, but an author's environment need not."""
     code, log = train()
 
     assert code == 0, log
@@ -73,7 +73,7 @@ def test_an_own_environment_without_reward_trains(train):
     ids=["signature", "shape", "dtype", "range"],
 )
 def test_a_wrong_environment_ends_the_run_with_2(train, arguments, seen, fact):
-    """Another attempt cannot help, and one line is clearer than four tracebacks."""
+    """A retry cannot help, and the author reads one line instead of tracebacks."""
     code, log = train(arguments, seen)
 
     assert code == 2, log
@@ -83,7 +83,7 @@ def test_a_wrong_environment_ends_the_run_with_2(train, arguments, seen, fact):
 
 
 def test_nan_from_an_own_environment_names_it_and_ends_the_run_with_81(train):
-    """Four restarts of a working simulator would not help."""
+    """The simulator works, so its restart would not help. The author must see which value is NaN."""
     code, log = train(seen="np.array([0.0, np.nan], np.float32)")
 
     assert code == 81, log
@@ -95,7 +95,7 @@ def test_nan_from_an_own_environment_names_it_and_ends_the_run_with_81(train):
     ("arguments", "name"), [("robot, scene", "PPO"), ("robot", "PPO"), ("scene, size=1", "RecurrentPPO")]
 )
 def test_its_policy_is_used_as_the_page_shows(train, tmp_path, arguments, name):
-    """The block of the page works for environments without `simulator`, and without a scene."""
+    """The page's code must work for environments without the argument `simulator`, and without a scene."""
     [block] = [text for text in blocks(PAGE.read_text(), "python") if "def drive(" in text]
     code, log = train(arguments, algorithm=PPO | {"name": name})
     typed = {}

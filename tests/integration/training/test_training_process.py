@@ -1,6 +1,6 @@
-"""A trainer as a process: signals, exit codes, resumed runs.
+"""Signals, exit codes and resumed runs of a trainer.
 
-Where a test kills the trainer, it starts a separate process; elsewhere it runs the same program in this one.
+A test that kills the trainer starts a separate process; other tests run the same code in this process.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ REINFORCE = {"name": "REINFORCE", "hyperparameters": {"episodes_per_update": 2}}
 
 
 def await_line(process, word):
-    """Read the process's log up to a line with `word`."""
+    """Read the log of a process up to a line that contains `word`, and return the line."""
     for line in process.stderr:
         if word in line:
             return line
@@ -28,13 +28,13 @@ def await_line(process, word):
 
 
 def end(process):
-    """Return the process's exit code and the rest of its log."""
+    """Wait for the end of a process; return its exit code and the rest of its log."""
     _, log = process.communicate(timeout=DEADLINE_S)
     return process.returncode, log
 
 
 def summary(folder):
-    """Return the contents of the run's summary.json."""
+    """Return the content of the run's summary.json."""
     return json.loads((folder / "run" / "summary.json").read_text())
 
 
@@ -44,9 +44,9 @@ def summary(folder):
     ids=["DQN", "PPO", "REINFORCE"],
 )
 def test_a_run_survives_a_fault(write_job, play, tmp_path, algorithm, collectors, steps):
-    """It ends with 0 after all of its steps, and reports one fault.
+    """The run must complete all steps and report one fault.
 
-    A rollout of two simulators has one invalid row for each step of the other simulator during the repair.
+    While one of two simulators restarts, each step of the other adds an invalid row to the rollout.
     """
     job = write_job(algorithm=algorithm, collectors=collectors)
 
@@ -68,7 +68,7 @@ def test_a_run_survives_a_fault(write_job, play, tmp_path, algorithm, collectors
 def test_an_interrupted_run_ends_at_the_total_of_an_uninterrupted_one(
     write_job, play, tmp_path, algorithm, total, number
 ):
-    """Ctrl-C comes after a third of the steps; the same command then continues from the checkpoint's step."""
+    """After Ctrl-C, the same command must continue from the checkpoint and end at the same step."""
     job = write_job(algorithm=algorithm, steps=1200)
     code, _ = play(job, at=400, number=number)
     word = Termination.from_message((tmp_path / "word").read_text())
@@ -84,7 +84,7 @@ def test_an_interrupted_run_ends_at_the_total_of_an_uninterrupted_one(
 
 
 def test_a_killed_run_goes_on_from_its_newest_checkpoint(write_job, start, play, tmp_path):
-    """A node that fails sends no signal before."""
+    """A node that fails sends no signal first, so the trainer cannot save a checkpoint."""
     job = write_job(algorithm=DQN, steps=800)
     first = start(job)
     await_line(first, "checkpoint written")
@@ -99,7 +99,7 @@ def test_a_killed_run_goes_on_from_its_newest_checkpoint(write_job, start, play,
 
 
 def test_a_run_that_diverges_says_where_and_keeps_its_last_good_checkpoint(write_job, play, tmp_path):
-    """The exit code is 81, because no attempt from there would do better."""
+    """With exit code 81 the operator does not retry, because every attempt would diverge again."""
     wild = {"learning_starts": 100, "learning_rate": float("inf"), "policy_kwargs": {"net_arch": [16]}}
     job = write_job(
         algorithm={"name": "DQN", "hyperparameters": wild}, checkpoint={"everySteps": 100, "keep": 3}
@@ -116,7 +116,7 @@ def test_a_run_that_diverges_says_where_and_keeps_its_last_good_checkpoint(write
 
 
 def test_ctrl_c_does_not_wait_for_a_simulator_that_starts(write_job, start):
-    """There is nothing to save yet, and the start may take minutes."""
+    """The user has no results to save, and a start may take minutes."""
     process = start(write_job(), deaths="0")
     await_line(process, "never comes up")
     process.send_signal(signal.SIGINT)
@@ -128,7 +128,7 @@ def test_ctrl_c_does_not_wait_for_a_simulator_that_starts(write_job, start):
 
 
 def test_a_second_signal_ends_the_process_at_once(write_job, start):
-    """A user who presses Ctrl-C twice does not want to wait until a long rollout is learned."""
+    """A user who types Ctrl-C twice does not want to wait for the end of an update."""
     endless = {"name": "PPO", "hyperparameters": {"n_steps": 64, "batch_size": 32, "n_epochs": 100_000}}
     process = start(write_job(algorithm=endless))
     await_line(process, "training")

@@ -1,4 +1,4 @@
-"""Repairs of a real simulator: killed, stopped, without its sidecar, and ended during a start."""
+"""Restarts of a real simulator that was killed or stopped, or whose sidecar was killed."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ PATIENCE_S = 60.0
 
 
 class Restarts(NullWatcher):
-    """A watcher that counts the restarts."""
+    """A watcher that counts restarts."""
 
     def __init__(self):
         self.count = 0
@@ -42,11 +42,11 @@ class Restarts(NullWatcher):
 
 
 class Trained:
-    """One started simulator in a vector environment.
+    """One running simulator in a vector environment.
 
     Attributes:
-        restarter: of the simulator.
-        restarts: how many there were.
+        restarter: restarts the simulator.
+        restarts: counts the restarts.
     """
 
     def __init__(self, sidecar):
@@ -67,34 +67,34 @@ class Trained:
         return self._sidecar.state().pid
 
     def step(self):
-        """Take a step, and return whether its row is valid, and its info."""
+        """Take a step; return whether its row is valid, and the info."""
         _, _, _, (info,) = self.env.step(STAND)
         return info["palaestra"]["valid"], info
 
     def break_by(self, number):
-        """Send a signal to the simulator, and return the fault that follows."""
+        """Send a signal to the simulator, and return the resulting fault."""
         os.kill(self.pid, number)
         return self.fault()
 
     def fault(self):
-        """Step until the simulator has a fault, and return the fault."""
+        """Take steps until the simulator has a fault, and return the fault."""
         while (info := self.step()[1])["palaestra"]["valid"]:
             pass
         return info["palaestra"]["sim_fault"]
 
     def go_on(self):
-        """Step until a row is valid again."""
+        """Take steps until a row is valid again."""
         eventually(lambda: self.step()[0], PATIENCE_S)
 
     def close(self):
-        """End the environment and the simulator."""
+        """Close the environment, and stop the simulator."""
         self.env.close()
         self.restarter.stop()
 
 
 @pytest.fixture
 def train(master):
-    """Yield a function that returns a started simulator; an argument may give its sidecar."""
+    """Yield a function that returns a running simulator, with a given sidecar or a new one."""
     del master
     made = []
 
@@ -111,7 +111,7 @@ def train(master):
 
 
 def test_a_killed_simulator_is_played_in_again(train):
-    """This happens after a bus error, or when the kernel takes its memory."""
+    """A simulator also ends in this way by a bus error, or if the kernel kills it for its memory."""
     trained = train()
 
     fault = trained.break_by(signal.SIGKILL)
@@ -122,7 +122,7 @@ def test_a_killed_simulator_is_played_in_again(train):
 
 
 def test_a_stopped_simulator_is_noticed(train):
-    """Its socket stays open, so that only a deadline shows the fault."""
+    """The socket of a stopped process stays open, so only a timeout shows the fault."""
     trained = train()
 
     fault = trained.break_by(signal.SIGSTOP)
@@ -132,7 +132,7 @@ def test_a_stopped_simulator_is_noticed(train):
 
 
 def test_faults_leave_no_thread_no_descriptor_and_no_process(train):
-    """A week of training has thousands of faults."""
+    """A week of training has thousands of faults, so even a small leak would end the training."""
     trained = train()
     trained.break_by(signal.SIGKILL)
     trained.go_on()
@@ -143,11 +143,11 @@ def test_faults_leave_no_thread_no_descriptor_and_no_process(train):
         trained.go_on()
 
     assert trained.restarts.count == 11
-    eventually(lambda: left() == before, PATIENCE_S)  # a master may still be calling our node
+    eventually(lambda: left() == before, PATIENCE_S)  # a master may still call our node
 
 
 def left():
-    """Return the threads of this process, and the numbers of its descriptors and child processes."""
+    """Return the names of threads, and the numbers of descriptors and child processes, of this process."""
     for thread in threading.enumerate():
         if thread.name.startswith("restarter-"):
             thread.join(PATIENCE_S)
@@ -155,13 +155,13 @@ def left():
     tasks = Path("/proc/self/task").iterdir()
     children = []
     for task in tasks:
-        with contextlib.suppress(OSError):  # it has ended in the meantime
+        with contextlib.suppress(OSError):  # the thread has ended meanwhile
             children += (task / "children").read_text().split()
     return sorted(thread.name for thread in threading.enumerate()), len(descriptors), len(children)
 
 
 def test_ending_amid_a_start_waits_for_nobody(train):
-    """A simulator may need a minute to start, and the pod has less time to end."""
+    """A simulator may need a minute to start, but the pod must end sooner."""
     trained = train(options=["--fault=slow_start:start=2,latency_ms=600000"])
     trained.break_by(signal.SIGKILL)
 
@@ -171,7 +171,7 @@ def test_ending_amid_a_start_waits_for_nobody(train):
 
 
 class OwnSidecar:
-    """A sidecar whose address stays the same after restarts, as that of a container does."""
+    """A sidecar that keeps its address after a restart, as in a container."""
 
     def __init__(self):
         self._ports = HeldPorts()
@@ -179,7 +179,7 @@ class OwnSidecar:
         self.process = None
 
     def start(self):
-        """Start the sidecar, as a kubelet would."""
+        """Start the sidecar, as a kubelet does."""
         self.process = subprocess.Popen(
             [
                 Path(sys.executable).with_name("palaestra-sidecar"),
@@ -193,19 +193,19 @@ class OwnSidecar:
         )
 
     def kill(self):
-        """Kill the sidecar, and the simulator with it."""
+        """Kill the sidecar; its simulator ends with it."""
         self.process.kill()
         self.process.wait(PATIENCE_S)
 
     def end(self):
-        """Kill the sidecar for good."""
+        """Kill the sidecar, and release its port."""
         self.kill()
         self._ports.close()
 
 
 @pytest.fixture
 def own_sidecar():
-    """Yield a sidecar that the test starts and kills."""
+    """Yield a sidecar, which the test may kill and start again."""
     own = OwnSidecar()
     own.start()
     yield own
@@ -213,7 +213,7 @@ def own_sidecar():
 
 
 def test_a_sidecar_that_is_gone_is_waited_for(train, own_sidecar):
-    """Its container is started again within a minute, but ten tries would end within a second."""
+    """A kubelet restarts the sidecar within a minute, but ten attempts would be spent within a second."""
     trained = train(Sidecar(f"http://{own_sidecar.address}", "collect-0"))
     own_sidecar.kill()
     assert trained.fault()["kind"] == "dead"
@@ -228,7 +228,7 @@ def test_a_sidecar_that_is_gone_is_waited_for(train, own_sidecar):
 
 
 def test_ending_does_not_wait_for_a_sidecar_that_is_gone(train, own_sidecar):
-    """The end of the pod may be the reason why it is gone."""
+    """The sidecar may be gone because the pod ends."""
     trained = train(Sidecar(f"http://{own_sidecar.address}", "collect-0"))
     own_sidecar.kill()
     trained.fault()

@@ -1,4 +1,4 @@
-"""TensorBoard itself on a claim: it shows runs with the names of their jobs during the training."""
+"""TensorBoard on a claim shows runs by the names of their jobs, even during training."""
 
 import json
 import re
@@ -25,7 +25,7 @@ END_S = 30
 
 @pytest.fixture(params=["true", "false"], ids=["data server", "python"])
 def ask(request, tmp_path):
-    """Start TensorBoard on an empty claim, with each of its loaders, and yield a function for requests."""
+    """Start TensorBoard on an empty claim with one of its two loaders; yield a function for requests."""
     options = ("--host=127.0.0.1", "--port=0", "--reload_interval=1", f"--load_fast={request.param}")
     with subprocess.Popen(
         [TENSORBOARD, f"--logdir={tmp_path / FOLDER}", *options], stderr=subprocess.PIPE, text=True
@@ -40,7 +40,7 @@ def ask(request, tmp_path):
 
 
 def steps(ask):
-    """Return the steps of the run's curve; none if TensorBoard does not have the run yet."""
+    """Return the steps in the curve of the run, or an empty list if TensorBoard does not have the run yet."""
     if RUN not in ask("runs"):
         return []
     query = urllib.parse.urlencode({"run": RUN, "tag": "loss"})
@@ -48,9 +48,10 @@ def steps(ask):
 
 
 def write(run, step):
-    """Append a point, as a separate attempt in a later second, because TensorBoard sorts files by name.
+    """Write a point into a new file, as another attempt does, in a second without another file.
 
-    Names of the same second contain the process's count of writers, in which 10 comes before 9.
+    TensorBoard sorts files by name. Names of the same second end in a count of writers, in which 10 sorts
+    before 9.
     """
     eventually(lambda: not list(run.tensorboard.glob(f"*.{int(time.time())}.*")))
     with SummaryWriter(str(run.tensorboard)) as writer:
@@ -59,9 +60,9 @@ def write(run, step):
 
 @pytest.mark.timeout(120)
 def test_tensorboard_shows_a_run_by_the_name_of_its_job_and_follows_it(ask, tmp_path):
-    """The test begins before the first point and includes a restart.
+    """TensorBoard starts before the first point, and the run is restarted once.
 
-    A link whose run was deleted hides no other run.
+    A link to a deleted run must not hide the other runs.
     """
     run = RunDirectory(tmp_path / UID / "0")
     run.path.mkdir(parents=True)

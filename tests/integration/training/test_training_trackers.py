@@ -1,4 +1,4 @@
-"""Runs on fakes with the trackers' own libraries, and a real MLflow server."""
+"""Runs with fake simulators and the real libraries of trackers; MLflow has a real server."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ FEW = {"everySteps": 200, "episodes": 2, "confirmEpisodes": 2}
 
 @pytest.fixture
 def interrupted_and_resumed(write_job, play, tmp_path):
-    """Return a function that runs a job with a tracker in two attempts and returns the run directory."""
+    """Return a function that runs a job with a tracker, in two attempts, and returns the run directory."""
 
     def run(name, **options):
         algorithm = PPO | {"callbacks": [{"name": name, "options": options}]}
@@ -40,16 +40,16 @@ def interrupted_and_resumed(write_job, play, tmp_path):
 
 
 def curve(run: Path, name: str) -> dict[int, float]:
-    """Return a curve in TensorBoard by step.
+    """Return a curve in TensorBoard, by step.
 
-    Evaluations log some values twice, and the last one counts.
+    Evaluations log some values twice, and the last value counts.
     """
     points = EventAccumulator(str(run / "tensorboard")).Reload().Scalars(name)
     return {point.step: pytest.approx(point.value, rel=1e-5) for point in points}
 
 
 def records(path: Path) -> Iterator[bytes]:
-    """Yield the records of a file of W&B: a header, then LevelDB's log in blocks of 32 KiB."""
+    """Yield the records of a W&B file, which is a header and a LevelDB log in blocks of 32 KiB."""
     content, place, parts = path.read_bytes(), 7, b""
     while place + 7 <= len(content):
         if 32768 - place % 32768 < 7:
@@ -58,7 +58,7 @@ def records(path: Path) -> Iterator[bytes]:
         length, kind = struct.unpack("<HB", content[place + 4 : place + 7])
         parts += content[place + 7 : place + 7 + length]
         place += 7 + length
-        if kind in {1, 4}:  # a whole record, or the last part of one
+        if kind in {1, 4}:  # a whole record, or the last part of a record
             yield parts
             parts = b""
 
@@ -66,7 +66,7 @@ def records(path: Path) -> Iterator[bytes]:
 def test_wandb_writes_both_attempts_as_one_run_with_the_curves_of_tensorboard(
     interrupted_and_resumed, monkeypatch, tmp_path
 ):
-    """It is offline: as in a pod, it has no network, no account, and a home that cannot be written."""
+    """The test is offline, as in a pod: no network, no account, and a home that is not writable."""
     messages = pytest.importorskip("wandb.proto.wandb_internal_pb2", reason=INSTALL)
     monkeypatch.setenv("HOME", str(tmp_path / "none" / "such"))
     run = interrupted_and_resumed("palaestra_trainer.trackers.wandb:Wandb", project="corridors")
@@ -88,7 +88,7 @@ def test_wandb_writes_both_attempts_as_one_run_with_the_curves_of_tensorboard(
 
 @pytest.fixture
 def server(tmp_path):
-    """Yield the address of a running MLflow server."""
+    """Start an MLflow server, and yield its address."""
     if not (importlib.util.find_spec("mlflow") and importlib.util.find_spec("flask")):
         pytest.skip(INSTALL)
     with socket.socket() as free:
@@ -121,7 +121,7 @@ def _answers(url: str) -> bool:
 
 
 def test_mlflow_has_both_attempts_as_one_run_with_the_curves_of_tensorboard(server, interrupted_and_resumed):
-    """The test uses a server, because the client has no store."""
+    """MLflow's client cannot store runs without a server, so this test starts a server."""
     tracking = pytest.importorskip("mlflow.tracking", reason=INSTALL)
     run = interrupted_and_resumed("palaestra_trainer.trackers.mlflow:MLflow", uri=server)
 
@@ -137,7 +137,7 @@ def test_mlflow_has_both_attempts_as_one_run_with_the_curves_of_tensorboard(serv
 
 
 def test_a_server_that_does_not_answer_ends_an_attempt_with_the_callback_s_name(write_job, play, monkeypatch):
-    """The run ends at its beginning. Otherwise its curves would be missing only at the end."""
+    """The run must fail at its start, because its curves would otherwise be missing at its end."""
     pytest.importorskip("mlflow", reason=INSTALL)
     monkeypatch.setenv("MLFLOW_HTTP_REQUEST_MAX_RETRIES", "0")
     callback = {"name": "palaestra_trainer.trackers.mlflow:MLflow", "options": {"uri": "http://127.0.0.1:9"}}

@@ -1,4 +1,4 @@
-"""The vector environments of gymnasium and Stable-Baselines3 in a job's simulators, which are real stubs."""
+"""Vector environments of gymnasium and Stable-Baselines3 use a job's simulators, which are real stubs."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ TASK = "palaestra_trainer.environments:MoveToTargetEnv-v0"
 
 
 def running(simulators):
-    """Return the names of the simulators that were started."""
+    """Return the names of the simulators that are ready."""
     return [name for name, launcher in simulators.items() if launcher.ready()]
 
 
 @pytest.mark.filterwarnings("ignore:.*multi-threaded.*fork:DeprecationWarning")
 @pytest.mark.parametrize("method", ["fork", "spawn"])
 def test_each_worker_of_gymnasium_drives_a_simulator_of_its_own(simulators, method):
-    """Workers in one simulator would move each other's robot, with plausible numbers and no error."""
+    """Two workers in one simulator would move each other's robot, without an error."""
     envs = gymnasium.make_vec(TASK, num_envs=2, vectorization_mode="async", vector_kwargs={"context": method})
     try:
         assert_apart(envs)
@@ -33,7 +33,7 @@ def test_each_worker_of_gymnasium_drives_a_simulator_of_its_own(simulators, meth
 
 
 def assert_apart(envs):
-    """Assert that each simulator sees only its own movement, when one drives and the other one stands."""
+    """Assert that, if one robot drives and the other stands, each environment sees only its own robot."""
     _, infos = envs.reset(seed=[1, 2])
     assert infos["start"].shape[0] == 2
     distances = []
@@ -46,7 +46,7 @@ def assert_apart(envs):
 
 
 def test_each_worker_of_stable_baselines3_drives_a_simulator_of_its_own(simulators):
-    """SubprocVecEnv starts its workers from a server process, which is the third method."""
+    """SubprocVecEnv starts its workers from a fork server, which inherits no simulator."""
     ours = {name: value for name, value in os.environ.items() if name.startswith(("PALAESTRA_", "ROS_"))}
     make = partial(make_environment, ours)
     envs = SubprocVecEnv([make] * 2, start_method="forkserver")
@@ -65,7 +65,7 @@ def test_each_worker_of_stable_baselines3_drives_a_simulator_of_its_own(simulato
 def make_environment(variables):
     """Return the environment of the job.
 
-    The server process still has the variables of an earlier test.
+    The fork server has the variables of an earlier test, so they are set again.
     """
     os.environ.update(variables)
     return gymnasium.make(TASK)

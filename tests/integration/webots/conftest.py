@@ -1,4 +1,4 @@
-"""A stub simulator, started in the same way as by a notebook."""
+"""A stub simulator that a test starts as a notebook does."""
 
 from contextlib import ExitStack
 
@@ -11,7 +11,7 @@ from palaestra_trainer.webots.launching.local_simulator import ProcessLauncher
 
 
 class Simulator:
-    """A running simulator with a short timeout, so that a hang is detected soon."""
+    """A running simulator whose facade has a short timeout."""
 
     def __init__(self, *options, world="arena", supervisor="robotino"):
         self.launcher = ProcessLauncher(world, options=options)
@@ -42,19 +42,19 @@ class Setup:
 
 
 class Standing:
-    """A simulator for several tests, which ends while others with its names run."""
+    """A simulator that several tests share. It must end before another simulator with its names starts."""
 
     def __init__(self):
         self._simulator = None
 
     def simulator(self):
-        """Return the simulator, which runs."""
+        """Start the simulator if it does not run, and return it."""
         if self._simulator is None:
             self._simulator = Simulator()
         return self._simulator
 
     def go(self):
-        """End the simulator until the next test needs it."""
+        """End the simulator; the next test that needs one starts it again."""
         if self._simulator is not None:
             self._simulator.close()
             self._simulator = None
@@ -62,7 +62,7 @@ class Standing:
 
 @pytest.fixture(scope="module")
 def standing(master):
-    """Yield the included arena for all tests of a module."""
+    """Yield the included arena for all tests of a module; it starts on demand."""
     del master
     one = Standing()
     yield one
@@ -71,7 +71,7 @@ def standing(master):
 
 @pytest.fixture
 def start(standing):
-    """Yield a function that starts simulators with options, and end them with the test."""
+    """Yield a function that starts simulators with options; they end with the test."""
     standing.go()
     with ExitStack() as started:
 
@@ -87,7 +87,7 @@ def start(standing):
 
 @pytest.fixture
 def arena(standing):
-    """Yield the included arena as it is after a start; `own_arena` is for tests of its process."""
+    """Yield the shared arena in its initial state; tests that stop the simulator use `own_arena`."""
     setup = Setup(standing.simulator())
     yield setup
     with setup.webots:
@@ -97,5 +97,5 @@ def arena(standing):
 
 @pytest.fixture
 def own_arena(start):
-    """Yield the included arena, running for one test, which may stop it."""
+    """Yield an included arena that runs only for this test, which may stop it."""
     return start()

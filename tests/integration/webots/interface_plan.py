@@ -1,8 +1,8 @@
-"""The requests of the clients with rospy and roscpp to a simulator, and the expected responses.
+"""The requests that the clients with rospy and roscpp send to a simulator, and the expected responses.
 
-A service without an entry here is called with an empty request and must succeed. `REQUESTS` has the requests
-for the others, by the end of their paths. `ANSWERS` has the responses of some of them, such as a value that
-was set before.
+A service without an entry in `REQUESTS` gets an empty request. The keys of `REQUESTS` are the ends of
+services' paths. Every service must succeed. `ANSWERS` contains the responses that are known in advance, such
+as a value that an earlier request has set.
 """
 
 from tools.interface.everything import ROBOT, offered
@@ -10,7 +10,7 @@ from tools.interface.everything import ROBOT, offered
 STEP_MS = 32
 QUIT_STATUS = 3
 STEP = (f"/{ROBOT}/robot/time_step", "webots_ros/set_int", {"value": STEP_MS})
-REFUSED = (f"/{ROBOT}/robot/get_urdf", "webots_ros/get_urdf", {})  # it causes a log message for /rosout
+REFUSED = (f"/{ROBOT}/robot/get_urdf", "webots_ros/get_urdf", {})  # the simulator logs it to /rosout
 DRAWN = """DEF DRAWN Pose { children [ DEF SHADED Shape { castShadows FALSE
   appearance DEF PAINT PBRAppearance { roughness 0.25 baseColor 1 0.5 0.25 name "red" }
   geometry DEF ROUND Cylinder { subdivision 24 } } Shape { geometry DEF FLAT Plane { size 3 2 } } ] }"""
@@ -136,7 +136,7 @@ ANSWERS = {
     "supervisor/node/get_base_type_name": {"name": "Solid"},
     "supervisor/node/is_proto": {"value": False},
     "supervisor/node/get_def": {"name": "BOX"},
-    # A changed field moves the node with the next step.
+    # A node moves in the step after its field has changed.
     "supervisor/node/get_position": {"position": {"x": 2.0, "y": 0.0, "z": 0.5}},
     "supervisor/field/get_name": {"name": "roughness"},
     "supervisor/field/get_type": {"type": 3},
@@ -150,9 +150,9 @@ HANDLES = ("BOX", "LINEARMOTOR_JOINT", "SHADED", "PAINT", "ROUND", "FLAT")
 
 
 def plan(world_path, simulator):
-    """Return the plan for the client.
+    """Return the plan that a client executes.
 
-    The name of a call is its path, except for calls that return handles.
+    Calls that return handles have names of their own; the name of any other call is its path.
     """
     survey = offered(simulator)
     typed = {**survey.services}
@@ -179,7 +179,7 @@ def _call(typed, name, path, request):
 
 
 def _opening():
-    """Yield the first calls: handles, and one field of every type, which is written and read back."""
+    """Yield the first calls: for handles, and for one field of each type, which is written and read."""
     get_field, from_def = "supervisor/node/get_field", "supervisor/get_from_def"
     for name, text in (("data", "eight"), ("custom_data", "seven")):
         yield f"robot/set_{name}", f"robot/set_{name}", {"value": text}
@@ -217,7 +217,7 @@ def _request(path, world_path):
 
 
 def _of_files(path, world_path):
-    """Return the request of a service that reads or writes a file, or None for other services."""
+    """Return the request to a service that reads or writes a file, or None for any other service."""
     if path == "supervisor/world_load":
         return {"value": str(world_path)}
     if path == "display/image_load":

@@ -1,10 +1,17 @@
-"""Carry out a plan of the interface with a client that uses any library.
+"""Execute a plan of the interface with a client of any library.
 
-A plan has `calls`, a list of [name, path, type, request]; `topics`, type by path; `rounds`, a list of [path,
-type, request] that cause messages on topics; `last`, calls that end the simulator. A string "@name" in a
-request stands for the first value in the response to that call, such as the handle of a node. A client has
-three functions. `call(path, type, request)` returns the response as a dictionary, or {"failed": text}.
-`listen(topic, type)` subscribes. `heard()` returns the first message of each topic.
+A plan has four entries:
+
+- `calls`: a list of [name, path, type, request]
+- `topics`: a type by path
+- `rounds`: a list of [path, type, request] that cause messages on topics
+- `last`: calls that end the simulator
+
+In a request, the string "@name" stands for the first value in the response to that call, e.g. the handle of a
+node.
+
+A client has three functions. `call(path, type, request)` returns the response as a dictionary, or {"failed":
+text}. `listen(topic, type)` subscribes. `heard()` returns the first message of each topic.
 """
 
 import time
@@ -17,7 +24,7 @@ PAUSE_S = 0.02
 
 
 def play(plan, client):
-    """Return the `answers` by the names of calls, and the `heard` messages by topic."""
+    """Return the responses (`answers`) by name of the call, and the messages (`heard`) by topic."""
     answers = {}
     for name, path, type_name, request in plan["calls"]:
         answers[name] = client.call(path, type_name, _filled(request, answers))
@@ -30,7 +37,7 @@ def play(plan, client):
 
 
 def request_of(service, fields):
-    """Return the request of a class of genpy with these fields and the defaults of the others."""
+    """Return a request of a genpy class with these fields; the other fields have their defaults."""
     message = service._request_class()
     genpy.message.fill_message_args(message, [fields])
     return message
@@ -50,7 +57,7 @@ def plain(value):
 
 
 def _filled(request, answers):
-    """Return a request with the values from earlier responses."""
+    """Return a request in which values of earlier responses replace "@name"."""
     return {
         name: next(iter(answers[value[1:]].values())) if str(value).startswith("@") else value
         for name, value in request.items()
@@ -58,7 +65,7 @@ def _filled(request, answers):
 
 
 def _heard(plan, client):
-    """Return the first message of every topic that sent one."""
+    """Call the rounds until every topic has sent a message or the time is over; return the messages."""
     end = time.monotonic() + DEADLINE_S
     heard = {}
     while plan["topics"].keys() - heard.keys() and time.monotonic() < end:
@@ -69,9 +76,9 @@ def _heard(plan, client):
 
 
 def _call_again(client, path, type_name, request):
-    """Call until the service responds.
+    """Call a service until it responds.
 
-    A controller that restarts removes its services for a moment.
+    A controller that restarts has no services for a moment.
     """
     end = time.monotonic() + DEADLINE_S
     while True:

@@ -1,7 +1,7 @@
-"""The client with roscpp, compiled with headers from gencpp: one program for all types of the interface.
+"""Build the client with roscpp from headers of gencpp: one program for all types of the interface.
 
-As a program it makes the headers: `python roscpp_build.py FOLDER PACKAGE FILE...`. Then it is a separate
-process, because gencpp's template engine replaces the output of its own process.
+As a program, this module writes the headers: `python roscpp_build.py FOLDER PACKAGE FILE...`. It runs as a
+separate process, because the template engine of gencpp replaces sys.stdout.
 """
 
 import subprocess
@@ -26,7 +26,7 @@ def build(folder, services, topics):
     package = write(folder)
     kinds = {name: "srv" if name in services else "msg" for name in ours}
     files = [package / kinds[name] / f"{name.partition('/')[2]}.{kinds[name]}" for name in ours]
-    # Messages that services and other messages of the package contain.
+    # These messages are nested in services and in other messages of the package.
     nested = [*(package / "msg").glob("*.msg")]
     includes = folder / "include"
     _run(sys.executable, __file__, includes / "webots_ros", package, *{*files, *nested})
@@ -56,7 +56,7 @@ def _run(*words):
 
 
 def make_headers(folder, package, files):
-    """Write the C++ header of each definition, and those of a service's request and response."""
+    """Write the C++ header of each definition; for a service, write two more for request and response."""
     paths = [f"webots_ros:{package}/msg", *(f"{name}:{MESSAGES / name / 'msg'}" for name in NESTED)]
     for file in files:
         genmsg.template_tools.generate_from_file(

@@ -1,4 +1,4 @@
-"""The client with roscpp as a process, which reads requests and returns responses as bytes."""
+"""The client with roscpp: a process that reads requests and returns responses as bytes."""
 
 import subprocess
 from io import BytesIO
@@ -9,15 +9,15 @@ from tests.integration.webots.interface_player import plain, request_of
 
 
 class RoscppClient:
-    """Calls and listens with the classes from gencpp; it is a context, which ends the process.
+    """Calls services and subscribes to topics with classes of gencpp; the `with` block ends the process.
 
     Args:
-        program: its path.
-        environment: of its process.
-        log: the file for the errors that roscpp logs.
+        program: the path of the program.
+        environment: the environment of the process.
+        log: the file for roscpp's errors.
 
     Attributes:
-        digests: the md5 of each type, in the program.
+        digests: the md5 sum of each type that the program contains.
     """
 
     def __init__(self, program, environment, log):
@@ -44,7 +44,7 @@ class RoscppClient:
         self._errors.close()
 
     def call(self, path, type_name, request):
-        """Return the response of a service once it can be reached, or roscpp's log of the failure."""
+        """Return the response of a service, or roscpp's error messages if the call fails."""
         service = roslib.message.get_service_class(type_name)
         self._tell("call", type_name, path, _bytes_of(request_of(service, request)).hex())
         result, _, answer = self._line().partition(" ")
@@ -53,13 +53,13 @@ class RoscppClient:
         return plain(service._response_class().deserialize(bytes.fromhex(answer)))
 
     def listen(self, topic, type_name):
-        """Keep the first message of a topic from now on."""
+        """Subscribe to a topic, of which the program keeps the first message."""
         self._topics[topic] = roslib.message.get_message_class(type_name)
         self._tell("listen", type_name, topic)
         self._line()
 
     def heard(self):
-        """Return the messages by topic."""
+        """Return the first message of each topic that has sent one."""
         self._tell("heard")
         pairs = (line.partition(" ")[::2] for line in self._lines())
         return {topic: plain(self._topics[topic]().deserialize(bytes.fromhex(text))) for topic, text in pairs}

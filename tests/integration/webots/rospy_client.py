@@ -1,6 +1,6 @@
-"""A client with rospy: it reads a plan as JSON from its input, and prints the results.
+"""The client with rospy: it reads a plan as JSON from standard input, and prints the results.
 
-It is a separate process, because rospy has one node per process.
+It is a separate process, because rospy can have only one node per process.
 """
 
 import json
@@ -13,14 +13,14 @@ from tests.integration.webots.interface_player import DEADLINE_S, plain, play, r
 
 
 class RospyClient:
-    """Calls and listens with the classes of `import webots_ros.srv`."""
+    """Calls services and subscribes to topics with the classes of the package webots_ros."""
 
     def __init__(self):
         rospy.init_node("client", anonymous=True, disable_signals=True)
         self._heard = {}
 
     def call(self, path, type_name, request):
-        """Return the response of a service once it can be reached, or the text of its failure."""
+        """Wait for a service and return its response, or the error message if the call fails."""
         service = roslib.message.get_service_class(type_name)
         try:
             rospy.wait_for_service(path, timeout=DEADLINE_S)
@@ -29,14 +29,14 @@ class RospyClient:
             return {"failed": str(error)}
 
     def listen(self, topic, type_name):
-        """Keep the first message of a topic from now on."""
+        """Subscribe to a topic and keep its first message."""
         class_ = roslib.message.get_message_class(type_name)
         rospy.Subscriber(topic, class_, lambda message: self._heard.setdefault(topic, plain(message)))
 
     def heard(self):
-        """Return the messages by topic."""
+        """Return the first message of each topic that has sent one."""
         return dict(self._heard)
 
 
-answers, sys.stdout = sys.stdout, sys.stderr  # rospy prints to stdout when it reaches a service only later
+answers, sys.stdout = sys.stdout, sys.stderr  # rospy prints to stdout when it waits for a service
 json.dump(play(json.load(sys.stdin), RospyClient()), answers)

@@ -21,7 +21,7 @@ EYES = b"""Camera { name "camera" width 64 height 48 }
 
 @pytest.fixture
 def seer(start, tmp_path):
-    """Return a stub with the arena, whose robot has cameras and a lidar."""
+    """Return a running stub of the arena whose robot has cameras and a lidar."""
     source = builtin("arena").replace(BUMPER, EYES + BUMPER)
     path = tmp_path / "seer.wbt"
     path.write_bytes(source)
@@ -29,7 +29,7 @@ def seer(start, tmp_path):
 
 
 def test_a_lidar_measures_in_layers_and_as_points(seer):
-    """Both describe the same rays: each point's distance from the lidar is the range of its ray."""
+    """A point and a range describe the same ray, so the point's distance must equal the range."""
     ranges, points = Lidar("robotino", "lidar"), LidarPoints("robotino", "lidar")
     seer.robot.simulation.add([ranges, points], [])
     seer.robot.connect()
@@ -43,7 +43,7 @@ def test_a_lidar_measures_in_layers_and_as_points(seer):
 
 
 def test_a_lidar_sends_a_new_array_every_step(seer):
-    """A copy keeps the old array, and the view does not."""
+    """`value` is a view of the newest array, so a program must copy an older one."""
     ranges = Lidar("robotino", "lidar")
     seer.robot.simulation.add([ranges], [])
     seer.robot.connect()
@@ -59,7 +59,7 @@ def test_a_lidar_sends_a_new_array_every_step(seer):
 
 @pytest.mark.parametrize("sensor", [Camera("robotino", "camera"), RangeFinder("robotino", "depth camera")])
 def test_a_simulator_that_renders_nothing_does_not_fit(seer, sensor):
-    """A restart would not help, and the message says what would."""
+    """A restart would not help, so the message must name a simulator that renders images."""
     seer.robot.simulation.add([sensor], [])
 
     with pytest.raises(WorldMisfit, match="a simulator that renders images, such as driver mujoco"):
@@ -67,7 +67,7 @@ def test_a_simulator_that_renders_nothing_does_not_fit(seer, sensor):
 
 
 def test_there_is_no_image_before_the_first_step():
-    """The image would show nothing."""
+    """An empty image would look to a policy like a real one."""
     for read in (lambda: Camera("robotino", "camera").rgb, lambda: RangeFinder("robotino", "depth").depths):
         with pytest.raises(NoReading, match="let a period pass"):
             read()
@@ -77,7 +77,7 @@ SIZES = pytest.mark.parametrize(("height", "width"), [(48, 64), (480, 640), (108
 
 
 class Renderer:
-    """A controller with a camera and a depth camera, whose images a test sends."""
+    """A ROS node with a camera and a depth camera; a test sends their images."""
 
     def __init__(self, name, master_uri):
         self.loop = Loop()
@@ -105,7 +105,7 @@ class Renderer:
 
 @pytest.fixture
 def renderer(master):
-    """Yield a simulator that renders the images of the test."""
+    """Yield a node that publishes the images of the test."""
     made = Renderer("renderer", master)
     yield made
     made.end()
@@ -113,9 +113,9 @@ def renderer(master):
 
 @SIZES
 def test_a_camera_reads_each_image_as_it_was_sent(renderer, height, width):
-    """Some images are as small as a policy's input, others arrive in pieces.
+    """Small images arrive at once, and large ones in pieces.
 
-    RGB has the same values in reverse order.
+    RGB must contain the same values with reversed channels.
     """
     sent = np.random.default_rng(1).integers(0, 256, (3, height, width, 4), np.uint8)
     camera = Camera("renderer", "camera")
@@ -132,7 +132,7 @@ def test_a_camera_reads_each_image_as_it_was_sent(renderer, height, width):
 
 @SIZES
 def test_a_depth_camera_reads_meters(renderer, height, width):
-    """The reading is infinite where nothing is in range."""
+    """The reading is infinite where no object is in range."""
     sent = np.random.default_rng(1).uniform(0.0, 6.0, (height, width)).astype(np.float32)
     sent[0] = np.inf
     depth_camera = RangeFinder("renderer", "depth camera")

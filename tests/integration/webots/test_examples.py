@@ -1,4 +1,4 @@
-"""The scripts in the documentation for users."""
+"""The example scripts and the blocks of pages work as a user runs them."""
 
 import json
 import os
@@ -13,7 +13,7 @@ EXAMPLES = ROOT / "examples"
 
 
 def carried_out(*program, folder=None, **variables):
-    """Return the result of a Python program, without pod, runner and ROS master."""
+    """Run a Python program without a pod, a runner and a ROS master, and return the result."""
     environment = {name: value for name, value in os.environ.items() if not name.startswith("ROS_")}
     return subprocess.run(
         [sys.executable, *program],
@@ -27,7 +27,7 @@ def carried_out(*program, folder=None, **variables):
 
 
 def test_the_facade_example_drives_and_reads():
-    """The script runs as on the page about notebooks."""
+    """A user copies the script from the page about notebooks."""
     result = carried_out(EXAMPLES / "facade.py")
 
     assert result.stdout.startswith("Pose(x_m=0.03")
@@ -36,7 +36,7 @@ def test_the_facade_example_drives_and_reads():
 
 
 def test_the_blocks_of_the_page_about_facades_are_one_script():
-    """The script is a separate process, because it also starts the ROS master."""
+    """A reader pastes the page's blocks, in order, into one script, which also starts the ROS master."""
     page = (ROOT / "docs/howto/facades.md").read_text()
 
     result = carried_out("-c", "\n".join(blocks(page, "python with-a-simulator")))
@@ -47,7 +47,7 @@ def test_the_blocks_of_the_page_about_facades_are_one_script():
 
 
 def test_the_blocks_of_the_page_about_a_training_loop_are_one_script():
-    """These blocks are a user's own training loop."""
+    """A reader pastes the page's blocks, in order, into a training loop."""
     page = (ROOT / "docs/howto/training-loop.md").read_text()
 
     result = carried_out("-c", "\n".join(blocks(page, "python with-a-simulator")))
@@ -56,7 +56,7 @@ def test_the_blocks_of_the_page_about_a_training_loop_are_one_script():
 
 
 def test_the_listings_of_the_paper_run_in_their_order():
-    """The simulator crashes after each 80 steps; the paper restarted it by hand."""
+    """The simulator of this test crashes after every 80 steps. In the paper, a person restarted it."""
     result = carried_out(EXAMPLES / "paper.py", PALAESTRA_STUB_FAULTS="crash:step=80")
 
     assert result.stdout.count("simulator fault") >= 2
@@ -64,9 +64,9 @@ def test_the_listings_of_the_paper_run_in_their_order():
 
 
 def test_the_cells_of_the_first_notebook_can_be_carried_out_from_top_to_bottom(tmp_path):
-    """`make e2e` runs them in the notebook's pod.
+    """A user executes the cells in their order, as `make e2e` does in the notebook's pod.
 
-    A new notebook contains no results.
+    A new notebook must contain no results.
     """
     cells = json.loads((EXAMPLES / "first-steps.ipynb").read_text())["cells"]
     code = [cell for cell in cells if cell["cell_type"] == "code"]

@@ -1,4 +1,4 @@
-"""Fields and velocities through the supervisor have their own types."""
+"""The supervisor reads and writes fields and velocities as Python values."""
 
 import math
 
@@ -21,7 +21,7 @@ START = Pose(-1.5, 0.0, 0.0)
     ],
 )
 def test_what_is_written_is_read_as_the_same_type(arena, node, field, value):
-    """The caller gives no handle, no message type and no service."""
+    """A user passes only the names and the value, and the supervisor finds handle, type and service."""
     arena.scene.supervisor.set_field(node, field, value)
 
     found = arena.scene.supervisor.get_field(node, field)
@@ -41,14 +41,14 @@ def test_what_is_written_is_read_as_the_same_type(arena, node, field, value):
     ],
 )
 def test_a_field_is_read_as_the_type_that_it_has(arena, node, field, value):
-    """The simulator gives the type, which is not guessed from the value."""
+    """The simulator reports the type, so an integer is not read as a float."""
     found = arena.scene.supervisor.get_field(node, field)
 
     assert (type(found), found) == (type(value), value)
 
 
 def test_one_of_several_values_is_chosen_by_its_index(arena):
-    """The field controllerArgs has several values."""
+    """The field controllerArgs has several values, so a user needs an index."""
     assert arena.scene.supervisor.get_field("ROBOTINO", "controllerArgs", 1) == "--synchronize"
 
 
@@ -70,13 +70,13 @@ def test_one_of_several_values_is_chosen_by_its_index(arena):
     ],
 )
 def test_a_value_that_a_field_cannot_hold_is_refused_before_it_is_sent(arena, node, field, value, fact):
-    """Webots would ignore such a value and report success."""
+    """Webots would ignore the value and report success."""
     with pytest.raises(ConfigurationError, match=fact):
         arena.scene.supervisor.set_field(node, field, value)
 
 
 def test_numbers_of_numpy_are_numbers(arena):
-    """A random generator returns such numbers."""
+    """NumPy's random generators return numbers of NumPy's types."""
     place = np.array([0.5, 0.25, 0.001])
 
     arena.scene.supervisor.set_field("TARGET", "translation", tuple(place))
@@ -85,7 +85,7 @@ def test_numbers_of_numpy_are_numbers(arena):
 
 
 def test_a_node_or_field_that_is_not_there_is_named(arena):
-    """The supervisor does not use the handle 0."""
+    """A request with the handle 0 would have no effect, so the error must name the missing node."""
     with pytest.raises(WrongData, match="the world has no node DEF NOTHING"):
         arena.scene.supervisor.get_field("NOTHING", "translation")
     with pytest.raises(WrongData, match="the world has TARGET has no field color"):
@@ -93,7 +93,7 @@ def test_a_node_or_field_that_is_not_there_is_named(arena):
 
 
 def test_a_cylinder_that_is_moved_by_field_is_met_where_it_is(arena):
-    """Domain randomization changes what the sensors measure."""
+    """Domain randomization moves obstacles, and the sensors must measure the new positions."""
     arena.scene.reset(1, START, (1.0, 0.0))
     free = arena.robot.distances()[0]
 
@@ -106,7 +106,7 @@ def test_a_cylinder_that_is_moved_by_field_is_met_where_it_is(arena):
 
 
 def test_a_velocity_that_is_given_is_had(arena):
-    """The units are meters and radians per second, in world axes; the motors act from then on."""
+    """The units are meters and radians per second in world axes."""
     arena.scene.reset(1, START, (1.0, 0.0))
 
     arena.scene.supervisor.set_velocity("ROBOTINO", (0.2, 0.0, 0.0), (0.0, 0.0, 0.5))
@@ -117,5 +117,5 @@ def test_a_velocity_that_is_given_is_had(arena):
 
 
 def test_the_robot_knows_its_ros_name(arena):
-    """Users' own sensors and motors need it."""
+    """A user needs the name for additional sensors and motors."""
     assert arena.robot.node_name == "robotino"

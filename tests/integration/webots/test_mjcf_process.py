@@ -1,4 +1,4 @@
-"""A cart-pole in MJCF in `palaestra-mujoco`, driven over ROS like any robot of Webots."""
+"""A cart-pole in MJCF runs in `palaestra-mujoco` and is driven over ROS like a Webots robot."""
 
 from pathlib import Path
 
@@ -27,13 +27,13 @@ class CartPole:
         self._services = []
 
     def call(self, path, type_name, **request):
-        """Return the response of a service."""
+        """Call a service, and return the response."""
         service = RosService(f"/cartpole/{path}", f"webots_ros/{type_name}")
         self._services.append(service)
         return service(**request)
 
     def step(self):
-        """Take one step, and return the position of the cart."""
+        """Take one step, and return the cart's position."""
         assert self.call("robot/time_step", "set_int", value=STEP_MS).success
         assert self.position.read()
         return self.position.value
@@ -60,7 +60,7 @@ def source():
 
 @pytest.fixture
 def cartpole(master, tmp_path, source):
-    """Yield the world, which runs under the name cartpole."""
+    """Yield the running example; its robot has the name `cartpole`."""
     del master
     world = tmp_path / "cartpole.xml"
     world.write_text(source)
@@ -70,7 +70,7 @@ def cartpole(master, tmp_path, source):
 
 
 def test_a_model_of_mujoco_is_driven_measured_moved_and_reset_over_ros(cartpole):
-    """The services and facades are the same as for a robot of Webots."""
+    """A user drives an MJCF model with the same services and facades as a robot of Webots."""
     devices = cartpole.call("robot/get_device_list", "robot_get_device_list", ask=True).list
     assert list(devices) == ["push", "cart position", "cart speed", "pole angle", "pole speed"]
     start = cartpole.step()
@@ -94,16 +94,16 @@ def test_a_model_of_mujoco_is_driven_measured_moved_and_reset_over_ros(cartpole)
 
 
 class TestAKeyframe:
-    """A world whose keyframe has a control that pushes the cart."""
+    """A world whose keyframe contains a control that pushes the cart."""
 
     @pytest.fixture
     def source(self, source):
-        """Return the world of the example with the keyframe."""
+        """Return the world of the example with such a keyframe."""
         named = source.replace("<custom>", '<custom><text name="keyframe" data="home"/>')
         return named.replace("</mujoco>", '<keyframe><key name="home" ctrl="5"/></keyframe></mujoco>')
 
     def test_its_control_acts_until_the_first_command_after_a_reset(self, cartpole):
-        """With a command of 0 at a reset, a robot would fall that its keyframe holds up."""
+        """If a reset set the control to 0, a robot that its keyframe keeps upright would fall."""
         lever = JointMotor("cartpole", "push", "force")
         lever.release()
         start = [cartpole.step() for _ in range(5)]
@@ -121,18 +121,18 @@ class TestAKeyframe:
 
 
 class TestWhatWebotsDoesNotHave:
-    """A world with a sensor and an actuator that have no device in Webots."""
+    """A world with a sensor and an actuator for which Webots has no device."""
 
     @pytest.fixture
     def source(self, source):
-        """Return the world of the example with both."""
+        """Return the world of the example with this sensor and this actuator."""
         sensor = '<subtreecom name="center of mass" body="cart"/></sensor>'
         return source.replace(
             "</actuator>", '<adhesion name="grip" body="cart" ctrlrange="0 1"/></actuator>'
         ).replace("</sensor>", sensor)
 
     def test_facades_read_its_numbers_and_set_its_control(self, cartpole):
-        """They are below `mujoco/`, with the names of the model."""
+        """Their services are below `mujoco/` and have the names in the model."""
         sensor = MujocoSensor("cartpole", "center of mass")
         sensor.enable(STEP_MS)
         grip = MujocoActuator("cartpole", "grip")

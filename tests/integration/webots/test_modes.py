@@ -1,4 +1,4 @@
-"""Time passes only inside `with webots:` and `webots.run(...)`."""
+"""Simulated time passes only inside `with webots:` and `webots.run(...)`."""
 
 import pytest
 
@@ -8,7 +8,7 @@ from palaestra_trainer.webots import Mode
 
 
 def test_a_step_while_paused_is_refused_and_the_next_context_goes_on(arena):
-    """The controller would wait for time to pass, and could not be resumed during that wait."""
+    """Otherwise the controller would block until time passes, and could not be resumed."""
     with arena.webots:
         arena.robot.advance()
     pid, before = arena.pid, arena.webots.observer.time()
@@ -23,7 +23,7 @@ def test_a_step_while_paused_is_refused_and_the_next_context_goes_on(arena):
 
 
 def test_a_reset_while_paused_is_refused_before_it_has_begun(arena):
-    """Otherwise the next step of any client would carry out half a reset."""
+    """Otherwise half of the reset would take effect in the next step of any client."""
     with arena.webots:
         arena.scene.reset(1, Pose(-1.0, 0.0, 0.0), (1.0, 0.0))
 
@@ -36,12 +36,12 @@ def test_a_reset_while_paused_is_refused_before_it_has_begun(arena):
 
 
 def test_a_step_while_paused_is_no_fault_of_the_simulator():
-    """Otherwise training would restart a working simulator again and again."""
+    """A fault would make training restart a working simulator repeatedly."""
     assert not issubclass(Paused, SimulatorFault)
 
 
 def test_a_simulator_that_did_not_confirm_its_mode_is_not_taken_for_paused(start):
-    """The next step shows whether it runs, and its failure is a fault, no error of the caller."""
+    """The next step shows whether the simulator runs. If that step fails, the simulator has a fault."""
     arena = start("--fault=wrong_shape:service=supervisor/simulation_set_mode,call=4")
     arena.webots.supervisor.set_mode(Mode.PAUSE)
     with pytest.raises(WrongData):
@@ -51,7 +51,7 @@ def test_a_simulator_that_did_not_confirm_its_mode_is_not_taken_for_paused(start
 
 
 def test_only_the_outermost_context_pauses(arena):
-    """The paper has `run` inside a `with`, for collection and for evaluation."""
+    """The paper calls `run` inside a `with` block, to collect and to evaluate."""
     with arena.webots:
         with arena.webots:
             arena.robot.advance()
@@ -63,7 +63,7 @@ def test_only_the_outermost_context_pauses(arena):
 
 
 def test_after_a_context_that_broke_the_outermost_one_pauses_still(arena):
-    """An exception in a notebook's cell must not leave a simulator running."""
+    """An exception in a notebook's cell must not leave the simulator running."""
     with arena.webots:
         with pytest.raises(ZeroDivisionError):
             arena.webots.run(lambda: 1 / 0)
@@ -73,9 +73,9 @@ def test_after_a_context_that_broke_the_outermost_one_pauses_still(arena):
 
 
 def test_a_simulator_that_was_started_stands_until_it_is_let_go(arena):
-    """Without the pause the stub would run and Webots would not.
+    """A started stub would run and a started Webots would not, so both are paused.
 
-    Code for one must work with the other.
+    Code that works with the stub must work with Webots too.
     """
     arena.webots()
 
@@ -87,7 +87,7 @@ def test_a_simulator_that_was_started_stands_until_it_is_let_go(arena):
 
 
 def test_a_simulator_that_is_restarted_inside_of_a_context_runs(arena):
-    """A restart does not end the context."""
+    """A restart in a `with` block must not leave the simulator paused for the rest of the block."""
     with arena.webots:
         arena.webots()
         inside = arena.webots.observer.mode()
@@ -96,7 +96,7 @@ def test_a_simulator_that_is_restarted_inside_of_a_context_runs(arena):
 
 
 def test_a_simulator_that_is_stopped_inside_of_a_context_need_not_be_paused(arena):
-    """A stopped simulator cannot be paused; the next context starts it."""
+    """A stopped simulator cannot be paused, so the end of the block must not fail."""
     with arena.webots:
         arena.webots.stop()
     with arena.webots:
@@ -106,9 +106,9 @@ def test_a_simulator_that_is_stopped_inside_of_a_context_need_not_be_paused(aren
 
 
 def test_a_refused_mode_raises_an_error(arena):
-    """The number 3 was FAST until Webots R2020b.
+    """Until Webots R2020b, 3 was the number of the mode FAST.
 
-    A client that still uses it would wait for ever.
+    A client that still uses this number would otherwise wait forever.
     """
     with pytest.raises(WrongData, match="robotino: refuses mode 3"):
         arena.webots.supervisor.set_mode(3)

@@ -1,4 +1,4 @@
-"""An environment is created only by its name, on a stub or on MuJoCo, and gymnasium's checker accepts it."""
+"""`gymnasium.make` with only a name starts a simulator; gymnasium's checker accepts the environment."""
 
 import gymnasium
 import pytest
@@ -16,14 +16,14 @@ WRAPPED = "ignore:.*different from the unwrapped version"
 
 @pytest.fixture
 def nothing_configured(master, monkeypatch):
-    """Remove the configuration, as in a notebook."""
+    """Remove the configuration of a job, as in a notebook."""
     del master
     monkeypatch.delenv("PALAESTRA_CONFIG", raising=False)
 
 
 @pytest.mark.usefixtures("nothing_configured")
 def test_an_environment_made_by_its_name_alone_starts_a_simulator_that_ends_with_it():
-    """Two environments have two simulators."""
+    """Two environments need two simulators, because a step of one must not move the other's robot."""
     one, other = gymnasium.make(NAME), gymnasium.make(NAME)
     names = [env.unwrapped._robot.node_name for env in (one, other)]
 
@@ -41,7 +41,7 @@ def test_an_environment_made_by_its_name_alone_starts_a_simulator_that_ends_with
 @pytest.mark.usefixtures("nothing_configured")
 @pytest.mark.parametrize("make", [gymnasium.make, palaestra_trainer.make_env], ids=["plain", "tolerant"])
 def test_an_environment_that_sees_starts_mujoco_by_its_name_alone(make):
-    """The stub renders no images."""
+    """The stub renders no images, so such an environment must start MuJoCo."""
     env = make("SeeTarget-v0")
 
     image, _ = env.reset(seed=1)
@@ -54,7 +54,7 @@ def test_an_environment_that_sees_starts_mujoco_by_its_name_alone(make):
 @pytest.mark.usefixtures("nothing_configured")
 @pytest.mark.parametrize("make", [gymnasium.make, palaestra_trainer.make_env], ids=["plain", "tolerant"])
 def test_an_environment_of_another_robot_starts_the_world_of_that_robot(make):
-    """`Navigate-v0` drives a TurtleBot3 in the world `court`."""
+    """`Navigate-v0` drives a TurtleBot3, which the world `court` contains."""
     env = make("Navigate-v0")
     first, _ = env.reset(seed=1)
     env.close()
@@ -64,7 +64,7 @@ def test_an_environment_of_another_robot_starts_the_world_of_that_robot(make):
 
 @pytest.mark.usefixtures("nothing_configured")
 def test_an_environment_of_another_robot_finds_it_in_the_facade_of_the_program():
-    """The facade itself has no robot."""
+    """The facade has no robot yet, so the environment must create the robot of its own class."""
     webots = Webots("burger", "court")
     try:
         env = gymnasium.make("Navigate-v0")
@@ -80,7 +80,7 @@ def test_an_environment_of_another_robot_finds_it_in_the_facade_of_the_program()
 
 @pytest.mark.usefixtures("nothing_configured")
 def test_the_robot_in_a_facade_is_that_of_the_job(tmp_path, monkeypatch):
-    """A job's own program may create the facade; the job says which robot is in its world."""
+    """The program of a job may create the facade, but the job names the robot in its world."""
     job = {
         "job": "j",
         "environment": {"id": "Navigate-v0"},
@@ -101,7 +101,7 @@ def test_the_robot_in_a_facade_is_that_of_the_job(tmp_path, monkeypatch):
 
 @pytest.fixture
 def webots(nothing_configured):
-    """Yield a facade as a notebook creates it."""
+    """Yield a facade that a test creates as a notebook does."""
     del nothing_configured
     made = Webots("robotino", "arena")
     yield made
@@ -110,7 +110,7 @@ def webots(nothing_configured):
 
 
 def test_an_environment_uses_the_facade_that_was_made_before_it(webots):
-    """In the paper, the environment's reset starts the facade's simulator, which is then paused."""
+    """In the paper, a reset of the environment starts the facade's simulator, which `run` then pauses."""
     env = gymnasium.make(NAME)
 
     first, _ = webots.run(lambda: env.reset(seed=1))
@@ -119,12 +119,12 @@ def test_an_environment_uses_the_facade_that_was_made_before_it(webots):
     with pytest.raises(Paused):
         env.step(0)
     env.close()
-    with gymnasium.make(NAME) as again, webots:  # it runs already
+    with gymnasium.make(NAME) as again, webots:  # the simulator runs already
         assert again.reset(seed=1)[0].tolist() == first.tolist()
 
 
 def test_a_facade_s_simulator_that_breaks_is_mended_where_it_broke(webots):
-    """The simulator can then be paused after the step, as `run` does."""
+    """After the step, `run` pauses the simulator, so the simulator must have been restarted by then."""
     env = palaestra_trainer.make_env(NAME)
     webots.run(lambda: env.reset(seed=1))
     webots.supervisor.quit()
@@ -139,7 +139,7 @@ def test_a_facade_s_simulator_that_breaks_is_mended_where_it_broke(webots):
 
 
 def test_an_episode_does_not_go_on_in_a_simulator_that_the_program_restarted(webots):
-    """Its robot would stand elsewhere, with plausible numbers."""
+    """The restarted robot has another position, so the next observations would be plausible but wrong."""
     env = palaestra_trainer.make_env(NAME)
     webots.run(lambda: env.reset(seed=1))
     webots()
@@ -153,5 +153,5 @@ def test_an_episode_does_not_go_on_in_a_simulator_that_the_program_restarted(web
 
 @pytest.mark.filterwarnings(WRAPPED)
 def test_the_checker_of_gymnasium_accepts_an_environment_on_a_simulated_robot(arena):
-    """The checker makes the environment again from copies of its arguments."""
+    """The checker creates the environment a second time from copies of its arguments."""
     check_env(gymnasium.make(NAME, robot=arena.robot, scene=arena.scene))

@@ -1,4 +1,4 @@
-"""Simulators that a script starts may print without limit, and end with the script."""
+"""A simulator that a script starts may print without limit, and ends with the script."""
 
 import os
 import subprocess
@@ -33,7 +33,7 @@ sys.stdin.read()
 
 
 def test_a_child_that_prints_without_end_is_not_stopped_by_a_full_pipe(tmp_path):
-    """Webots forwards its controllers' output, which nobody reads in a script."""
+    """Webots forwards the output of its controllers, which no script reads."""
     mark = tmp_path / "done"
     program = CHATTERBOX.replace('print("done", file=sys.stderr, flush=True)', f"open({str(mark)!r}, 'w')")
     child = start_child([sys.executable, "-c", program], stderr=subprocess.PIPE)
@@ -49,7 +49,7 @@ def test_a_child_that_prints_without_end_is_not_stopped_by_a_full_pipe(tmp_path)
 
 
 def test_a_killed_script_leaves_no_simulator(master):
-    """The sidecar's standard input closes with its owner, however the owner ends."""
+    """The kernel closes the sidecar's standard input when the script ends in any way."""
     del master
     owner = subprocess.Popen(
         [sys.executable, "-c", OWNER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
@@ -67,7 +67,7 @@ def test_a_killed_script_leaves_no_simulator(master):
 
 
 def test_a_killed_script_leaves_no_folder_of_a_world_with_other_names(master, tmp_path):
-    """The second simulator of a world runs a copy of it; killed notebooks would fill the disk with copies."""
+    """A second simulator of a world runs a copy of the world file, and such copies would fill the disk."""
     del master
     code = (
         "import sys\n"
@@ -97,7 +97,7 @@ def test_a_killed_script_leaves_no_folder_of_a_world_with_other_names(master, tm
 
 
 def test_the_error_inside_a_context_is_raised_and_not_that_the_simulator_is_gone(own_arena):
-    """The context manager cannot pause a dead simulator, and must not hide the cause."""
+    """The `with` block cannot pause a stopped simulator, but the user must see the original error."""
 
     def fail():
         with own_arena.webots:
@@ -109,7 +109,7 @@ def test_the_error_inside_a_context_is_raised_and_not_that_the_simulator_is_gone
 
 
 def test_after_an_interrupted_call_the_next_answer_is_its_own(own_arena, monkeypatch):
-    """After a Ctrl-C in a notebook cell, each later call must return its own response."""
+    """After Ctrl-C in a notebook's cell, a late response must not be returned for a later call."""
     probe = own_arena.webots.observer
     before = probe.time()
     monkeypatch.setattr("palaestra_trainer.ros.tcpros_client.TcprosClient.receive", _interrupted)
@@ -128,7 +128,7 @@ def _interrupted(_wire, ahead=0):
 
 
 def test_a_simulator_takes_options_of_its_own(master):
-    """They are options of its command line, as in a TrainingJob."""
+    """A user passes the same options as in a TrainingJob."""
     del master
     webots = Webots("robotino", "arena", options=["--fault=start_refused:code=7"])
 
@@ -139,7 +139,7 @@ def test_a_simulator_takes_options_of_its_own(master):
 
 
 def test_a_simulator_that_is_not_known_is_refused_at_once(master):
-    """The error comes from `ProcessLauncher`, which would have to start it."""
+    """The user must see the mistake when the facade is created, before a simulator starts."""
     del master
 
     with pytest.raises(ConfigurationError, match="gazebo"):
@@ -147,7 +147,7 @@ def test_a_simulator_that_is_not_known_is_refused_at_once(master):
 
 
 def test_a_simulator_that_does_not_start_raises_an_error_at_its_deadline(master):
-    """A name that is not in the world never responds."""
+    """The facade waits for a name that the world does not contain, and must not wait forever."""
     del master
     webots = Webots("nobody", "arena", start_deadline_s=1.0)
 

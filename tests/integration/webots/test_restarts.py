@@ -1,4 +1,4 @@
-"""After a restart nothing is left to do."""
+"""A program can continue after a restart of its simulator without further calls."""
 
 import os
 import signal
@@ -15,12 +15,12 @@ STANDS = 0
 
 
 def environment(robot, scene):
-    """Return the task on the given robot."""
+    """Return the environment with this robot and this scene."""
     return gymnasium.make("MoveToTargetEnv-v0", robot=robot, scene=scene)
 
 
 def test_an_episode_can_be_begun_after_each_restart(own_arena):
-    """The paper's loop restarts its simulator before the 25th reset, at which the simulator crashed."""
+    """The paper's loop restarts its simulator before the 25th reset, in which it always crashed."""
     env = environment(own_arena.robot, own_arena.scene)
 
     began = [own_arena.webots.run(lambda: env.reset(seed=1), restart=True)[0].tolist() for _ in range(2)]
@@ -30,7 +30,7 @@ def test_an_episode_can_be_begun_after_each_restart(own_arena):
 
 
 def test_a_robot_that_was_made_before_the_simulator_needs_no_connect(master):
-    """In listings 3 and 4 of the paper, the first reset starts Webots and everything else."""
+    """In listings 3 and 4 of the paper, the first reset starts Webots and connects the robot."""
     del master
     webots = Webots("robotino", "arena")
     robot = Robotino(webots)
@@ -49,8 +49,8 @@ def test_a_robot_that_was_made_before_the_simulator_needs_no_connect(master):
 
 
 def test_the_newest_robot_of_a_name_is_connected_and_no_other(own_arena):
-    """A repeated notebook cell makes another robot, and the first may have been a mistake."""
-    Robotino(own_arena.webots, period_ms=50)  # the simulator would refuse it
+    """A repeated cell of a notebook creates a second robot, and the first may have been a mistake."""
+    Robotino(own_arena.webots, period_ms=50)  # a period that the simulator refuses
     robot = Robotino(own_arena.webots)
 
     own_arena.webots()
@@ -62,7 +62,7 @@ def test_the_newest_robot_of_a_name_is_connected_and_no_other(own_arena):
 
 @pytest.mark.parametrize("begin", [Webots.start, Webots.__enter__])
 def test_a_hung_simulator_is_restarted_when_it_is_to_be_started(own_arena, begin):
-    """Its sidecar reports it as ready, and would refuse to start a second one."""
+    """The sidecar still reports the hung simulator as ready, and would refuse a second start."""
     hung = own_arena.pid
     os.kill(hung, signal.SIGSTOP)
 
@@ -73,7 +73,7 @@ def test_a_hung_simulator_is_restarted_when_it_is_to_be_started(own_arena, begin
 
 
 def test_a_simulator_that_is_on_its_way_is_not_restarted(own_arena):
-    """A simulator that is starting does not respond either, but it only needs time."""
+    """A simulator that is starting does not respond either, but needs only more time."""
     own_arena.webots.stop()
     own_arena.launcher.start()
 

@@ -1,4 +1,4 @@
-"""Simulators that are paused during an update: what happens to them then is a fault, never an error."""
+"""A simulator that fails while it is paused for an update causes a fault, and no error of the caller."""
 
 import os
 import signal
@@ -20,7 +20,7 @@ PATIENCE_S = 60.0
 
 
 class Rested:
-    """One started simulator in a vector environment."""
+    """A running simulator in a vector environment."""
 
     def __init__(self):
         def make(robot, scene):
@@ -35,7 +35,7 @@ class Rested:
         self.env.reset()
 
     def step(self):
-        """Take a step, and return its info."""
+        """Take a step, and return the info."""
         return self.env.step(STAND)[3][0]
 
     def close(self):
@@ -47,7 +47,7 @@ class Rested:
 
 @pytest.fixture
 def rested(master):
-    """Yield a simulator that made a step and is paused now."""
+    """Yield a simulator that has made a step and is now paused."""
     del master
     rested = Rested()
     rested.step()
@@ -57,7 +57,7 @@ def rested(master):
 
 
 def test_what_has_rested_goes_on(rested):
-    """It continues with the next rollout."""
+    """Training pauses the simulators during an update, and continues with the next rollout."""
     mode = rested.simulator.webots.observer.mode()
 
     rested.env.unpause()
@@ -68,7 +68,7 @@ def test_what_has_rested_goes_on(rested):
 
 @pytest.mark.parametrize(("number", "kind"), [(signal.SIGKILL, "dead"), (signal.SIGSTOP, "hung")])
 def test_what_broke_while_it_rested_is_mended(rested, number, kind):
-    """The pause could not be ended, and the earlier pause is not treated as an error of the caller."""
+    """The fault must be that of the simulator, although the paused mode could not be ended."""
     os.kill(rested.launcher.state().pid, number)
 
     rested.env.unpause()

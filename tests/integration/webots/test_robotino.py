@@ -1,4 +1,4 @@
-"""The simulated Robotino in a real simulator."""
+"""The simulated Robotino in a running stub."""
 
 import math
 
@@ -13,7 +13,7 @@ START = Pose(-1.5, 0.0, 0.0)
 
 
 def test_it_drives_as_commanded(arena):
-    """It drives half a meter per second for one second, minus the distance lost to acceleration."""
+    """At 0.5 m/s for about a second, the robot drives almost half a meter, because it accelerates first."""
     arena.scene.reset(1, START, (1.0, 0.0))
 
     arena.robot.move(Movement.FORWARD)
@@ -27,7 +27,7 @@ def test_it_drives_as_commanded(arena):
 
 @pytest.mark.parametrize("heading", [0.0, 1.0, -2.5, math.pi])
 def test_a_reset_puts_it_where_the_episode_begins(arena, heading):
-    """This includes the heading 0, whose quaternion Webots refuses."""
+    """Heading 0 is included, because Webots refuses the quaternion of this heading."""
     arena.scene.reset(1, Pose(0.2, -1.5, 2.0), (1.0, 0.0))
     arena.scene.reset(2, Pose(1.4, 0.1, heading), (0.0, 1.5))
 
@@ -38,7 +38,7 @@ def test_a_reset_puts_it_where_the_episode_begins(arena, heading):
 
 
 def test_after_a_reset_it_stands_and_obeys(arena):
-    """A reset ends velocity control; the facade restores it."""
+    """A reset ends the motors' velocity control, which the facade must restore."""
     arena.scene.reset(1, START, (1.0, 0.0))
     arena.robot.drive(0.5, 0.0, 0.0)
     arena.robot.advance()
@@ -51,7 +51,7 @@ def test_after_a_reset_it_stands_and_obeys(arena):
 
 
 def test_the_same_seed_gives_the_same_readings(arena):
-    """This includes the noise of the sensors."""
+    """A user repeats an experiment by its seed, which also determines the sensors' noise."""
 
     def readings(seed):
         arena.scene.reset(seed, Pose(-1.0, 0.0, 0.3), (1.0, 0.0))
@@ -65,7 +65,7 @@ def test_the_same_seed_gives_the_same_readings(arena):
 
 
 def test_it_feels_a_wall(arena):
-    """It drives forward, and the sensor toward the wall detects it before the bumper does."""
+    """The front sensor must measure the wall before the bumper touches it."""
     arena.scene.reset(1, Pose(1.0, 0.0, 0.0), (-1.0, 0.0))
     arena.robot.drive(0.5, 0.0, 0.0)
 
@@ -80,14 +80,14 @@ def test_it_feels_a_wall(arena):
 
 
 def test_volts_become_metres_within_the_sensors_range():
-    """The real robot returns meters, so the facade does the same."""
+    """The facade returns meters, as the real robot does."""
     read = [meters(volts) for volts in (3.03, 0.82, 0.31, 0.0)]
 
     assert read == pytest.approx([0.0327, 0.16, 0.40, 0.40], abs=0.01)
 
 
 def test_it_has_no_camera(arena):
-    """The error has a type, so that an environment can handle it."""
+    """An environment handles the error by its type."""
     with pytest.raises(NoSuchSensor, match="has no device camera"):
         arena.robot.use_cameras(color=True)
     with pytest.raises(NoSuchSensor, match=r"call use_cameras\(depth=True\), then advance"):
@@ -97,7 +97,7 @@ def test_it_has_no_camera(arena):
 
 
 def test_cameras_that_a_simulator_does_not_render_are_refused(start):
-    """The world has cameras, but the stub does not render their images."""
+    """The world has cameras, but the stub renders no images."""
     seeing = start(world="seeing")
 
     with pytest.raises(NoSuchSensor, match="such as driver mujoco"):
@@ -107,8 +107,8 @@ def test_cameras_that_a_simulator_does_not_render_are_refused(start):
 
 
 def test_a_lost_wake_up_costs_an_extra_step_and_no_fault(start):
-    """The real controller can miss a step that comes too early."""
-    arena = start("--lost-wakeup", "--publish-delay-ms=50")  # the next step is requested within this time
+    """The real controller, too, can miss a step request that comes too early."""
+    arena = start("--lost-wakeup", "--publish-delay-ms=50")  # the next request comes within this delay
 
     extra = [arena.robot.advance() for _ in range(4)]
 
@@ -117,7 +117,7 @@ def test_a_lost_wake_up_costs_an_extra_step_and_no_fault(start):
 
 
 def test_a_period_that_is_no_multiple_of_the_step_is_refused(arena):
-    """Webots would then never send a message."""
+    """Webots would accept the period and never publish a message."""
     robot = Robotino(arena.webots, period_ms=50)
 
     with pytest.raises(WrongData, match="refuses a period of 50 ms"):
@@ -127,7 +127,7 @@ def test_a_period_that_is_no_multiple_of_the_step_is_refused(arena):
 
 
 def test_a_world_with_a_separate_supervisor_works_too(start):
-    """Both robots are stepped together, because otherwise the world would wait for ever."""
+    """Both robots need a step, because the world waits for every controller."""
     pair = start(world="two_robots", supervisor="supervisor", robot="robotino")
     pair.scene.reset(1, START, (1.0, 0.0))
 
@@ -140,7 +140,7 @@ def test_a_world_with_a_separate_supervisor_works_too(start):
 
 @pytest.mark.parametrize("ask", [Robotino.distances, Robotino.bumped])
 def test_readings_are_asked_for_in_vain_before_the_first_period(arena, ask):
-    """The value `not bumped` would be a guess, and a TypeError would explain nothing."""
+    """Without a reading, `False` would be a guess, and a TypeError would not explain the cause."""
     with pytest.raises(NoReading, match=r"let a period pass by advance\(\)"):
         ask(arena.robot)
 
@@ -149,7 +149,7 @@ def test_readings_are_asked_for_in_vain_before_the_first_period(arena, ask):
 
 
 def test_a_viewer_sees_where_it_is(arena):
-    """A replay of an episode needs the looks of the world once, and the poses of every step."""
+    """To replay an episode, a viewer needs the scene once and the poses of every step."""
     scene = arena.webots.observer.scene()
     arena.scene.reset(1, START, (1.0, 0.5))
 

@@ -1,4 +1,4 @@
-"""Robots and scenes in simulators: the nodes of the classes exist, and the layout is that of the world."""
+"""Robots and scenes in simulators: the nodes that a class names exist, and the layout is the world's."""
 
 import pytest
 
@@ -46,14 +46,14 @@ FITTED = b"""
 
 
 class Noting(Services):
-    """Services of a running simulator that record which of them were used."""
+    """Services of a running simulator; they record the paths of all requests."""
 
     def __init__(self, node_name):
         super().__init__(node_name)
         self.asked = []
 
     def get(self, path, type_name):
-        """Record the path."""
+        """Record the path, and return the service."""
         self.asked.append(path)
         return super().get(path, type_name)
 
@@ -87,7 +87,7 @@ def running(master, tmp_path):
     ids=["burger", "e-puck"],
 )
 def test_a_robot_on_two_wheels_passes_the_checks(running, kind, world, near):
-    """It follows its commands, in the curve that its wheels allow."""
+    """The robot must follow its commands in the curves that two wheels permit."""
     robot, scene = running(kind, builtin(world), kind.definition.lower())
 
     scene.reset(1, near, TARGET)
@@ -96,7 +96,7 @@ def test_a_robot_on_two_wheels_passes_the_checks(running, kind, world, near):
 
 
 def test_a_fake_e_puck_sees_what_one_in_a_simulator_sees(running):
-    """Otherwise an experiment with rewards on the fake would be worth nothing."""
+    """Otherwise results with the fake would not be valid for a simulator."""
     robot, scene = running(EPuck, builtin("pen"), "epuck")
     fake, fake_scene = fake_pen()
 
@@ -111,7 +111,7 @@ def test_a_fake_e_puck_sees_what_one_in_a_simulator_sees(running):
 
 
 def test_a_robotino_uses_what_its_world_fits_it_with(running):
-    """The optional devices are laser scanner, forklift and gripper; they cost nothing before their use."""
+    """Laser scanner, forklift and gripper are optional, and cost no time before their first use."""
     world = builtin("arena").replace(
         b"  supervisor TRUE\n  children [", b"  supervisor TRUE\n  children [" + FITTED
     )
@@ -130,7 +130,7 @@ def test_a_robotino_uses_what_its_world_fits_it_with(running):
 
 @pytest.mark.parametrize("use", ["use_scanner", "use_gripper", "use_forklift"])
 def test_what_a_world_lacks_is_refused_by_name(arena, use):
-    """The robot is connected, so it knows its devices."""
+    """The robot is connected, so its list of devices is known."""
     with pytest.raises(NoSuchSensor, match="the robot has no device"):
         getattr(arena.robot, use)()
 
@@ -141,13 +141,13 @@ def test_what_a_world_lacks_is_refused_by_name(arena, use):
     ids=["scan", "grip", "lift"],
 )
 def test_what_is_not_in_use_says_how_to_use_it(arena, call):
-    """The error comes before anything is sent."""
+    """The user must get the name of the method before a request is sent."""
     with pytest.raises(NoSuchSensor, match="is not in use; call use_"):
         call(arena.robot)
 
 
 def test_a_subclass_names_other_nodes_and_devices(running):
-    """The names are those in its world."""
+    """A user's robot has other names, and a subclass is all that a user needs to write."""
 
     class MyBot(Robotino):
         definition = "MYBOT"
@@ -163,12 +163,12 @@ def test_a_subclass_names_other_nodes_and_devices(running):
 
 
 def things(layout):
-    """Return the objects on a floor without its walls, by name."""
+    """Return the obstacles of a floor by name, without the walls."""
     return {thing.name: thing for thing in layout.obstacles if not thing.name.startswith("WALL")}
 
 
 def test_the_layout_is_that_of_the_world(arena, running):
-    """The fakes have the same floors."""
+    """The fakes must have the same floors, so that results with a fake are valid."""
     court = running(TurtleBot3Burger, builtin("court"), "burger")[1].layout()
     pen = running(EPuck, builtin("pen"), "epuck")[1].layout()
 
@@ -186,7 +186,7 @@ def test_the_layout_is_that_of_the_world(arena, running):
 
 
 def test_the_layout_follows_a_thing_that_somebody_moved(arena):
-    """The supervisor or `put` moved it; a new episode puts it back."""
+    """The supervisor or `put` may move an obstacle; a new episode moves it back."""
     arena.scene.supervisor.set_field("CYLINDER_0", "translation", (1.5, 0.0, 0.2))
     arena.scene.put("CYLINDER_1", (0.0, 1.5, 0.2))
     arena.robot.advance()
@@ -200,7 +200,7 @@ def test_the_layout_follows_a_thing_that_somebody_moved(arena):
 
 
 def test_a_start_is_never_drawn_inside_a_thing_that_the_world_has_elsewhere(running):
-    """The world file moved the object, and no constant contains its position."""
+    """A world file may move an obstacle, so its position must be read from the world."""
     world = builtin("arena").replace(b"translation 0.8 0.8 0.2", b"translation 0.3 -0.1 0.2")
     robot, scene = running(Robotino, world, "robotino")
     env = MoveToTargetEnv(robot, scene)
@@ -213,7 +213,7 @@ def test_a_start_is_never_drawn_inside_a_thing_that_the_world_has_elsewhere(runn
 
 
 def test_a_world_without_a_floor_is_refused(running):
-    """The error gives the remedy."""
+    """The user must learn how to define a floor."""
     _, scene = running(
         Robotino, builtin("arena").replace(b"DEF FLOOR Solid", b"DEF GROUND Solid"), "robotino"
     )
@@ -223,9 +223,9 @@ def test_a_world_without_a_floor_is_refused(running):
 
 
 def test_only_what_looks_different_when_turned_is_asked_for_its_orientation(arena):
-    """Each call costs time at a reset.
+    """Each request costs time at every reset.
 
-    A layout has a floor with two corners, which no heading changes.
+    The floor in a layout has only two corners, so its heading is not needed.
     """
     services = Noting(arena.webots.supervisor.node_name)
     try:

@@ -1,4 +1,4 @@
-"""Clients with rospy and roscpp use every service and topic in docs/reference/ros-interface.md."""
+"""Clients with rospy and roscpp can use every service and topic in docs/reference/ros-interface.md."""
 
 import json
 import os
@@ -18,7 +18,7 @@ from tests.integration.webots.roscpp_client import RoscppClient
 from tests.tables import for_each
 from tools.interface.everything import FAILING, offered, world
 
-DEADLINE_S = 120.0  # the work takes seconds, but the machine may be busy
+DEADLINE_S = 120.0  # seconds on an idle machine
 ROOT = Path(__file__).parents[3]
 RUN = "import sys; from palaestra_sim.{}.cli import main; sys.exit(main())"
 PAGE = (ROOT / "docs/reference/ros-interface.md").read_text()
@@ -26,12 +26,12 @@ STEPPED = {"robot/time_step"}
 
 
 def cases(paths):
-    """Return a function that returns each path in `paths(simulator)` with each simulator."""
+    """Return a function that returns pairs: each simulator with each path in `paths(simulator)`."""
     return lambda: [(simulator, path) for simulator in FAILING for path in sorted(paths(simulator))]
 
 
 def of_rospy(plan_, environment, _folder):
-    """Return the results of the client with rospy."""
+    """Return the results of the client with rospy, which runs in a separate process."""
     client = subprocess.run(
         [sys.executable, "-m", "tests.integration.webots.rospy_client"],
         cwd=ROOT,
@@ -46,7 +46,7 @@ def of_rospy(plan_, environment, _folder):
 
 
 def of_roscpp(plan_, environment, folder):
-    """Return the results of the client with roscpp, and the `digests` of its types."""
+    """Return the results of the client with roscpp, and the md5 sums of its types."""
     with RoscppClient(program(folder.parent / "roscpp"), environment, folder / "errors.log") as client:
         return {**play(plan_, client), "digests": client.digests}
 
@@ -55,15 +55,15 @@ def of_roscpp(plan_, environment, folder):
 def program(folder):
     """Return the path of the client with roscpp, built once for all simulators."""
     folder.mkdir()
-    survey = offered("mujoco")  # its types include those of the stub
+    survey = offered("mujoco")  # the stub's types are among its types
     return build(folder, set(survey.services.values()), set(survey.topics.values()))
 
 
 @pytest.fixture(scope="module", params=[of_rospy, of_roscpp], ids=["rospy", "roscpp"])
 def outcomes(request, master, tmp_path_factory):
-    """Return a function that runs a client with a simulator, and returns the results.
+    """Return a function that runs a client with a simulator and returns the results.
 
-    They are the responses by call, the messages by topic, and the simulator's exit status.
+    The results are the responses by call, the messages by topic, and the simulator's exit status.
     """
 
     @cache
@@ -76,7 +76,7 @@ def outcomes(request, master, tmp_path_factory):
 
 
 def observed(simulator, client, environment, folder):
-    """Run a simulator and a client, and return the client's results."""
+    """Run a simulator and a client, and return the client's results and the simulator's exit status."""
     path = folder / "everything.wbt"
     path.write_text(world())
     (folder / "logo.png").write_bytes(encode((1, 1), b"\0\0\xff\xff"))
@@ -91,7 +91,7 @@ def observed(simulator, client, environment, folder):
 
 
 def near(value):
-    """Return a response in which every number may differ by rounding."""
+    """Return a response for comparison, in which every number may differ by rounding."""
     if isinstance(value, dict):
         return {name: near(inside) for name, inside in value.items()}
     if isinstance(value, list):
@@ -101,7 +101,7 @@ def near(value):
 
 @pytest.mark.parametrize("outcomes", [of_roscpp], ids=["roscpp"], indirect=True)
 def test_the_headers_of_roscpp_have_the_md5_of_the_page(outcomes):
-    """A client refuses a service or topic with another md5, which gencpp computes from the definition."""
+    """A client refuses a type with another md5 sum, which gencpp computes from the definition."""
     rows = dict(re.findall(r"^\| `[^`]+` \| (\S+) \| `(\w{32})` ", PAGE, re.MULTILINE))
 
     assert outcomes("stub")["digests"] == rows
@@ -109,7 +109,7 @@ def test_the_headers_of_roscpp_have_the_md5_of_the_page(outcomes):
 
 @for_each("simulator, path", cases(lambda it: offered(it).services.keys() - STEPPED - FAILING[it]))
 def test_a_service_of_the_page_succeeds(outcomes, simulator, path):
-    """Where earlier requests determine the response, it must be that one."""
+    """A user relies on the page. If earlier requests determine the response, the test compares its values."""
     answer = outcomes(simulator)["answers"][path]
 
     assert "failed" not in answer, answer
@@ -132,7 +132,7 @@ def test_a_service_that_the_page_calls_failing_fails(outcomes, simulator, path):
 
 @for_each("simulator, type_name", [(simulator, name) for simulator in FAILING for name in FIELDS])
 def test_a_field_of_every_type_is_read_as_it_was_written(outcomes, simulator, type_name):
-    """The value goes through the messages of rospy in both directions."""
+    """The value passes through the client's messages in both directions."""
     _, _, value = FIELDS[type_name]
 
     answers = outcomes(simulator)["answers"]
@@ -141,7 +141,7 @@ def test_a_field_of_every_type_is_read_as_it_was_written(outcomes, simulator, ty
 
 @for_each("simulator, path", cases(lambda it: offered(it).topics))
 def test_a_topic_of_the_page_is_heard(outcomes, simulator, path):
-    """The message has the class of its type, and the time at which it was sent."""
+    """The client can decode the message, and its stamp is the time of the measurement."""
     message = outcomes(simulator)["heard"][absolute(path)]
 
     assert message.get("header", {"stamp": 1.0})["stamp"] > 0.0
@@ -152,7 +152,7 @@ def test_a_topic_of_the_page_is_heard(outcomes, simulator, path):
     ("topic", "encoding"), [("camera/image", "bgra8"), ("range_finder/range_image", "32FC1")]
 )
 def test_a_picture_arrives_whole(outcomes, topic, encoding):
-    """It has four bytes for each of 64 x 64 pixels, in an encoding that cv_bridge knows."""
+    """The image has four bytes for each of 64 x 64 pixels, in an encoding that cv_bridge supports."""
     image = outcomes("mujoco")["heard"][absolute(topic)]
 
     assert (image["width"], image["height"], image["encoding"]) == (64, 64, encoding)
@@ -161,7 +161,7 @@ def test_a_picture_arrives_whole(outcomes, topic, encoding):
 
 @pytest.mark.parametrize("simulator", FAILING)
 def test_the_last_service_ends_the_simulator_with_the_status_that_was_asked_for(outcomes, simulator):
-    """Before it, the client used reset, restart, revert, reload and load, and was connected after each."""
+    """Before this request, the client used reset, restart, revert, reload and load."""
     outcome = outcomes(simulator)
 
     assert outcome["answers"]["supervisor/simulation_quit"]["success"]

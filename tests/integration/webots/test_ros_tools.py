@@ -1,4 +1,4 @@
-"""The blocks of docs/howto/ros-tools.md about ROS's own tools and rospy, with a stub and a real master."""
+"""The blocks of docs/howto/ros-tools.md for ROS's tools and rospy work, with a stub and a real master."""
 
 import os
 import signal
@@ -14,7 +14,7 @@ from tests.pages import blocks
 
 ROOT = Path(__file__).parents[3]
 PAGE = (ROOT / "docs/howto/ros-tools.md").read_text()
-DEADLINE_S = 60.0  # the work takes moments, but the machine may be busy
+DEADLINE_S = 60.0  # moments on an idle machine
 PRINT_MD5 = """
 import webots_ros.msg, webots_ros.srv
 for type_ in (*vars(webots_ros.msg).values(), *vars(webots_ros.srv).values()):
@@ -25,9 +25,9 @@ for type_ in (*vars(webots_ros.msg).values(), *vars(webots_ros.srv).values()):
 
 @pytest.fixture
 def environment(master, tmp_path):
-    """Return the variables of a terminal.
+    """Return the environment of a user's terminal.
 
-    They have no path of packages, and a folder of the test for ROS's logs.
+    It has no path of ROS packages, and a folder of the test for ROS's logs.
     """
     leading = ("PYTHONPATH", "ROS_PACKAGE_PATH")
     given = {name: value for name, value in os.environ.items() if name not in leading}
@@ -36,7 +36,7 @@ def environment(master, tmp_path):
 
 @pytest.fixture
 def terminal(environment):
-    """Yield a function that starts blocks of the page, by their kinds, in a shell in the checkout."""
+    """Yield a function that runs blocks of the page, selected by kind, in a shell in the checkout."""
     started = []
 
     def typed(*kinds, **variables):
@@ -60,19 +60,19 @@ def terminal(environment):
 
 
 def typed_lines(*kinds):
-    """Return all blocks of these kinds as one script."""
+    """Return all blocks of these kinds, in order, as one script."""
     return "".join(text for kind in kinds for text in blocks(PAGE, f"sh {kind}"))
 
 
 def answer(shell):
-    """Return the output of a shell's commands after they have ended without an error."""
+    """Wait for the end of a shell, which must succeed without errors, and return its output."""
     output, errors = shell.communicate(timeout=DEADLINE_S)
     assert (shell.returncode, errors) == (0, "")
     return output
 
 
 def run_python(code, environment):
-    """Return the output of a program in the Python of the virtual environment."""
+    """Run code with the Python of the virtual environment, and return the output."""
     done = subprocess.run(
         [sys.executable, "-c", code],
         cwd=environment["ROS_HOME"],
@@ -87,7 +87,7 @@ def run_python(code, environment):
 
 @pytest.fixture
 def simulator(terminal):
-    """Return the shell with the simulator of the page, once that responds."""
+    """Start the page's simulator, wait until it responds, and return its shell."""
     shell = terminal("the-simulator")
     assert "arena.wbt: robotino" in shell.stderr.readline()
     return shell
@@ -96,7 +96,7 @@ def simulator(terminal):
 @pytest.mark.usefixtures("simulator")
 @pytest.mark.parametrize("place", ["ros-package-path", "ros-package-path-elsewhere"])
 def test_rossrv_and_rosservice_read_the_types_of_a_simulator(place, terminal, tmp_path):
-    """Without the package they end with `Unable to load type`."""
+    """Without the package webots_ros, these tools end with `Unable to load type`."""
     programs = f"{Path(sys.executable).parent}:{os.environ['PATH']}"
 
     output = answer(terminal(place, "the-tools", HOME=str(tmp_path), PATH=programs))
@@ -106,7 +106,7 @@ def test_rossrv_and_rosservice_read_the_types_of_a_simulator(place, terminal, tm
 
 @pytest.mark.usefixtures("simulator")
 def test_rostopic_echo_prints_a_message_of_a_simulator(terminal):
-    """The test steps until rostopic has printed a message, because nothing shows when it has subscribed."""
+    """The test steps repeatedly, because no output shows when rostopic has subscribed."""
     answer(terminal("ros-package-path", "the-tools"))
     listening = terminal("ros-package-path", "the-topic")
 
@@ -118,14 +118,14 @@ def test_rostopic_echo_prints_a_message_of_a_simulator(terminal):
 
 @pytest.mark.usefixtures("simulator")
 def test_rospy_calls_a_simulator_with_the_classes_of_the_package(environment):
-    """A program with rospy needs no facade and no variable."""
+    """A user's program with rospy needs no facade and no environment variable."""
     [program] = blocks(PAGE, "python with-rospy")
 
     assert run_python(program, environment) == "0.0\n"
 
 
 def test_every_class_of_the_package_has_the_md5_of_the_wire(environment):
-    """`make setup` has put them into the virtual environment, even after a changed definition."""
+    """`make setup` must update the classes in the virtual environment after a changed definition."""
     messages, services = type_names()
     of_the_wire = {name: message_type(name).md5 for name in messages if name.startswith("webots_ros/")}
     of_the_wire |= {name: service_type(name).md5 for name in services if name.startswith("webots_ros/")}
@@ -137,7 +137,7 @@ def test_every_class_of_the_package_has_the_md5_of_the_wire(environment):
 
 
 def test_the_packages_that_the_page_names_are_those_that_the_tests_run_with():
-    """`make test` installs them."""
+    """A reader installs the page's packages, and the tests run only with those of `make test`."""
     lines = [text for text in blocks(PAGE, "console") if "apt-get install" in text]
     installed = (ROOT / "tools/test-packages.sh").read_text()
 
@@ -146,7 +146,7 @@ def test_the_packages_that_the_page_names_are_those_that_the_tests_run_with():
 
 
 def test_an_installed_package_comes_before_ours(tmp_path):
-    """A user's Webots may be of another release than our definitions."""
+    """A user's Webots may have another release than our definitions, so its package must come first."""
     installed = tmp_path / "webots_ros"
     (installed / "srv").mkdir(parents=True)
     (installed / "package.xml").write_text("<package><name>webots_ros</name></package>")

@@ -1,4 +1,4 @@
-"""Two simulators of one world on one master, as in a notebook: each facade drives its own."""
+"""Two simulators of one world with one ROS master, as in a notebook; each facade drives its own."""
 
 import os
 import signal
@@ -31,13 +31,13 @@ _OF_ANOTHER_MASTER = (
 
 @pytest.fixture
 def name():
-    """Return a ROS name that only this test uses, because other tests share its master."""
+    """Return a ROS name that only this test uses, because all tests share a master."""
     return f"twin_{uuid.uuid4().hex[:8]}"
 
 
 @pytest.fixture
 def world(master, tmp_path, name):
-    """Return the path of an arena in which the robot has that name."""
+    """Return the path of an arena whose robot has this ROS name."""
     del master
     path = tmp_path / "arena.wbt"
     path.write_bytes(builtin("arena").replace(b"--name=robotino", f"--name={name}".encode()))
@@ -46,7 +46,7 @@ def world(master, tmp_path, name):
 
 @pytest.fixture
 def make(world, name):
-    """Yield `make()`, which returns a facade of that world."""
+    """Yield a function that creates facades of that world."""
     made = []
 
     def begin(**options):
@@ -59,7 +59,7 @@ def make(world, name):
 
 
 def test_two_facades_of_one_world_drive_a_simulator_each(make, name):
-    """The second facade gets the next free name, and shows it."""
+    """The second facade must choose the next free name and report it."""
     first, second = make(), make()
     robots = [Robotino(webots) for webots in (first, second)]
     scenes = [SimulatedScene(webots, robot) for webots, robot in zip((first, second), robots, strict=True)]
@@ -86,7 +86,7 @@ def test_two_facades_of_one_world_drive_a_simulator_each(make, name):
 
 
 def test_a_name_is_free_again_once_its_facade_is_closed(make, name):
-    """Otherwise the numbers in names would grow without end."""
+    """Otherwise each repetition of a notebook's cell would get a higher number."""
     first = make()
     first.close()
 
@@ -94,7 +94,7 @@ def test_a_name_is_free_again_once_its_facade_is_closed(make, name):
 
 
 def test_the_name_of_a_simulator_that_was_killed_is_free(make, world, name):
-    """The master still lists the name."""
+    """The master still lists the name, but no node responds under it."""
     launcher = ProcessLauncher(world)
     make(launcher=launcher).start()
     os.kill(launcher.state().pid, signal.SIGKILL)
@@ -104,7 +104,7 @@ def test_the_name_of_a_simulator_that_was_killed_is_free(make, world, name):
 
 
 def test_a_name_that_another_program_has_reserved_is_not_taken(make, master, name):
-    """Two notebooks that start at the same time must not get the same name."""
+    """Two notebooks that start at the same time must not choose the same name."""
     code = (
         "from palaestra_trainer.webots.launching.ros_name_locks import Reservation\n"
         "held = Reservation()\n"
@@ -128,7 +128,7 @@ def test_a_name_that_another_program_has_reserved_is_not_taken(make, master, nam
 
 
 def test_a_simulator_that_runs_is_used_with_an_attached_launcher_only(make):
-    """The attached facade never stops the simulator."""
+    """The attached facade must never stop a simulator that another program owns."""
     owner = make()
     owner.start()
     guest = make(launcher=Attached())
@@ -143,13 +143,13 @@ def test_a_simulator_that_runs_is_used_with_an_attached_launcher_only(make):
 
 
 def test_attaching_to_nothing_says_so_at_once(make):
-    """There is nothing to wait for."""
+    """An attached facade cannot start a simulator, so a wait would be useless."""
     with pytest.raises(SimulatorDead, match="no simulator responds under this name"):
         make(launcher=Attached()).start()
 
 
 def test_a_node_that_does_not_run_is_known_as_such(master):
-    """The node itself is queried, because its registration may be old."""
+    """The registration of a killed node stays, so the node itself must be asked."""
     del master
     assert not Master("/test").runs("/nobody")
 
@@ -160,7 +160,7 @@ def test_a_node_that_does_not_run_is_known_as_such(master):
     ids=["another program", "a node of another master"],
 )
 def test_the_name_of_a_killed_node_is_free_when_another_program_has_its_port(master, name, response):
-    """The kernel may give a free port to the next program, and then a request to the node is answered."""
+    """The kernel may give the port to another program, which then responds to the request."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         uri = f"http://127.0.0.1:{server.getsockname()[1]}/"
         with xmlrpc.client.ServerProxy(master) as registry:

@@ -1,4 +1,4 @@
-"""A member with a spare, on real stubs: whatever happens to one simulator, the other one takes over."""
+"""A member with a spare, on real stubs: after any failure of one simulator, the other takes over."""
 
 import os
 import signal
@@ -24,11 +24,11 @@ from tests.waiting import eventually
 
 PATIENCE_S = 60.0
 START_DEADLINE_S = 60.0
-LONG_S = 30.0  # a change of roles takes milliseconds, and a start may take 60 s
+LONG_S = 30.0  # a change of roles takes milliseconds, and a start may take a minute
 
 
 class Pair:
-    """A member with a spare, and its two simulators."""
+    """A member of a run with two simulators, of which one is the spare."""
 
     def __init__(self, launcher, recycle, limit):
         def make(robot, scene):
@@ -42,14 +42,14 @@ class Pair:
         self.member = Standby(self.first, self.second, limit)
 
     def begin(self):
-        """Start the member, wait for the spare, and begin an episode."""
+        """Start the member, wait until the spare is ready, and begin an episode."""
         self.member.start()
         self.wait_for_spare()
         self.member.env.reset(seed=1)
         return self
 
     def wait_for_spare(self):
-        """Return once the spare is ready."""
+        """Wait until the spare is ready."""
         give_up = time.monotonic() + PATIENCE_S
         while self.member.spare() == "starting":
             assert time.monotonic() < give_up
@@ -57,27 +57,27 @@ class Pair:
         assert self.member.spare() == "ready"
 
     def play(self):
-        """Step until the simulator fails."""
+        """Take steps until the simulator fails."""
         for _ in range(200):
             self.member.env.step(0)
 
     def plays_in(self, simulator):
-        """Return whether the member uses that simulator, and it responds."""
+        """Begin an episode and take a step; return whether the member uses that simulator."""
         self.member.env.reset(seed=2)
         self.member.env.step(0)
         return self.member.env is simulator.env
 
 
 def pid_of(simulator):
-    """Return the process id of a simulator."""
+    """Return the process id of a member's simulator."""
     return simulator.sidecar.state().pid
 
 
 @pytest.fixture
 def pair(master, tmp_path):
-    """Yield a function that makes a member with a spare, which is not started.
+    """Yield a function that returns a member with a spare, which has not been started.
 
-    At the end, its sidecar and both simulators are ended too.
+    At the end of the test, the sidecar ends with both simulators.
     """
     del master
     made = []
@@ -95,7 +95,7 @@ def pair(master, tmp_path):
 
 
 def test_a_killed_simulator_is_replaced_by_the_one_that_stood_by(pair, capsys):
-    """SIGKILL is the kernel's signal for too much memory. The figure is in docs/explain/reliability.md."""
+    """The kernel, too, sends SIGKILL, for too much memory. docs/explain/reliability.md lists the times."""
     it = pair().begin()
     os.kill(pid_of(it.first), signal.SIGKILL)
 
@@ -116,7 +116,7 @@ def test_a_killed_simulator_is_replaced_by_the_one_that_stood_by(pair, capsys):
 
 
 def test_the_one_that_was_killed_becomes_the_next_spare(pair):
-    """The next fault then costs no more than this one."""
+    """With a new spare, the next fault costs no more time than this one."""
     it = pair().begin()
     for broken, next_ in ((it.first, it.second), (it.second, it.first)):
         os.kill(pid_of(broken), signal.SIGKILL)
@@ -130,7 +130,7 @@ def test_the_one_that_was_killed_becomes_the_next_spare(pair):
 
 
 def test_a_recycled_simulator_is_ended_and_is_no_fault(pair):
-    """The change comes between two episodes, and the new simulator begins with no resets."""
+    """The member changes simulators between two episodes, and the new simulator has no resets."""
     it = pair(recycle=Recycle(after_resets=2)).begin()
     it.member.env.reset(seed=3)
 
@@ -145,7 +145,7 @@ def test_a_recycled_simulator_is_ended_and_is_no_fault(pair):
 
 
 def test_a_hanging_simulator_is_not_waited_for(pair):
-    """Its process is killed in the background, because that takes time."""
+    """Its process is killed in the background, because a kill takes time."""
     it = pair().begin()
     hung = pid_of(it.first)
     os.kill(hung, signal.SIGSTOP)
@@ -160,7 +160,7 @@ def test_a_hanging_simulator_is_not_waited_for(pair):
 
 
 def test_a_spare_that_is_not_ready_yet_is_waited_for(pair):
-    """After two faults in a row, the second costs a start, as it would without a spare."""
+    """The second of two faults in a row costs a start, as it would without a spare."""
     it = pair().begin()
 
     it.member.restart()
@@ -171,7 +171,7 @@ def test_a_spare_that_is_not_ready_yet_is_waited_for(pair):
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
 def test_a_broken_spare_fails_one_restart_and_the_next_one_succeeds(pair, number):
-    """Each is a separate fault, and nothing waits for more than one start."""
+    """Each failure is a separate fault, and no restart waits longer than for one start."""
     it = pair().begin()
     os.kill(pid_of(it.second), number)
 
@@ -184,7 +184,7 @@ def test_a_broken_spare_fails_one_restart_and_the_next_one_succeeds(pair, number
 
 
 def test_a_spare_that_does_not_come_up_is_tried_again_while_nobody_waits(pair):
-    """Otherwise the next fault would cost a start, however long ago the refusal was."""
+    """Otherwise the next fault would cost a start, even long after the refusal."""
     it = pair("--fault=start_refused:start=2").begin()
 
     it.member.restart()
@@ -196,7 +196,7 @@ def test_a_spare_that_does_not_come_up_is_tried_again_while_nobody_waits(pair):
 
 
 def test_a_spare_that_does_not_start_within_its_budget_fails_the_restart_that_needs_it(pair):
-    """Until then the working simulator continues."""
+    """The working simulator must continue until its own fault."""
     it = pair("--fault=start_refused:start=2", limit=RestartLimit(restarts=0))
     it.member.start()
     it.member.restart()
@@ -209,7 +209,7 @@ def test_a_spare_that_does_not_start_within_its_budget_fails_the_restart_that_ne
 
 
 def test_a_spare_is_waited_for_as_long_as_a_simulator_may_take_to_start(pair):
-    """The wait is no longer, because a member that waits blocks the others."""
+    """A member that waits blocks all other members, so the wait must be limited."""
     it = pair("--fault=slow_start:latency_ms=600000,start=2").begin()
     it.member.restart()
     it.first.start_deadline_s = 0.5
@@ -219,7 +219,7 @@ def test_a_spare_is_waited_for_as_long_as_a_simulator_may_take_to_start(pair):
 
 
 def test_a_spare_rests_until_it_takes_over(pair):
-    """A second simulator must not take processor time from the first."""
+    """A spare that steps would take processor time from the simulator in use."""
     it = pair().begin()
 
     modes = [each.webots.observer.mode() for each in (it.first, it.second)]
@@ -230,7 +230,7 @@ def test_a_spare_rests_until_it_takes_over(pair):
 
 
 def test_a_simulator_that_takes_too_much_memory_is_due(pair):
-    """The sidecar reports the memory of all its processes, a second after the last request."""
+    """The sidecar measures the memory of all processes of the simulator, once per second."""
     it = pair("--fault=memory_growth:mib=20,most_mib=300", recycle=Recycle(above_memory_bytes=200 * 2**20))
     it.begin()
     before = it.member.due()
@@ -246,7 +246,7 @@ def test_a_simulator_that_takes_too_much_memory_is_due(pair):
 
 
 def test_a_stop_while_the_spare_starts_leaves_no_process_and_no_thread(pair):
-    """A run may end at any moment, and its end must not wait for a start."""
+    """A run may end at any time, and its end must not wait for a start."""
     it = pair("--fault=slow_start:latency_ms=600000,start=2").begin()
     it.member.restart()
 
@@ -261,7 +261,7 @@ def test_a_stop_while_the_spare_starts_leaves_no_process_and_no_thread(pair):
 
 
 def test_a_start_that_a_restart_waits_for_is_not_begun_again_once_it_is_abandoned(pair):
-    """This holds for any budget, because a run that ends gives each simulator only a few seconds."""
+    """A run that ends gives each simulator only seconds, even if the budget allows more starts."""
     held = [f"--fault=slow_start:latency_ms=600000,start={start}" for start in range(2, 60)]
     it = pair(*held, limit=RestartLimit(restarts=1000)).begin()
     it.member.restart()
@@ -280,7 +280,7 @@ def test_a_start_that_a_restart_waits_for_is_not_begun_again_once_it_is_abandone
 
 
 def test_what_was_stopped_can_be_started_again(pair):
-    """Every member can do this."""
+    """Every member of a run can be started again after a stop."""
     it = pair().begin()
     it.member.stop()
 
@@ -296,7 +296,7 @@ def descriptors():
 
 
 def test_changing_places_again_and_again_leaves_no_file_open(pair):
-    """A run of a week changes roles ten thousand times."""
+    """A run of a week may change simulators ten thousand times."""
     it = pair().begin()
     opened = []
     for _ in range(4):
@@ -306,4 +306,4 @@ def test_changing_places_again_and_again_leaves_no_file_open(pair):
         it.wait_for_spare()
         opened.append(descriptors())
 
-    eventually(lambda: descriptors() <= opened[1])  # a master may still be calling our node
+    eventually(lambda: descriptors() <= opened[1])  # a master may still call our node

@@ -1,4 +1,4 @@
-"""The stub as a program: its output, its end, and its requests to the master."""
+"""The stub as a program: its output, its end, and its requests to the ROS master."""
 
 import os
 import signal
@@ -11,7 +11,7 @@ import pytest
 
 from palaestra_trainer.ros import Master, RosService
 
-DEADLINE_S = 60.0  # the work takes moments, but the machine may be busy
+DEADLINE_S = 60.0  # moments on an idle machine
 STUB = Path(sys.executable).with_name("palaestra-stub")
 WITHOUT_ROS = """
 import sys
@@ -24,7 +24,7 @@ ARENA = Path(__file__).parents[3] / "sim_image/src/palaestra_sim/worlds/arena.wb
 
 @pytest.fixture
 def stub(master, tmp_path):
-    """Yield a function that starts stubs of the arena under a separate name, and kill them at the end."""
+    """Yield a function that starts stubs with a ROS name of their own; all are killed at the end."""
     world = tmp_path / "arena.wbt"
     world.write_bytes(ARENA.read_bytes().replace(b"--name=robotino", b"--name=process_test"))
     started = []
@@ -43,14 +43,14 @@ def stub(master, tmp_path):
 
 
 def ready(process):
-    """Wait for the line about the running controllers."""
+    """Wait for the line about running controllers, and return the service for the simulated time."""
     line = process.stderr.readline()
     assert "process_test" in line
     return RosService("/process_test/robot/get_time", "webots_ros/get_float")
 
 
 def test_it_runs_where_no_ros_is_installed(stub):
-    """A laptop with another system has no ROS; only the master is elsewhere."""
+    """The stub must run on a laptop without ROS, where only a ROS master is needed as another program."""
     process = stub(program=(sys.executable, "-c", WITHOUT_ROS))
     get_time = ready(process)
 
@@ -59,7 +59,7 @@ def test_it_runs_where_no_ros_is_installed(stub):
 
 
 def test_sigterm_ends_it_in_good_order(stub):
-    """The master no longer lists its names, so the next simulator is not mistaken for it."""
+    """The master must no longer list the names, or clients would look for the next simulator there."""
     process = stub()
     ready(process)
 
@@ -70,7 +70,7 @@ def test_sigterm_ends_it_in_good_order(stub):
 
 
 def test_a_client_can_choose_the_exit_status(stub):
-    """`simulation_quit` of Webots allows this."""
+    """Webots' service `simulation_quit` has this argument."""
     process = stub()
     ready(process)
     quit_ = RosService("/process_test/supervisor/simulation_quit", "webots_ros/set_int")
@@ -82,7 +82,7 @@ def test_a_client_can_choose_the_exit_status(stub):
 
 
 def test_without_a_master_it_says_so_and_ends(stub):
-    """A controller of Webots would leave a simulation that nobody can reach."""
+    """A simulation without a master would run, and no client could reach it."""
     process = stub(uri="http://localhost:1")
 
     assert process.wait(DEADLINE_S) == 1
@@ -90,7 +90,7 @@ def test_without_a_master_it_says_so_and_ends(stub):
 
 
 def test_the_error_for_an_invalid_world_has_its_line(master, tmp_path):
-    """The line helps the author to correct the world."""
+    """With the line number, the author finds the mistake in the world file."""
     del master
     world = tmp_path / "broken.wbt"
     world.write_text("#VRML_SIM R2023b utf8\nRobot {\n  name 3 {\n}\n")
@@ -102,7 +102,7 @@ def test_the_error_for_an_invalid_world_has_its_line(master, tmp_path):
 
 
 def test_all_refusals_of_a_world_are_printed_and_the_last_line_sums_them_up(master, tmp_path):
-    """A sidecar reports the last line, and a user reads the rest."""
+    """A user reads all lines, and a sidecar reports only the last one."""
     del master
     world = tmp_path / "forest.wbt"
     world.write_text("#VRML_SIM R2023b utf8\nColosseum { }\nMinotaur { }\nMinotaur { }\n")
@@ -119,7 +119,7 @@ def test_all_refusals_of_a_world_are_printed_and_the_last_line_sums_them_up(mast
 
 
 def test_a_second_one_of_the_same_name_takes_the_name(stub):
-    """The rules of ROS 1 demand it: the older node must shut down, but its simulation continues."""
+    """By the rules of ROS 1, the older node must shut down, but its simulation continues."""
     older = stub()
     ready(older)
     newer = stub()
@@ -134,7 +134,7 @@ def test_a_second_one_of_the_same_name_takes_the_name(stub):
 
 
 def test_a_node_that_rosnode_kill_ends_is_reported_as_shut_down(master, stub):
-    """No other node then has its name. `rosnode kill` sends this request to the node."""
+    """`rosnode kill` sends this request, and the user must learn why the robot has no controller."""
     process = stub()
     ready(process)
     with xmlrpc.client.ServerProxy(master) as ask_master:

@@ -1,4 +1,4 @@
-"""Two starts of MuJoCo with one seed and the same commands send equal messages, except for their stamps."""
+"""Two starts of MuJoCo with one seed and equal commands publish equal messages, except for the stamps."""
 
 import math
 
@@ -12,8 +12,8 @@ from palaestra_trainer.webots import Mode, Webots
 from palaestra_trainer.webots.launching.local_simulator import ProcessLauncher
 
 STEPS = 20
-START = Pose(0.9, 0.3, 0.2)  # close enough to the wall ahead to reach it
-STAMP = slice(4, 12)  # the bytes of a message's stamp, after the number in its header
+START = Pose(0.9, 0.3, 0.2)  # so close to a wall that the robot reaches it
+STAMP = slice(4, 12)  # the bytes of the stamp, after the number in the header
 DEADLINE_S = 30.0
 IMAGE, RANGE = "sensor_msgs/Image", "sensor_msgs/Range"
 FLOAT, BOOL = "webots_ros/Float64Stamped", "webots_ros/BoolStamped"
@@ -28,7 +28,7 @@ TOPICS = {
 
 @pytest.fixture
 def messages(master):
-    """Return `messages(seed)`, which returns a new simulator's messages by topic, without stamps."""
+    """Return a function that starts a simulator with a seed and returns its messages by topic."""
     del master
 
     def messages(seed):
@@ -49,7 +49,7 @@ def messages(master):
 
 
 def listen(scene, robot, seed):
-    """Begin an episode, drive in curves into a wall, and return the messages by topic."""
+    """Begin an episode, drive in curves into a wall, and return all messages by topic."""
     topics = {path: RosSubscriber(f"/robotino/{path}", kind, bytes) for path, kind in TOPICS.items()}
     for path in TOPICS:
         enable = RosService(f"/robotino/{path.partition('/')[0]}/enable", "webots_ros/set_int")
@@ -70,12 +70,12 @@ def listen(scene, robot, seed):
 
 
 def unstamped(message):
-    """Return a message without the seconds of its header."""
+    """Return a message without the stamp in its header."""
     return message[: STAMP.start] + message[STAMP.stop :]
 
 
 def test_two_starts_with_one_seed_send_equal_messages(messages):
-    """The messages contain pictures, noise, contacts and encoders, all of which change in this world."""
+    """The messages contain images, noise, contacts and encoders, which all change in this world."""
     first, second = messages(3), messages(3)
 
     assert [path for path in TOPICS if first[path] != second[path]] == []

@@ -1,4 +1,4 @@
-"""The facade over a real simulator: it starts on demand, is controlled, and reports its true state."""
+"""The facade of a real simulator starts it on demand, controls it, and reports its state."""
 
 import os
 import signal
@@ -11,7 +11,7 @@ from palaestra_trainer.webots import Mode
 
 
 def test_a_started_simulator_is_available_until_it_is_stopped(own_arena):
-    """The test of availability is a real round trip."""
+    """`available` sends a request, so it reports the real state."""
     available = [own_arena.webots.available()]
 
     own_arena.webots.stop()
@@ -20,7 +20,7 @@ def test_a_started_simulator_is_available_until_it_is_stopped(own_arena):
 
 
 def test_a_stop_is_no_fault(own_arena):
-    """The stop was announced before the supervisor received the request to quit."""
+    """The sidecar knows about the stop before the simulator ends."""
     own_arena.webots.stop()
 
     state = own_arena.launcher.state()
@@ -28,7 +28,7 @@ def test_a_stop_is_no_fault(own_arena):
 
 
 def test_calling_the_facade_restarts_the_simulator(own_arena):
-    """Another process responds under the same name."""
+    """A new process must respond under the same name."""
     before = own_arena.pid
 
     own_arena.webots()
@@ -38,7 +38,7 @@ def test_calling_the_facade_restarts_the_simulator(own_arena):
 
 
 def test_inside_the_context_time_is_fast_and_outside_it_stands(own_arena):
-    """Between steps, a simulator needs a whole core unless it is paused."""
+    """A simulator that is not paused between steps uses a whole processor."""
     with own_arena.webots:
         inside = own_arena.webots.observer.mode()
 
@@ -46,13 +46,13 @@ def test_inside_the_context_time_is_fast_and_outside_it_stands(own_arena):
 
 
 def test_run_returns_what_the_callback_returns(own_arena):
-    """`run(callback)` and the context do the same."""
+    """`run(callback)` has the same effect as the `with` block."""
     assert own_arena.webots.run(own_arena.webots.observer.mode) is Mode.FAST
     assert own_arena.webots.observer.mode() is Mode.PAUSE
 
 
 def test_run_can_restart_before_the_callback(own_arena):
-    """The paper's training loop does this after 24 resets."""
+    """The paper's training loop restarts its simulator after 24 resets."""
     before = own_arena.pid
 
     own_arena.webots.run(lambda: None, restart=True)
@@ -61,7 +61,7 @@ def test_run_can_restart_before_the_callback(own_arena):
 
 
 def test_entering_starts_a_simulator_that_does_not_run(own_arena):
-    """The simulator starts on demand, without a call of start()."""
+    """A user need not call `start`."""
     own_arena.webots.stop()
 
     with own_arena.webots:
@@ -69,7 +69,7 @@ def test_entering_starts_a_simulator_that_does_not_run(own_arena):
 
 
 def test_a_killed_simulator_is_dead_and_comes_back_with_the_same_objects(own_arena):
-    """Robot, scene and environment are kept over restarts."""
+    """Robot, scene and environment of a program must survive a restart."""
     os.kill(own_arena.pid, signal.SIGKILL)
     with pytest.raises(SimulatorDead):
         own_arena.robot.advance()
@@ -82,7 +82,7 @@ def test_a_killed_simulator_is_dead_and_comes_back_with_the_same_objects(own_are
 
 
 def test_a_stopped_process_hangs_and_can_be_restarted(own_arena):
-    """Its sockets are open, and the kernel even accepts new connections for it."""
+    """The sockets of a stopped process are open, and the kernel even accepts new connections."""
     os.kill(own_arena.pid, signal.SIGSTOP)
 
     with pytest.raises(SimulatorHung):
@@ -94,7 +94,7 @@ def test_a_stopped_process_hangs_and_can_be_restarted(own_arena):
 
 
 def test_the_observer_changes_nothing(own_arena):
-    """The simulated time does not advance during its requests."""
+    """A request of the observer must not advance the simulated time."""
     observer = own_arena.webots.observer
     before = observer.time()
 
@@ -107,7 +107,7 @@ def test_the_observer_changes_nothing(own_arena):
 
 
 def test_a_reload_brings_the_world_back_with_new_handles(own_arena):
-    """The old handles are invalid, and are looked up again on the next use."""
+    """The old handles are invalid, so the facade must look them up again."""
     own_arena.robot.drive(0.5, 0.0, 0.0)
     for _ in range(3):
         own_arena.robot.advance()

@@ -1,4 +1,4 @@
-"""The velocities that the facade sends to wheels, and when it sends them again."""
+"""The velocities that the facade sends to the wheels, and when it sends a velocity again."""
 
 import math
 
@@ -13,22 +13,22 @@ from palaestra_trainer.webots.services import Services
 
 START = Pose(-1.5, 0.0, 0.0)
 AHEAD = (0.5, 0.0, 0.0)
-CURVE = (0.3, 0.1, 0.5)  # it turns every wheel
+CURVE = (0.3, 0.1, 0.5)  # every wheel turns
 
 
 class Stranger:
-    """Another client of the wheels, which shows what the facade sends and what not."""
+    """A second client of the wheels, which detects whether the facade sends a command."""
 
     def __init__(self):
         self._services = Services("robotino")
 
     def tell(self, velocity):
-        """Turn all wheels at `velocity` rad/s."""
+        """Set the velocity of all wheels, in rad/s."""
         for wheel in range(3):
             self._services.get(f"wheel{wheel}_joint/set_velocity", "set_float")(value=velocity)
 
     def ask(self):
-        """Return the commanded velocities of the wheels, in rad/s."""
+        """Return the commanded velocities of all wheels, in rad/s."""
         return [self._services.ask(f"wheel{wheel}_joint/get_velocity", "get_float") for wheel in range(3)]
 
     def close(self):
@@ -38,7 +38,7 @@ class Stranger:
 
 @pytest.fixture
 def stranger(master):
-    """Yield another client on the same master."""
+    """Yield a second client of the simulator."""
     del master
     somebody = Stranger()
     yield somebody
@@ -47,7 +47,7 @@ def stranger(master):
 
 @pytest.fixture
 def motor(arena):
-    """Yield a single wheel."""
+    """Yield a wheel as a separate motor."""
     del arena
     wheel = Motor("robotino", "wheel0_joint")
     yield wheel
@@ -55,9 +55,9 @@ def motor(arena):
 
 
 def test_a_velocity_that_did_not_change_is_not_sent_again(arena, stranger):
-    """Webots keeps the velocity, and a policy often repeats an action.
+    """Webots keeps a velocity, and a policy often repeats an action.
 
-    This saves three messages of fifteen per step.
+    Without these commands, a step needs three messages less of fifteen.
     """
     arena.robot.drive(*CURVE)
     stranger.tell(7.0)
@@ -68,7 +68,7 @@ def test_a_velocity_that_did_not_change_is_not_sent_again(arena, stranger):
 
 
 def test_only_the_velocities_that_change_are_sent(arena, stranger):
-    """The rear wheel stands when the robot drives ahead or back."""
+    """The rear wheel does not turn when the robot drives ahead or back."""
     arena.robot.drive(*AHEAD)
     stranger.tell(7.0)
 
@@ -78,7 +78,7 @@ def test_only_the_velocities_that_change_are_sent(arena, stranger):
 
 
 def test_after_a_reset_it_is_sent_again(arena, stranger):
-    """A reset removes the velocities of all motors."""
+    """A reset sets the velocities of all motors to 0."""
     arena.robot.drive(*CURVE)
     arena.scene.reset(1, START, (1.0, 0.0))
     assert stranger.ask() == [0.0, 0.0, 0.0]
@@ -99,7 +99,7 @@ def test_a_reset_to_standing_is_sent_although_it_stood(arena, stranger):
 
 
 def test_after_a_restart_it_is_sent_again(arena, stranger):
-    """The new process does not know the velocity."""
+    """The new process does not have the velocity of the old one."""
     arena.robot.drive(*CURVE)
     stranger.close()
     arena.webots()
@@ -110,7 +110,7 @@ def test_after_a_restart_it_is_sent_again(arena, stranger):
 
 
 def test_after_a_reconnection_it_is_sent_again(arena, stranger):
-    """Another client may have changed the velocity in the meantime."""
+    """Another client may have changed the velocity meanwhile."""
     arena.robot.drive(*CURVE)
     arena.robot.connect()
 
@@ -120,7 +120,7 @@ def test_after_a_reconnection_it_is_sent_again(arena, stranger):
 
 
 def test_what_was_not_confirmed_is_sent_again(start, stranger):
-    """The second command of a wheel gets half a response, so its effect is unknown."""
+    """The second command gets half of a response, so its effect is unknown."""
     arena = start("--fault=wrong_shape:service=wheel1_joint/set_velocity,call=2")
     with pytest.raises(WrongData):
         arena.robot.drive(*CURVE)
@@ -132,7 +132,7 @@ def test_what_was_not_confirmed_is_sent_again(start, stranger):
 
 
 def test_a_velocity_that_was_refused_is_sent_again_with_a_new_position(motor, stranger):
-    """Webots refuses to turn backward to a position, but confirms the command all the same."""
+    """Webots confirms the command, although it refuses to turn backward to a position."""
     motor.set_position(1.0)
     motor.set_velocity(-2.0)
     assert stranger.ask()[0] != -2.0
@@ -144,7 +144,7 @@ def test_a_velocity_that_was_refused_is_sent_again_with_a_new_position(motor, st
 
 
 def test_a_single_motor_always_sends_its_velocity(motor, stranger):
-    """Such a motor belongs to no simulation, so no reset would make it send its velocity again."""
+    """A separate motor is not informed about resets, so it must send every velocity."""
     motor.set_velocity(2.0)
     stranger.tell(7.0)
 
@@ -154,7 +154,7 @@ def test_a_single_motor_always_sends_its_velocity(motor, stranger):
 
 
 def test_others_have_their_turn_while_the_wheels_answer(arena):
-    """Commands to four robots take the time of one round trip."""
+    """Commands to four robots then take the time of one round trip."""
     told = []
 
     take_turns([lambda: (arena.robot.drive(*CURVE), told.append("this")), lambda: told.append("the other")])

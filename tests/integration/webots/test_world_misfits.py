@@ -1,4 +1,4 @@
-"""Worlds without the parts that the environment needs: the error comes before the first step."""
+"""If a world lacks a part that the environment needs, the error comes before the first step."""
 
 import threading
 from contextlib import nullcontext
@@ -32,7 +32,7 @@ WITHOUT = {
 
 @pytest.fixture
 def world(tmp_path):
-    """Return `world(source)`, which returns the path of a world file."""
+    """Return a function that writes a world file and returns its path."""
 
     def write(source):
         path = tmp_path / "changed.wbt"
@@ -44,7 +44,7 @@ def world(tmp_path):
 
 @pytest.mark.parametrize(("source", "fact"), WITHOUT.values(), ids=WITHOUT.keys())
 def test_a_start_names_what_the_world_lacks(master, world, source, fact):
-    """The error names it before the first step."""
+    """The user must learn the name of the missing part before training starts."""
     del master
     assert source != ARENA
     webots = Webots("robotino", world(source), start_deadline_s=DEADLINE_S)
@@ -60,7 +60,7 @@ def test_a_start_names_what_the_world_lacks(master, world, source, fact):
 
 
 def test_the_second_process_in_a_row_makes_a_wrong_configuration_of_it(master, world):
-    """The restart budget of ten is not spent on a world that does not change."""
+    """The world does not change, so restarts must not spend the budget of ten."""
     del master
     source, fact = WITHOUT["a sensor"]
 
@@ -95,7 +95,7 @@ def test_the_second_process_in_a_row_makes_a_wrong_configuration_of_it(master, w
 
 @pytest.mark.parametrize("count", [1, 2])
 def test_only_a_complete_list_of_devices_is_a_proof(master, count):
-    """A simulator that is still starting is not judged."""
+    """A simulator that is still starting may report only some of its devices."""
     loop = Loop()
     node = RosNode(loop, "half_started", master)
     node.serve("robot/get_device_list", "webots_ros/robot_get_device_list", lambda _: {"list": ["ir2"]})
@@ -113,7 +113,7 @@ def test_only_a_complete_list_of_devices_is_a_proof(master, count):
 
 
 def test_a_world_without_a_supervisor_is_a_wrong_configuration(master, world):
-    """Every process of such a world would report the same."""
+    """Every process of this world would have the same error, so a restart cannot help."""
     del master
     launcher = ProcessLauncher(world(ARENA.replace(b"supervisor TRUE", b"supervisor FALSE")))
     try:
