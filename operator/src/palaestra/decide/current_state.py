@@ -1,4 +1,4 @@
-"""Checks for a replica that continues without a waiting reason: its state."""
+"""The checks that report the state of a replica that has no waiting reason."""
 
 from dataclasses import replace
 
@@ -12,7 +12,7 @@ from palaestra.observe.models import PodView
 
 UNASKED = "; the cause was not looked up, because too many other replicas wait"
 DESCRIBE = "; `kubectl describe` shows it"
-DESCRIBE_WORKLOAD = "; `kubectl describe workload` shows it"  # only this object has Kueue's message
+DESCRIBE_WORKLOAD = "; `kubectl describe workload` shows it"  # only the Workload has Kueue's message
 
 
 def held(situation: ReplicaContext) -> Finding | None:
@@ -42,7 +42,7 @@ def suspended(situation: ReplicaContext) -> Finding | None:
 
 
 def _with_words(situation: ReplicaContext, why: Explanation) -> str:
-    """Return the message of `why`; a restarted operator keeps Kueue's message until it reads the Workload."""
+    """Return the message of `why`, or after a restart the stored one, until Kueue's message is read again."""
     if situation.seen.unasked:
         return why.message + UNASKED + (DESCRIBE_WORKLOAD if why.reason == Reason.QUEUED else DESCRIBE)
     before, plain = situation.old.message or "", why.message.removesuffix(AGAIN)
@@ -89,7 +89,8 @@ def starts(situation: ReplicaContext) -> Finding | None:
 def runs(situation: ReplicaContext) -> bool:
     """Return whether the trainer runs, in a pod of the replica's Job, and has responded once.
 
-    The kubelet reports the first response to its startup probe. A custom program has no such probe.
+    The kubelet reports the first response to the trainer's startup probe. A custom program has no startup
+    probe, so a response to the operator's poll counts too.
     """
     pod = situation.pod if situation.seen.job is not None else None
     if pod is None or pod.trainer is None or not _in_trainer(pod):
