@@ -32,7 +32,7 @@ def generated_files(root: Path) -> dict[str, str]:
 
 
 def reasons_page(text: str) -> str:
-    """Return the page docs/reference/reasons.md, now `text`, with its table of reasons updated.
+    """Return the page docs/reference/reasons.md with a new table of reasons; `text` is the present page.
 
     Raises:
         ValueError: a mark is missing.

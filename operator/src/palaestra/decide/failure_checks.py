@@ -1,7 +1,7 @@
-"""Checks that stop a replica for good: limits that its author set, and causes that a retry cannot remove.
+"""Checks that stop a replica for good: limits in the job's spec, and causes that a retry cannot remove.
 
-While a replica waits for its first step, `trouble` remembers the cause, because a kubelet that restarts stops
-reporting it for a moment.
+While a replica waits for its first step, `trouble` keeps the last cause of the delay for a minute. A kubelet
+that restarts does not report the cause for a moment.
 """
 
 from dataclasses import replace
@@ -17,7 +17,7 @@ from palaestra.decide.restart_counts import failed_by_itself, has_run
 from palaestra.decide.waiting_reasons import of_image
 
 FIRST_STEP = ("first step",)  # the key of the wait for the first step
-MOMENT_S = 60  # a kubelet that restarts or retries reports a reason again within this time
+MOMENT_S = 60  # seconds within which a kubelet that restarts or retries reports a reason again
 
 _NO_TROUBLE = frozenset({Reason.STARTING, Reason.TRAINING, Reason.DISRUPTED, Reason.INTERRUPTED})
 
@@ -51,7 +51,7 @@ def no_progress(situation: ReplicaContext) -> Finding | None:
     if limit == 0 or pods < limit:
         return None
     evictions = (storage_eviction(pod) for pod in reversed(situation.seen.pods) if pod.ended)
-    cause = next(evictions, None)  # of the last that ended
+    cause = next(evictions, None)  # the eviction of the pod that ended last
     return Finding(explanation=cause) if cause is not None else found(Reason.NO_PROGRESS, pods=pods)
 
 
@@ -76,7 +76,7 @@ def start_timeout(situation: ReplicaContext) -> Finding | None:
 
 
 def trouble(situation: ReplicaContext, shown: Explanation) -> WaitingReason | None:
-    """Return the cause that delays the first step, even if the kubelet stops reporting it for a moment."""
+    """Return the cause that delays the first step; keep it if the kubelet stops reporting it for a moment."""
     if shown.reason not in _NO_TROUBLE:
         return WaitingReason(explanation=shown)
     last, now_s = situation.times.record.troubles.get(situation.seen.index), situation.times.clock_s
@@ -92,7 +92,10 @@ def _is_past_its_start(situation: ReplicaContext) -> bool:
 
 
 def _taken_and_not_replaced(situation: ReplicaContext) -> bool:
-    """Return whether the newest pod was interrupted; Kubernetes doubles the wait for the next each time."""
+    """Return whether the newest pod was interrupted and its Job has not created the next one yet.
+
+    Kubernetes doubles the wait for the next pod each time, so the interrupted pod is counted at once.
+    """
     pod = situation.seen.pod
     if pod is None or not situation.counted.furthest_step or mark_of(situation, pod) is not None:
         return False

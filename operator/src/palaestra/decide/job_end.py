@@ -1,7 +1,8 @@
-"""The end of a replica, by its Job.
+"""The end of a replica whose Job has ended or was stopped.
 
-`palaestra.decide.replica_policy` has the order: first a stop mark, because it caused everything after it;
-then the trainer's exit code and termination message; then the Job's own message.
+`palaestra.decide.replica_policy` has the order of these checks. A stop mark comes first, because it caused
+all that follows. The trainer's exit code and termination message come next, and the Job's own message comes
+last.
 """
 
 import re
@@ -19,8 +20,8 @@ from palaestra.decide.restart_counts import exit_code
 from palaestra.observe.models import JobEnd, JobView, PodView
 from palaestra_protocol.pod.status import ExitCode
 
-LAST_WORD_S = 30  # after the end of a Job, the longest wait for the end of its pod
-_EXIT_CODE = re.compile(r"exit code (\d{1,3})\b")  # in the Job's message, if the pod is gone
+LAST_WORD_S = 30  # longest wait in seconds for the end of a pod, after the end of its Job
+_EXIT_CODE = re.compile(r"exit code (\d{1,3})\b")  # matches the Job's message, for a pod that was deleted
 
 
 def ended_by_others(situation: ReplicaContext) -> Finding | None:
@@ -94,10 +95,10 @@ def job_failed(situation: ReplicaContext) -> Finding | None:
 
 
 def _ended(situation: ReplicaContext, job: JobView, why: Explanation) -> Finding:
-    """Return an end that holds once the end of the pod is observed too, or after `LAST_WORD_S`.
+    """Return an end that holds as soon as the pod's end is observed too, or after `LAST_WORD_S`.
 
-    The two watches have different delays, so the Job's end may be observed before the pod's. Only the pod has
-    the termination message.
+    The watches of Jobs and pods have different delays, so the Job's end may be observed first. Only the pod
+    has the termination message.
     """
     if job.stopped is not None or situation.pod is None:
         return Finding(explanation=why, phase=Phase.FAILED)

@@ -1,4 +1,4 @@
-"""Checks for a waiting replica: the status shows the reason, and nothing is ended or counted.
+"""Checks for a waiting replica: the status shows the reason, and no pod is ended or counted.
 
 The API server, the scheduler and the kubelet retry by themselves. `palaestra.decide.replica_policy` has the
 order of these checks.
@@ -28,8 +28,8 @@ from palaestra.plan.job import GIVEN_UP
 from palaestra.plan.replica import INSTALL_SIDECAR, ROS_MASTER, SIMULATOR_PREFIX, TRAINER
 from palaestra_protocol.pod.status import SimulatorStatus
 
-LOST_AFTER_S = 30  # after the end of a deleted pod's grace period
-CRASHES = 3  # of one sidecar, after which the status reports a crash loop
+LOST_AFTER_S = 30  # seconds after the end of a deleted pod's grace period
+CRASHES = 3  # crashes of one sidecar after which the status reports a crash loop
 PULLING = frozenset(
     {"ErrImagePull", "ImagePullBackOff", "InvalidImageName", "ErrImageNeverPull", "ImageInspectError",
      "RegistryUnavailable", "SignatureValidationFailed"}
@@ -83,7 +83,7 @@ def pods_refused(situation: ReplicaContext) -> Finding | None:
 
 
 def _not_admitted(words: str) -> Explanation:
-    """Quote the API server's message, and add the fields of the job that it does not name."""
+    """Return the reason with the API server's message, and the fields of the job that a person must set."""
     return explain(Reason.PODS_REFUSED, words=words, remedy=_remedy_of(words))
 
 
@@ -94,7 +94,7 @@ def node_lost(situation: ReplicaContext) -> Finding | None:
         return None
     why = explain(Reason.NODE_LOST, pod=pod.name, node=pod.node, seconds=LOST_AFTER_S)
     wait = Wait(key=("gone", pod.uid), seconds=pod.grace_s + LOST_AFTER_S)
-    # By the last report of its node, it runs.
+    # The node's last report says that the pod runs, so the phase is set here.
     return replace(after(situation, wait, why), phase=Phase.PENDING)
 
 
@@ -173,7 +173,7 @@ def pod_was_taken(situation: ReplicaContext) -> Finding | None:
         return None
     if (mark := mark_of(situation, pod)) is not None:
         return Finding(explanation=mark)
-    if ended_by_suspension(situation.seen, pod):  # and resumed: the next pod is on its way
+    if ended_by_suspension(situation.seen, pod):  # the Job was resumed and will create the next pod
         return None
     if pod.disruption or pod.gone_by is not None:
         words = pod.disruption or "it was deleted"
@@ -201,11 +201,11 @@ def pod_failed(situation: ReplicaContext) -> Finding | None:
 
 
 def no_other_comes(situation: ReplicaContext, pod: PodView) -> bool:
-    """Return whether a failed pod is the last one, because its Job is about to fail."""
+    """Return whether a failed pod is the last pod, because its Job is about to fail."""
     booked = situation.seen.job.failures if situation.seen.job is not None else 0
     failures = max(
         booked, situation.counted.restarts.trainer + 1
-    )  # the Job may not have counted the newest yet
+    )  # the Job may not have counted the newest pod yet
     return failures > situation.job.spec.backoff_limit or exit_code(pod) in GIVEN_UP
 
 
@@ -244,10 +244,11 @@ def of_crash(situation: ReplicaContext, container: ContainerView) -> Explanation
 
 
 def _remedy_of(words: str) -> str:
-    """Return the clause that names the fields to set, for the end of a message; "" for any other refusal.
+    """Return the clause that names the fields to set, for the end of a message; "" if no field helps.
 
-    A quota on limits or a LimitRange refuses the pod. The API server's message names containers, but a person
-    sets fields. No field has the name of the ROS master's container or of `install-sidecar`.
+    Fields help if a quota on limits or a LimitRange refused the pod. The API server's message names
+    containers, but a person sets fields. The fields for the ROS master's container and for `install-sidecar`
+    have other names.
     """
     if (unspecified := _UNSPECIFIED.search(words)) is not None:
         names = ",".join(_NAMES.findall(unspecified["containers"])).split(",")
