@@ -1,7 +1,7 @@
 """The texts of all reasons.
 
-The message of a reason is a template, which the facts complete to a sentence for people: the fact and the
-remedy. `meaning` and `remedy` are columns of docs/reference/reasons.md.
+The message of a reason is a template with placeholders for facts. The complete message is a sentence for
+people with the fact and the remedy. `meaning` and `remedy` are columns of docs/reference/reasons.md.
 """
 
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ LONGEST_FACT = 600  # Characters of one external fact: from the scheduler, a reg
 
 @dataclass(frozen=True, slots=True)
 class ReasonText:
-    """The texts of a reason: `message` is a template; `warning`: whether its event has the type Warning."""
+    """The texts of a reason: `message` is a template, and `warning` selects the event type Warning."""
 
     message: str
     meaning: str
