@@ -1,4 +1,4 @@
-"""`palaestra compare`: the policies of two runs on the same fresh episodes."""
+"""`palaestra compare`: compare the policies of two runs on the same fresh episodes."""
 
 import argparse
 from pathlib import Path

@@ -32,7 +32,7 @@ exit codes:
   1    failed; the last lines of the log give the reason
 """
 JOB = "demo.yaml"
-# A step of the robot is 192 ms of simulated time; the stub would take it in less than one.
+# A step of the robot is 192 ms of simulated time; the stub would compute this step in less than 1 ms.
 ABOUT_REAL_TIME = {"name": "PALAESTRA_STUB_FAULTS", "value": "slow:latency_ms=190"}
 
 

@@ -39,7 +39,7 @@ def _doctor(client: Client, options: argparse.Namespace) -> int:
 
 
 def shown(found: CheckResult) -> Iterator[str]:
-    """Yield a line for a finding, and one for its remedy."""
+    """Yield a line with a finding, and another line with its remedy."""
     yield f"{found.verdict:<8} {found.what:<{WIDTH}} {found.fact}"
     if found.remedy:
         yield f"{'':<8} {'':<{WIDTH}} -> {found.remedy}"

@@ -11,7 +11,8 @@ from palaestra.api.json_schema import json_schema
 from palaestra.cli.subcommands import Commands, command
 from palaestra.view.field_text import field_text
 
-_WIDTH = (100, 24)  # where the output is not a terminal; COLUMNS chooses another
+# Columns and lines if the output is not a terminal; the variable COLUMNS overrides the columns.
+_WIDTH = (100, 24)
 _NARROWEST, _WIDEST = 40, 110
 
 EXPLAIN = """\

@@ -1,4 +1,4 @@
-"""`palaestra plan`, `world` and `crd`: they read a file and print text, without a run or a cluster."""
+"""`palaestra plan`, `world` and `crd`: commands that print text, and use neither a run nor a cluster."""
 
 import argparse
 import sys
@@ -18,7 +18,7 @@ from palaestra_protocol.numbers import whole
 from palaestra_sim.world import RunIdentity, generate
 
 _NOT_AS_IT_IS = 2
-UNASSIGNED = "00000000-0000-0000-0000-000000000000"  # in place of the uid from a cluster
+UNASSIGNED = "00000000-0000-0000-0000-000000000000"  # replaces the uid that a cluster would assign
 
 PLAN = """\
 Reads the TrainingJob in FILE and prints the Kubernetes objects that it needs, as YAML. Outside a cluster the
@@ -79,7 +79,7 @@ def _world(options: argparse.Namespace) -> int:
 
 
 def _check(options: argparse.Namespace) -> int:
-    """Print the result of each simulator's check of a world, with the options of its start."""
+    """Print the result of each simulator's check of a world with the given options."""
     read(options.file)
     given = [word for name in options.leave_out for word in ("--leave-out", name)]
     given += [word for file in options.stand_ins for word in ("--stand-ins", str(file))]

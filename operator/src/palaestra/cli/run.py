@@ -69,10 +69,10 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _wanted(options: argparse.Namespace) -> TrainingJob:
-    """Return the job in the file, with the policy of the command line.
+    """Return the job in the file; the command line may replace its initial policy.
 
     Raises:
-        PalaestraError: the file cannot be read, or the job is wrong.
+        PalaestraError: the file cannot be read, or the job is invalid.
     """
     given, policy = job(options.file), options.initial_policy
     if policy is None:

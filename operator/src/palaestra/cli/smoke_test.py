@@ -60,7 +60,7 @@ def add(commands: Commands) -> None:
 
 
 def _chosen(options: argparse.Namespace) -> int:
-    """Try the job here or in a cluster."""
+    """Run the test on this machine or in a cluster."""
     if options.local:
         return _here(options)
     if options.agent is not None or options.episodes is not None or options.json:
@@ -84,7 +84,7 @@ def _here(options: argparse.Namespace) -> int:
 def _try(client: Client, options: argparse.Namespace) -> int:
     try:
         tried = job(options.file)
-    except SpecErrors as error:  # The file is wrong and no request was sent, so the exit code is 2.
+    except SpecErrors as error:  # The job is invalid and no request was sent, so the exit code is 2.
         raise PalaestraError(str(error)) from error
     content = tried.model_dump(mode="json", by_alias=True, exclude_unset=True)
     content["metadata"].setdefault("namespace", client.namespace)

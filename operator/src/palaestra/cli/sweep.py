@@ -31,7 +31,8 @@ from palaestra_protocol.pod.status import ExitCode
 from palaestra_protocol.signals import obeyed
 
 FAILED = 1
-SEARCHED_AT_ONCE = 4  # trials of a search in a cluster: it does not learn from running trials
+# Trials of a search in a cluster at the same time: few, because a search does not learn from running trials.
+SEARCHED_AT_ONCE = 4
 SWEEP = """\
 Trains the job of the Sweep in FILE with different values of some fields, each with several seeds. Checks
 every trial before it starts the first. Writes <dir>/<sweep>/: a run directory for each trial and seed,
@@ -98,7 +99,7 @@ def _on_this_machine(options: argparse.Namespace) -> int:
 
 
 def _carried_out(search: Search, place: LocalBackend, folder: Path, objective: Objective) -> None:
-    """Run the trials, and stop the runs that have not ended."""
+    """Run the trials; at the end, stop the runs that have not ended."""
     try:
         carry_out(search, place, folder, objective, _say)
     except KeyboardInterrupt:
@@ -122,7 +123,7 @@ def _loaded(file: Path) -> Sweep:
     """Return the Sweep in a file.
 
     Raises:
-        PalaestraError: the file is wrong or cannot be read; no request was sent to a cluster.
+        PalaestraError: the file is invalid or cannot be read; no request was sent to a cluster.
     """
     try:
         return load(file)
@@ -170,7 +171,7 @@ def _say(line: str) -> None:
 
 @contextmanager
 def _interruptible() -> Iterator[None]:
-    """Handle SIGTERM and SIGHUP like Ctrl-C, except a SIGHUP that is ignored, as under nohup."""
+    """Handle SIGTERM and SIGHUP like Ctrl-C, but leave an ignored SIGHUP ignored, as under nohup."""
     numbers = obeyed((signal.SIGTERM, signal.SIGHUP))
     before = [signal.signal(number, signal.default_int_handler) for number in numbers]
     try:
@@ -181,7 +182,7 @@ def _interruptible() -> Iterator[None]:
 
 
 def _shown(search: Search, place: TrialBackend, sweep: Sweep, folder: Path) -> int:
-    """Print the table, write it and the figure into the folder, and return the exit code."""
+    """Print the table, write table and figure into the folder, and return the exit code."""
     ended, objective = trial_log.ended(folder), sweep.spec.objective
     rows = [
         TrialRow(

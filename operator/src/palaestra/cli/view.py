@@ -1,4 +1,4 @@
-"""`palaestra view`: look at the simulators of a run."""
+"""`palaestra view`: show the simulators of a run in a browser."""
 
 import argparse
 import os
@@ -22,7 +22,7 @@ from palaestra.live_view.source import NotNow, NotShown, SidecarSource
 from palaestra_protocol.numbers import MOST_PORT, whole
 
 PORT = 8080
-FIRST_S = 300.0  # until a run has written where its simulators are
+FIRST_S = 300.0  # longest wait for a run to write the addresses of its simulators
 POLL_S = 0.2
 VIEW = """\
 Shows the simulators of a running training in a browser: the world, the robots, and what is known about the
@@ -36,7 +36,8 @@ exit codes:
   1    the simulator describes no world, or the cluster has no such job or refused
   2    no such run or simulator, or viser is missing; nothing was started
 """
-DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY")  # without one, a browser may take over the terminal
+# Without one of these variables, a text browser may take over the terminal.
+DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY")
 
 
 def add(commands: Commands) -> None:
@@ -69,7 +70,7 @@ def _of_cluster(client: Client, options: argparse.Namespace) -> int:
 
 
 def _local(options: argparse.Namespace, folder: Path) -> Callable[[], Sequence[SidecarSource]]:
-    """Return a function that lists the simulators of a run; wait for a run that is starting.
+    """Return a function that lists the simulators of a run; wait first if the run is just starting.
 
     Raises:
         NoRun: the folder has no run with simulators.
@@ -85,18 +86,18 @@ def _local(options: argparse.Namespace, folder: Path) -> Callable[[], Sequence[S
 
 
 def _shown(options: argparse.Namespace, sources: Callable[[], Sequence[SidecarSource]]) -> int:
-    """Show the page until it is ended."""
+    """Serve the page until the view ends, and return the exit code."""
     found = {source.name: source for source in sources()}
     if options.simulator is not None and options.simulator not in found:
         say([f"--simulator {options.simulator}: the run has {', '.join(found)}"])
         return WRONG_INPUT
     try:
-        with suppress(NotNow):  # it may start later
+        with suppress(NotNow):  # the simulator may start later
             found[options.simulator or next(iter(found))].scene()
     except NotShown as error:
         say([str(error)])
         return REFUSED
-    # viser is optional, and slow to import
+    # The import is here because viser is optional, and slow to import.
     page = import_module("palaestra.live_view.page").ViewPage(
         options.run, sources, options.port, options.simulator
     )
@@ -118,7 +119,7 @@ def _shown(options: argparse.Namespace, sources: Callable[[], Sequence[SidecarSo
 
 
 def _ended(*, by_stdin: bool) -> Callable[[], bool]:
-    """Return whether the view has to end; a view of `palaestra run` ends with its standard input."""
+    """Return a function that returns whether the view must end: by request, when its input closes."""
     if not by_stdin:
         return lambda: False
     closed = threading.Event()

@@ -200,7 +200,7 @@ class Api:
         subresource: str | None = None,
         resource_version: str | None = None,
     ) -> Object:
-        """Change the fields in `patch` (RFC 7386: null removes, lists are replaced), and return the object.
+        """Change the fields in `patch` (RFC 7386: null removes, lists are replaced); return the new object.
 
         `subresource` may be `status`. With a `resource_version`, the API server refuses the change if the
         object has another version.
