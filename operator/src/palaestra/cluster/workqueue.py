@@ -93,7 +93,7 @@ class WorkQueue(Generic[Item]):
                 self._changed.notify_all()
 
     def retry(self, key: Item) -> float:
-        """Queue a name after a failure, with a longer wait after each; return that wait in seconds."""
+        """Queue a name after a wait that doubles with each failure in a row; return the wait in seconds."""
         with self._changed:
             self._failures[key] = self._failures.get(key, 0) + 1
             wait_s = self._again.wait_s(self._failures[key])
@@ -111,7 +111,7 @@ class WorkQueue(Generic[Item]):
             self._failures.pop(key, None)
 
     def get(self, deadline_s: float) -> Item | None:
-        """Return a name, for which the caller must call `done`; None after `deadline_s`, or if closed."""
+        """Return a name, or None after `deadline_s` or if closed; the caller must then call `done`."""
         with self._changed:
             ends = self._clock() + deadline_s
             while not self._closed:
