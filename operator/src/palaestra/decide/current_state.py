@@ -16,7 +16,7 @@ DESCRIBE_WORKLOAD = "; `kubectl describe workload` shows it"  # only the Workloa
 
 
 def held(situation: ReplicaContext) -> Finding | None:
-    """It does not start: its run is lost, or an object that the job names is missing or not for jobs."""
+    """The replica does not start: its run is lost, or an object in the spec is missing or not for jobs."""
     if situation.hold is None:
         return None
     job = situation.seen.job
@@ -25,7 +25,7 @@ def held(situation: ReplicaContext) -> Finding | None:
 
 
 def suspending(situation: ReplicaContext) -> Finding | None:
-    """It is or was just suspended, and its pod still saves a checkpoint."""
+    """The replica is or was just suspended, and its pod still saves a checkpoint."""
     pod = situation.pod if situation.seen.job is not None else None
     if pod is None or not (situation.suspended or ended_by_suspension(situation.seen, pod)):
         return None
@@ -34,7 +34,7 @@ def suspending(situation: ReplicaContext) -> Finding | None:
 
 
 def suspended(situation: ReplicaContext) -> Finding | None:
-    """`spec.suspend` or a queue keeps it from running."""
+    """`spec.suspend` or a queue keeps the replica from running."""
     if not situation.suspended:
         return None
     why = paused(situation, situation.seen.unadmitted or "")
@@ -60,7 +60,7 @@ def trainer_has_ended(situation: ReplicaContext) -> Finding | None:
 
 
 def trains(situation: ReplicaContext) -> Finding | None:
-    """The trainer runs and has responded."""
+    """The trainer runs and has responded at least once."""
     if not runs(situation):
         return None
     if situation.seen.polled is not None and not situation.trains:
@@ -72,7 +72,7 @@ def trains(situation: ReplicaContext) -> Finding | None:
 
 
 def starts(situation: ReplicaContext) -> Finding | None:
-    """Its objects are about to be created, or its containers start."""
+    """The replica's objects are about to be created, or its containers start."""
     there = [*situation.seen.in_the_way, *([situation.pod.name] if situation.pod is not None else [])]
     if situation.seen.job is None:
         waits = f"waits for pod {there[0]} to end" if there else "is about to be created"

@@ -52,7 +52,7 @@ def restart_policy_dropped(situation: ReplicaContext) -> Finding | None:
 
 
 def trainer_never_started(situation: ReplicaContext) -> Finding | None:
-    """All sidecars run, but the kubelet does not start the trainer."""
+    """All sidecars run, but the kubelet has not started the trainer for five minutes."""
     pod = situation.pod
     if pod is None or pod.trainer is None or not pod.sidecars or pod.gone_by is not None:
         return None
@@ -64,7 +64,7 @@ def trainer_never_started(situation: ReplicaContext) -> Finding | None:
 
 
 def stalled(situation: ReplicaContext) -> Finding | None:
-    """The trainer responds, its step count does not change, and its watchdog has not ended it."""
+    """The trainer responds, but its step count stays the same, and its watchdog has not ended it."""
     wait = standstill(situation)
     if wait is None or situation.pod is None or situation.pod.gone_by is not None or not situation.fresh:
         return None
@@ -76,7 +76,7 @@ def stalled(situation: ReplicaContext) -> Finding | None:
 
 
 def ended_by_probe(situation: ReplicaContext) -> Finding | None:
-    """The kubelet ended the trainer because a probe failed, and its Job does not count that."""
+    """The kubelet ended the trainer because a probe failed; the Job does not count this end."""
     pod = situation.seen.pod
     if pod is None or not pod.ended or not situation.seen.probe:
         return None
@@ -95,7 +95,7 @@ def replaced_too_often(situation: ReplicaContext) -> Finding | None:
 
 
 def kept_alive(situation: ReplicaContext) -> Finding | None:
-    """The trainer has ended, and foreign containers keep its pod alive."""
+    """The trainer has ended, but foreign containers keep its pod alive."""
     pod = _outlived(situation)
     if pod is None:
         return None
@@ -105,7 +105,7 @@ def kept_alive(situation: ReplicaContext) -> Finding | None:
 
 
 def trainer_is_done(situation: ReplicaContext) -> Finding | None:
-    """The trainer has ended for good, and foreign containers keep its pod alive or made it fail."""
+    """The trainer has ended for good, and foreign containers keep its pod alive or made the pod fail."""
     pod, job = situation.seen.pod, situation.seen.job
     if pod is None or job is None or job.end is not None:
         return None
@@ -118,7 +118,7 @@ def trainer_is_done(situation: ReplicaContext) -> Finding | None:
 
 
 def pod_outlives_trainer(situation: ReplicaContext) -> Finding | None:
-    """The trainer has ended and must be retried, and foreign containers keep its pod alive."""
+    """The trainer has ended and must be retried, but foreign containers keep its pod alive."""
     pod = _outlived(situation)
     if pod is None or exit_code(pod) in {ExitCode.DONE, *GIVEN_UP}:
         return None

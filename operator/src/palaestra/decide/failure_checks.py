@@ -23,7 +23,7 @@ _NO_TROUBLE = frozenset({Reason.STARTING, Reason.TRAINING, Reason.DISRUPTED, Rea
 
 
 def active_deadline(situation: ReplicaContext) -> Finding | None:
-    """The job was active as long as `activeDeadlineSeconds` allows."""
+    """The job was active for `activeDeadlineSeconds`."""
     if situation.active_left_s is None or (seconds := situation.job.spec.active_deadline_seconds) is None:
         return None
     return Finding(
@@ -32,20 +32,20 @@ def active_deadline(situation: ReplicaContext) -> Finding | None:
 
 
 def cannot_be_planned(situation: ReplicaContext) -> Finding | None:
-    """Its objects cannot be created from its spec, and a spec does not change."""
+    """The replica's objects cannot be planned from the spec, and a spec does not change."""
     if situation.seen.job is not None or situation.hold is None or not situation.hold.final:
         return None
     return Finding(explanation=situation.hold.explanation)
 
 
 def image_name_is_invalid(situation: ReplicaContext) -> Finding | None:
-    """The name of an image is invalid, so it is in no registry."""
+    """The name of an image is invalid, so no registry can have the image."""
     stuck = first_waiting(situation.pod, frozenset({"InvalidImageName"}))
     return None if stuck is None else of_image(stuck)
 
 
 def no_progress(situation: ReplicaContext) -> Finding | None:
-    """Its pods are interrupted again and again without progress; Kubernetes has no limit for that."""
+    """The replica's pods are interrupted repeatedly without progress; Kubernetes does not limit this."""
     limit = situation.job.spec.most_fruitless
     pods = situation.counted.fruitless + _taken_and_not_replaced(situation)
     if limit == 0 or pods < limit:
@@ -56,7 +56,7 @@ def no_progress(situation: ReplicaContext) -> Finding | None:
 
 
 def start_timeout(situation: ReplicaContext) -> Finding | None:
-    """It has not done its first step within `startTimeoutSeconds`; the reason is the cause of the delay."""
+    """The replica has done no step within `startTimeoutSeconds`; the reason is the cause of the delay."""
     if (
         situation.suspended
         or situation.hold is not None

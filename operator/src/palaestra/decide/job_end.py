@@ -25,7 +25,7 @@ _EXIT_CODE = re.compile(r"exit code (\d{1,3})\b")  # matches the Job's message, 
 
 
 def ended_by_others(situation: ReplicaContext) -> Finding | None:
-    """The Job is complete, but the built-in loop did not report it: a library ended its process."""
+    """The Job is complete, but the built-in loop did not report its end: a library ended the process."""
     job, pod = situation.seen.job, situation.seen.pod
     if job is None or job.end is not JobEnd.COMPLETE or pod is None:
         return None
@@ -43,14 +43,14 @@ def job_is_complete(situation: ReplicaContext) -> Finding | None:
 
 
 def stopped(situation: ReplicaContext) -> Finding | None:
-    """The operator stopped it; the mark on the Job has the reason."""
+    """The operator stopped the replica; the mark on the Job has the reason."""
     job = situation.seen.job
     why = stop_of(job) if job is not None else None
     return None if job is None or why is None else _with_phase(_ended(situation, job, why))
 
 
 def trainer_was_done(situation: ReplicaContext) -> Finding | None:
-    """The Job has failed, but its trainer was done: a foreign container has failed."""
+    """The Job has failed, but its trainer had completed: a foreign container has failed."""
     job, pod = situation.seen.job, situation.seen.pod
     if job is None or job.end is not JobEnd.FAILED or pod is None or exit_code(pod) != ExitCode.DONE:
         return None
@@ -64,7 +64,7 @@ def _with_phase(end: Finding) -> Finding:
 
 
 def would_end_the_same(situation: ReplicaContext) -> Finding | None:
-    """The Job has failed, and the last attempt ended by itself for a known cause."""
+    """The Job has failed, and its last attempt ended for a known cause that a retry cannot remove."""
     job, pod = situation.seen.job, situation.seen.pod
     if job is None or job.end is None:
         return None
@@ -77,7 +77,7 @@ def would_end_the_same(situation: ReplicaContext) -> Finding | None:
 
 
 def backoff_limit_spent(situation: ReplicaContext) -> Finding | None:
-    """The Job has failed: it was tried as often as `backoffLimit` allows."""
+    """The Job has failed: its pods failed more often than `backoffLimit` allows."""
     job = situation.seen.job
     if job is None or job.end_reason != "BackoffLimitExceeded":
         return None
@@ -86,7 +86,7 @@ def backoff_limit_spent(situation: ReplicaContext) -> Finding | None:
 
 
 def job_failed(situation: ReplicaContext) -> Finding | None:
-    """The Job has failed for another cause; the reason has the Job's own message."""
+    """The Job has failed for another cause; the replica's reason has the Job's own message."""
     job = situation.seen.job
     if job is None or job.end is None:
         return None

@@ -151,7 +151,7 @@ class ViewPage:
         self._picture.label, self._picture.image = _cell(picture.name), pixels
 
     def _wait(self, reason: str) -> None:
-        """Say why nothing moves, and look for the simulator again: a new start has new addresses."""
+        """Show the reason why nothing moves, and read the simulators' addresses again, which may be new."""
         self._stage.revision = None
         self._text.content = _paragraphs(summarized(self._sources[self._shown].progress()), reason)
         self._away_since = self._away_since or time.monotonic()
