@@ -85,7 +85,7 @@ def full_path(text: str) -> tuple[str | int, ...]:
 
 
 def _put(data: Any, text: str, value: Any) -> str | None:
-    """Set a field in plain data; return a problem if the path does not lead to a field, else None.
+    """Set a field in plain data; return a problem if the path cannot exist in the data, else None.
 
     If the data has another value where the path needs a mapping, an empty mapping replaces this value. The
     check of the whole job then reports the field.

@@ -119,7 +119,7 @@ def _status(api: Api, namespace: str, name: str, report: Report) -> Object | Non
 
 
 def _readable(status: Object) -> Status:
-    """Return the parsed status; an empty status if this release cannot read what another release wrote."""
+    """Return the parsed status; an empty status if this release cannot read the status of another release."""
     try:
         return Status.model_validate(status)
     except ValidationError:

@@ -1,6 +1,6 @@
 """The CustomResourceDefinition, generated from the models.
 
-The models define what an API server checks. This module adds the names, the scope, the columns, the
+The models define the checks of the API server. This module adds the names, the scope, the columns, the
 selectable fields and the status subresource.
 """
 

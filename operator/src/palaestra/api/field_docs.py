@@ -48,7 +48,7 @@ class FieldDoc:
 
     @property
     def paragraphs(self) -> list[str]:
-        """Return the paragraphs of the description; for a list, also those of its items' description."""
+        """Return the paragraphs of the description; for a list, append the paragraphs about its items."""
         own = self.schema.get("description", "").split("\n")
         items = self.schema.get("items", {}).get("description", "").split("\n")
         return [paragraph for paragraph in dict.fromkeys((*own, *items)) if paragraph]
@@ -102,7 +102,7 @@ def kind_of(field: Schema, quote: Quote = str) -> str:
 
 
 def default_of(field: Schema) -> str | None:
-    """Return the default as JSON; None if there is none, "" if only the field's own fields have defaults."""
+    """Return the default as JSON; None without a default, "" if only the inner fields have defaults."""
     if "default" not in field:
         return None
     text = json.dumps(_without_nested_defaults(field["default"], field))

@@ -127,7 +127,7 @@ def _without_unknown_items(items: Any, read: ValidatorFunctionWrapHandler) -> An
 
 
 # A newer release may write items of a kind that this release does not know. This validator drops such items.
-# It is only for lists of a status that are displayed only, or that each reconcile builds again.
+# Use the validator only for lists of a status that are only displayed, or that each reconcile builds again.
 KNOWN_ITEMS = WrapValidator(_without_unknown_items)
 
 
@@ -225,7 +225,7 @@ def _free(value: dict[str, Any]) -> dict[str, Any]:
 
 
 # The schema is a map to values of any type, not an object with unknown fields. If an API server compares two
-# objects with unknown fields, it does not notice a renamed key. So users could change a frozen field.
+# objects with unknown fields, it ignores a renamed key. So users could change a frozen field.
 FreeObject = Annotated[
     dict[str, Any],
     Field(max_length=64),

@@ -20,7 +20,7 @@ def crd_text() -> str:
 def generated_files(root: Path) -> dict[str, str]:
     """Return the text of each generated file, by path relative to the repository's `root`.
 
-    Only the tables of the two pages are generated; the rest of each page is read from `root`.
+    Of the two pages, only the tables are generated; all other text is read from the files below `root`.
     """
     reference, operations = "docs/reference/trainingjob.md", "docs/reference/reasons.md"
     return {

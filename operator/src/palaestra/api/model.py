@@ -1,7 +1,7 @@
 """The base class of all models of a TrainingJob, and the rules that check several fields together.
 
-The Python check, the CEL expression and the message of a rule are in one `Rule`, so that `palaestra` and an
-API server refuse the same job with the same message. All broken rules are collected and reported at once.
+A `Rule` has a Python check, a CEL expression and a message. So `palaestra` and an API server refuse the same
+job with the same message. All broken rules are collected and reported at once.
 """
 
 from collections.abc import Callable
@@ -58,8 +58,9 @@ class ApiModel(BaseModel):
     """One immutable object of the API: camelCase in YAML, snake_case in Python; unknown fields are errors.
 
     Every program that reads a job checks the `rules` of its objects. The `guards` apply only to new jobs of a
-    cluster: the API server checks them when a job is created, and the operator checks them until it accepts
-    the job. A rule that a later release adds is a guard, so that jobs of an earlier release stay accepted.
+    cluster. The API server checks the guards when a job is created, and the operator checks them until it
+    accepts the job. A rule that a later release adds is a guard, so that jobs of an earlier release stay
+    accepted.
     """
 
     model_config = ConfigDict(

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from palaestra.api.reasons import LONGEST_MESSAGE, Reason
 from palaestra.api.text import flat, one_line
 
-LONGEST_FACT = 600  # Characters of one external fact: from the scheduler, a registry or a trainer.
+# Limit in characters of a fact from another program, such as the scheduler, a registry or a trainer.
+LONGEST_FACT = 600
 
 
 @dataclass(frozen=True, slots=True)

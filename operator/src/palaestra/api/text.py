@@ -19,7 +19,7 @@ def printable(text: str) -> str:
 
 
 def flat(text: str, most: int) -> str:
-    """Return text as one line like `one_line`, but keep one space at an end with spaces."""
+    """Return text like `one_line`, but reduce spaces at the beginning and the end to one space."""
     plain = "".join(letter if letter.isprintable() else " " for letter in text[: most * 4])
     words = _SPACES.sub(" ", masked(plain))
     return words if len(words) <= most else words[: most - 3] + "..."

@@ -1,4 +1,4 @@
-"""`palaestra doctor`: find out why jobs do not run in a cluster."""
+"""`palaestra doctor`: find the reasons for which jobs do not run in a cluster."""
 
 import argparse
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""`palaestra report`: the report of runs, as one HTML file."""
+"""`palaestra report`: write the report of runs as one HTML file."""
 
 import argparse
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The client: one method for each operation on the TrainingJobs of a cluster."""
+"""The client, which has one method for each operation on the TrainingJobs of a cluster."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -103,7 +103,7 @@ class Client:
         return _job(self.raw(name))
 
     def list(self, labels: str | None = None) -> tuple[TrainingJob, ...]:
-        """Return all jobs of the namespace, or those that match a label selector."""
+        """Return all jobs of the namespace, or only the jobs that match a label selector."""
         with asked(None, self.namespace):
             return tuple(_job(job) for job in self.api.list(TRAINING_JOBS, self.namespace, labels=labels))
 
@@ -192,7 +192,7 @@ class Client:
             replica: the number of the replica.
             container: `trainer`, `ros-master`, or `sim-<group>-<number>`.
             follow: whether to wait for further lines until the container has ended.
-            tail: number of last lines; None: all lines that the node has kept.
+            tail: number of last lines; None: all lines that the node still has.
             deadline_s: the deadline of the whole call, in seconds.
 
         Raises:
@@ -251,7 +251,7 @@ class Client:
         return job
 
     def restart(self, name: str) -> TrainingJob:
-        """Restart those replicas of a job whose runs are lost, from the content of their run directories.
+        """Restart the replicas of a job that have lost their runs, from the content of their run directories.
 
         A replica starts at step 0 again if its run directory is empty or its claim does not exist.
 

@@ -3,13 +3,13 @@
     ClientError
     ├── NotInstalled        the cluster has no TrainingJob definition
     ├── NoSuchNamespace     the namespace does not exist
-    ├── NoSuchJob           the TrainingJob does not exist, or was deleted in the meantime
+    ├── NoSuchJob           the TrainingJob does not exist, or was deleted during the call
     ├── QueueDecides        only Kueue suspends and resumes a job in a queue
     ├── HasEnded            the job has ended, so it is neither suspended nor resumed
-    ├── NothingLost         no replica of the job has lost its run, so none is restarted
+    ├── NothingLost         no replica of the job has lost its run, so no replica is restarted
     ├── EndedOtherwise      the job ended in another phase than expected
     ├── TookTooLong         a deadline passed; the same call may be repeated
-    ├── NoPod               a replica has no pod or no such container, so no log
+    ├── NoPod               a replica has no pod or no such container, so it has no log
     └── NotFetched          a run could not be copied; no file was written
 
 A request that the API server refuses raises an ApiError (palaestra.cluster.errors).

@@ -136,7 +136,7 @@ def _copy(api: Api, source: RunSource, target: Path, deadline: float, most_bytes
 
 @contextmanager
 def _source(api: Api, job: TrainingJob, replica: int, deadline: float) -> Iterator[RunSource]:
-    """Yield a container in which the run is mounted: the running trainer, or else a temporary pod's."""
+    """Yield a container with the run mounted: the running trainer, or a container of a temporary pod."""
     template = _template(api, job, replica)
     directory = run_directory(template)
     running = _running(api, job, replica)

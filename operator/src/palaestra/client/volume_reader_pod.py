@@ -20,7 +20,7 @@ GRACE_S = 1
 
 
 def reading_pod(job: TrainingJob, template: Mapping[str, Any], name: str, lives_s: int) -> dict[str, Any]:
-    """Return the pod, which the TrainingJob owns, so that both are deleted together.
+    """Return the pod; the TrainingJob owns it, so that the two are deleted together.
 
     Args:
         job: the job of the run.
@@ -53,7 +53,8 @@ def reading_pod(job: TrainingJob, template: Mapping[str, Any], name: str, lives_
 def _reader(template: Mapping[str, Any], lives_s: int) -> dict[str, Any]:
     """Return the container: the trainer's image and security context, with only the run mounted, read-only.
 
-    Its resources are those of the ROS master: the smallest that the namespace's quotas are known to admit.
+    Its resources are the resources of the ROS master, which are small, and which the namespace's quotas have
+    admitted before.
     """
     trainer = trainer_of(template)
     [master] = (each for each in template["spec"]["initContainers"] if each["name"] == ROS_MASTER)

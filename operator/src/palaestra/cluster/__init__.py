@@ -11,11 +11,11 @@ are not used (docs/decisions/0004). These modules depend on Kubernetes, but not 
 - `timeouts`: deadlines, and waits before a retry
 - `api`: one request, with a deadline
 - `transport`: the bytes of requests and responses
-- `errors`: one exception for each kind of refusal
+- `errors`: the exceptions, one for each kind of refusal
 - `watch`: one watch, until it ends
 - `reflector`: a cache that follows the API server
 - `store`: the objects in such a cache
-- `workqueue`: keys to reconcile, each with one worker at a time
+- `workqueue`: the keys to reconcile; only one worker at a time has a key
 - `lease`: leader election; `lease_timing`: the arithmetic of its durations
 - `recorder`: events for people
 - `pod_logs`: the log of a running container

@@ -139,7 +139,7 @@ class Api:
         """Yield a list page by page, so that at most one page is in memory.
 
         Raises:
-            Gone: the version of the list has expired; start again.
+            Gone: the version of the list has expired; read the list again from its first page.
         """
         query = {"limit": str(limit), "labelSelector": labels, "fieldSelector": fields, "continue": None}
         while True:
@@ -237,7 +237,7 @@ class Api:
         resource_version: str | None = None,
         propagation: str = "Background",
     ) -> None:
-        """Delete one object; `propagation` is how its dependents are deleted, as in kubectl's `--cascade`.
+        """Delete one object; `propagation` selects how the API server deletes its dependent objects.
 
         `propagation` is `Background`, `Foreground` or `Orphan`. With a `uid`, a later object of the same name
         is not deleted. With a `resource_version`, the object is deleted only if it still has this version.

@@ -49,7 +49,7 @@ class _Entry:
     folder: Path
 
     def bytes_of(self, field: str) -> bytes | None:
-        """Return the content of a field's `-data`, or of the file that the field names; None without both."""
+        """Return the content of the field's `-data`, or of the file that the field names, or None."""
         given, path = self.content.get(f"{field}-data"), self.content.get(field)
         if given:
             try:
@@ -113,7 +113,7 @@ def _entry(node: ConfigNode) -> _Entry:
 
 
 def _user(config: ConfigNode, chosen: ConfigNode) -> _Entry:
-    """Return the user of a context; the user has no fields if the context names none or it is missing."""
+    """Return the user of a context; an entry without fields if the kubeconfig has no such user."""
     name = chosen.safe_get("user")
     found = config["users"].get_with_name(name, safe=True) if name and config.safe_get("users") else None
     if found is None or not found.safe_get("user"):

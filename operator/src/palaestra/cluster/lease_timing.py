@@ -3,8 +3,8 @@
 Each process compares durations on its own monotonic clock; the times in a Lease are only for people. A
 follower counts from the time at which it *saw* the last renewal, which is after the write. A leader counts
 from the time at which it *sent* the renewal, which is before the write. It stops after two thirds of the
-duration. So a leader has stopped before another starts, unless one clock runs at two thirds of the other's
-speed.
+duration. So a leader has stopped before another leader starts, as long as their clocks run at similar speeds
+(faster than two thirds of each other).
 """
 
 from dataclasses import dataclass, field
@@ -57,7 +57,7 @@ class ObservedLease:
             self.claim, self.since = claim, now
 
     def free(self, now: float) -> bool:
-        """Return whether the Lease may be taken: it has no holder, or the holder did not renew it in time."""
+        """Return whether a candidate may take the Lease: it has no holder, or was not renewed in time."""
         return not self.claim.holder or now >= self.since + self.claim.duration_s
 
 

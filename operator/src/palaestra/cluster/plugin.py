@@ -31,7 +31,7 @@ class Credentials:
         token: the bearer token for the header `Authorization`, or None.
         certificate: the certificate of the client, as PEM, or None.
         key: the key of that certificate.
-        expires: time after which the plugin must run again; None: never.
+        expires: the time after which the plugin must run again; None: the credentials do not expire.
     """
 
     token: str | None

@@ -1,7 +1,7 @@
 """Run a command in a container: its unchanged output, and its result.
 
 The first byte of each websocket message is the number of a stream. At the end, the API server sends the
-result of the command on a separate stream. If no result comes, the output is incomplete.
+result of the command on a separate stream. If the API server sends no result, the output is incomplete.
 """
 
 import json
@@ -26,7 +26,7 @@ def open_socket(connection: socket, url: str, headers: Headers, wait_s: float) -
     """Return the socket of a running command; the caller closes it. A read waits at most `wait_s`.
 
     Args:
-        connection: the connection to the API server, with TLS, and through the proxy if there is one.
+        connection: the TLS connection to the API server, which may go through a proxy.
         url: the url of the command.
         headers: the headers of the request.
         wait_s: longest time in seconds until the command runs.
@@ -78,7 +78,7 @@ def output(command: websocket.WebSocket, deadline: float) -> Iterator[bytes]:
                 return
     finally:
         # The socket is closed without the websocket's closing handshake, to which a dead peer would not
-        # respond. The library itself does not close TLS within TLS.
+        # respond. The socket must be closed here, because the library does not close TLS within TLS.
         if command.sock is not None:
             command.sock.close()
         command.shutdown()

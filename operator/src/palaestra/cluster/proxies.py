@@ -110,7 +110,7 @@ def _covers(
 
 
 def _split(entry: str) -> tuple[str, str]:
-    """Return name and port of an entry; the port is "" if the entry has none."""
+    """Return name and port of an entry; the port is "" if the entry has no port."""
     if _address(entry.strip("[]")) is not None:
         return entry.strip("[]"), ""
     name, colon, port = entry.rpartition(":")

@@ -143,7 +143,7 @@ class Reflector:
 
     def _follow(self, version: str) -> None:
         shortest_s, longest_s = self._api.limits.watch_s
-        seconds = random.uniform(shortest_s, longest_s)  # noqa: S311 - spreads load, hides nothing
+        seconds = random.uniform(shortest_s, longest_s)  # noqa: S311 - spreads load, not a secret
         watch = self._api.watch(
             self._resource, self._namespace, version=version, labels=self._labels, seconds=seconds
         )

@@ -1,4 +1,4 @@
-"""Send the bytes of requests and read those of responses, with a deadline for the whole response.
+"""Send requests and read responses as bytes, with a deadline for the whole response.
 
 This module replaces the official client, whose models need ten times the time and twice the memory of plain
 JSON. Also, the calls of the official client have no deadline for the body of a response.
@@ -191,7 +191,7 @@ class Transport:
         response = self._send(call, Timeout(connect=min(self.limits.connect_s, left_s), read=left_s))
         try:
             return self._answer(response, call, deadline)
-        # Including Ctrl-C: otherwise the next request would read the rest of this response.
+        # Ctrl-C is included: otherwise the next request would read the remaining bytes of this response.
         except BaseException:
             response.close()
             raise

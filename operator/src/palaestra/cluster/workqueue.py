@@ -1,4 +1,4 @@
-"""The controller's queue: names of objects, each at most once, and each with one worker at a time.
+"""The controller's queue of names of objects; it has each name at most once, for one worker at a time.
 
 If a name is added while a worker has it, `get` returns the name again after that worker is done. So no change
 is missed, and two workers never work on one object. The queue contains names, not events: a worker reads the

@@ -79,7 +79,7 @@ def affinity_stays_in_its_namespace(job: TrainingJob, allowed: Allowed) -> Hold 
 
 
 def no_pods_of_others_are_kept_away(job: TrainingJob, allowed: Allowed) -> Hold | None:
-    """A scheduler applies a required anti-affinity both ways: selected pods cannot use the job's nodes."""
+    """A required anti-affinity works in both directions: selected pods cannot use the job's nodes."""
     for where, term in _terms(job, ANTI_AFFINITY, REQUIRED):
         selector = term.get("labelSelector")
         if selector is not None and not _selects_own(job, term) and not _selects_allowed(selector, allowed):

@@ -48,7 +48,7 @@ class WaitingReason:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReconcileRecord:
-    """The data that one reconcile passes to the next one in the same process; a restart loses the record.
+    """The data that one reconcile passes to the next reconcile of the same process; a restart loses it.
 
     Attributes:
         waits: time at which each open wait was first found, on the monotonic clock.

@@ -42,7 +42,7 @@ def suspended(situation: ReplicaContext) -> Finding | None:
 
 
 def _with_words(situation: ReplicaContext, why: Explanation) -> str:
-    """Return the message of `why`, or after a restart the stored one, until Kueue's message is read again."""
+    """Return the message of `why`; after a restart, keep the stored message until Kueue's is read again."""
     if situation.seen.unasked:
         return why.message + UNASKED + (DESCRIBE_WORKLOAD if why.reason == Reason.QUEUED else DESCRIBE)
     before, plain = situation.old.message or "", why.message.removesuffix(AGAIN)

@@ -63,8 +63,7 @@ class Stop:
 class Replace:
     """Replace the pod of a replica: first patch its Job, then evict the pod with this uid.
 
-    In this order both steps can be repeated: if the annotated pod still runs, only the eviction is left to
-    do.
+    In this order both steps can be repeated: if the annotated pod still runs, the operator evicts it again.
 
     Attributes:
         times: number of pods of the replica that the operator has replaced, including this pod.

@@ -28,7 +28,7 @@ _BY_ATTEMPT = {Reason.DISRUPTED}  # one event for each attempt, even if no recon
 
 
 def emitted(reason: Reason, message: str, replica: int | None = None) -> EmittedEvent:
-    """Return the event for a reason; its type is the one in docs/reference/reasons.md."""
+    """Return the event for a reason, with the event type from docs/reference/reasons.md."""
     kind = EventType.WARNING if ROWS[reason].warning else EventType.NORMAL
     return EmittedEvent(type=kind, reason=reason, message=message, replica=replica)
 

@@ -4,8 +4,8 @@ An eviction gives the pod the condition DisruptionTarget, so its Job counts no f
 the operator counts the pod in an annotation of the Job, the mark. If the operator is killed between the two
 writes, it restarts, finds the mark of a running pod, and evicts that pod.
 
-A trainer that ends because a probe failed exits with 75, which its Job does not count either. The operator
-counts that pod in the mark too. The pod has already ended, so no eviction is needed.
+A trainer that ends because a probe failed exits with 75, and its Job does not count this exit code either.
+The operator counts that pod in the mark too. The pod has already ended, so no eviction is needed.
 
 A service mesh or an agent may add a container to the pod. Then the pod may not end, or may end as failed,
 although the trainer succeeded. The operator waits a minute for these foreign containers and then ends the
@@ -126,7 +126,7 @@ def pod_outlives_trainer(situation: ReplicaContext) -> Finding | None:
 
 
 def _outlived(situation: ReplicaContext) -> PodView | None:
-    """Return the pod if only foreign containers keep it alive and nobody deletes it; else None."""
+    """Return the pod if only foreign containers keep it alive and it is not being deleted; else None."""
     pod = situation.pod if situation.seen.job is not None else None
     if pod is None or pod.gone_by is not None or exit_code(pod) is None or not pod.keeping:
         return None

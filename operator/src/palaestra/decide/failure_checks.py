@@ -92,7 +92,7 @@ def _is_past_its_start(situation: ReplicaContext) -> bool:
 
 
 def _taken_and_not_replaced(situation: ReplicaContext) -> bool:
-    """Return whether the newest pod was interrupted and its Job has not created the next one yet.
+    """Return whether the newest pod was interrupted, and the Job has not created the next pod yet.
 
     Kubernetes doubles the wait for the next pod each time, so the interrupted pod is counted at once.
     """

@@ -1,8 +1,8 @@
 """The end of a replica whose Job has ended or was stopped.
 
-`palaestra.decide.replica_policy` has the order of these checks. A stop mark comes first, because it caused
-all that follows. The trainer's exit code and termination message come next, and the Job's own message comes
-last.
+`palaestra.decide.replica_policy` has the order of these checks. A stop mark comes first, because the stop
+caused the later ends of trainer and Job. The trainer's exit code and termination message come next, and the
+Job's own message comes last.
 """
 
 import re

@@ -1,4 +1,4 @@
-"""The status of the whole job: one phase, one reason, the conditions, and the columns of `kubectl get`.
+"""The status of the whole job: its phase, its reason, its conditions, and the columns of `kubectl get`.
 
 Five conditions always exist, each with a reason, whether true or false. The job's message is in the condition
 of the job's phase. No condition exists for the phase Pending: then the message is in Accepted while that is

@@ -1,6 +1,6 @@
 """The record of the newest ended attempt in the status, because a pod's logs are deleted with the pod.
 
-The record is written as soon as the trainer has ended, and stays after the pod is gone. If no reconcile
+The record is written as soon as the trainer has ended, and stays after the pod is deleted. If no reconcile
 observed the end of a pod, the record is written once the next pod exists.
 """
 

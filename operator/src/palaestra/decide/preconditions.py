@@ -220,7 +220,7 @@ def complete(job: TrainingJob, observed: Observed) -> bool:
 
 
 def _lacking(job: TrainingJob, observed: Observed) -> tuple[int, ...]:
-    """Return the unfinished replicas with a missing object, without those whose run is lost."""
+    """Return the unfinished replicas with a missing object, except replicas whose run is lost."""
     named = {source.name for source in references(job) if source.kind is ReferenceKind.CLAIM}
     there = {name for _, name in observed.present} | named
     lost = _lost(job, observed)

@@ -139,7 +139,7 @@ def _checkpoint(checkpoint: CheckpointStatus | None) -> LastCheckpoint | None:
 
 
 def _figure(new: float | None, old: float | None) -> float | None:
-    """Return the new value, rounded to four decimals; the old value if the new one is None."""
+    """Return the new value, rounded to four decimals; the old value if the new value is None."""
     return old if new is None else round(new, 4)
 
 

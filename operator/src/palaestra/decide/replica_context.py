@@ -26,7 +26,7 @@ class ReplicaContext:
     Attributes:
         old: the replica's stored status.
         seen: the observation of the replica.
-        counted: the attempts and restarts of the replica, including those in this observation.
+        counted: the attempts and restarts of the replica, including this observation.
         times: the clocks; the wall clock is in UTC and whole seconds.
         active_left_s: remaining seconds of the job's active time; None: the job has no active deadline, or
             its active time does not run now.
@@ -66,7 +66,7 @@ class ReplicaContext:
         return wait.seconds - self.waited_s(wait)
 
     def start_deadline_s(self, container: str) -> int:
-        """Return the start deadline of a simulator in seconds; for other containers, the longest one."""
+        """Return the start deadline of a simulator in seconds; for other containers, the longest deadline."""
         deadlines = {_container(group, i): group.start_deadline_seconds for group, i in _members(self.job)}
         return deadlines.get(container, max(deadlines.values()))
 

@@ -151,7 +151,7 @@ def _status(situation: ReplicaContext, verdict: ReplicaVerdict) -> ReplicaStatus
 
 
 def _node(situation: ReplicaContext) -> str | None:
-    """Return the node of the newest pod; if no pod exists, the node of the last one."""
+    """Return the node of the newest pod; if no pod exists, the node in the stored status."""
     pod = situation.seen.pod
     return situation.old.node if pod is None else one_line(pod.node, LONGEST_NODE) or None
 

@@ -29,7 +29,7 @@ from palaestra.observe.json_access import MOST_COUNT
 from palaestra.observe.models import JobView, PodView, ReplicaObserved
 from palaestra_protocol.pod.status import ExitCode
 
-# A pod can report any number, so its report may add at most this many attempts to the observed ones.
+# A pod can report any number, so its report may exceed the observed attempts by at most this number.
 MOST_UNSEEN = 100
 
 # The Job controller creates the pod first and records the time of the resumption later. Both times are whole
@@ -85,7 +85,7 @@ def newer_pods(old: ReplicaStatus, pods: Sequence[PodView]) -> tuple[PodView, ..
 
 
 def of_this_run(old: ReplicaStatus, pods: Sequence[PodView]) -> frozenset[str]:
-    """Return the uids of the pods whose reports count: all, or only those after a lost run was given up."""
+    """Return the uids of the pods whose reports count; after a lost run was given up, only of newer pods."""
     if old.lost is not None and old.lost.restarted is not None and old.lost.pod is not None:
         pods = newer_pods(old.model_copy(update={"pod": old.lost.pod}), pods)
         return frozenset(pod.uid for pod in pods if pod.uid != old.lost.pod.uid)

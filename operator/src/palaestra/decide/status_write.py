@@ -114,8 +114,8 @@ def _rest(replica: Any) -> Any:
 def fitted(job: Mapping[str, Any], status: Data) -> Data:
     """Return a status from `as_data` without the details that do not fit into the TrainingJob.
 
-    The function is deterministic, and a second call does not change the result. If the spec leaves less than
-    450,000 bytes for the status, the result may still be too large.
+    The function is deterministic, and a second call on the result returns it unchanged. If the spec leaves
+    less than 450,000 bytes for the status, the result may still be too large.
     """
     room = MOST_BYTES - _taken(job)
     for cut in CUTS:

@@ -1,4 +1,4 @@
-"""Check a cluster and report why TrainingJobs do not run in it, with the remedy.
+"""Check a cluster, and report the problems that keep TrainingJobs from running, with their remedies.
 
 `CHECKS` has the order of the checks: causes come before their consequences. The checks are in these modules:
 

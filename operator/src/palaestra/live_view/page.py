@@ -151,7 +151,7 @@ class ViewPage:
         self._picture.label, self._picture.image = _cell(picture.name), pixels
 
     def _wait(self, reason: str) -> None:
-        """Show the reason why nothing moves, and read the simulators' addresses again, which may be new."""
+        """Show the reason for which the scene stands still, and read the simulators' addresses again."""
         self._stage.revision = None
         self._text.content = _paragraphs(summarized(self._sources[self._shown].progress()), reason)
         self._away_since = self._away_since or time.monotonic()

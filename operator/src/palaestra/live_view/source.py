@@ -117,9 +117,9 @@ class SidecarSource:
 
     Attributes:
         name: the name of the simulator, for people.
-        fetch: sends a GET request for a path, and returns status and body of the response. The body is cut
-            after the given number of bytes plus one. The function raises OSError or HTTPException without a
-            response.
+        fetch: sends a GET request for a path, and returns status and body of the response. The body has at
+            most the given number of bytes plus one, so that a longer body can be detected. The function
+            raises OSError or HTTPException without a response.
         episodes: reads the episodes from the run's trainer; None if they are unknown.
         run: reads the progress of the run; None if it is unknown.
         here: whether the simulator's processes run on this machine as this user, so that `signal` works.

@@ -154,7 +154,7 @@ CHECKS: tuple[Check, ...] = (
 
 
 def _existing(path: Path) -> Path:
-    """Return the path itself if it exists, else its nearest existing parent."""
+    """Return the path if it exists; otherwise return its nearest existing parent."""
     return next(parent for parent in (path, *path.parents) if parent.exists())
 
 

@@ -133,8 +133,8 @@ async def end_marked(pod_uid: str, container: str) -> None:
 def when_ended(pid: int, report: Callable[[], object]) -> None:
     """Call `report` from a thread as soon as a child process has ended; the caller must reap the child.
 
-    `os.pidfd_open` would need no thread. But it does not work with old kernels, with Pythons that were built
-    for an old kernel, and with the seccomp filters of older container runtimes.
+    `os.pidfd_open` would need no thread. But some systems do not support it: old kernels, Pythons that were
+    built for an old kernel, and older container runtimes with a seccomp filter.
     """
     Thread(target=_wait, args=(pid, report), name=f"end of {pid}", daemon=True).start()
 

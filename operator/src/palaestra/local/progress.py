@@ -70,7 +70,7 @@ class ProgressReader:
             address = RunAddresses.read(self._file.read_bytes()).status
             with DIRECT.open(f"http://{address}/status", timeout=ANSWER_S) as answer:
                 return TrainerStatus.from_json(decoded(answer.read(MOST_BYTES)))
-        return None  # the trainer has not started yet, has ended, or starts again
+        return None  # the trainer has not started yet, has ended, or is between two attempts
 
     def _written(self) -> int | None:
         try:

@@ -1,7 +1,7 @@
 """The Job controller of this machine: after the end of a pod, decide whether the replica gets another pod.
 
 `verdict` applies the planned Job's podFailurePolicy as Kubernetes does. The first matching rule decides, and
-a failure without a matching rule counts against `backoffLimit`. Kubernetes does not limit ignored failures.
+a failure without a matching rule counts against `backoffLimit`. Kubernetes has no limit for ignored failures.
 Here, as in the operator, ignored failures without progress have a limit.
 """
 

@@ -70,8 +70,8 @@ def locked(directory: Path, taken: int | None = None) -> Iterator[int]:
     """Lock a run directory for this process, and yield the descriptor of the lock.
 
     The kernel releases the lock when every process with this descriptor has closed it or ended. A process
-    that inherited the descriptor passes it as `taken`. The lock is not a record lock, as in the trainer,
-    because a child process cannot inherit a record lock.
+    that inherited the descriptor passes the descriptor as `taken`. The lock is not a record lock, as in the
+    trainer, because a child process cannot inherit a record lock.
 
     Raises:
         RunRefused: another runner has the lock, or the file system has no locks.
@@ -162,7 +162,7 @@ def _raised(was: Any, is_now: Any) -> bool:
 def _learned_nothing(directory: Path) -> bool:
     """Return whether the trainer refused the job of a run at step 0, and the run has no checkpoint.
 
-    A run without a reported step does not count, because a custom program may have trained without a report.
+    If no step was reported, the result is False, because a custom program may have trained without a report.
     """
     outcome, checkpoints = RunOutcome.of(directory), directory / "checkpoints"
     return (
@@ -185,7 +185,7 @@ def changed_fields(before: Record, now: Record) -> Iterator[str]:
 
 
 def _completed(record: Any) -> Record:
-    """Return a record with the defaults of those fields that the release that wrote it did not have.
+    """Return the record of an older release, completed with the defaults of newer fields.
 
     A job that lacks a newer field equals the job with that field's default. If this release cannot read a
     record, for example because a newer release wrote it, the record is compared unchanged.

@@ -90,8 +90,8 @@ def _pods(
 ) -> tuple[tuple[PodView, ...], tuple[PodView, ...]]:
     """Return the pods of a replica, oldest first, and all other pods with the replica's labels.
 
-    A user who can create pods can give them the operator's labels. So only the pods that the replica's Job
-    owns belong to the replica, and of an earlier Job only the pod that the status names.
+    A user who can create pods can give them the operator's labels. So a pod belongs to the replica only if
+    the replica's Job owns the pod, or if the status names it as a pod of an earlier Job.
     """
     known = {
         replica.pod.uid

@@ -1,6 +1,6 @@
 """The running operator: the control loop, its observations and its writes.
 
-- `controller`: one reconcile: observe, plan, decide, act, one status write, events
+- `controller`: one reconcile: observe, plan, decide, act, write the status once, write the events
 - `observer`: the complete observation of one TrainingJob
 - `caches`, `informer`: the watched objects
 - `unwatched_facts`: facts that no watch reports: foreign Jobs, refusals, events, Workloads, field managers
@@ -9,7 +9,7 @@
 - `world_check_process`, `world_check_main`: the process that checks large worlds
 - `crd_check`: the cluster's CustomResourceDefinition, compared with this release's
 - `poller`: the status of each running trainer, read over the pod network
-- `poll_schedule`: the next trainer to poll, chosen so that silent pods do not delay the others
+- `poll_schedule`: the choice of the next trainer to poll, so that silent pods do not delay other pods
 - `poll_targets`: the pods to poll
 - `preconditions`: reads from the API server before a write, because a cache may be behind
 - `executor`, `status_writer`, `fenced_client`: all writes to the cluster, refused while another operator

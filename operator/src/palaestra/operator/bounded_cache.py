@@ -2,13 +2,13 @@
 
 Each reconcile of a job replaces the values that the previous reconcile stored. The values of a deleted or
 recreated TrainingJob are dropped, so the memory holds only facts about existing objects. A full memory
-accepts a new value only after another value was dropped. It does not evict the oldest value: with thousands
-of jobs in turn, each job would evict the values of another one, and no value would stay.
+accepts a new value only after another value was dropped. It does not evict the oldest value. Otherwise, with
+thousands of jobs, each job would evict the values of another job, and no value would stay.
 
-A `RateLimitedLookup` also sends the requests for the facts. It requests facts about incomplete objects: those
-that lack a pod, a volume, an admission or a cause. It sends the first request about an object some seconds
-after it found the object incomplete. The pauses between the later requests grow. All objects of one lookup
-share a few requests a second, so that thousands of objects in one namespace do not delay other namespaces.
+A `RateLimitedLookup` also sends the requests for the facts. It requests facts about incomplete objects, which
+lack a pod, a volume, an admission or a cause. It sends the first request about an object some seconds after
+it found the object incomplete. The pauses between the later requests grow. All objects of one lookup share a
+few requests a second, so that thousands of objects in one namespace do not delay other namespaces.
 """
 
 import threading
@@ -19,7 +19,7 @@ from typing import Generic, TypeVar
 
 from palaestra.objects import Key
 
-REMEMBERED = 4000  # objects of all jobs together; the memory holds one message for each
+REMEMBERED = 4000  # limit of objects of all jobs together; one message is stored for each object
 PATIENCE_S = 5.0  # from the time an object is found incomplete until the first request about it
 # The pause between the first two requests about an object; each later pause is twice the previous one.
 RECHECK_S = 15.0

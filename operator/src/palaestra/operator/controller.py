@@ -72,7 +72,7 @@ class ReconcileRecords:
 
 
 def now(record: ReconcileRecord) -> Times:
-    """Return the current time by both clocks; `record` is from the last reconcile."""
+    """Return the current time by both clocks; `record` is the record of the last reconcile."""
     return Times(now=datetime.now(UTC), clock_s=time.monotonic(), record=record)
 
 
@@ -85,7 +85,7 @@ class Controller:
         acting: executes actions.
         reporting: writes status and events.
         layout: the layout of this release in this cluster.
-        times: returns the clocks at a reconcile, given the record of the last one.
+        times: returns the clocks of a reconcile; its argument is the record of the last reconcile.
     """
 
     def __init__(

@@ -6,7 +6,7 @@ see an incomplete status. The API server also refuses a status with a condition 
 leaves out such conditions until it has read that the definition allows them. Conditions that the stored
 status already has stay.
 
-Printer columns and selectable fields are not compared, because a missing one loses no written value.
+Printer columns and selectable fields are not compared, because their absence loses no written value.
 
 The operator has no permission to read CustomResourceDefinitions, so it reads the OpenAPI document, which
 every account may read. If that read fails, the operator still works.

@@ -157,7 +157,7 @@ class Executor:
 
 
 def _wrong_with(found: Object, planned: Object) -> str:
-    """Return the difference between an existing ConfigMap and the planned one; "" if they agree."""
+    """Return the difference between an existing ConfigMap and the planned ConfigMap; "" if they agree."""
     if found.get("data") != planned["data"]:
         return "with other content"
     if not owners(found) & owners(planned):

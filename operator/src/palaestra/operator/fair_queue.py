@@ -1,6 +1,6 @@
 """The order in which the worlds of jobs are checked: namespaces take turns, one job each.
 
-Each namespace has at most one job under check, so many jobs in one namespace do not delay the others.
+Each namespace has at most one job under check, so many jobs in one namespace do not delay other namespaces.
 """
 
 import threading

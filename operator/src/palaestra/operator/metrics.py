@@ -54,7 +54,7 @@ class Metrics:
         self._queued.observe(seconds)
 
     def written(self, job: Object, status: Object) -> None:
-        """Count the changes between the old status of a TrainingJob and the written one.
+        """Count the changes between the old status of a TrainingJob and the written status.
 
         Only the operator that wrote the status counts its changes, so no change is counted twice.
         """

@@ -19,7 +19,8 @@ FIRST_S = 1.0  # seconds within which a new trainer is polled for the first time
 class PollStatus(Enum):
     """The result of the last request to a trainer."""
 
-    PROMPT = "prompt"  # it ended soon, with or without a response: a refused connection does not delay others
+    # It ended soon, with or without a response: a refused connection does not delay other requests.
+    PROMPT = "prompt"
     NEW = "new"  # no request was sent yet
     SLOW = "slow"
 

@@ -30,7 +30,7 @@ class PollTargets:
         self._pods: dict[Key, tuple[PollTarget, frozenset[str]]] = {}
 
     def training_job(self, obj: Object, *, exists: bool) -> None:
-        """Record the newest state of a TrainingJob, or remove it if it does not exist any more."""
+        """Record the newest state of a TrainingJob; if it was deleted (`exists` is False), remove it."""
         name = _name(obj)
         if exists:
             self._training_jobs[name] = text(part(obj, "metadata"), "uid")
@@ -38,7 +38,7 @@ class PollTargets:
             self._training_jobs.pop(name, None)
 
     def job(self, obj: Object, *, exists: bool) -> None:
-        """Record the newest state of a batch/v1 Job, or remove it if it does not exist any more."""
+        """Record the newest state of a batch/v1 Job; if it was deleted (`exists` is False), remove it."""
         name, uid = _name(obj), text(part(obj, "metadata"), "uid")
         if exists:
             self._jobs[name] = _Job(key=_key(obj), uid=uid, owners=owners(obj))
@@ -46,7 +46,7 @@ class PollTargets:
             self._jobs.pop(name, None)
 
     def pod(self, obj: Object, *, exists: bool) -> None:
-        """Record the newest state of a pod, or remove it if it does not exist any more."""
+        """Record the newest state of a pod; if it was deleted (`exists` is False), remove it."""
         name, host = _name(obj), _address(obj)
         if exists and host is not None and _trains(obj):
             uid = text(part(obj, "metadata"), "uid")

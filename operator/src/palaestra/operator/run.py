@@ -213,7 +213,7 @@ def _layout(options: OperatorOptions) -> ClusterLayout:
 
 
 def configure_logs() -> None:
-    """Set up the log: one JSON object a line on standard error, with its level and the time in UTC.
+    """Configure the log: standard error gets one JSON object a line, with its level and the time in UTC.
 
     The message of each log call is constant; its values are separate fields.
     """

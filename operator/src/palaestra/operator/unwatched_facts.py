@@ -83,7 +83,7 @@ class RejectedCreations(BoundedCache[int | None, str]):
     """
 
     def learn(self, key: Key, uid: str, refused: Denied) -> None:
-        """Record the refusals of one reconcile; drop the older ones of objects that are not in `refused`.
+        """Record the refusals of one reconcile; drop older refusals of objects that are not in `refused`.
 
         A temporary error, such as a busy API server, does not change the record.
         """
@@ -120,7 +120,7 @@ class PodEvents(RateLimitedLookup[Lacking, Object]):
     def of(
         self, key: Key, uid: str, jobs: Sequence[Object], pods: Sequence[Object]
     ) -> Answers[Lacking, Object]:
-        """Return the events about those of a TrainingJob's `jobs` and `pods` that need an explanation.
+        """Return the events about a TrainingJob's incomplete `jobs` and `pods`.
 
         Raises:
             ApiError: the read of events failed.
@@ -201,7 +201,7 @@ class KueueWorkloads(RateLimitedLookup[str, str]):
         self._api = api
 
     def of(self, key: Key, uid: str, jobs: Sequence[Object], pods: Sequence[Object]) -> Answers[str, str]:
-        """Return the messages for those of a TrainingJob's `jobs` that wait in a queue.
+        """Return the messages for the Jobs in `jobs` that wait in a queue.
 
         Raises:
             ApiError: the read of a Workload failed.

@@ -19,7 +19,8 @@ from palaestra.operator.preconditions import Outdated
 IDLE_S = 1.0  # seconds between two checks of the stop condition
 REPEATS = 4  # consecutive conflicts of a key before the first log line; then each power of two is logged
 IN_DOUBT_S = 1.0  # seconds until the next try of a key while it is uncertain whether this operator leads
-# Seconds after which a reconcile is stuck; every call has a deadline, so none takes this long.
+# Seconds after which a reconcile counts as stuck. Every call has a deadline, so a reconcile is normally
+# shorter.
 STUCK_S = 300.0
 
 log = structlog.get_logger(__name__)

@@ -59,7 +59,7 @@ class WorldChecker:
         return self._turns.waits(key)
 
     def verdicts(self, key: Key, worlds: Sequence[GivenWorld]) -> Mapping[str, WorldVerdict]:
-        """Return the known results for a job's worlds; check the others and queue the job afterwards."""
+        """Return the known results for a job's worlds; the other worlds are queued for a check."""
         missing = [world for world in worlds if self._recall(world.digest) is None]
         if missing and sum(len(world.source) for world in missing) <= MOST_BYTES_HERE:
             self._remember({world.digest: _checked(world) for world in missing})

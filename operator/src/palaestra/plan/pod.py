@@ -99,7 +99,7 @@ def _sizes(replica: Replica, main: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _empty_volumes(containers: list[dict[str, Any]], memory: Mapping[str, str]) -> list[dict[str, Any]]:
-    """Return an empty volume for each mount that has no other volume; no two containers share one."""
+    """Return an empty volume for each mount that has no other volume; each container has its own volumes."""
     mounted = {mount["name"] for container in containers for mount in container["volumeMounts"]}
     return [
         {"name": name, "emptyDir": _empty(name, memory)}

@@ -1,7 +1,7 @@
 """One replica of a job in a layout: the input from which its objects are planned.
 
-Names are deterministic. If a second operator, or a restarted one, creates the same objects again, the API
-server refuses the duplicates.
+Names are deterministic. If a second or a restarted operator creates the same objects again, the API server
+refuses the duplicates.
 """
 
 from dataclasses import dataclass
@@ -42,7 +42,7 @@ class PlannedSimulator:
 
     @property
     def keeps_clock(self) -> bool:
-        """Return whether the simulator publishes /clock; of all simulators of a ROS master, only one may."""
+        """Return whether the simulator publishes /clock, which only one simulator of a ROS master may do."""
         return self.place == 0
 
 

@@ -124,7 +124,7 @@ def _study(sweep: Sweep, folder: Path) -> optuna.Study:
 
 
 def _values(trial: optuna.trial.FrozenTrial) -> dict[str, Any]:
-    """Return the values of a trial, including those that Optuna will use for an enqueued trial."""
+    """Return the values of a trial, including the fixed values of an enqueued trial."""
     return {**trial.system_attrs.get("fixed_params", {}), **trial.params}
 
 

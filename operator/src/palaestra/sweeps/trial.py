@@ -83,7 +83,7 @@ class TrialFigures:
 
     @classmethod
     def of(cls, runs: tuple[RunFigures, ...]) -> Self:
-        """Return the figures of a trial from its runs, none of which was pruned."""
+        """Return the figures of a trial from its runs, for a trial that was not pruned."""
         if not all(run.ended for run in runs):
             return cls(state=TrialProgress.RUNNING, runs=runs)
         done = all(run.succeeded for run in runs)

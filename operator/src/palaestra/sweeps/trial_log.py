@@ -23,7 +23,8 @@ from palaestra.sweeps.trial import Point, RunFigures, TrialFigures, TrialProgres
 RECORD = "sweep.yaml"
 TRIALS = "trials.jsonl"
 MUTABLE = {"trials"}
-# Changeable without Optuna: trials.jsonl has both figures, but a search by Optuna used only one.
+# This field may change without Optuna. trials.jsonl has both figures, but a search by Optuna used only one
+# figure.
 _COMPARING = {"objective"}
 
 

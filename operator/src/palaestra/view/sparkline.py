@@ -1,4 +1,4 @@
-"""A bar chart in one line of text, one character per value."""
+"""A bar chart in one line of text, with one character for each value."""
 
 from collections.abc import Sequence
 

@@ -89,7 +89,7 @@ def entry_of(data: Mapping[str, Any], name: str, env: str | None) -> tuple[str, 
 
 
 def algorithm_of(given: str | None, name: str, entry: Mapping[str, Any]) -> str:
-    """Return the algorithm: the given one, or the entry's, or the file's, in this order.
+    """Return the algorithm: `given`, or else the algorithm of the entry, or else of the file.
 
     Raises:
         ZooError: the algorithm is unknown, or Palaestra cannot use it.

@@ -247,7 +247,7 @@ def _vector_wrappers(draft: Draft, value: Any) -> None:
 
 def _frames(draft: Draft, value: Any) -> None:
     number = None if value is None else _whole(draft, "frame_stack", value)
-    if number is None or number == 1:  # one frame is the observation itself
+    if number is None or number == 1:  # a stack of one frame is the observation itself
         return
     draft.frame_stack = number
 
