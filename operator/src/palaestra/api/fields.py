@@ -1,8 +1,8 @@
 """The types of a TrainingJob's values; each type has a maximum size.
 
-An API server estimates the cost of a rule from the largest object that the schema allows. It refuses rules
-over strings, lists or maps without a maximum size. Two regular expression engines read the patterns: Rust's
-in pydantic, and Go's in the API server. So the patterns use only plain ASCII classes.
+An API server estimates the cost of a rule from the largest object that the schema allows. The API server
+refuses rules over strings, lists or maps without a maximum size. Two regular expression engines read the
+patterns: Rust's in pydantic, and Go's in the API server. So the patterns use only plain ASCII classes.
 """
 
 import json

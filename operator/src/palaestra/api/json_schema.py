@@ -1,7 +1,7 @@
 """A JSON Schema (draft 7) of the TrainingJob for editors and programs, with the checks of the CRD's schema.
 
-Language servers of YAML read draft 7. They support neither Kubernetes' keywords nor its rules. So the rules
-about several fields are only listed, under `x-palaestra-rules`.
+Language servers of YAML read draft 7. Language servers support neither Kubernetes' keywords nor its rules. So
+the rules about several fields are only listed, under `x-palaestra-rules`.
 """
 
 from collections.abc import Mapping

@@ -153,8 +153,8 @@ class Client:
             name: of the job.
             until: the phase, or `ended`.
             deadline_s: the longest wait in seconds.
-            report: a function such as `print` or `logging.info`. It is called with one line for each new
-                phase, and for each new waiting reason of a replica. None: no report.
+            report: a function such as `print` or `logging.info`. The function is called with one line for
+                each new phase, and for each new waiting reason of a replica. None: no report.
 
         Raises:
             EndedOtherwise: the job ended in another phase than `until`.

@@ -109,7 +109,7 @@ class _Stream(io.RawIOBase):
     """An iterator of chunks as a readable file.
 
     Attributes:
-        left: bytes that may be read until the next member is known. This limits headers, because tarfile
+        left: bytes that may be read until the next member is known. The limit is for headers, because tarfile
             keeps a whole header in memory.
     """
 

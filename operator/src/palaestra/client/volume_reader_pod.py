@@ -1,8 +1,8 @@
 """The pod that reads the volume of a run after the run's own pod has ended.
 
-This module is pure. The pod is built from the template of the replica's Job in the cluster. So it has the
-same security context, scheduling, pull secrets and trainer image as the run's pods. The pod mounts the volume
-read-only, has no service account token, and ends by itself even if nobody deletes it.
+This module is pure. The pod is built from the template of the replica's Job in the cluster. So the reader pod
+has the same security context, scheduling, pull secrets and trainer image as the run's pods. The pod mounts
+the volume read-only, has no service account token, and ends by itself even if nobody deletes it.
 """
 
 import copy

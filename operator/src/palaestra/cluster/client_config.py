@@ -18,7 +18,7 @@ class Access:
         host: the address, such as `https://10.0.0.1:443`.
         pool: connections with the TLS settings for that server, through its proxy.
         authorization: returns the header `Authorization`, or None. Only one thread at a time calls the
-            function. It raises Unreachable if the credentials cannot be read.
+            function. The function raises Unreachable if the credentials cannot be read.
         headers: additional headers of every request, for impersonation. The same name may occur several
             times.
         proxy: the proxy of all connections, which messages name.

@@ -16,8 +16,8 @@ ApiError                    any response but success; `retryable`: whether a ret
 NotConfigured               no API server is configured, or its credentials cannot be read
 CommandFailed               the exit code of a command in a container is not 0
 
-The message of an ApiError is the API server's own message. It names the object and, if the object is invalid,
-the field.
+The message of an ApiError is the API server's own message. The message names the object and, if the object is
+invalid, the field.
 """
 
 import math

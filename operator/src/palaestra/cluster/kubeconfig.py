@@ -1,8 +1,8 @@
 """Read a kubeconfig by the rules of kubectl.
 
-The official client merges the files and supports auth-providers. It ignores `as` and the errors of plugins,
-so this module reads all other fields. The module is imported only if a kubeconfig is used, because the
-official client needs 10 MiB of memory.
+The official client merges the files and supports auth-providers. The official client ignores `as` and the
+errors of plugins, so this module reads all other fields. The module is imported only if a kubeconfig is used,
+because the official client needs 10 MiB of memory.
 """
 
 import base64

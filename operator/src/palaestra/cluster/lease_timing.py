@@ -2,9 +2,9 @@
 
 Each process compares durations on its own monotonic clock; the times in a Lease are only for people. A
 follower counts from the time at which it *saw* the last renewal, which is after the write. A leader counts
-from the time at which it *sent* the renewal, which is before the write. It stops after two thirds of the
-duration. So a leader has stopped before another leader starts, as long as their clocks run at similar speeds
-(faster than two thirds of each other).
+from the time at which it *sent* the renewal, which is before the write. The leader stops after two thirds of
+the duration. So a leader has stopped before another leader starts, as long as their clocks run at similar
+speeds (faster than two thirds of each other).
 """
 
 from dataclasses import dataclass, field
@@ -22,8 +22,8 @@ class LeaseSpec:
     Attributes:
         holder: identity of the leader; "" without a leader.
         duration_s: seconds without a renewal after which another candidate may take the Lease.
-        renewed: time of the last renewal by the leader's clock. It is compared only with earlier values of
-            the Lease, never with a clock.
+        renewed: time of the last renewal by the leader's clock. This time is compared only with earlier
+            values of the Lease, never with a clock.
         transitions: number of changes of the leader.
     """
 

@@ -1,8 +1,8 @@
 """A cache that follows the API server: the reflector lists the objects in pages, and then watches forever.
 
 - If a watch is silent for longer than the interval of bookmarks, the reflector opens a new watch.
-- If the version has expired (410, as a response or as an event), the reflector lists again. It then removes
-  and reports each object that the new list lacks, so no deletion is missed.
+- If the version has expired (410, as a response or as an event), the reflector lists again. The reflector
+  then removes and reports each object that the new list lacks, so no deletion is missed.
 - After each consecutive failure, the reflector waits longer before it retries.
 """
 

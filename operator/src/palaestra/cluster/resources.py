@@ -67,7 +67,7 @@ EVENTS = Resource(
 NETWORK_POLICIES = Resource(
     api_version="networking.k8s.io/v1", kind="NetworkPolicy", plural="networkpolicies"
 )
-# Kueue serves this version since 0.15. It also stores this version since 0.16, so that no webhook must
+# Kueue serves this version since 0.15. Kueue also stores this version since 0.16, so that no webhook must
 # convert objects.
 WORKLOADS = Resource(api_version="kueue.x-k8s.io/v1beta2", kind="Workload", plural="workloads")
 LEASES = Resource(api_version="coordination.k8s.io/v1", kind="Lease", plural="leases")

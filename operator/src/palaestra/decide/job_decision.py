@@ -41,7 +41,8 @@ def decide(job: TrainingJob, observed: Observed, prepared: Prepared, times: Time
     """Return the status of a job and the actions for it.
 
     A second decision on the resulting status and record, with the same observation, returns the same status
-    and no event about a change. It returns only those actions whose effect is not in the observation yet.
+    and no event about a change. The second decision returns only the actions whose effect is not in the
+    observation yet.
     """
     now = whole(times.now)
     times = replace(times, now=now)

@@ -22,7 +22,7 @@ from palaestra_protocol.pod.status import MOST_FAULTS, MOST_LINE, MOST_LINES, Fa
 def last_attempt(situation: ReplicaContext, end: ReplicaVerdict | None = None) -> LastAttempt | None:
     """Return the record of the newest ended attempt; None if no attempt has ended.
 
-    `end` is the phase and reason of an ended replica. It becomes the record of an attempt whose pod was
+    `end` is the phase and reason of an ended replica. They become the record of an attempt whose pod was
     deleted.
     """
     known, newest = situation.old.last_attempt, situation.seen.pod

@@ -72,8 +72,8 @@ def newer_pods(old: ReplicaStatus, pods: Sequence[PodView]) -> tuple[PodView, ..
     """Return the pods that were created after the pod in the status, oldest first.
 
     Times are whole seconds. If the pod in the status no longer exists, a pod created in the same second
-    counts as newer. It cannot be older: after its failure, the Job controller would have waited several
-    seconds before it created the pod in the status.
+    counts as newer. Such a pod cannot be older: after the failure of an older pod, the Job controller would
+    have waited several seconds before it created the pod in the status.
     """
     named = old.pod
     if named is None:

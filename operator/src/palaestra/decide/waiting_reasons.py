@@ -39,7 +39,7 @@ MAKING = frozenset(
      "PostStartHookError"}
 )  # fmt: skip
 
-# These match the messages of Kubernetes' admission plugins ResourceQuota and LimitRanger.
+# These expressions match the messages of Kubernetes' admission plugins ResourceQuota and LimitRanger.
 _UNSPECIFIED = re.compile(r"must specify (?P<containers>.+)$")
 _NAMES = re.compile(r"for: (?P<names>[a-z0-9,-]+)")
 _SIZES = re.compile(r"\b(?:usage|ratio) per (?:Container|Pod) is ")

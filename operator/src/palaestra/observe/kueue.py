@@ -15,8 +15,8 @@ _READY = "Ready"  # the state of an admission check that has passed
 def why_not_admitted(workloads: Iterable[Raw]) -> str:
     """Return Kueue's reason not to admit a Job, on one line, from the Workloads that Kueue created for it.
 
-    The reason is Kueue's own message where Kueue has one. It is "" if Kueue has admitted the Job, or reports
-    no reason yet.
+    The reason is Kueue's own message where Kueue has one. The result is "" if Kueue has admitted the Job, or
+    reports no reason yet.
     """
     newest = max(workloads, key=lambda raw: text(part(raw, "metadata"), "creationTimestamp"), default=None)
     if newest is None:

@@ -357,8 +357,8 @@ class ReplicaObserved:
 class Observed:
     """The observation of a TrainingJob.
 
-    The operator adds `sources`, `kueue`, `verdicts` and `worlds_wait`. It needs these values only while
-    objects of the job are missing.
+    The operator adds `sources`, `kueue`, `verdicts` and `worlds_wait`. The operator needs these values only
+    while objects of the job are missing.
 
     Attributes:
         replicas: the observations of the spec's replicas, by index.

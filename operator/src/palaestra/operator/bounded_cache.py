@@ -2,13 +2,13 @@
 
 Each reconcile of a job replaces the values that the previous reconcile stored. The values of a deleted or
 recreated TrainingJob are dropped, so the memory holds only facts about existing objects. A full memory
-accepts a new value only after another value was dropped. It does not evict the oldest value. Otherwise, with
-thousands of jobs, each job would evict the values of another job, and no value would stay.
+accepts a new value only after another value was dropped. The memory does not evict the oldest value.
+Otherwise, with thousands of jobs, each job would evict the values of another job, and no value would stay.
 
-A `RateLimitedLookup` also sends the requests for the facts. It requests facts about incomplete objects, which
-lack a pod, a volume, an admission or a cause. It sends the first request about an object some seconds after
-it found the object incomplete. The pauses between the later requests grow. All objects of one lookup share a
-few requests a second, so that thousands of objects in one namespace do not delay other namespaces.
+A `RateLimitedLookup` also sends the requests for the facts. The facts are about incomplete objects, which
+lack a pod, a volume, an admission or a cause. The lookup sends the first request about an object some seconds
+after the object was found incomplete. The pauses between the later requests grow. All objects of one lookup
+share a few requests a second, so that thousands of objects in one namespace do not delay other namespaces.
 """
 
 import threading

@@ -120,8 +120,8 @@ def _condition_types(served: Mapping[str, Any]) -> frozenset[str]:
 def lacks(served: Schema, ours: Schema, path: str = "") -> Iterator[str]:
     """Yield "<path>: <difference>" for each field of `ours` that `served` lacks or defines differently.
 
-    Both are structural schemas. The fields below a missing field are not listed. Additional fields of
-    `served` belong to a newer release and are ignored.
+    `ours` and `served` are structural schemas. The fields below a missing field are not listed. Additional
+    fields of `served` belong to a newer release and are ignored.
     """
     kind, wanted = served.get("type"), ours.get("type")
     if kind != wanted:

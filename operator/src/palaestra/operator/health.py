@@ -1,6 +1,7 @@
 """The operator's HTTP server: liveness, readiness and metrics.
 
-The server has no authentication: any client that reaches the pod may send requests. So it is read-only.
+The server has no authentication: any client that reaches the pod may send requests. So the server is
+read-only.
 """
 
 from collections.abc import Callable

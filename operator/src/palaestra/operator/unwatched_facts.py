@@ -37,8 +37,8 @@ class ForeignJobs(BoundedCache[str, tuple[float, Object]]):
 
     A foreign Job has a name that a TrainingJob needs, but belongs to an earlier TrainingJob or to another
     owner. The caches may not have it, because it may lack the label of the operator's objects. The operator
-    finds a foreign Job when the creation of its own Job fails with "already exists". It then reads the
-    foreign Job every few seconds until that Job is deleted.
+    finds a foreign Job when the creation of its own Job fails with "already exists". The operator then reads
+    the foreign Job every few seconds until that Job is deleted.
 
     Args:
         api: the cluster.

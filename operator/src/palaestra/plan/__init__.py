@@ -1,7 +1,7 @@
 """Turn a TrainingJob into the objects that it needs.
 
-The plan is pure: the same job and layout give the same objects. It uses no clock, no network and no random
-numbers. So tests/golden/ can store the plan of every example, for a cluster and for a laptop.
+The plan is pure: the same job and layout give the same objects. `plan` uses no clock, no network and no
+random numbers. So tests/golden/ can store the plan of every example, for a cluster and for a laptop.
 
     plan(job, layout).objects
 """

@@ -11,7 +11,8 @@ from palaestra.errors import PlanError
 from palaestra.plan.replica import TRAINER, Replica
 
 INITIAL = "initial-policy"
-# Provisioners copy the name of a claim into the value of a label or into a cloud's tag. Both have this limit.
+# Provisioners copy the name of a claim into the value of a label or into a cloud's tag. Labels and tags have
+# this limit.
 LONGEST_NAME = 63
 DIGITS = 12  # hexadecimal digits in a shortened name
 

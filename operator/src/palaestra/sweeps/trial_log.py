@@ -33,8 +33,8 @@ def begin(folder: Path, sweep: Sweep) -> None:
 
     Only `trials` may differ, and without Optuna also `objective`.
 
-    A crash may leave an incomplete last line in `trials.jsonl`. It is removed, so that the next record begins
-    a new line.
+    A crash may leave an incomplete last line in `trials.jsonl`. This line is removed, so that the next record
+    begins a new line.
 
     Raises:
         RunRefused: the folder belongs to another sweep.

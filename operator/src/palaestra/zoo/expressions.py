@@ -1,7 +1,7 @@
 """Python expressions in a file of RL-Baselines3-Zoo, such as `dict(net_arch=[64], activation_fn=nn.ReLU)`.
 
-Zoo evaluates such expressions. This module only parses them, and reads only literals, `dict(...)` and names
-of classes, so an untrusted file cannot run code. A class becomes text for a TrainingJob: `ReLU` or
+Zoo evaluates such expressions. This module only parses the expressions. It reads only literals, `dict(...)`
+and names of classes, so an untrusted file cannot run code. A class becomes text for a TrainingJob: `ReLU` or
 `module:Class`.
 """
 
