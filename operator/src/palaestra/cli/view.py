@@ -61,7 +61,7 @@ def _view(options: argparse.Namespace) -> int:
     folder = Path(options.run)
     if folder.is_dir() or os.sep in options.run or options.until_stdin_closes:
         return _shown(options, _local(options, folder))
-    say([f"{options.run}: is not a folder here, so the cluster is asked for a job of this name"])
+    say([f"{options.run}: is not a folder here; looking for a job of this name in the cluster"])
     return connected(_of_cluster)(options)
 
 

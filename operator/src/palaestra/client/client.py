@@ -207,7 +207,7 @@ class Client:
             )
         except NotFound as error:
             raise NoPod(
-                f"pod {pod.name}: does not exist any more, nor does its log; "
+                f"pod {pod.name}: does not exist any more, and its log was deleted with it; "
                 f"`palaestra describe {name}` shows the last lines of the last attempt"
             ) from error
         except Invalid as error:
@@ -217,7 +217,7 @@ class Client:
                     f"pod {pod.name}: has no container {container}; it has {', '.join(known)}"
                 ) from error
             raise NoPod(
-                f"pod {pod.name}: {error.message}; `palaestra describe {name}` shows what it waits for"
+                f"pod {pod.name}: {error.message}; `palaestra describe {name}` shows what the pod waits for"
             ) from error
 
     def events(self, name: str) -> tuple[Event, ...]:
@@ -322,8 +322,8 @@ def newest_pod(job: TrainingJob, replica: int) -> PodReference:
     if pod is None:
         name = job.metadata.name
         raise NoPod(
-            f"job {name}: replica {replica} has no pod; "
-            f"the job has {job.spec.replicas} replicas, and `palaestra describe {name}` shows why they wait"
+            f"job {name}: replica {replica} has no pod; the job has "
+            f"{job.spec.replicas} replicas, and `palaestra describe {name}` shows why replicas wait"
         )
     return pod
 

@@ -108,8 +108,8 @@ def _with_remedies(source: RunSource, target: Path, deadline: float) -> Iterator
         ) from error
     except WrongArchive as error:
         raise NotFetched(
-            f"{source.directory} in pod {source.pod}: was refused: {error}; nothing was written; look "
-            "into the run, and allow more with --max-size if it is only large"
+            f"{source.directory} in pod {source.pod}: was refused: {error}; no file was written; inspect "
+            "the run, and raise --max-size if its files are only large"
         ) from error
     except OSError as error:
         raise NotFetched(f"{target}: {error}; choose a writable folder") from error
@@ -159,7 +159,7 @@ def _template(api: Api, job: TrainingJob, replica: int) -> Object:
     except NotFound:
         raise NotFetched(
             f"job {job.metadata.name}: replica {replica} was not created, so it has no run; "
-            f"the job has {job.spec.replicas} replicas, and `palaestra describe` shows why one waits"
+            f"the job has {job.spec.replicas} replicas, and `palaestra describe` shows why a replica waits"
         ) from None
     return template
 

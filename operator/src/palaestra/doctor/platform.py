@@ -113,7 +113,7 @@ def sidecars(site: Site) -> Iterator[CheckResult]:
             return
         yield wrong(
             what,
-            f"a pod like those of jobs is refused in {site.namespace}: {error.message}",
+            f"a pod like the pods of jobs is refused in {site.namespace}: {error.message}",
             "allow what the message names",
         )
     except Invalid as error:  # the API server refuses a dry run if a webhook has side effects
@@ -168,6 +168,6 @@ def storage(site: Site) -> Iterator[CheckResult]:
     names = ", ".join(class_["metadata"]["name"] for class_ in classes)
     yield wrong(
         "storage class",
-        f"none is the default; the classes are {names}" if names else "the cluster has no storage class",
+        f"no class is the default; the classes are {names}" if names else "the cluster has no storage class",
         f"annotate one with {DEFAULT_CLASS}=true, or name one in spec.storage.storageClassName of each job",
     )

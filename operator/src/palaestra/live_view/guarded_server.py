@@ -110,7 +110,7 @@ def refusal(request: Request) -> Response | None:
     """Return the refusal of a request that does not come from this server's page; None if it is allowed."""
     host = request.headers.get("Host", "")
     if _name(f"//{host}") not in _OWN_NAMES:
-        return _forbidden("this view answers only as 127.0.0.1 or localhost")
+        return _forbidden("this view accepts only requests to 127.0.0.1 or localhost")
     upgrade = request.headers.get("Upgrade", "").lower() == "websocket"
     if upgrade and request.headers.get("Origin") != f"http://{host}":
         return _forbidden("only the page of this view may connect")

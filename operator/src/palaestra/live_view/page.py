@@ -175,7 +175,7 @@ class ViewPage:
             choice.on_update(lambda _: self._choose(choice.value))
         if all(source.here for source in self._sources.values()):
             self._add_fault("kill it", "The simulator ends at once, as after a crash.", signal.SIGKILL)
-            self._add_fault("hang it", "The simulator stops, and answers nothing.", signal.SIGSTOP)
+            self._add_fault("hang it", "The simulator stops, and does not respond any more.", signal.SIGSTOP)
         return gui.add_markdown("waits for the first pose")
 
     def _add_fault(self, label: str, hint: str, number: int) -> None:

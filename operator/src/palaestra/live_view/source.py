@@ -182,7 +182,7 @@ class SidecarSource:
                 else None
             )
             if pid is None:
-                raise NotNow(f"{self.name}: no process of this machine runs")
+                raise NotNow(f"{self.name}: its process does not run on this machine")
             os.kill(pid, number)
         except (OSError, http.client.HTTPException, ProtocolError) as error:
             raise NotNow(f"{self.name}: has no process to signal ({error})") from error
@@ -237,4 +237,4 @@ def _reason(body: bytes) -> str:
     try:
         return Fields(decoded(body, _MOST_ERROR_BYTES)).text("error")
     except ProtocolError:
-        return "its sidecar answered with something else than a scene; is it of an older release?"
+        return "its sidecar did not return a scene; the sidecar may be from an older release"

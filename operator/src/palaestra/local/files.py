@@ -43,7 +43,7 @@ def make_folder(path: Path) -> None:
 def without_locks(path: Path, error: OSError) -> str:
     """Return the message about a file or folder that cannot be locked."""
     return (
-        f"{path}: the file system has no locks ({error.strerror}), and without one two runs could write "
+        f"{path}: the file system has no locks ({error.strerror}), and without locks two runs could write "
         "into the same directory; choose a folder on a local disk with --dir"
     )
 

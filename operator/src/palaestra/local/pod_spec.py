@@ -100,7 +100,7 @@ def _value(container: str, entry: Mapping[str, Any], uid: str) -> str:
     if source.get("fieldRef", {}).get("fieldPath") == "metadata.uid":
         return uid
     raise RunRefused(
-        f"env {entry['name']} of container {container}: its value is in a cluster; "
+        f"env {entry['name']} of container {container}: its value is in an object of a cluster; "
         "give it as `value` to run the job here"
     )
 

@@ -237,7 +237,9 @@ def _replica(job: TrainingJob, replica: int | None) -> int:
     """
     count = job.spec.replicas
     if replica is None and count > 1:
-        raise RunRefused(f"spec.replicas: the job has {count}; choose one with replica=, all may run at once")
+        raise RunRefused(
+            f"spec.replicas: the job has {count}; choose one with replica=, because a handle runs one replica"
+        )
     number = replica or 0
     if not 0 <= number < count:
         raise RunRefused(

@@ -126,7 +126,7 @@ def _sources(job: TrainingJob, config_maps: ConfigMaps) -> Mapping[int, bytes]:
     )
     if size > MOST_BYTES:
         raise PlanError(
-            f"spec.simulators: their worlds take {size} bytes and {MOST_BYTES} fit in a "
+            f"spec.simulators: the worlds take {size} bytes, but only {MOST_BYTES} fit into a "
             "ConfigMap; put the worlds into the images and name them with world.file"
         )
     return sources

@@ -79,7 +79,7 @@ def _environments(draft: Draft, value: Any) -> None:
         draft.note(
             "n_envs",
             f"{value} became {MOST_COLLECTING}, because a pod has at most 32 simulators and one evaluates; "
-            "a rollout of n_steps is shorter by as much",
+            "a rollout of n_steps is shorter in the same proportion",
         )
 
 
@@ -297,7 +297,7 @@ def _schedule(draft: Draft, word: str, value: str) -> Any:
     if number is None:
         return value  # the trainer refuses the value and lists the accepted forms
     if kind not in {"lin", "linear"}:
-        draft.note(word, f"{value} falls linearly to 0, as in Zoo, which reads every schedule so")
+        draft.note(word, f"{value} falls linearly to 0, as in Zoo, which treats every schedule as linear")
     return [[0, number], [1, 0.0]]
 
 
