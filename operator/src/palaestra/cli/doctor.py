@@ -12,8 +12,8 @@ from palaestra.operator.options import DEFAULT_NAMESPACE
 DOCTOR = """\
 Checks a cluster: version, sidecars, the definition of TrainingJobs, the namespace, storage, the operator, its
 images, its leader, its rights and its metrics, and your own rights. Prints each problem with its remedy.
-Changes nothing: it only reads, and does a dry run where it must try something. Exits with 1 if a check finds
-a problem; warnings and checks that could not be made do not count.
+Changes nothing in the cluster: it only reads objects, and creates a pod in a dry run. Exits with 1 if a check
+finds a problem; warnings and checks that could not be made do not count.
 """
 WIDTH = 18
 

@@ -16,9 +16,9 @@ _WIDTH = (100, 24)
 _NARROWEST, _WIDEST = 40, 110
 
 EXPLAIN = """\
-Prints what a field of a TrainingJob is: its type, default and meaning, the rules about it, and the fields in
-it. FIELD is a path with dots, such as spec.simulators or trainer.algorithm; `spec.` may be left out, and an
-index is ignored. Without FIELD, it prints the TrainingJob itself.
+Prints the documentation of a field of a TrainingJob: type, default and meaning, the rules about the field,
+and its inner fields. FIELD is a path with dots, such as spec.simulators or trainer.algorithm; `spec.` may be
+left out, and an index is ignored. Without FIELD, the command documents the TrainingJob itself.
 """
 EXIT_CODES = """\
 exit codes:

@@ -29,8 +29,9 @@ Reads the world in FILE and prints the copy that one simulator of a job gets. On
 robots whose controller is "ros" change: --name= is set, --synchronize is added, and --clock is removed. With
 the option --clock, the first --clock is kept.
 
-With --check, it prints what each simulator of this machine can and cannot do with the world instead, and
-starts nothing. The exit code is then 0 if each can start it with the options given, 2 otherwise.
+With --check, the command instead prints what each simulator of this machine can and cannot do with the world,
+and starts no simulator. The exit code is then 0 if each simulator can start the world with the given options,
+and 2 otherwise.
 """
 CRD = "Prints the CustomResourceDefinition of TrainingJobs, as YAML."
 
@@ -121,7 +122,7 @@ def _add_world(commands: Commands) -> None:
         action="append",
         default=[],
         metavar="TYPE",
-        help="with --check: what the simulator may leave out; repeatable, all: everything",
+        help="with --check: type that the simulator may leave out; repeatable; all: every type",
     )
     parser.add_argument(
         "--stand-ins",

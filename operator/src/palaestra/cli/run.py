@@ -37,7 +37,7 @@ def add(commands: Commands) -> None:
         "--initial-policy",
         metavar="PATH",
         type=Path,
-        help="run directory or model.zip whose policy a new run begins with, as trainer.initialPolicy",
+        help="run directory or model.zip with the policy of a new run, as trainer.initialPolicy",
     )
     parser.add_argument(
         "--ros-port",

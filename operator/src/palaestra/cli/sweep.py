@@ -37,14 +37,14 @@ SWEEP = """\
 Trains the job of the Sweep in FILE with different values of some fields, each with several seeds. Checks
 every trial before it starts the first. Writes <dir>/<sweep>/: a run directory for each trial and seed,
 trials.jsonl, table.txt and curves.png. The same command skips trials that are complete and resumes the
-others. Prints a line for each trial that begins, and one with its result when it has ended.
+others. Prints a line when a trial begins, and a line with its result when it has ended.
 
 Ctrl-C saves a checkpoint of each run and exits; a second Ctrl-C exits at once.
 SIGTERM and SIGHUP act as Ctrl-C; a SIGINT or SIGHUP that was ignored at the start stays ignored.
 
-With --cluster, each trial is a TrainingJob with the label palaestra.dev/sweep=<sweep>; a queue of the job
-decides when it runs. Ctrl-C ends the command and leaves the jobs; the same command continues. Deletes the
-jobs of pruned trials.
+With --cluster, each trial is a TrainingJob with the label palaestra.dev/sweep=<sweep>; if the job has a
+queue, the queue decides when each trial runs. Ctrl-C ends the command, and the jobs continue; the same
+command then continues the sweep. The command deletes the jobs of pruned trials.
 """
 EXIT_CODES = """\
 exit codes:

@@ -25,8 +25,8 @@ PORT = 8080
 FIRST_S = 300.0  # longest wait for a run to write the addresses of its simulators
 POLL_S = 0.2
 VIEW = """\
-Shows the simulators of a running training in a browser: the world, the robots, and what is known about the
-episode. Prints the address of the page, which only this machine can open, and ends with Ctrl-C. The training
+Shows the simulators of a running training in a browser: the world, the robots, and the state of the episode.
+Prints the address of the page, which only this machine can open. Ctrl-C ends the view, and the training
 continues. RUN is a folder of this machine, or the name of a job in a cluster. The sidecars of a job are read
 through the API server, which needs the right `get` on pods/proxy. Needs the optional package viser.
 """
@@ -44,12 +44,18 @@ def add(commands: Commands) -> None:
     """Add the command."""
     parser = command(commands, "view", _view, VIEW, EXIT_CODES)
     parser.add_argument("run", metavar="RUN", help="run directory, such as runs/JOB/0, or name of a job")
-    parser.add_argument("--simulator", metavar="NAME", help="the one that is shown first; default: the first")
     parser.add_argument(
-        "--replica", metavar="N", type=whole(), default=0, help="of a job in a cluster; default: 0"
+        "--simulator", metavar="NAME", help="simulator that is shown first; default: the first"
     )
     parser.add_argument(
-        "--port", metavar="PORT", type=whole(0, MOST_PORT), default=PORT, help="of the page; default: 8080"
+        "--replica", metavar="N", type=whole(), default=0, help="replica of a job in a cluster; default: 0"
+    )
+    parser.add_argument(
+        "--port",
+        metavar="PORT",
+        type=whole(0, MOST_PORT),
+        default=PORT,
+        help="port of the page; default: 8080",
     )
     for hidden in (WITH_STDIN, OPENED):
         parser.add_argument(hidden, action="store_true", help=argparse.SUPPRESS)
