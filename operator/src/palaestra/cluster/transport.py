@@ -136,7 +136,7 @@ class Transport:
         Raises:
             ApiError: the API server refuses, or cannot be reached.
         """
-        from palaestra.cluster import pod_exec  # noqa: PLC0415 - it needs a library of people's tools
+        from palaestra.cluster import pod_exec  # noqa: PLC0415 - the operator needs no websockets
 
         started, code = time.monotonic(), 0
         try:

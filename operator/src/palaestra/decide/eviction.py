@@ -31,7 +31,7 @@ from palaestra_protocol.pod.status import ExitCode
 STALL_GRACE_S = 120  # seconds in which the trainer's own watchdog should end the trainer
 # A trainer normally starts in seconds, because the ROS master has already pulled the same image.
 FORGOTTEN_S = 300
-OUTLIVED_S = 60  # a proxy that ends after the main process needs only seconds
+OUTLIVED_S = 60  # seconds; a proxy that ends after the main process normally ends within this time
 
 
 def marked(situation: ReplicaContext) -> Finding | None:

@@ -136,7 +136,7 @@ def _taken(job: Mapping[str, Any]) -> int:
 
 
 def _of_replicas(cut: Cut, *, healthy: bool | None = None) -> Cut:
-    """Return a cut of all replicas, or only of the healthy or only of the unhealthy replicas."""
+    """Return a cut that applies `cut` to all replicas, or only to the healthy or to the unhealthy ones."""
 
     def cuts(replica: Data) -> bool:
         return healthy is None or (replica.get("phase") in _HEALTHY) is healthy

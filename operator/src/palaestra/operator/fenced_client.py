@@ -34,7 +34,7 @@ class FencedClient:
         self._look = threading.local()
 
     def begin(self) -> None:
-        """Begin a reconcile: later writes of this thread are allowed only in the current term."""
+        """Begin a reconcile: this thread may write only until the current term of the leader ends."""
         self._look.term = self._term()
 
     def create(self, obj: Object) -> Object:
