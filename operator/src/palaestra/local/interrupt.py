@@ -1,4 +1,4 @@
-"""End a run early: the first Ctrl-C saves a checkpoint, and the second kills. A deadline acts as a Ctrl-C.
+"""End a run early: the first Ctrl-C or a deadline saves a checkpoint, and the second Ctrl-C kills.
 
 A signal that was ignored when the program started stays ignored. Only SIGTERM always ends a run.
 """
