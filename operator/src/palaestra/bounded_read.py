@@ -1,4 +1,4 @@
-"""Read files that a person names, up to a size: a file may be a disk image, or an endless device."""
+"""Read files that a person names, up to a maximum size: a file may be a disk image or an endless device."""
 
 import os
 import stat
@@ -11,15 +11,15 @@ MOST_WORLD_BYTES = 2**26
 
 
 class TooLarge(PalaestraError):
-    """A file is larger than a file of its kind can be."""
+    """A file is larger than the maximum for its kind."""
 
 
 def read_bounded(file: Path, most_bytes: int) -> bytes:
     """Return the content of a file.
 
     Raises:
-        TooLarge: the file has more than `most_bytes`; then a regular file is not read at all.
-        OSError: it cannot be read.
+        TooLarge: the file has more than `most_bytes` bytes; a regular file is then not read at all.
+        OSError: the file cannot be read.
     """
     with file.open("rb") as content:
         status = os.fstat(content.fileno())

@@ -2,16 +2,16 @@
 
     PalaestraError
     ├── TrainingJobError             a TrainingJob cannot be used in its current form
-    │   ├── SpecErrors               its spec is wrong: never retried
-    │   ├── JobRefused               the operator cannot run it (decide.validation)
+    │   ├── SpecErrors               the spec is invalid: never retried
+    │   ├── JobRefused               the operator cannot run the job (decide.validation)
     │   └── PlanError                the job cannot be planned
     │       ├── WorldCheckTooCostly  the check of a world exceeds its budget
-    │       ├── WorldRefused         a world is wrong
-    │       └── WorldUnchecked       a world is not checked yet: retried once it is
+    │       ├── WorldRefused         a world is invalid
+    │       └── WorldUnchecked       a world is not checked yet: retried after the check
     ├── LocalError                   the local runner cannot continue (local.errors)
     │   ├── RunRefused               the run cannot be started as requested
-    │   ├── StartFailed              a container that others wait for did not start
-    │   ├── StillRunning             a run in the background has not ended by a deadline
+    │   ├── StartFailed              a container for which others wait did not start
+    │   ├── StillRunning             a run in the background did not end within a deadline
     │   └── StorageFailed            a file of the run could not be written
     ├── ApiError                     a call of the API server failed (cluster.errors)
     │   ├── AlreadyExists            the name is taken
@@ -44,7 +44,7 @@
     ├── NoSuccess                    a sweep has no success rates to compare (sweeps.runner)
     ├── NotLeading                   this operator may have lost its Lease (operator.fenced_client)
     ├── Outdated                     the cluster has changed since the decision (operator.preconditions)
-    ├── TooLarge                     a file is larger than a file of its kind can be (bounded_read)
+    ├── TooLarge                     a file is larger than the maximum for its kind (bounded_read)
     ├── UnknownField                 a TrainingJob has no such field (api.field_lookup)
     ├── ViewError                    a run cannot be shown (live_view.source)
     │   ├── NoRun                    the folder has no run with simulators (live_view.local_run)
@@ -67,7 +67,7 @@ class TrainingJobError(PalaestraError):
 
 
 class SpecErrors(TrainingJobError, ValueError):
-    """All problems of one TrainingJob; retrying cannot help.
+    """A TrainingJob has problems, all of which are listed; retrying cannot help.
 
     Attributes:
         name: the path of the file that was read.
@@ -89,8 +89,8 @@ class WorldCheckTooCostly(PlanError):
 
 
 class WorldRefused(PlanError):
-    """A check before the plan refused a world; the message is that of the check."""
+    """A check before the plan refused a world; the message is the check's message."""
 
 
 class WorldUnchecked(PlanError):
-    """A world has no verdict yet, so the plan succeeds or fails later; the message is the world's field."""
+    """A world was not checked yet, so the plan must wait for the check; the message is the world's field."""

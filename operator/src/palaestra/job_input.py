@@ -1,7 +1,7 @@
-"""A job from a program: the path of a file, YAML text, plain data or the model.
+"""Read a job that a program gives as the path of a file, YAML text, plain data or the model.
 
-`changed` returns a job with other values in some fields, checked like a file. It does not change its
-arguments, and does not start a run.
+`changed` returns a job with other values in some fields, and checks it like a file. The function does not
+change its arguments, and does not start a run.
 """
 
 from collections.abc import Mapping
@@ -20,10 +20,10 @@ _ROOTS = ("metadata", "spec")
 
 
 def job_of(job: Given) -> TrainingJob:
-    """Return the job; a text of one line is the path of a file.
+    """Return the job as a model; a text of one line is the path of a file.
 
     Raises:
-        SpecErrors: the job is wrong; the error lists every problem.
+        SpecErrors: the job is invalid; the error lists every problem.
         OSError: the file cannot be read.
         TooLarge: the file is too large for a job.
     """
@@ -34,12 +34,12 @@ def changed(job: Given, changes: Mapping[str, Any]) -> TrainingJob:
     """Return the job with other values in some fields; the given job does not change.
 
     Args:
-        job: the path of a file, YAML text, plain data or the model.
-        changes: values by the path of their field, as in docs/reference/trainingjob.md. The path may
-            leave out `spec.`: `{"trainer.algorithm.hyperparameters.learning_rate": 1e-3}`.
+        job: the job, as the path of a file, YAML text, plain data or the model.
+        changes: the new values by the paths of their fields, which docs/reference/trainingjob.md lists. A
+            path may omit `spec.`: `{"trainer.algorithm.hyperparameters.learning_rate": 1e-3}`.
 
     Raises:
-        SpecErrors: a path or a value is wrong; the error lists every problem.
+        SpecErrors: a path or a value is invalid; the error lists every problem.
         OSError: the file cannot be read.
         TooLarge: the file is too large for a job.
     """
@@ -74,21 +74,21 @@ def data_of(job: Given) -> Any:
 
 
 def name_of(job: Given) -> str:
-    """Return the name of a job in messages: its file, or `job`."""
+    """Return the name of a job for messages: the path of its file, or `job`."""
     return str(job) if isinstance(job, Path) or (isinstance(job, str) and "\n" not in job) else "job"
 
 
 def full_path(text: str) -> tuple[str | int, ...]:
-    """Return the path of a field from the top of the job; empty if `text` is not a path."""
+    """Return the path of a field, starting at the job's top level; empty if `text` is not a path."""
     path = path_of(text)
     return path if not path or path[0] in _ROOTS else ("spec", *path)
 
 
 def _put(data: Any, text: str, value: Any) -> str | None:
-    """Set a field in plain data; return the problem if its path cannot be followed.
+    """Set a field in plain data; return a problem if the path cannot exist in the data, else None.
 
-    If the path needs a mapping but finds another value, a mapping replaces the value, so that the check of
-    the whole job reports the field.
+    If the data has another value where the path needs a mapping, an empty mapping replaces this value. The
+    check of the whole job then reports the field.
     """
     path = full_path(text)
     if not path:
@@ -107,7 +107,7 @@ def _put(data: Any, text: str, value: Any) -> str | None:
 
 
 def _default(path: tuple[str | int, ...]) -> list[Any]:
-    """Return the list that a job has at `path` if its author leaves it out."""
+    """Return the default list at `path`, which a job has if its author does not set the list."""
     found: Any = as_data(TrainingJob(metadata=Metadata(name="a"), spec=Spec()))
     for piece in path:
         found = found.get(piece) if isinstance(found, dict) else None

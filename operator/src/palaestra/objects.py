@@ -1,4 +1,4 @@
-"""Kubernetes objects as JSON data, and their keys: the types that all layers share."""
+"""The types of Kubernetes objects as JSON data, and of their keys; all layers share these types."""
 
 from collections.abc import Mapping
 from typing import Any

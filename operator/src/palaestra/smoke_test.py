@@ -1,7 +1,7 @@
-"""Test an installation: run a TrainingJob, and delete it in any case.
+"""Test an installation: run a TrainingJob, and always delete it afterwards.
 
-`helm test` runs this in a pod that may only create, read and delete TrainingJobs, so it polls and needs no
-watch permission.
+`helm test` runs this test in a pod that may only create, read and delete TrainingJobs. So the test polls the
+job and does not watch it.
 """
 
 import math
@@ -21,8 +21,8 @@ from palaestra.objects import Object
 
 PERIOD_S = 2.0
 
-# If the smoke test is killed, these limits end and delete its job. They are so long that people can read
-# the result first.
+# If the smoke test is killed, these two limits end its job and delete it later. The time until the deletion
+# is long enough for people to read the result.
 SLACK_S = 60
 TTL_S = 3600
 
@@ -30,7 +30,7 @@ Report = Callable[[str], None]
 
 
 class TrialFailed(PalaestraError):
-    """The job did not succeed in time; the message is the newest one in its status."""
+    """The job did not succeed in time; the message contains the newest message in the job's status."""
 
 
 def attempt(api: Api, job: Object, *, within_s: float, report: Report) -> None:
@@ -38,9 +38,9 @@ def attempt(api: Api, job: Object, *, within_s: float, report: Report) -> None:
 
     Args:
         api: the cluster.
-        job: the TrainingJob; the API server adds five characters to its name, so that two trials never share
-            a name.
-        within_s: seconds in which the job must succeed.
+        job: the TrainingJob; the API server adds five characters to its name, so that two tests never have
+            the same name.
+        within_s: seconds within which the job must succeed.
         report: called with a line for each new phase of the job, and for each new waiting reason of a
             replica.
 
@@ -58,7 +58,7 @@ def attempt(api: Api, job: Object, *, within_s: float, report: Report) -> None:
 
 
 def _passing(job: Object, within_s: float) -> Object:
-    """Return the job without a name, with a trial's limits and storage where the author set none."""
+    """Return the job without a name; the test's limits and storage replace only absent values."""
     metadata = {**job["metadata"], "generateName": f"{job['metadata']['name']}-"}
     del metadata["name"]
     ends = {"activeDeadlineSeconds": math.ceil(within_s) + SLACK_S, "ttlSecondsAfterFinished": TTL_S}
@@ -67,16 +67,16 @@ def _passing(job: Object, within_s: float) -> Object:
 
 
 def _passing_storage(storage: Object) -> Object:
-    """Return the storage with claims that are deleted with the job; an existing claim is never deleted."""
+    """Return the storage with claims that are deleted with the job; an existing claim stays."""
     if storage.get("existingClaim") is not None:
         return storage
     return {"retain": Retain.DELETE.value, **storage}
 
 
 def _take_away(api: Api, made: Object, report: Report, *, or_fail: bool) -> None:
-    """Delete the job; if that fails, report it, or with `or_fail` raise an error that a retry cannot help.
+    """Delete the job; report an error of the deletion, or raise it with `or_fail` if a retry cannot help.
 
-    `or_fail` is for successful trials: otherwise the error of the failed trial must be shown.
+    `or_fail` is for a successful job. After a failed job, the error of the job must be shown instead.
     """
     namespace, name = made["namespace"], made["name"]
     try:
@@ -119,7 +119,7 @@ def _status(api: Api, namespace: str, name: str, report: Report) -> Object | Non
 
 
 def _readable(status: Object) -> Status:
-    """Return the parsed status; empty if another release wrote one that this release cannot read."""
+    """Return the parsed status; an empty status if this release cannot read the status of another release."""
     try:
         return Status.model_validate(status)
     except ValidationError:
@@ -127,7 +127,7 @@ def _readable(status: Object) -> Status:
 
 
 def _why(status: Object) -> str:
-    """Return reason and message of the condition with the job's whole message."""
+    """Return reason and message of the condition that has the job's whole message."""
     conditions = {condition["type"]: condition for condition in status.get("conditions", ())}
     if not conditions:
         return "no operator has reconciled it; check that the operator runs and watches this namespace"

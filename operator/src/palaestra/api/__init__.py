@@ -1,4 +1,4 @@
-"""The TrainingJob: its models, its validation, and everything that is generated from the models.
+"""The TrainingJob: its models, its validation, and the files that are generated from the models.
 
 The models are the only source: the CustomResourceDefinition, its rules and the reference page are generated
 from them. No module here uses a cluster, a file or a clock.

@@ -1,7 +1,7 @@
 """The history of a replica in the status: end of the last attempt, faults, and time by activity.
 
-Kubernetes deletes logs with their pod, so the status keeps the last lines. Every part has a limit, because a
-status is one object of the API server and people read it.
+Kubernetes deletes logs with their pod, so the status keeps the last lines. Every list and text has a maximum
+length, because etcd limits the size of an object and people read the status.
 """
 
 from datetime import datetime

@@ -1,6 +1,6 @@
 """The CustomResourceDefinition, generated from the models.
 
-The models define what an API server checks. This module adds the names, the scope, the columns, the
+The models define the checks of the API server. This module adds the names, the scope, the columns, the
 selectable fields and the status subresource.
 """
 
@@ -43,7 +43,7 @@ _COLUMNS = (
 _SELECTABLE = (
     ".status.phase",
     ".spec.scheduling.queueName",
-)  # for `--field-selector`; needs Kubernetes 1.32 or newer
+)  # fields for `--field-selector`, which needs Kubernetes 1.32 or newer
 
 
 def crd() -> dict[str, Any]:
@@ -84,13 +84,13 @@ def schema() -> Schema:
     whole = structural(source, source["$defs"])
     fields = whole["properties"]
     freeze(fields["spec"])
-    for heading in ("apiVersion", "kind"):  # the API server checks these itself
+    for heading in ("apiVersion", "kind"):  # the API server itself checks the values of these fields
         fields[heading] = {"type": "string", "maxLength": 63}
-    # A schema may restrict no field of metadata but the names.
+    # A schema may restrict only the name fields of metadata.
     name = fields["metadata"]["properties"]["name"]
     fields["metadata"] = {"type": "object", "properties": {"name": name}}
-    # Generations begin at 1. Without this default, kstatus would report a job as reconciled before an
-    # operator has read it.
+    # Generations begin at 1, so 0 means "not read yet". Without this default, kstatus would report a new job
+    # as reconciled before an operator has read the job.
     fields["status"]["default"] = {"observedGeneration": 0}
     _remove_empty_defaults(fields["status"])
     plain: Schema = without_marks(whole)
@@ -98,7 +98,7 @@ def schema() -> Schema:
 
 
 def _remove_empty_defaults(schema: Schema) -> None:
-    """Remove defaults of lists that may be absent; `kubectl describe` would print them without content."""
+    """Remove the empty defaults of lists; `kubectl describe` would print a heading for each empty list."""
     if schema.get("default") == []:
         del schema["default"]
     for inner in (*schema.get("properties", {}).values(), *([schema["items"]] if "items" in schema else ())):

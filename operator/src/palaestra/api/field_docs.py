@@ -1,6 +1,6 @@
-"""What a field of a TrainingJob is: the facts that the reference page, `palaestra explain` and editors show.
+"""The documentation of a TrainingJob's fields, for the reference page, `palaestra explain` and editors.
 
-Everything comes from the schema of the CRD and from the rules of the models, so no text is written twice.
+All facts come from the schema of the CRD and from the rules of the models, so no text is written twice.
 """
 
 import json
@@ -15,19 +15,20 @@ from palaestra.api.model import Rule
 from palaestra.api.model_walk import fields_of, model_at
 from palaestra.api.structural import Schema
 
-FieldPath = tuple[str, ...]  # the names of the fields; a list's name ends in `[]` if more names follow
+# The names of the fields; the name of a list ends in `[]` if another name follows.
+FieldPath = tuple[str, ...]
 Quote = Callable[[str], str]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FieldDoc:
-    """One field, or the whole TrainingJob, whose path is empty.
+    """The documentation of one field, or of the whole TrainingJob, whose path is empty.
 
     Attributes:
         path: the names from the TrainingJob to this field.
-        schema: the structural schema of its value.
-        required: whether its parent must have it.
-        children: the fields of its value, or of each item.
+        schema: the structural schema of the field's value.
+        required: whether the parent must have this field.
+        children: the fields of the value; for a list, the fields of each item.
     """
 
     path: FieldPath
@@ -47,14 +48,14 @@ class FieldDoc:
 
     @property
     def paragraphs(self) -> list[str]:
-        """Return the description; a list's field gets that of its items too."""
+        """Return the paragraphs of the description; for a list, append the paragraphs about its items."""
         own = self.schema.get("description", "").split("\n")
         items = self.schema.get("items", {}).get("description", "").split("\n")
         return [paragraph for paragraph in dict.fromkeys((*own, *items)) if paragraph]
 
     @property
     def rules(self) -> tuple[Rule, ...]:
-        """Return the rules about several fields of its value, or of each item."""
+        """Return the rules about several fields of the value; for a list, the rules of each item."""
         model = model_at(TrainingJob, tuple(piece.removesuffix("[]") for piece in self.path))
         return () if model is None else (*model.rules, *model.guards)
 
@@ -69,7 +70,7 @@ class FieldDoc:
 def whole_job() -> FieldDoc:
     """Return the documentation of the TrainingJob with all its fields."""
     job = schema()
-    for name, field in fields_of(TrainingJob).items():  # the CRD leaves out what an API server knows itself
+    for name, field in fields_of(TrainingJob).items():  # the CRD has no descriptions of the standard fields
         job["properties"][name].setdefault("description", " ".join((field.description or "").split()))
     job["properties"]["metadata"]["required"] = ["name"]
     return _doc((), job | {"required": [*job["required"], "apiVersion", "kind"]}, required=True)
@@ -87,7 +88,7 @@ def _doc(path: FieldPath, at: Schema, *, required: bool) -> FieldDoc:
 
 
 def kind_of(field: Schema, quote: Quote = str) -> str:
-    """Return type and range in words, such as `list of text` or `integer, 1 to 16`; `quote` marks members."""
+    """Return type and range in words, such as `integer, 1 to 16`; `quote` formats each value of an enum."""
     if "enum" in field:
         return " | ".join(quote(member) for member in field["enum"])
     if "items" in field:
@@ -101,7 +102,7 @@ def kind_of(field: Schema, quote: Quote = str) -> str:
 
 
 def default_of(field: Schema) -> str | None:
-    """Return the default as JSON; None without a default; empty if the field's own fields have defaults."""
+    """Return the default as JSON; None without a default, "" if only the inner fields have defaults."""
     if "default" not in field:
         return None
     text = json.dumps(_without_nested_defaults(field["default"], field))
@@ -109,7 +110,7 @@ def default_of(field: Schema) -> str | None:
 
 
 def _without_nested_defaults(default: Any, field: Schema) -> Any:
-    """Return `default` without values that equal the defaults of its fields, which are shown there."""
+    """Return `default` without values that equal the inner fields' own defaults, which those fields show."""
     if isinstance(default, list):
         return [_without_nested_defaults(item, field["items"]) for item in default]
     if not isinstance(default, dict):

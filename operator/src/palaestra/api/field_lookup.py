@@ -12,18 +12,18 @@ from palaestra.errors import PalaestraError
 
 _MOST_NEAR = 3
 _LONGEST_QUOTE = 120
-_KIND_NAMES = {"trainingjob", "trainingjobs", "tj"}  # `kubectl explain` wants the kind before the field
+_KIND_NAMES = {"trainingjob", "trainingjobs", "tj"}  # in `kubectl explain`, the kind precedes the field
 _INDEX = re.compile(r"\[[^\]]*\]")
 
 
 class UnknownField(PalaestraError, LookupError):
-    """A TrainingJob has no field of that path; the message has the nearest ones."""
+    """A TrainingJob has no field with this path; the message suggests the nearest fields."""
 
 
 def field_at(text: str) -> FieldDoc:
-    """Return the field of a path such as `spec.trainer.steps`; without `spec.` too, and with indices.
+    """Return the field of a path such as `spec.trainer.steps`; `spec.` is optional, indices are ignored.
 
-    The path of the whole TrainingJob is empty.
+    An empty path is the whole TrainingJob.
 
     Raises:
         UnknownField: a TrainingJob has no field with this path.
@@ -43,7 +43,7 @@ def field_at(text: str) -> FieldDoc:
 
 
 def _descend(field: FieldDoc, names: list[str]) -> tuple[FieldDoc, list[str]]:
-    """Return the last field along `names` that exists, and the names after it."""
+    """Return the last existing field along the path `names`, and the remaining names."""
     for count, name in enumerate(names):
         below = next((child for child in field.children if child.name == name), None)
         if below is None:
@@ -61,7 +61,7 @@ def _remedy(deepest: FieldDoc, name: str) -> str:
 
 
 def _nearest(deepest: FieldDoc, name: str) -> list[str]:
-    """Return the paths of the fields most likely meant: the children of `deepest`, or fields further away."""
+    """Return the paths of the fields with the most similar names, first among the children of `deepest`."""
     for fields in (deepest.children, [*deepest.walk()][1:], [*whole_job().walk()][1:]):
         if matches := _matches(name, fields):
             found = [field.shown_path for match in matches for field in fields if field.name == match]

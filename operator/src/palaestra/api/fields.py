@@ -1,8 +1,8 @@
-"""The types of a TrainingJob's values, each with a limit.
+"""The types of a TrainingJob's values; each type has a maximum size.
 
-Every type has a largest size: an API server estimates the cost of a rule from the largest object that the
-schema allows, and refuses a schema with unlimited strings, lists or maps. Two regular expression engines read
-the patterns, Rust's here and Go's in the API server, so the patterns use only plain ASCII classes.
+An API server estimates the cost of a rule from the largest object that the schema allows. The API server
+refuses rules over strings, lists or maps without a maximum size. Two regular expression engines read the
+patterns: Rust's in pydantic, and Go's in the API server. So the patterns use only plain ASCII classes.
 """
 
 import json
@@ -21,7 +21,7 @@ from pydantic_core import PydanticCustomError
 
 T = TypeVar("T")
 
-# This mark in a field's JSON schema means that the field may be changed after the job was accepted.
+# This mark in a field's JSON schema means that users may change the field in an existing job.
 MAY_CHANGE = "x-may-change"
 
 LABEL = "^[a-z]([-a-z0-9]*[a-z0-9])?$"
@@ -59,9 +59,9 @@ POLICY = f"^([A-Za-z_][A-Za-z0-9_]*|{CLASS})$"
 CLASS_NAME = f"^{CLASS}$"
 ROBOT = f"^({'|'.join(ROBOTS)}|{CLASS})$"
 POLICY_FILE = "^(/.+|[A-Za-z0-9_][-A-Za-z0-9._]*(/[A-Za-z0-9_][-A-Za-z0-9._]*)*)[.]zip$"
-ENVIRONMENT_ID = "^([A-Za-z0-9_.]+:)?([-A-Za-z0-9_.]+/)?[-A-Za-z0-9_.]+$"  # -vN may be missing
+ENVIRONMENT_ID = "^([A-Za-z0-9_.]+:)?([-A-Za-z0-9_.]+/)?[-A-Za-z0-9_.]+$"  # the version -vN may be missing
 
-# The message for a value that does not match: <value> is not <first text>; <second text>
+# The texts of the message about a value that does not match: "<value> is not <first>; <second>".
 PATTERNS: dict[str, tuple[str, str]] = {
     LABEL: ("a name", "use a-z first, then a-z, 0-9 and '-', no '-' at the end"),
     DIGIT_LABEL: ("a namespace", "use a-z, 0-9 and '-', no '-' at the beginning or the end"),
@@ -126,8 +126,8 @@ def _without_unknown_items(items: Any, read: ValidatorFunctionWrapHandler) -> An
         return read([item for place, item in enumerate(items) if place not in unknown])
 
 
-# It is for a list of a status that is only displayed, or is built again in each reconcile: a newer release
-# may report items of a kind that this release does not know.
+# A newer release may write items of a kind that this release does not know. This validator drops such items.
+# Use the validator only for lists of a status that are only displayed, or that each reconcile builds again.
 KNOWN_ITEMS = WrapValidator(_without_unknown_items)
 
 
@@ -136,7 +136,7 @@ class Named(Protocol):
 
     @property
     def name(self) -> str:
-        """The item's name."""
+        """The unique name of the item."""
         ...
 
 
@@ -177,7 +177,7 @@ LabelMap = Annotated[
 
 
 def _as_text(value: object) -> object:
-    """Return a whole number as text, and any other value unchanged; authors must quote a fraction."""
+    """Return a whole number as text and any other value unchanged; authors must quote fractions."""
     if isinstance(value, int) and not isinstance(value, bool):
         return str(value)
     return value
@@ -193,7 +193,7 @@ Quantity = Annotated[
 ]
 Quantities = Annotated[dict[Annotated[str, Field(max_length=317)], Quantity], Field(max_length=16)]
 
-_DEEPEST = 16  # the affinity of a pod is nested 9 deep
+_DEEPEST = 16  # levels; the affinity of a pod has 9
 _LONGEST_TEXT = 4096
 _MOST_VALUES = 1000
 
@@ -224,8 +224,8 @@ def _free(value: dict[str, Any]) -> dict[str, Any]:
     return value
 
 
-# This is a map to values of any type, not an object with unknown fields. An API server that compares two
-# objects with unknown fields misses a renamed key, so a frozen field could be changed.
+# The schema is a map to values of any type, not an object with unknown fields. If an API server compares two
+# objects with unknown fields, it ignores a renamed key. So users could change a frozen field.
 FreeObject = Annotated[
     dict[str, Any],
     Field(max_length=64),

@@ -20,7 +20,7 @@ def crd_text() -> str:
 def generated_files(root: Path) -> dict[str, str]:
     """Return the text of each generated file, by path relative to the repository's `root`.
 
-    Only the tables of the two pages are generated; the rest of each page is read from `root`.
+    Of the two pages, only the tables are generated; all other text is read from the files below `root`.
     """
     reference, operations = "docs/reference/trainingjob.md", "docs/reference/reasons.md"
     return {
@@ -32,7 +32,7 @@ def generated_files(root: Path) -> dict[str, str]:
 
 
 def reasons_page(text: str) -> str:
-    """Return the page docs/reference/reasons.md, now `text`, with its table of reasons updated.
+    """Return the page docs/reference/reasons.md with a new table of reasons; `text` is the present page.
 
     Raises:
         ValueError: a mark is missing.

@@ -1,4 +1,4 @@
-"""Pages with a generated part between two marks; people write the other parts."""
+"""Pages with a generated section between two marks; people write the other sections."""
 
 END = "<!-- end of the generated part -->"
 

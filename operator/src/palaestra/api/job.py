@@ -32,12 +32,12 @@ START_TIMEOUT_S = 21_600  # Six hours: a job survives a registry outage of a nig
 
 FRUITLESS_PODS = 6  # Equal to Kubernetes' default backoffLimit.
 
-MOST_SIMULATORS = 32  # In one pod; simulator k uses ports 7100+k and 7200+k.
+MOST_SIMULATORS = 32  # The limit for one pod, in which simulator k uses ports 7100+k and 7200+k.
 
 MOST_INLINE = 900_000  # Characters of all inline worlds together; the plan also limits their bytes.
 
 
-# The API server writes these metadata; a file from `kubectl get -o yaml` contains them.
+# The API server writes these fields of metadata, so a file from `kubectl get -o yaml` contains them.
 _SERVER_FIELDS = frozenset(
     {
         "creationTimestamp",
@@ -202,7 +202,7 @@ class Spec(ApiModel):
 
     @property
     def most_fruitless(self) -> int:
-        """Return the number of consecutive pods that may end without a new step; 0: no limit."""
+        """Return the limit of consecutive interrupted pods without a new step; 0: no limit."""
         return FRUITLESS_PODS if self.no_progress_limit is None else self.no_progress_limit
 
     rules = (

@@ -1,7 +1,7 @@
-"""A JSON Schema of the TrainingJob, for editors and programs: what the CRD checks, in the words of draft 7.
+"""A JSON Schema (draft 7) of the TrainingJob for editors and programs, with the checks of the CRD's schema.
 
-Language servers of YAML read draft 7. They know neither Kubernetes' keywords nor its rules, so a rule about
-several fields is only named, under `x-palaestra-rules`.
+Language servers of YAML read draft 7. Language servers support neither Kubernetes' keywords nor its rules. So
+the rules about several fields are only listed, under `x-palaestra-rules`.
 """
 
 from collections.abc import Mapping
@@ -20,7 +20,7 @@ _KEPT = (
 )  # fmt: skip
 
 _FIXED: Mapping[FieldPath, str] = {("apiVersion",): API_VERSION, ("kind",): KIND}
-_METADATA = ("metadata",)  # Kubernetes defines the other fields of it
+_METADATA = ("metadata",)  # Kubernetes defines the other fields of metadata
 
 
 def json_schema(field: FieldDoc) -> Schema:
@@ -46,7 +46,7 @@ def _value(field: FieldDoc) -> Schema:
 
 
 def _converted(schema: Schema) -> Schema:
-    """Return the schema of a value without the fields in it."""
+    """Return the schema of a value without the schemas of its fields."""
     result: dict[str, Any] = {key: schema[key] for key in _KEPT if key in schema}
     if schema.get("exclusiveMinimum"):
         result["exclusiveMinimum"] = result.pop("minimum")

@@ -1,8 +1,8 @@
 """Load a TrainingJob from YAML or plain data, report all problems at once, and dump a TrainingJob.
 
-Pydantic does not check the rules of an object with a wrong field. So each wrong field is reported and
-removed, and the rest is validated again until it is valid. Then the rules are checked, except those that read
-a removed field.
+Pydantic does not check the rules of an object with a wrong field. So this module reports and removes each
+wrong field, and validates the remaining fields again until they are valid. Then it checks the rules, except
+for rules that read a removed field.
 """
 
 import re
@@ -19,21 +19,21 @@ from palaestra.api.validation_messages import quoted, sentence
 from palaestra.api.yaml_io import NotYaml, read, write
 from palaestra.errors import SpecErrors
 
-_NOT_EXACT = 2.0**53  # a larger float may stand for several whole numbers
-_KEY = "[key]"  # last item of pydantic's path if a mapping's key is wrong, not its value
+_NOT_EXACT = 2.0**53  # from here on, a float may be the nearest float of several whole numbers
+_KEY = "[key]"  # last item of pydantic's path if the key of a mapping is wrong
 
 _HEADING = (("apiVersion", API_VERSION), ("kind", KIND))
 
-# These replace required objects that are wrong as a whole, so that the rest can be validated.
+# These objects replace required objects that are wrong as a whole, so that the other fields can be validated.
 _STAND_INS: dict[Path, Any] = {("metadata",): {"name": "stand-in"}, ("spec",): {}}
 
 
 def load(text: str, name: str = "job") -> TrainingJob:
-    """Return the one TrainingJob in `text`, a YAML document; `name` is its file's path.
+    """Return the TrainingJob in `text`, one YAML document; `name` is the path of its file.
 
     Raises:
-        SpecErrors: the job is invalid; the error lists every problem, or only the first if the text is not
-            YAML.
+        SpecErrors: the job is invalid; the error lists every problem, or only the first problem if the text
+            is not YAML.
     """
     try:
         data = read(text, name)
@@ -43,9 +43,9 @@ def load(text: str, name: str = "job") -> TrainingJob:
 
 
 def validate(data: Any, name: str = "job") -> TrainingJob:
-    """Return the TrainingJob in plain `data`, such as an API server returns.
+    """Return the TrainingJob in plain `data`, for example in the response of an API server.
 
-    A float with a whole value counts as a whole number: an API server stores 1e6 and 1.0 as 1000000 and 1.
+    A float with a whole value counts as a whole number, as in an API server, which stores 1e6 as 1000000.
 
     Raises:
         SpecErrors: the job is invalid; the error lists every problem.
@@ -60,7 +60,7 @@ def validate(data: Any, name: str = "job") -> TrainingJob:
         for key, ours in _HEADING
         if key in data and data[key] != ours
     ]
-    if len(other) == len(_HEADING):  # this is another kind of object, so its fields are not checked
+    if len(other) == len(_HEADING):  # the object is of another kind, so its fields are not checked
         raise SpecErrors(name, tuple(other))
     missing = [f"{key}: is missing; add {key}: {ours}" for key, ours in _HEADING if key not in data]
     job, problems = _examine(data)
@@ -103,7 +103,7 @@ def _unsupported(value: Any, ours: str) -> str:
 
 
 def _examine(data: Mapping[str, Any]) -> tuple[TrainingJob | None, list[str]]:
-    """Return the job without its wrong fields, or None, and a line for each problem."""
+    """Return the job without its wrong fields, or None if it is unusable, and a line for each problem."""
     pruned = Pruned(data)
     removed: list[Path] = []
     problems: list[str] = []
@@ -123,7 +123,7 @@ def _examine(data: Mapping[str, Any]) -> tuple[TrainingJob | None, list[str]]:
         return job, problems + _broken_rules(job, pruned, removed)
 
 
-# Errors that may be consequences of a removed field.
+# The types of errors that may be consequences of a removed field.
 _CONSEQUENCES = {"missing", "too_short"}
 
 
@@ -137,7 +137,7 @@ def _touches(path: Path, removed: list[Path]) -> bool:
 
 
 def _remove(pruned: Pruned, paths: list[Path], removed: list[Path]) -> bool:
-    """Remove the wrong fields, or their nearest existing parents; return whether a field was removed."""
+    """Remove the wrong fields or their nearest existing parents; return whether a field was removed."""
     before = len(removed)
     for path in paths:
         if any(path[: len(other)] == other != path for other in removed):

@@ -1,7 +1,7 @@
 """The base class of all models of a TrainingJob, and the rules that check several fields together.
 
-The Python check, the CEL expression and the message of a rule are in one `Rule`, so that `palaestra` and an
-API server refuse the same job with the same message. All broken rules are collected and reported at once.
+A `Rule` has a Python check, a CEL expression and a message. So `palaestra` and an API server refuse the same
+job with the same message. All broken rules are collected and reported at once.
 """
 
 from collections.abc import Callable
@@ -19,8 +19,8 @@ from pydantic.alias_generators import to_camel
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
-# This validation context skips the rules. `palaestra.api.loading` then checks them itself, even if some
-# fields are wrong.
+# With this validation context, the models skip their rules. `palaestra.api.loading` then checks the rules
+# itself, even if some fields are wrong.
 FIELDS_ONLY: Final = {"rules": "later"}
 
 
@@ -29,9 +29,9 @@ class Rule:
     """One condition on several fields of an object.
 
     `message` is "<fact>; <remedy>". `field` is the path of the reported field below the object, in camelCase
-    with dots; empty for the object itself. In `cel`, `self` is the object with its defaults; the expression
-    names every field that `holds` reads. An API server cannot read free objects such as options. A rule about
-    them has no `cel`, and `reads` names the fields.
+    with dots; it is empty for the object itself. In `cel`, `self` is the object with its defaults, and the
+    expression names every field that `holds` reads. An API server cannot read free objects such as options.
+    So a rule about free objects has no `cel`, and `reads` names the fields.
     """
 
     holds: Callable[[Any], bool]
@@ -55,11 +55,12 @@ class RulesBroken(ValueError):
 
 
 class ApiModel(BaseModel):
-    """One object of the API: camelCase in YAML, snake_case in Python, frozen; unknown fields are refused.
+    """One immutable object of the API: camelCase in YAML, snake_case in Python; unknown fields are errors.
 
-    Every reader of a job checks the `rules` of its objects. `guards` are for new jobs of a cluster: an API
-    server checks them when a job is created, and the operator until it accepts a job. A rule that is added
-    later is a guard, so that it ends no job that an earlier release accepted.
+    Every program that reads a job checks the `rules` of its objects. The `guards` apply only to new jobs of a
+    cluster. The API server checks the guards when a job is created, and the operator checks them until it
+    accepts the job. A rule that a later release adds is a guard, so that jobs of an earlier release stay
+    accepted.
     """
 
     model_config = ConfigDict(
@@ -95,10 +96,10 @@ class ApiModel(BaseModel):
 
 
 class StatusModel(ApiModel):
-    """One object of a status: like every other object, but unknown fields are ignored.
+    """One object of a status; unlike other objects, it may have unknown fields, which are ignored.
 
-    A newer release may have written the status, with more fields. No model of what a person writes inherits
-    from this class.
+    A newer release may have written the status with more fields. Only models of the status inherit from this
+    class; a spec with an unknown field is an error.
     """
 
     model_config = ConfigDict(extra="ignore")

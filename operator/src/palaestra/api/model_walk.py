@@ -1,4 +1,4 @@
-"""The tree of the models: the fields of each model, and the models in them."""
+"""The tree of the models: the fields of each model, and the models of these fields."""
 
 from collections.abc import Iterator
 from types import UnionType
@@ -11,7 +11,7 @@ from palaestra.api.paths import Path
 
 
 def model_in(annotation: Any) -> type[ApiModel] | None:
-    """Return the model in a field's annotation, alone or in a list, or None."""
+    """Return the model in a field's annotation, also inside a list or a union; None without a model."""
     if isinstance(annotation, type) and issubclass(annotation, ApiModel):
         return annotation
     if get_origin(annotation) in {Annotated, Union, UnionType, tuple, dict}:

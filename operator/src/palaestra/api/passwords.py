@@ -1,12 +1,13 @@
-"""Find addresses with a password in a TrainingJob: everybody who may read the job could read the password."""
+"""Find URLs with a password in a TrainingJob: each user who may read the job could read the password."""
 
 import re
 from collections.abc import Mapping, Sequence
 
 from palaestra.api.model import Rule
 
-# It matches user information with a password, between the scheme and the host of an address. Shell variables
-# and placeholders, such as ${TOKEN} and {token}, are not passwords. API servers use this expression too.
+# This expression matches user information with a password, between the scheme and the host of a URL. Shell
+# variables and placeholders, such as ${TOKEN} and {token}, are not passwords. API servers use this expression
+# too.
 PASSWORD = r"://[^\s/?#:@]*:[^\s/?#@${][^\s/?#@]*@"
 _PASSWORD = re.compile(PASSWORD)
 
@@ -15,7 +16,7 @@ _ELSEWHERE = "contains a password in an address; pass it in an environment varia
 
 
 def has_password(value: object) -> bool:
-    """Return whether a text, or any text in a list or mapping, has an address with a password."""
+    """Return whether a text, or any text in a list or mapping, contains a URL with a password."""
     if isinstance(value, str):
         return _PASSWORD.search(value) is not None
     if isinstance(value, Mapping):
@@ -41,7 +42,7 @@ NO_PASSWORD_IN_WORDS = Rule(
     cel=f"!self.options.exists(word, word.matches(r'{PASSWORD}'))",
     message=_ELSEWHERE,
 )
-NO_PASSWORD_IN_OPTIONS = Rule(  # in a free object, which an API server cannot check
+NO_PASSWORD_IN_OPTIONS = Rule(  # about a free object, which an API server cannot check
     field="options",
     holds=lambda owner: not has_password(owner.options),
     reads=("options",),

@@ -1,4 +1,4 @@
-"""Paths of fields in messages, and a copy of plain data from which parts can be removed.
+"""Paths of fields in messages, and a copy of plain data from which values can be removed.
 
 The path `spec.simulators[1].role` is the tuple `("spec", "simulators", 1, "role")`.
 """
@@ -13,7 +13,7 @@ _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 
 def shown(path: Path) -> str:
-    """Return `path` as text, such as `a.b[1]["c.d"]`; keys that are not plain words are in brackets."""
+    """Return `path` as text, such as `a.b[1]["c.d"]`; a key that is not a plain word is in brackets."""
     text = ""
     for piece in path:
         if isinstance(piece, int):
@@ -39,14 +39,14 @@ def path_of(text: str) -> Path:
         name, index, key = found.groups()
         try:
             pieces.append(name or (int(index) if index else json.loads(key)))
-        except ValueError:  # an escape that JSON does not have
+        except ValueError:  # the quoted key contains an escape that JSON does not define
             return ()
         at = found.end()
     return tuple(pieces)
 
 
 class Pruned:
-    """A copy of plain data from which parts can be removed.
+    """A copy of plain data from which values can be removed.
 
     Lists are stored as mappings from index to item, so that the remaining items keep their original indices.
     """
@@ -57,7 +57,8 @@ class Pruned:
     def take(self, path: Path, stand_in: Any = None) -> bool:
         """Remove the value at `path`; return False if it did not exist.
 
-        If a `stand_in` is given, replace the value by it; return False if it was already there.
+        If a `stand_in` is given, replace the value by the stand-in; return False if the stand-in was already
+        there.
         """
         *above, last = path
         tree = self._tree
@@ -74,7 +75,7 @@ class Pruned:
         return changed
 
     def data(self) -> Any:
-        """Return the remaining parts as plain data."""
+        """Return the remaining values as plain data."""
         return _dense(self._tree)
 
     def original(self, path: Path) -> Path:

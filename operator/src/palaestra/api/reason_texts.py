@@ -1,7 +1,7 @@
 """The texts of all reasons.
 
-The message of a reason is a template, which the facts complete to a sentence for people: the fact and the
-remedy. `meaning` and `remedy` are columns of docs/reference/reasons.md.
+The message of a reason is a template with placeholders for facts. The complete message is a sentence for
+people with the fact and the remedy. `meaning` and `remedy` are columns of docs/reference/reasons.md.
 """
 
 from dataclasses import dataclass
@@ -9,12 +9,13 @@ from dataclasses import dataclass
 from palaestra.api.reasons import LONGEST_MESSAGE, Reason
 from palaestra.api.text import flat, one_line
 
-LONGEST_FACT = 600  # Characters of one external fact: from the scheduler, a registry or a trainer.
+# Limit in characters of a fact from another program, such as the scheduler, a registry or a trainer.
+LONGEST_FACT = 600
 
 
 @dataclass(frozen=True, slots=True)
 class ReasonText:
-    """The texts of a reason: `message` is a template; `warning`: whether its event has the type Warning."""
+    """The texts of a reason: `message` is a template, and `warning` selects the event type Warning."""
 
     message: str
     meaning: str

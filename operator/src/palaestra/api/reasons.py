@@ -2,7 +2,7 @@
 
 from enum import StrEnum
 
-LONGEST_MESSAGE = 1024  # Characters; the API server's limit for an event, which applies to all messages.
+LONGEST_MESSAGE = 1024  # Characters of every message: the API server's limit for the message of an event.
 
 
 class Reason(StrEnum):
@@ -71,11 +71,11 @@ class Reason(StrEnum):
 
     @classmethod
     def known(cls, word: str) -> "Reason":
-        """Return the reason with this name; `JobFailed` for an unknown one, such as a newer release's."""
+        """Return the reason with this name; `JobFailed` if this release does not know the name."""
         return cls(word) if word in set(cls) else cls.JOB_FAILED
 
 
-# A job with one of these reasons is not planned or resumed until a person acts.
+# A job with one of these reasons waits for a person: the operator neither plans nor resumes the job.
 HELD = frozenset(
     {
         Reason.INVALID_SPEC,

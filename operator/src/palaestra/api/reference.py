@@ -9,7 +9,7 @@ BEGIN = "<!-- generated from the models: palaestra.api.reference -->"
 
 
 def page(text: str) -> str:
-    """Return the page docs/reference/trainingjob.md, now `text`, with its tables updated.
+    """Return the page docs/reference/trainingjob.md with new tables; `text` is the present page.
 
     Raises:
         ValueError: a mark is missing.

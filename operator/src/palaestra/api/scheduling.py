@@ -1,4 +1,4 @@
-"""Queue, priority, nodes and metadata of the pods. `palaestra run` ignores all of it."""
+"""Queue, priority, nodes and metadata of the pods; `palaestra run` ignores these settings."""
 
 from enum import StrEnum
 from typing import Annotated
@@ -78,12 +78,12 @@ def _domain(key: str) -> str:
 
 
 def _has_foreign_domain(key: str) -> bool:
-    """Return whether a key has a domain, and the domain is not one of Kubernetes."""
+    """Return whether a key has a domain, and the domain does not belong to Kubernetes."""
     return _domain(key) != "" and not _domain(key).endswith(("kubernetes.io", "k8s.io"))
 
 
 def _selects_security_profile(key: str) -> bool:
-    """Return whether an annotation selects a seccomp or AppArmor profile; kubelets still apply AppArmor's."""
+    """Return whether an annotation selects a seccomp or AppArmor profile; kubelets still use AppArmor's."""
     return "security" in _domain(key) and _domain(key).endswith(".kubernetes.io")
 
 

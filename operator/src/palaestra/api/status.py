@@ -1,10 +1,11 @@
 """The status of a TrainingJob, which the operator writes.
 
-Numbers come from the trainers and are as old as the last poll. An unknown value is absent, never zero.
+The numbers come from the trainers and are as old as the last poll. An unknown value is absent, never zero.
 
-Another release may have written a status. The reader ignores unknown fields, and conditions and simulators
-with an unknown enum value. It refuses an unknown phase or a value of another type, because that could mean
-that a replica has ended. A field that a later release adds is absent unless it is set.
+Another release may have written a status. The operator ignores unknown fields, and drops conditions and
+simulators with an unknown enum value. It refuses a status with an unknown phase or a value of a wrong type,
+because such a value could mean that a replica has ended. A field that a later release adds must be absent
+unless it is set.
 """
 
 from datetime import datetime
@@ -30,7 +31,7 @@ class Phase(StrEnum):
     FAILED = "Failed"
 
 
-TERMINAL = frozenset({Phase.SUCCEEDED, Phase.FAILED})  # A job or replica never leaves these phases.
+TERMINAL = frozenset({Phase.SUCCEEDED, Phase.FAILED})  # These phases are final for a job or replica.
 
 
 class ConditionType(StrEnum):

@@ -1,7 +1,7 @@
 """Convert pydantic's JSON Schema into the structural schema that an API server requires.
 
-A structural schema has no references and no alternatives, and has the type and the limits of every value.
-Descriptions are copied from the models.
+A structural schema contains no references and no alternatives, and states the type and the limits of every
+value. Descriptions are copied from the models.
 """
 
 from typing import Any
@@ -61,7 +61,8 @@ def _whole(schema: Schema, definitions: dict[str, Schema]) -> Schema:
     there = definitions[schema["$ref"].removeprefix("#/$defs/")]
     both = there | here
     if there.get("type") == "object" and "description" in here:
-        _, *more = there["description"].split("\n\n")  # the first paragraph repeats the field's description
+        # The first paragraph would repeat the field's description.
+        _, *more = there["description"].split("\n\n")
         both["description"] = "\n\n".join((here["description"], *more))
     return both
 
@@ -80,7 +81,7 @@ def _name_bounds(schema: Schema) -> None:
 
 
 def _present(default: Any) -> Any:
-    """Return `default` without null values, because the API server applies the rules to the default."""
+    """Return `default` without null values, because the API server checks the default by the rules too."""
     if isinstance(default, list):
         return [_present(item) for item in default]
     if isinstance(default, dict):
@@ -89,7 +90,7 @@ def _present(default: Any) -> Any:
 
 
 def freeze(schema: Schema) -> None:
-    """Add rules to the object `schema` that refuse a change of fields without the mark `MAY_CHANGE`."""
+    """Add rules to the object `schema` that refuse changes of all fields without the mark `MAY_CHANGE`."""
     # An API server refuses a rule on a field with arbitrary content, so the field's parent gets the rule.
     whole = False
     for name, inner in schema["properties"].items():
@@ -99,7 +100,7 @@ def freeze(schema: Schema) -> None:
         if _has_changeable_field(inner):
             _freeze_items(inner)
         elif always and "properties" in inner:
-            freeze(inner)  # the message then names the changed field, not its parent
+            freeze(inner)  # then the message of a refusal names the changed field, not its parent
         elif _OPAQUE in inner.get("additionalProperties", ()):
             whole = True
         elif always:

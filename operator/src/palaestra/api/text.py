@@ -1,4 +1,4 @@
-"""Text of other programs, made printable for a status and a terminal."""
+"""Convert text of other programs into printable text for a status or a terminal."""
 
 import re
 
@@ -13,13 +13,13 @@ def one_line(text: str, most: int) -> str:
 
 
 def printable(text: str) -> str:
-    """Return text of any number of lines without control characters and without passwords."""
+    """Return text with its line breaks, but without control characters and passwords."""
     plain = "".join(letter if letter.isprintable() or letter in "\n\t" else " " for letter in text)
     return masked(plain)
 
 
 def flat(text: str, most: int) -> str:
-    """Return the text like `one_line`, but keep one space at each end that has spaces."""
+    """Return text like `one_line`, but reduce spaces at the beginning and the end to one space."""
     plain = "".join(letter if letter.isprintable() else " " for letter in text[: most * 4])
     words = _SPACES.sub(" ", masked(plain))
     return words if len(words) <= most else words[: most - 3] + "..."

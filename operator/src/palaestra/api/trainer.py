@@ -232,7 +232,7 @@ class Checkpoint(ApiModel):
 
 
 def _actions(trainer: "Trainer") -> str | None:
-    """Return the kind of actions of a built-in task, discrete or continuous; None for another task."""
+    """Return the type of actions of a built-in task, discrete or continuous; None for other tasks."""
     if trainer.environment.id not in OWN_TASKS:
         return None
     return str(trainer.environment.options.get("actions", "discrete"))
@@ -242,7 +242,7 @@ _ACTIONS = ("environment", "id", "options", "actions", "algorithm", "name")
 
 
 def _needs(algorithm: str, actions: str, others: str) -> Rule:
-    """Return the rule that an algorithm requires one kind of actions in a built-in task."""
+    """Return the rule that an algorithm requires `actions`, and not `others`, in a built-in task."""
     return Rule(
         field="algorithm.name",
         holds=lambda trainer: trainer.algorithm.name != algorithm or _actions(trainer) != others,

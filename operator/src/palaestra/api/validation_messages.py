@@ -1,4 +1,4 @@
-"""Error messages about fields, for the author of a job: the fact and the remedy."""
+"""Error messages about fields, for the author of a job; each has the fact and the remedy."""
 
 import difflib
 import json
@@ -17,9 +17,11 @@ from palaestra_protocol.foreign_words import ELSEWHERE, FROM_ZOO, NO_ALGORITHM, 
 
 _LONGEST_QUOTE = 60
 _SIMILAR = 0.6
-_MISSPELLED = 0.92  # for a name in Python's style: every_steps is everySteps, but n_steps is not steps
-_OF_TRAINING = (("spec",), ("trainer",), ("algorithm",))  # sections in which people write keys of Zoo
-_VARIABLES = "env"  # `env` more likely means the environment variables of a container than an environment
+# Similarity for a name in Python's style: every_steps means everySteps, but n_steps does not mean steps.
+_MISSPELLED = 0.92
+# Sections in which people write hyperparameters of RL Zoo.
+_OF_TRAINING = (("spec",), ("trainer",), ("algorithm",))
+_VARIABLES = "env"  # a person who writes `env` more likely means environment variables than an environment
 
 
 def sentence(path: Path, error: ErrorDetails) -> str:
@@ -35,7 +37,7 @@ def sentence(path: Path, error: ErrorDetails) -> str:
 
 
 def quoted(value: Any) -> str:
-    """Return `value` on one line as its author may have written it, truncated if it is long."""
+    """Return `value` as JSON, truncated if it is long; of a mapping or list, return only the type."""
     if isinstance(value, dict | list):
         return "a mapping" if isinstance(value, dict) else "a list"
     text = json.dumps(value, ensure_ascii=False, default=str)

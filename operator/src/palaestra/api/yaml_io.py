@@ -1,8 +1,8 @@
 """Read and write one YAML document as Kubernetes clients do.
 
-PyYAML differs from kubectl: it reads `5e-4` as text, `1:30` as the number 90 and a date as an object, and it
-silently accepts a duplicate key. Here a file has the same meaning on a laptop and on a cluster; a value whose
-meaning would differ is refused with its line and column.
+PyYAML differs from kubectl: PyYAML reads `5e-4` as text, `1:30` as the number 90 and a date as an object, and
+silently accepts a duplicate key. With this module, a file has the same meaning on a laptop and in a cluster.
+If the meaning of a value would differ, `read` raises an error with its line and column.
 """
 
 import math
@@ -21,12 +21,12 @@ _TEXT = "tag:yaml.org,2002:str"
 
 _TAGS = {_BOOL, _FLOAT, _INT, _NULL, _TEXT, "tag:yaml.org,2002:map", "tag:yaml.org,2002:seq"}
 
-_MOST_NODES = 50_000  # an alias counts each time it is used
-_LARGEST_FILE = 1_500_000  # characters; an API server accepts no more
+_MOST_NODES = 50_000  # each use of an alias counts
+_LARGEST_FILE = 1_500_000  # characters, the limit of an API server
 
 
 class NotYaml(ValueError):
-    """The text cannot be read; `problem` is one line with the place, the fact and the remedy."""
+    """The text cannot be read; `problem` is one line with the position, the fact and the remedy."""
 
     def __init__(self, problem: str) -> None:
         super().__init__(problem)
@@ -34,7 +34,7 @@ class NotYaml(ValueError):
 
 
 class _Loader(yaml.SafeLoader):
-    """PyYAML's safe loader with the scalars of kubectl's YAML."""
+    """PyYAML's safe loader, which recognizes scalars by the rules of kubectl."""
 
     yaml_implicit_resolvers: dict[str, list[tuple[str, re.Pattern[str]]]] = {}  # noqa: RUF012 - PyYAML's name and shape
 
@@ -69,7 +69,7 @@ def write(data: Any) -> str:
 
 
 def read(text: str, name: str) -> Any:
-    """Return the one document in `text` as dicts, lists, text, numbers, booleans and None.
+    """Return the single document in `text` as dicts, lists, texts, numbers, booleans and None.
 
     Raises:
         NotYaml: the text is not valid; its `problem` is "<name>:<line>:<column>: <fact>; <remedy>".
@@ -141,7 +141,7 @@ class _Builder:
         return merged | own
 
     def _merged(self, node: Node) -> dict[str, Any]:
-        """Return the entries that `<<` merges; if several mappings have a key, the first one is used."""
+        """Return the entries that `<<` merges; if several mappings have one key, the first mapping wins."""
         value = self.value(node)
         sources = value if isinstance(value, list) else [value]
         if not all(isinstance(source, dict) for source in sources):

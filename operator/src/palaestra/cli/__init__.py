@@ -35,7 +35,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _failed(error, error.exit_code)
     except (PalaestraError, SimError) as error:
         return _failed(error, WRONG_INPUT)
-    except KeyboardInterrupt:  # before a run was started
+    except KeyboardInterrupt:  # Ctrl-C before a run was started
         return KILLED
 
 
@@ -43,7 +43,7 @@ def _module(name: str, module: str) -> ModuleType:
     """Return the module of a command.
 
     Raises:
-        SystemExit: it needs modules that this system's Python lacks.
+        SystemExit: the command needs modules that Python on this system lacks.
     """
     try:
         return import_module(f"palaestra.cli.{module}")
@@ -63,7 +63,7 @@ def _of_a_cluster(argument: str) -> bool:
 
 
 def _typed() -> str:
-    """Return the name to show in usage: `palaestra`, or `kubectl palaestra` when run as a kubectl plugin."""
+    """Return the program's name for usage texts: `palaestra`, or `kubectl palaestra` as a plugin."""
     return "kubectl palaestra" if Path(sys.argv[0]).name == "kubectl-palaestra" else "palaestra"
 
 
@@ -82,6 +82,6 @@ def _parser(first: Sequence[str]) -> argparse.ArgumentParser:
             commands.add_parser(name, help=each.summary)
     else:
         with without_collections():
-            import_without("rich", "structlog")  # structlog would format tracebacks with it
+            import_without("rich", "structlog")  # structlog would format tracebacks with rich
             _module(first[0], named.module).add(commands)
     return parser

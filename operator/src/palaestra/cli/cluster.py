@@ -1,4 +1,4 @@
-"""Common parts of the commands for a cluster: options that choose it, and exit codes."""
+"""The common options and exit codes of the commands for a cluster."""
 
 import argparse
 import os
@@ -27,7 +27,7 @@ Work = Callable[[Client, argparse.Namespace], int]
 
 
 def cluster_command(commands: Commands, name: str, work: Work, description: str) -> argparse.ArgumentParser:
-    """Return the parser of a new cluster command, with kubectl's options that choose the cluster."""
+    """Return the parser of a new command for a cluster, with kubectl's options that choose the cluster."""
     parser = command(commands, name, connected(work), description, EXIT_CODES)
     add_cluster(parser)
     return parser
@@ -43,7 +43,7 @@ def add_cluster(parser: argparse.ArgumentParser) -> None:
 
 
 def say(lines: Iterable[str]) -> None:
-    """Write lines to standard output as printable text, because pods wrote some; flush each at once."""
+    """Write lines to standard output as printable text, because some are from pods; flush each line."""
     for line in lines:
         sys.stdout.write(f"{printable(line)}\n")
         sys.stdout.flush()
@@ -53,7 +53,7 @@ def say(lines: Iterable[str]) -> None:
 def cleaned_up() -> Iterator[None]:
     """Handle SIGTERM like Ctrl-C, so that temporary objects are deleted.
 
-    Otherwise the first process of a container would ignore SIGTERM.
+    Without a handler, process 1 of a container would ignore SIGTERM.
     """
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
@@ -63,7 +63,7 @@ def cleaned_up() -> Iterator[None]:
 
 
 def connected(work: Work) -> Callable[[argparse.Namespace], int]:
-    """Return a command that connects, runs `work`, and prints errors of the cluster in one line."""
+    """Return a command that connects, runs `work`, and prints an error of the cluster as one line."""
 
     def run(options: argparse.Namespace) -> int:
         client = Client(namespace=options.namespace, kubeconfig=options.kubeconfig, context=options.context)
@@ -75,7 +75,7 @@ def connected(work: Work) -> Callable[[argparse.Namespace], int]:
                 return _refused(f"{error}{hint}")
             except (ApiError, ClientError, SpecErrors) as error:
                 return _refused(str(error))
-            except BrokenPipeError:  # The reader of the output ended, for example `| head`.
+            except BrokenPipeError:  # The program that reads the output has ended, for example `| head`.
                 os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
                 return 0
 

@@ -1,7 +1,7 @@
-"""The names of all commands, in the order of the help: the module of each, and its line in the help.
+"""All commands in the order of the help, each with its module and its line in the help.
 
-`palaestra --help` is printed from this table alone, and a command imports only its own module, because the
-import of all modules takes a second.
+The import of all modules takes a second. So `palaestra --help` is printed from this table alone, and a
+command imports only its own module.
 """
 
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""`palaestra compare`: the policies of two runs on the same fresh episodes."""
+"""`palaestra compare`: compare the policies of two runs on the same fresh episodes."""
 
 import argparse
 from pathlib import Path
@@ -9,11 +9,11 @@ from palaestra_protocol.numbers import whole
 
 PROGRAM = "palaestra-compare"
 COMPARE = """\
-Plays the policies of the run directories A and B on the same episodes, in the simulator that evaluates A's,
-until it is known which one succeeds more often, or that they differ by no more than --margin. No run uses the
-seeds of these episodes. Prints a line for each 20 episodes and a sentence at the end. The bounds are right
-after any number of episodes: at most one of 20 comparisons is wrong, even if you end it when you like, or
-repeat it with more --episodes.
+Plays the policies of the run directories A and B on the same episodes, in the simulator that evaluates A's
+policy. Ends when the results show that one policy succeeds more often, or that the success rates differ by no
+more than --margin. No run uses the seeds of these episodes. Prints a line for each 20 episodes and a sentence
+at the end. The bounds are right after any number of episodes: at most one of 20 comparisons is wrong, even if
+you end a comparison early, or repeat it with more --episodes.
 """
 EXIT_CODES = """\
 exit codes:
@@ -30,8 +30,8 @@ def add(commands: Commands) -> None:
     """Add the command."""
     parser = command(commands, "compare", _compare, COMPARE, EXIT_CODES)
     parser.add_argument("a", metavar="A", type=Path, help="run directory, such as runs/<job>/<replica>")
-    parser.add_argument("b", metavar="B", type=Path, help="another one")
-    parser.add_argument("--episodes", metavar="N", type=whole(1), help="at most; default: 1000")
+    parser.add_argument("b", metavar="B", type=Path, help="run directory of the other policy")
+    parser.add_argument("--episodes", metavar="N", type=whole(1), help="most episodes; default: 1000")
     parser.add_argument(
         "--margin",
         metavar="SHARE",
@@ -40,7 +40,7 @@ def add(commands: Commands) -> None:
     parser.add_argument(
         "--in", metavar="NAME", dest="driver", help="stub, mujoco or webots; default: the simulator of A"
     )
-    parser.add_argument("--seeds", metavar="NAME", help="other episodes; default: compare")
+    parser.add_argument("--seeds", metavar="NAME", help="name that selects the episodes; default: compare")
     parser.add_argument("--json", action="store_true", help="print one JSON object at the end")
 
 

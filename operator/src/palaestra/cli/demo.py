@@ -18,11 +18,11 @@ from palaestra.local.run import RunOptions, run
 from palaestra_protocol.pod.status import ExitCode
 
 DEMO = """\
-Trains a Robotino to drive to a target, in minutes, and shows it in a browser meanwhile. Two buttons of the
-page kill and hang the simulator that is shown; the page says after how many seconds it steps again. Then the
-best policy plays, about as fast as a real robot, until Ctrl-C. Without a display it prints the address of the
-page and does the same. The same command resumes an interrupted training, and plays again after a finished
-one. Needs the optional package viser.
+Trains a Robotino to drive to a target, in minutes, and shows the training in a browser. Two buttons of the
+page kill and hang the shown simulator; the page shows after how many seconds the simulator steps again. Then
+the best policy plays, about as fast as a real robot, until Ctrl-C. Without a display, the command prints the
+address of the page and opens no browser. The same command resumes an interrupted training; after a finished
+training, it plays the policy again. Needs the optional package viser.
 """
 EXIT_CODES = """\
 exit codes:
@@ -32,7 +32,7 @@ exit codes:
   1    failed; the last lines of the log give the reason
 """
 JOB = "demo.yaml"
-# A step of the robot is 192 ms of simulated time; the stub would take it in less than one.
+# A step of the robot is 192 ms of simulated time; the stub would compute this step in less than 1 ms.
 ABOUT_REAL_TIME = {"name": "PALAESTRA_STUB_FAULTS", "value": "slow:latency_ms=190"}
 
 

@@ -1,4 +1,4 @@
-"""`palaestra doctor`: find out why jobs do not run in a cluster."""
+"""`palaestra doctor`: find the reasons for which jobs do not run in a cluster."""
 
 import argparse
 from collections.abc import Iterator
@@ -12,8 +12,8 @@ from palaestra.operator.options import DEFAULT_NAMESPACE
 DOCTOR = """\
 Checks a cluster: version, sidecars, the definition of TrainingJobs, the namespace, storage, the operator, its
 images, its leader, its rights and its metrics, and your own rights. Prints each problem with its remedy.
-Changes nothing: it only reads, and does a dry run where it must try something. Exits with 1 if a check finds
-a problem; warnings and checks that could not be made do not count.
+Changes nothing in the cluster: it only reads objects, and creates a pod in a dry run. Exits with 1 if a check
+finds a problem; warnings and checks that could not be made do not count.
 """
 WIDTH = 18
 
@@ -39,7 +39,7 @@ def _doctor(client: Client, options: argparse.Namespace) -> int:
 
 
 def shown(found: CheckResult) -> Iterator[str]:
-    """Yield a line for a finding, and one for its remedy."""
+    """Yield a line with a finding, and another line with its remedy."""
     yield f"{found.verdict:<8} {found.what:<{WIDTH}} {found.fact}"
     if found.remedy:
         yield f"{'':<8} {'':<{WIDTH}} -> {found.remedy}"

@@ -11,13 +11,14 @@ from palaestra.api.json_schema import json_schema
 from palaestra.cli.subcommands import Commands, command
 from palaestra.view.field_text import field_text
 
-_WIDTH = (100, 24)  # where the output is not a terminal; COLUMNS chooses another
+# Columns and lines if the output is not a terminal; the variable COLUMNS overrides the columns.
+_WIDTH = (100, 24)
 _NARROWEST, _WIDEST = 40, 110
 
 EXPLAIN = """\
-Prints what a field of a TrainingJob is: its type, default and meaning, the rules about it, and the fields in
-it. FIELD is a path with dots, such as spec.simulators or trainer.algorithm; `spec.` may be left out, and an
-index is ignored. Without FIELD, it prints the TrainingJob itself.
+Prints the documentation of a field of a TrainingJob: type, default and meaning, the rules about the field,
+and its inner fields. FIELD is a path with dots, such as spec.simulators or trainer.algorithm; `spec.` may be
+left out, and an index is ignored. Without FIELD, the command documents the TrainingJob itself.
 """
 EXIT_CODES = """\
 exit codes:

@@ -11,9 +11,10 @@ from palaestra.local.trainer_program import run_program
 PROGRAM = "palaestra-export"
 EXPORT = """\
 Writes the best policy of the run directory RUN as one file, for programs without Palaestra or PyTorch. With
-the observation as the environment returned it, the file returns the action that the environment takes. It is
-written once it has acted as the policy on 1,000 observations, or not at all. It holds a data sheet of
-observations and actions, and the environment, steps and success of the run. Export only runs that you trust.
+the observation as the environment returned it, the file returns the action that the environment takes. The
+file is written only if it returns the actions of the policy for 1,000 observations. It contains a data sheet
+of observations and actions, and the environment, steps and success of the run. Export only runs that you
+trust.
 """
 EXIT_CODES = """\
 exit codes:

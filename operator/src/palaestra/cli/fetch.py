@@ -14,8 +14,8 @@ from palaestra_protocol.numbers import seconds, whole
 FETCH = """\
 Copies policy, evaluations, report and TensorBoard data of a run to <dir>/<job>/<replica>/. This folder must
 not exist yet; it is written completely or not at all. The data is read in the pod that trains. If that pod
-has ended, the command creates a pod that mounts the claim read-only, and deletes it afterwards. You need the
-rights to create and delete pods and to run commands in them.
+has ended, the command creates a pod that mounts the claim read-only, and deletes this pod afterwards. You
+need the rights to create and delete pods and to run commands in them.
 """
 
 
@@ -29,7 +29,7 @@ def add(commands: Commands) -> None:
         "--max-size",
         metavar="SIZE",
         type=_size,
-        help="most of all files, such as 500Mi; default: four times the volume that the job asks for",
+        help="limit for all files together, such as 500Mi; default: four times the requested volume",
     )
     parser.add_argument(
         "--timeout",

@@ -1,4 +1,4 @@
-"""Files given on the command line."""
+"""Read the files that are named on the command line."""
 
 import argparse
 from pathlib import Path
@@ -12,7 +12,7 @@ def job(file: Path) -> TrainingJob:
     """Return the TrainingJob in a file.
 
     Raises:
-        PalaestraError: it cannot be read, or is wrong.
+        PalaestraError: the file cannot be read, or its job is invalid.
     """
     return load(read_text(file), str(file))
 
@@ -21,7 +21,7 @@ def read_text(file: Path) -> str:
     """Return the text of a file.
 
     Raises:
-        PalaestraError: it cannot be read, or is not UTF-8.
+        PalaestraError: the file cannot be read, or is not UTF-8.
     """
     try:
         return read(file, MOST_JOB_BYTES).decode()

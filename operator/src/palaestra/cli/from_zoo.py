@@ -12,8 +12,8 @@ from palaestra.zoo import convert
 
 FROM_ZOO = """\
 Reads a hyperparameter file of RL-Baselines3-Zoo, such as ppo.yml, and prints the TrainingJob for one of its
-environments. Expressions such as dict(net_arch=[64, 64]) are read as data and never evaluated. Each point
-in which the job differs from Zoo is a line on standard error and a comment in the job.
+environments. Expressions such as dict(net_arch=[64, 64]) are read as data and never evaluated. Each
+difference between the job and Zoo is a line on standard error and a comment in the job.
 """
 EXIT_CODES = """\
 exit codes:

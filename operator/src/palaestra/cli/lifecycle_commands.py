@@ -19,8 +19,8 @@ because Kueue suspends and resumes it, and a job that has ended.
 """
 RESTART = """\
 Lets replicas with the reason RunLost continue. A replica whose claim is gone gets a new one and trains from
-step 0 again. A replica whose run directory was empty resumes from the newest checkpoint that is in it now,
-else it too begins at step 0.
+step 0 again. A replica whose run directory was empty resumes from the newest checkpoint that the directory
+has now; without a checkpoint, it begins at step 0 too.
 """
 DELETE = """\
 Deletes TrainingJobs with their pods and waits until they are deleted. The claims with their runs stay unless

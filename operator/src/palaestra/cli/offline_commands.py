@@ -1,4 +1,4 @@
-"""`palaestra plan`, `world` and `crd`: they read a file and print text, without a run or a cluster."""
+"""`palaestra plan`, `world` and `crd`: commands that print text, and use neither a run nor a cluster."""
 
 import argparse
 import sys
@@ -18,7 +18,7 @@ from palaestra_protocol.numbers import whole
 from palaestra_sim.world import RunIdentity, generate
 
 _NOT_AS_IT_IS = 2
-UNASSIGNED = "00000000-0000-0000-0000-000000000000"  # in place of the uid from a cluster
+UNASSIGNED = "00000000-0000-0000-0000-000000000000"  # replaces the uid that a cluster would assign
 
 PLAN = """\
 Reads the TrainingJob in FILE and prints the Kubernetes objects that it needs, as YAML. Outside a cluster the
@@ -29,8 +29,9 @@ Reads the world in FILE and prints the copy that one simulator of a job gets. On
 robots whose controller is "ros" change: --name= is set, --synchronize is added, and --clock is removed. With
 the option --clock, the first --clock is kept.
 
-With --check, it prints what each simulator of this machine can and cannot do with the world instead, and
-starts nothing. The exit code is then 0 if each can start it with the options given, 2 otherwise.
+With --check, the command instead prints what each simulator of this machine can and cannot do with the world,
+and starts no simulator. The exit code is then 0 if each simulator can start the world with the given options,
+and 2 otherwise.
 """
 CRD = "Prints the CustomResourceDefinition of TrainingJobs, as YAML."
 
@@ -79,7 +80,7 @@ def _world(options: argparse.Namespace) -> int:
 
 
 def _check(options: argparse.Namespace) -> int:
-    """Print the result of each simulator's check of a world, with the options of its start."""
+    """Print the result of each simulator's check of a world with the given options."""
     read(options.file)
     given = [word for name in options.leave_out for word in ("--leave-out", name)]
     given += [word for file in options.stand_ins for word in ("--stand-ins", str(file))]
@@ -121,7 +122,7 @@ def _add_world(commands: Commands) -> None:
         action="append",
         default=[],
         metavar="TYPE",
-        help="with --check: what the simulator may leave out; repeatable, all: everything",
+        help="with --check: type that the simulator may leave out; repeatable; all: every type",
     )
     parser.add_argument(
         "--stand-ins",

@@ -132,8 +132,8 @@ def _add_pods(parser: argparse.ArgumentParser) -> None:
             metavar="JSON",
             type=_resources,
             default=Resources(),
-            help=f"requests and limits of each {container} of a job that mentions none, such as "
-            '{"limits": {"cpu": "500m"}}; default: those of the release',
+            help=f"requests and limits of each {container} of a job that sets no resources, such as "
+            '{"limits": {"cpu": "500m"}}; default: the values of the release',
         )
 
 
@@ -154,7 +154,7 @@ def _add_users(parser: argparse.ArgumentParser) -> None:
         "--host-users",
         action=argparse.BooleanOptionalAction,
         default=True,
-        help="give training pods the users of their nodes; no: a user namespace for each pod; default: yes",
+        help="let training pods use their nodes' user IDs; no: a user namespace for each pod; default: yes",
     )
 
 
@@ -204,7 +204,7 @@ def _add_images(parser: argparse.ArgumentParser) -> None:
     release = Images.of_release(version("palaestra"))
     for name in ("trainer", "stub", "mujoco", "webots"):
         image = getattr(release, name)
-        meaning = f"image for jobs that name none; default: {image}"
+        meaning = f"image for jobs that do not name an image; default: {image}"
         parser.add_argument(f"--{name}-image", metavar="IMAGE", default=image, help=meaning)
 
 

@@ -78,7 +78,7 @@ def _get(client: Client, options: argparse.Namespace) -> int:
 
 
 def _table(client: Client, options: argparse.Namespace, namespace: str | None) -> int:
-    """Print the table of `kubectl get`; if it is empty, report that on standard error."""
+    """Print the table of `kubectl get`; if the table is empty, print a sentence on standard error."""
     with asked(options.name, client.namespace):
         table = client.api.table(TRAINING_JOBS, namespace, options.name, labels=options.selector)
     if options.name is None and not table.get("rows"):
@@ -95,7 +95,7 @@ def _table(client: Client, options: argparse.Namespace, namespace: str | None) -
 
 
 def _document(client: Client, options: argparse.Namespace, namespace: str | None) -> int:
-    """Print the jobs as the API server stores them, for programs."""
+    """Print the jobs for programs, in the form that the API server stores."""
     if options.name:
         found = [client.raw(options.name)]
     else:

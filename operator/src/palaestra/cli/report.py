@@ -1,4 +1,4 @@
-"""`palaestra report`: the report of runs, as one HTML file."""
+"""`palaestra report`: write the report of runs as one HTML file."""
 
 import argparse
 from pathlib import Path
@@ -8,13 +8,13 @@ from palaestra.local.report import PROGRAM
 from palaestra.local.trainer_program import run_program
 
 REPORT = """\
-Writes the report of the run directory RUN, or of several side by side, as one HTML file of at most 2.5 MB:
-what was asked and with which versions, curves with intervals, recorded episodes, every fault, where the time
-went, checkpoints, and how to repeat the run. The file refers to no address, so it can be mailed and opened
-anywhere. `palaestra run` and the trainer of a cluster write it at the end of each run; this command writes it
-again, also for a run that still trains.
+Writes the report of the run directory RUN, or of several runs side by side, as one HTML file of at most
+2.5 MB: the job and the versions, curves with intervals, recorded episodes, every fault, the time by activity,
+checkpoints, and the command that repeats the run. The file refers to no address, so it can be mailed and
+opened anywhere. `palaestra run` and the trainer of a cluster write the report at the end of each run; this
+command writes it again, also for a run that still trains.
 
-With --film FILE, it writes instead the best recorded episode of one run, seen from above.
+With --film FILE, the command instead writes the best recorded episode of one run, seen from above.
 """
 EXIT_CODES = """\
 exit codes:

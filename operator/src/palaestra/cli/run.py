@@ -37,7 +37,7 @@ def add(commands: Commands) -> None:
         "--initial-policy",
         metavar="PATH",
         type=Path,
-        help="run directory or model.zip whose policy a new run begins with, as trainer.initialPolicy",
+        help="run directory or model.zip with the policy of a new run, as trainer.initialPolicy",
     )
     parser.add_argument(
         "--ros-port",
@@ -69,10 +69,10 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _wanted(options: argparse.Namespace) -> TrainingJob:
-    """Return the job in the file, with the policy of the command line.
+    """Return the job in the file; the command line may replace its initial policy.
 
     Raises:
-        PalaestraError: the file cannot be read, or the job is wrong.
+        PalaestraError: the file cannot be read, or the job is invalid.
     """
     given, policy = job(options.file), options.initial_policy
     if policy is None:

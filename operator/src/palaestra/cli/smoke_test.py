@@ -20,10 +20,10 @@ Creates the TrainingJob in FILE under a unique name, waits until it has ended, a
 Prints a line for each phase and for each reason why a replica waits. Exits with 1 if the job did not succeed
 in time.
 
-With --local it uses no cluster and learns nothing: it plays ten episodes in the environment of FILE and its
-first collecting simulator, on this machine. Prints return and length of each, the time of a step by part, and
-one sentence for each problem that it finds in spaces, types, numbers, rewards or ends. Exits with 1 if it
-finds any.
+With --local, the command uses no cluster and does not train: it plays ten episodes on this machine, in the
+environment of FILE and its first collecting simulator. It prints return and length of each episode, the time
+of a step by part, and one sentence for each problem with spaces, types, numbers, rewards or ends of episodes.
+It exits with 1 if it finds a problem.
 """
 LOCAL_EXIT_CODES = """\
   with --local:
@@ -51,7 +51,7 @@ def add(commands: Commands) -> None:
     here.add_argument(
         "--agent",
         choices=AGENTS,
-        help="what acts; with keyboard you drive, with arrows and space; default: random",
+        help="source of the actions; keyboard: you drive with arrows and space; default: random",
     )
     here.add_argument("--episodes", metavar="N", type=whole(1), help=f"default: {EPISODES}")
     here.add_argument("--json", action="store_true", help="print one JSON object at the end")
@@ -60,7 +60,7 @@ def add(commands: Commands) -> None:
 
 
 def _chosen(options: argparse.Namespace) -> int:
-    """Try the job here or in a cluster."""
+    """Run the test on this machine or in a cluster."""
     if options.local:
         return _here(options)
     if options.agent is not None or options.episodes is not None or options.json:
@@ -84,7 +84,7 @@ def _here(options: argparse.Namespace) -> int:
 def _try(client: Client, options: argparse.Namespace) -> int:
     try:
         tried = job(options.file)
-    except SpecErrors as error:  # The file is wrong and no request was sent, so the exit code is 2.
+    except SpecErrors as error:  # The job is invalid and no request was sent, so the exit code is 2.
         raise PalaestraError(str(error)) from error
     content = tried.model_dump(mode="json", by_alias=True, exclude_unset=True)
     content["metadata"].setdefault("namespace", client.namespace)

@@ -1,4 +1,4 @@
-"""Common parts of all commands: their declaration and their exit codes."""
+"""The declaration of a command in argparse, and the exit codes that all commands share."""
 
 import argparse
 from collections.abc import Callable
@@ -36,7 +36,7 @@ exit codes of all commands:
 
 
 class Commands(Protocol):
-    """The object that adds commands to argparse; argparse's own class is not public."""
+    """The object that adds commands to a parser; a protocol, because argparse's own class is not public."""
 
     def add_parser(self, *args: Any, **options: Any) -> argparse.ArgumentParser:
         """Return the parser of a new command."""

@@ -31,19 +31,20 @@ from palaestra_protocol.pod.status import ExitCode
 from palaestra_protocol.signals import obeyed
 
 FAILED = 1
-SEARCHED_AT_ONCE = 4  # trials of a search in a cluster: it does not learn from running trials
+# Trials of a search in a cluster at the same time: few, because a search does not learn from running trials.
+SEARCHED_AT_ONCE = 4
 SWEEP = """\
 Trains the job of the Sweep in FILE with different values of some fields, each with several seeds. Checks
 every trial before it starts the first. Writes <dir>/<sweep>/: a run directory for each trial and seed,
 trials.jsonl, table.txt and curves.png. The same command skips trials that are complete and resumes the
-others. Prints a line for each trial that begins, and one with its result when it has ended.
+others. Prints a line when a trial begins, and a line with its result when it has ended.
 
 Ctrl-C saves a checkpoint of each run and exits; a second Ctrl-C exits at once.
 SIGTERM and SIGHUP act as Ctrl-C; a SIGINT or SIGHUP that was ignored at the start stays ignored.
 
-With --cluster, each trial is a TrainingJob with the label palaestra.dev/sweep=<sweep>; a queue of the job
-decides when it runs. Ctrl-C ends the command and leaves the jobs; the same command continues. Deletes the
-jobs of pruned trials.
+With --cluster, each trial is a TrainingJob with the label palaestra.dev/sweep=<sweep>; if the job has a
+queue, the queue decides when each trial runs. Ctrl-C ends the command, and the jobs continue; the same
+command then continues the sweep. The command deletes the jobs of pruned trials.
 """
 EXIT_CODES = """\
 exit codes:
@@ -98,7 +99,7 @@ def _on_this_machine(options: argparse.Namespace) -> int:
 
 
 def _carried_out(search: Search, place: LocalBackend, folder: Path, objective: Objective) -> None:
-    """Run the trials, and stop the runs that have not ended."""
+    """Run the trials; at the end, stop the runs that have not ended."""
     try:
         carry_out(search, place, folder, objective, _say)
     except KeyboardInterrupt:
@@ -122,7 +123,7 @@ def _loaded(file: Path) -> Sweep:
     """Return the Sweep in a file.
 
     Raises:
-        PalaestraError: the file is wrong or cannot be read; no request was sent to a cluster.
+        PalaestraError: the file is invalid or cannot be read; no request was sent to a cluster.
     """
     try:
         return load(file)
@@ -170,7 +171,7 @@ def _say(line: str) -> None:
 
 @contextmanager
 def _interruptible() -> Iterator[None]:
-    """Handle SIGTERM and SIGHUP like Ctrl-C, except a SIGHUP that is ignored, as under nohup."""
+    """Handle SIGTERM and SIGHUP like Ctrl-C, but leave an ignored SIGHUP ignored, as under nohup."""
     numbers = obeyed((signal.SIGTERM, signal.SIGHUP))
     before = [signal.signal(number, signal.default_int_handler) for number in numbers]
     try:
@@ -181,7 +182,7 @@ def _interruptible() -> Iterator[None]:
 
 
 def _shown(search: Search, place: TrialBackend, sweep: Sweep, folder: Path) -> int:
-    """Print the table, write it and the figure into the folder, and return the exit code."""
+    """Print the table, write table and figure into the folder, and return the exit code."""
     ended, objective = trial_log.ended(folder), sweep.spec.objective
     rows = [
         TrialRow(

@@ -1,4 +1,4 @@
-"""`palaestra view`: look at the simulators of a run."""
+"""`palaestra view`: show the simulators of a run in a browser."""
 
 import argparse
 import os
@@ -22,11 +22,11 @@ from palaestra.live_view.source import NotNow, NotShown, SidecarSource
 from palaestra_protocol.numbers import MOST_PORT, whole
 
 PORT = 8080
-FIRST_S = 300.0  # until a run has written where its simulators are
+FIRST_S = 300.0  # longest wait for a run to write the addresses of its simulators
 POLL_S = 0.2
 VIEW = """\
-Shows the simulators of a running training in a browser: the world, the robots, and what is known about the
-episode. Prints the address of the page, which only this machine can open, and ends with Ctrl-C. The training
+Shows the simulators of a running training in a browser: the world, the robots, and the state of the episode.
+Prints the address of the page, which only this machine can open. Ctrl-C ends the view, and the training
 continues. RUN is a folder of this machine, or the name of a job in a cluster. The sidecars of a job are read
 through the API server, which needs the right `get` on pods/proxy. Needs the optional package viser.
 """
@@ -36,19 +36,26 @@ exit codes:
   1    the simulator describes no world, or the cluster has no such job or refused
   2    no such run or simulator, or viser is missing; nothing was started
 """
-DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY")  # without one, a browser may take over the terminal
+# Without one of these variables, a text browser may take over the terminal.
+DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY")
 
 
 def add(commands: Commands) -> None:
     """Add the command."""
     parser = command(commands, "view", _view, VIEW, EXIT_CODES)
     parser.add_argument("run", metavar="RUN", help="run directory, such as runs/JOB/0, or name of a job")
-    parser.add_argument("--simulator", metavar="NAME", help="the one that is shown first; default: the first")
     parser.add_argument(
-        "--replica", metavar="N", type=whole(), default=0, help="of a job in a cluster; default: 0"
+        "--simulator", metavar="NAME", help="simulator that is shown first; default: the first"
     )
     parser.add_argument(
-        "--port", metavar="PORT", type=whole(0, MOST_PORT), default=PORT, help="of the page; default: 8080"
+        "--replica", metavar="N", type=whole(), default=0, help="replica of a job in a cluster; default: 0"
+    )
+    parser.add_argument(
+        "--port",
+        metavar="PORT",
+        type=whole(0, MOST_PORT),
+        default=PORT,
+        help="port of the page; default: 8080",
     )
     for hidden in (WITH_STDIN, OPENED):
         parser.add_argument(hidden, action="store_true", help=argparse.SUPPRESS)
@@ -60,7 +67,7 @@ def _view(options: argparse.Namespace) -> int:
     folder = Path(options.run)
     if folder.is_dir() or os.sep in options.run or options.until_stdin_closes:
         return _shown(options, _local(options, folder))
-    say([f"{options.run}: is not a folder here, so the cluster is asked for a job of this name"])
+    say([f"{options.run}: is not a folder here; looking for a job of this name in the cluster"])
     return connected(_of_cluster)(options)
 
 
@@ -69,7 +76,7 @@ def _of_cluster(client: Client, options: argparse.Namespace) -> int:
 
 
 def _local(options: argparse.Namespace, folder: Path) -> Callable[[], Sequence[SidecarSource]]:
-    """Return a function that lists the simulators of a run; wait for a run that is starting.
+    """Return a function that lists the simulators of a run; wait first if the run is just starting.
 
     Raises:
         NoRun: the folder has no run with simulators.
@@ -85,18 +92,18 @@ def _local(options: argparse.Namespace, folder: Path) -> Callable[[], Sequence[S
 
 
 def _shown(options: argparse.Namespace, sources: Callable[[], Sequence[SidecarSource]]) -> int:
-    """Show the page until it is ended."""
+    """Serve the page until the view ends, and return the exit code."""
     found = {source.name: source for source in sources()}
     if options.simulator is not None and options.simulator not in found:
         say([f"--simulator {options.simulator}: the run has {', '.join(found)}"])
         return WRONG_INPUT
     try:
-        with suppress(NotNow):  # it may start later
+        with suppress(NotNow):  # the simulator may start later
             found[options.simulator or next(iter(found))].scene()
     except NotShown as error:
         say([str(error)])
         return REFUSED
-    # viser is optional, and slow to import
+    # The import is here because viser is optional, and slow to import.
     page = import_module("palaestra.live_view.page").ViewPage(
         options.run, sources, options.port, options.simulator
     )
@@ -118,7 +125,7 @@ def _shown(options: argparse.Namespace, sources: Callable[[], Sequence[SidecarSo
 
 
 def _ended(*, by_stdin: bool) -> Callable[[], bool]:
-    """Return whether the view has to end; a view of `palaestra run` ends with its standard input."""
+    """Return a function that returns whether the view must end: by request, when its input closes."""
     if not by_stdin:
         return lambda: False
     closed = threading.Event()

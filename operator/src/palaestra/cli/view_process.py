@@ -1,6 +1,7 @@
-"""The page of a run that this program starts: `palaestra view` in a process of its own.
+"""Show a run that this program starts: run `palaestra view` in a separate process.
 
-It imports neither viser nor the cluster's client, so a run without a page does not pay for them.
+This module imports neither viser nor the cluster's client, so a run without a page does not need their time
+and memory.
 """
 
 import subprocess
@@ -33,11 +34,11 @@ def require_viser() -> None:
 
 @contextmanager
 def viewed(folder: Path, *, opened: bool = False) -> Iterator[None]:
-    """Show a run in a process of its own, which ends with this one even after SIGKILL: its input closes.
+    """Show a run in a separate process, which ends with this process, even after SIGKILL.
 
     Args:
         folder: the run directory; the run may start later.
-        opened: whether to open the page in a browser, if this person has a display.
+        opened: whether to open the page in a browser, if a display is available.
 
     Raises:
         ViserMissing: an optional package is not installed.
@@ -46,7 +47,7 @@ def viewed(folder: Path, *, opened: bool = False) -> Iterator[None]:
     program = "import sys; from palaestra.cli import main; sys.exit(main())"
     words = ["view", str(folder), WITH_STDIN, *([OPENED] if opened else [])]
     command_line = [sys.executable, "-P", "-c", program, *words]
-    # A signal of the terminal ends the run; its view must stay until then.
+    # In a session of its own, the view gets no signals of the terminal, so it stays until the run has ended.
     with subprocess.Popen(command_line, stdin=subprocess.PIPE, start_new_session=True) as viewer:
         try:
             yield

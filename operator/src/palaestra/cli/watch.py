@@ -45,7 +45,7 @@ def _watch(client: Client, options: argparse.Namespace) -> int:
 
 
 def _drawn(client: Client, options: argparse.Namespace) -> TrainingJob:
-    """Redraw the job each second, and return its last state."""
+    """Draw the job again each second, and return its last state."""
     history = History()
     job = client.get(options.name)
     with Live(

@@ -6,9 +6,10 @@
         client.apply(Path("job.yaml"))
         job = client.wait("job", deadline_s=3600)
 
-`client` has the public class, `errors` its errors and the way from a response to one. `watch` waits for
-changes, `wait_progress` describes them as lines, and `events` reads events. `fetch` copies a run out of its
-volume: the pod of `volume_reader_pod` runs `tar_stream`, and `tar_extraction` unpacks its output.
+`client` has the public class. `errors` has the exceptions, and converts responses of the API server to them.
+`watch` waits for changes, `wait_progress` describes changes as lines, and `events` reads events. `fetch`
+copies a run out of its volume: the pod of `volume_reader_pod` runs `tar_stream`, and `tar_extraction` unpacks
+the output.
 """
 
 from palaestra.client.client import Client

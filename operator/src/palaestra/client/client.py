@@ -1,4 +1,4 @@
-"""The client: one method for each operation on the TrainingJobs of a cluster."""
+"""The client, which has one method for each operation on the TrainingJobs of a cluster."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -37,22 +37,23 @@ Until = Literal["ended", "Running", "Suspended", "Succeeded", "Failed"]
 
 
 class Client:
-    """The TrainingJobs of one namespace of a cluster; safe to use from several threads.
+    """The TrainingJobs of one namespace of a cluster; several threads may use one client.
 
     Attributes:
-        api: the connection to the cluster, for other requests.
+        api: the connection to the cluster, for requests about other objects.
         namespace: the namespace of the jobs.
     """
 
     def __init__(
         self, *, namespace: str | None = None, kubeconfig: str | None = None, context: str | None = None
     ) -> None:
-        """Choose a cluster; no request is sent yet.
+        """Choose a cluster; the constructor sends no request.
 
         Args:
-            namespace: None for the namespace of the context, or of the pod.
-            kubeconfig: None for $KUBECONFIG, then ~/.kube/config, then the pod's service account.
-            context: the context of the kubeconfig; None for its current one.
+            namespace: the namespace of the jobs; None for the namespace of the context, or of the pod.
+            kubeconfig: the kubeconfig file; None for $KUBECONFIG, then ~/.kube/config, then the pod's service
+                account.
+            context: the context of the kubeconfig; None for the current context.
 
         Raises:
             NotConfigured: no API server is configured, or its credentials cannot be read.
@@ -65,7 +66,7 @@ class Client:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Close its connections."""
+        """Close all connections."""
         self.close()
 
     def close(self) -> None:
@@ -76,17 +77,18 @@ class Client:
         """Create a job, or change its mutable fields, and return the stored job.
 
         Args:
-            job: the job, plain data, YAML text, or the path of a file. The cluster sets the absent fields.
+            job: the job as an object, plain data, YAML text, or the path of a file. The cluster sets the
+                absent fields to their defaults.
 
         Raises:
-            SpecErrors: the job is wrong; the error lists every problem. No request was sent.
+            SpecErrors: the job is invalid; the error lists every problem. No request was sent.
             OSError: the file cannot be read.
             ApiError: the API server refuses, for example a change of an immutable field.
         """
         data = data_of(job)
         validate(data, name_of(job))
         metadata = {"namespace": self.namespace, **data["metadata"]}
-        # A second server-side apply of an empty spec would remove the spec.
+        # If this client applied an empty spec twice, the second server-side apply would remove the spec.
         spec = data["spec"] or {"replicas": Spec().replicas}
         with asked(None, self.namespace):
             return _job(self.api.apply({**data, "metadata": metadata, "spec": spec}, manager=MANAGER))
@@ -101,12 +103,12 @@ class Client:
         return _job(self.raw(name))
 
     def list(self, labels: str | None = None) -> tuple[TrainingJob, ...]:
-        """Return all jobs of the namespace, or those that match a label selector."""
+        """Return all jobs of the namespace, or only the jobs that match a label selector."""
         with asked(None, self.namespace):
             return tuple(_job(job) for job in self.api.list(TRAINING_JOBS, self.namespace, labels=labels))
 
     def raw(self, name: str) -> Object:
-        """Return a job as plain data, as the API server stores it.
+        """Return a job as plain data, in the form that the API server stores.
 
         Raises:
             NoSuchJob: no job has this name.
@@ -133,7 +135,7 @@ class Client:
             raise NoSuchJob.of(name, self.namespace)
 
     def statuses(self, name: str, *, deadline_s: float) -> Iterator[Status]:
-        """Yield the status of a job after each change; raises the same errors as `changes`."""
+        """Yield the status of a job now and after each change; raise the same errors as `changes`."""
         for job in self.changes(name, deadline_s=deadline_s):
             yield job.status
 
@@ -145,14 +147,14 @@ class Client:
         deadline_s: float,
         report: Callable[[str], object] | None = None,
     ) -> TrainingJob:
-        """Wait until the job reaches a phase or ends, and return it.
+        """Wait until the job reaches a phase or ends, and return the job.
 
         Args:
             name: of the job.
             until: the phase, or `ended`.
-            deadline_s: for the whole wait.
-            report: function such as `print` or `logging.info`, called with a line for each new phase, and for
-                each new waiting reason of a replica, with its time; None: no report.
+            deadline_s: the longest wait in seconds.
+            report: a function such as `print` or `logging.info`. The function is called with one line for
+                each new phase, and for each new waiting reason of a replica. None: no report.
 
         Raises:
             EndedOtherwise: the job ended in another phase than `until`.
@@ -187,11 +189,11 @@ class Client:
 
         Args:
             name: of the job.
-            replica: its number.
+            replica: the number of the replica.
             container: `trainer`, `ros-master`, or `sim-<group>-<number>`.
             follow: whether to wait for further lines until the container has ended.
-            tail: number of last lines; None: all lines that the node has kept.
-            deadline_s: for the whole call.
+            tail: number of last lines; None: all lines that the node still has.
+            deadline_s: the deadline of the whole call, in seconds.
 
         Raises:
             NoSuchJob: no job has this name.
@@ -205,7 +207,7 @@ class Client:
             )
         except NotFound as error:
             raise NoPod(
-                f"pod {pod.name}: does not exist any more, nor does its log; "
+                f"pod {pod.name}: does not exist any more, and its log was deleted with it; "
                 f"`palaestra describe {name}` shows the last lines of the last attempt"
             ) from error
         except Invalid as error:
@@ -215,11 +217,11 @@ class Client:
                     f"pod {pod.name}: has no container {container}; it has {', '.join(known)}"
                 ) from error
             raise NoPod(
-                f"pod {pod.name}: {error.message}; `palaestra describe {name}` shows what it waits for"
+                f"pod {pod.name}: {error.message}; `palaestra describe {name}` shows what the pod waits for"
             ) from error
 
     def events(self, name: str) -> tuple[Event, ...]:
-        """Return the events about a job and the objects created for it, oldest first.
+        """Return the events about a job and about the objects created for the job, oldest first.
 
         Raises:
             NoSuchJob: no job has this name.
@@ -227,7 +229,7 @@ class Client:
         return events_about(self.api, self.get(name))
 
     def suspend(self, name: str) -> TrainingJob:
-        """Suspend a job: its pods save a checkpoint and are deleted; raises the same errors as `resume`."""
+        """Suspend a job: its pods save a checkpoint and are deleted; raise the same errors as `resume`."""
         _check_running(self.get(name), "suspended")
         try:
             return self._suspended(name, suspend=True)
@@ -249,9 +251,9 @@ class Client:
         return job
 
     def restart(self, name: str) -> TrainingJob:
-        """Restart the replicas of a job whose runs are lost, from the content of their run directories.
+        """Restart the replicas of a job that have lost their runs, from the content of their run directories.
 
-        A replica whose run directory is empty or whose claim is gone starts at step 0 again.
+        A replica starts at step 0 again if its run directory is empty or its claim does not exist.
 
         Raises:
             NoSuchJob: no job has this name.
@@ -267,7 +269,7 @@ class Client:
             return _job(self.api.merge(TRAINING_JOBS, self.namespace, name, word))
 
     def delete(self, name: str, *, deadline_s: float | None = None) -> None:
-        """Delete a job and its pods; with a deadline, wait for that. With `retain: Keep`, claims stay.
+        """Delete a job and its pods; with a deadline, wait for the end. With `retain: Keep`, claims stay.
 
         Raises:
             NoSuchJob: no job has this name.
@@ -291,10 +293,11 @@ class Client:
         deadline_s: float = FETCH_S,
         most_bytes: int | None = None,
     ) -> Path:
-        """Copy policy, report and TensorBoard data of a run; return the folder `into/<job>/<replica>`.
+        """Copy policy, report and TensorBoard data of a run, and return the folder `into/<job>/<replica>`.
 
-        Needs the permissions to create and delete pods and to run commands in them. The data from the pod is
-        untrusted: `most_bytes` limits its size, by default to four times the volume that the job requests.
+        The user needs the permissions to create and delete pods and to run commands in them. The data from
+        the pod is untrusted, so `most_bytes` limits its size. The default is four times the volume that the
+        job requests.
 
         Raises:
             NoSuchJob: no job has this name.
@@ -319,21 +322,21 @@ def newest_pod(job: TrainingJob, replica: int) -> PodReference:
     if pod is None:
         name = job.metadata.name
         raise NoPod(
-            f"job {name}: replica {replica} has no pod; "
-            f"the job has {job.spec.replicas} replicas, and `palaestra describe {name}` shows why they wait"
+            f"job {name}: replica {replica} has no pod; the job has "
+            f"{job.spec.replicas} replicas, and `palaestra describe {name}` shows why replicas wait"
         )
     return pod
 
 
 def _containers(job: TrainingJob, replica: int) -> tuple[str, ...]:
-    """Return the names of a replica's containers with logs for people."""
+    """Return the names of a replica's containers whose logs people read."""
     layout = ClusterLayout(images=Images.of_release(version("palaestra")))
     simulators = Replica(job=job, index=replica, layout=layout).simulators
     return (TRAINER, ROS_MASTER, *(simulator.container for simulator in simulators))
 
 
 def _check_running(job: TrainingJob, verb: str) -> None:
-    """Return if the job has not ended.
+    """Check that the job has not ended.
 
     Raises:
         HasEnded: the job has ended.
@@ -344,10 +347,10 @@ def _check_running(job: TrainingJob, verb: str) -> None:
 
 
 def _check_queue(job: TrainingJob, refusal: Invalid | None = None) -> None:
-    """Return if the job has no queue.
+    """Check that the job has no queue.
 
     Raises:
-        QueueDecides: the job has a queue; chained to the API server's `refusal`, if any.
+        QueueDecides: the job has a queue; the API server's `refusal`, if given, is the cause.
     """
     queue = job.spec.scheduling.queue_name
     if queue is not None:

@@ -3,13 +3,13 @@
     ClientError
     ├── NotInstalled        the cluster has no TrainingJob definition
     ├── NoSuchNamespace     the namespace does not exist
-    ├── NoSuchJob           the TrainingJob does not exist, or was deleted in the meantime
+    ├── NoSuchJob           the TrainingJob does not exist, or was deleted during the call
     ├── QueueDecides        only Kueue suspends and resumes a job in a queue
     ├── HasEnded            the job has ended, so it is neither suspended nor resumed
-    ├── NothingLost         no replica of the job has lost its run, so none is restarted
+    ├── NothingLost         no replica of the job has lost its run, so no replica is restarted
     ├── EndedOtherwise      the job ended in another phase than expected
     ├── TookTooLong         a deadline passed; the same call may be repeated
-    ├── NoPod               a replica has no pod or no such container, so no log
+    ├── NoPod               a replica has no pod or no such container, so it has no log
     └── NotFetched          a run could not be copied; no file was written
 
 A request that the API server refuses raises an ApiError (palaestra.cluster.errors).
@@ -28,7 +28,7 @@ INSTALL = "`palaestra crd | kubectl apply --server-side -f -`"
 
 
 class ClientError(PalaestraError):
-    """A cluster does not have a requested object, or did not do what was requested."""
+    """A cluster does not have a requested object, or did not execute a request."""
 
 
 class NotInstalled(ClientError):
@@ -53,7 +53,7 @@ class NoSuchNamespace(ClientError, LookupError):
 
 
 class NoSuchJob(ClientError, LookupError):
-    """The TrainingJob does not exist, or was deleted in the meantime."""
+    """The TrainingJob does not exist, or was deleted during the call."""
 
     @classmethod
     def of(cls, name: str, namespace: str) -> Self:
@@ -82,7 +82,7 @@ class HasEnded(ClientError):
 
     @classmethod
     def of(cls, name: str, phase: str, verb: str) -> Self:
-        """Return the error about a job that ended in this phase; `verb` is the refused action: `resumed`."""
+        """Return the error about a job that ended in `phase`; `verb` is the refused action: `resumed`."""
         return cls(
             f"job {name}: has ended ({phase}), so it cannot be {verb}; create a new job, and continue this "
             "run with spec.storage.resumeFrom"
@@ -90,7 +90,7 @@ class HasEnded(ClientError):
 
 
 class NothingLost(ClientError):
-    """No replica of the job has lost its run, so none can be restarted."""
+    """No replica of the job has lost its run, so no replica can be restarted."""
 
     @classmethod
     def of(cls, name: str) -> Self:
@@ -136,7 +136,7 @@ def asked(name: str | None, namespace: str) -> Iterator[None]:
 
 
 def check_namespace(api: Api, name: str) -> None:
-    """Check that a namespace exists; without permission to read it, it is assumed to exist.
+    """Check that a namespace exists; without permission to read the namespace, do not check.
 
     Raises:
         NoSuchNamespace: the namespace does not exist.

@@ -1,4 +1,4 @@
-"""The events about a TrainingJob and the objects created for it, oldest first."""
+"""The events about a TrainingJob and about the objects created for it, oldest first."""
 
 import re
 from collections.abc import Mapping
@@ -14,7 +14,7 @@ from palaestra.plan.claim import claim_name
 
 MADE_FOR_REPLICAS = {"Job", "Pod", "PersistentVolumeClaim", "ConfigMap"}
 
-CONTAINER = re.compile(r"spec\.\w*[cC]ontainers\{(.+)\}")  # also of init and ephemeral containers
+CONTAINER = re.compile(r"spec\.\w*[cC]ontainers\{(.+)\}")  # matches init and ephemeral containers too
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,10 +25,11 @@ class Event:
         time: the time of the last occurrence.
         warning: whether its type is Warning.
         about: kind and name of the object: `Pod/job-0-x7k2p`.
-        reason: one word; docs/reference/reasons.md explains those about the TrainingJob.
+        reason: one word; docs/reference/reasons.md explains the reasons of events about the TrainingJob.
         message: one sentence.
         count: number of occurrences.
-        container: the container of the pod in `about`; empty: the whole pod, or another object.
+        container: the container of the pod in `about`; empty: the event is about the whole pod or another
+            object.
     """
 
     time: datetime
@@ -58,7 +59,8 @@ def concerns(event: Mapping[str, Any], job: TrainingJob) -> bool:
     kind, name, uid = about.get("kind"), about.get("name", ""), about.get("uid")
     if kind == KIND:
         return name == job.metadata.name and uid in {None, job.metadata.uid}
-    # Kubernetes ends the name of a Job's pod with five characters; ConfigMaps and most claims end with a uid.
+    # Kubernetes appends five characters to the name of a Job's pod. The names of most claims end in the job's
+    # uid.
     replica = rf"{re.escape(job.metadata.name)}-[0-9]+(-[a-z0-9]{{5}}|-{re.escape(job.metadata.uid or '')})?"
     claims = (
         claim_name(job.metadata.name, index, job.metadata.uid or "") for index in range(job.spec.replicas)
@@ -81,6 +83,6 @@ def _read(event: Mapping[str, Any]) -> Event:
 
 
 def _container(field_path: str) -> str:
-    """Return the name in a path such as `spec.initContainers{ros-master}`; empty for any other field."""
+    """Return the container's name in a path such as `spec.initContainers{ros-master}`, or ""."""
     found = CONTAINER.fullmatch(field_path)
     return found[1] if found else ""

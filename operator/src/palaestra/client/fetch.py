@@ -1,7 +1,8 @@
-"""Copy a run's results out of its volume: from the running pod, or with a temporary pod.
+"""Copy a run's results out of its volume, through the running pod or through a temporary pod.
 
-The target folder is complete or does not exist: the files are written to a temporary folder next to it, which
-is then renamed. docs/decisions/0011 explains why a command in a container sends the files.
+The target folder is either complete or absent. The files are written to a temporary folder next to it, which
+is renamed at the end. The reason for which a command in a container sends the files is in
+docs/decisions/0011.
 """
 
 import secrets
@@ -39,14 +40,15 @@ PARTS = (
     "attempts.jsonl",
     "tensorboard",
 )
-TIMES = 4  # provisioners round sizes up, and some do not limit a volume
+TIMES = 4  # a volume may be larger than its request: provisioners round up, and some do not limit a volume
 OF_EXISTING_BYTES = 2**34
-GOES_ON = frozenset({Phase.PENDING, Phase.RUNNING})  # A replica in these phases gets a pod if it has none.
+# A replica in these phases gets a new pod if it has no pod.
+GOES_ON = frozenset({Phase.PENDING, Phase.RUNNING})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunSource:
-    """A container that has a run directory mounted."""
+    """A container in which a run directory is mounted."""
 
     namespace: str
     pod: str
@@ -62,14 +64,14 @@ def fetch(
     Args:
         api: the cluster.
         job: the job of the run.
-        replica: its number.
+        replica: the number of the replica.
         into: the folder for results.
-        deadline: on the monotonic clock.
-        most_bytes: limit for all files together; None: `TIMES` times the volume that the job requests.
+        deadline: the end of the call, on the monotonic clock.
+        most_bytes: the limit for all files together; None: `TIMES` times the volume that the job requests.
 
     Raises:
-        NotFetched: the folder exists already, the run does not exist, or one of them cannot be accessed.
-        TookTooLong: the deadline, on the monotonic clock, passed.
+        NotFetched: the folder exists already, the run does not exist, or folder or run cannot be accessed.
+        TookTooLong: the deadline passed.
         ApiError: the API server refuses.
     """
     target = into / job.metadata.name / str(replica)
@@ -81,14 +83,14 @@ def fetch(
 
 
 def _usual_bytes(job: TrainingJob) -> int:
-    """Return the limit for the files of a run; the job does not state the size of an existing claim."""
+    """Return the default limit for the files of a run; for an existing claim, it is a constant."""
     storage = job.spec.storage
     return TIMES * in_bytes(storage.size) if storage.existing_claim is None else OF_EXISTING_BYTES
 
 
 @contextmanager
 def _with_remedies(source: RunSource, target: Path, deadline: float) -> Iterator[None]:
-    """Replace errors in the block by errors that name the place and the remedy."""
+    """Replace errors in the block by errors that name the pod or folder and the remedy."""
     try:
         yield
     except Unreachable as error:
@@ -97,7 +99,7 @@ def _with_remedies(source: RunSource, target: Path, deadline: float) -> Iterator
         raise TookTooLong(
             f"{source.directory} in pod {source.pod}: was not copied in time; allow more time with --timeout"
         ) from error
-    except (ApiError, ClientError):  # some of these are OSErrors too
+    except (ApiError, ClientError):  # some of these errors are OSErrors too
         raise
     except CommandFailed as error:
         raise NotFetched(
@@ -106,8 +108,8 @@ def _with_remedies(source: RunSource, target: Path, deadline: float) -> Iterator
         ) from error
     except WrongArchive as error:
         raise NotFetched(
-            f"{source.directory} in pod {source.pod}: was refused: {error}; nothing was written; look "
-            "into the run, and allow more with --max-size if it is only large"
+            f"{source.directory} in pod {source.pod}: was refused: {error}; no file was written; inspect "
+            "the run, and raise --max-size if its files are only large"
         ) from error
     except OSError as error:
         raise NotFetched(f"{target}: {error}; choose a writable folder") from error
@@ -134,7 +136,7 @@ def _copy(api: Api, source: RunSource, target: Path, deadline: float, most_bytes
 
 @contextmanager
 def _source(api: Api, job: TrainingJob, replica: int, deadline: float) -> Iterator[RunSource]:
-    """Yield a container with the run mounted: the trainer while it runs, else a temporary one."""
+    """Yield a container with the run mounted: the running trainer, or a container of a temporary pod."""
     template = _template(api, job, replica)
     directory = run_directory(template)
     running = _running(api, job, replica)
@@ -157,7 +159,7 @@ def _template(api: Api, job: TrainingJob, replica: int) -> Object:
     except NotFound:
         raise NotFetched(
             f"job {job.metadata.name}: replica {replica} was not created, so it has no run; "
-            f"the job has {job.spec.replicas} replicas, and `palaestra describe` shows why one waits"
+            f"the job has {job.spec.replicas} replicas, and `palaestra describe` shows why a replica waits"
         ) from None
     return template
 
@@ -166,7 +168,7 @@ def _running(api: Api, job: TrainingJob, replica: int) -> str | None:
     """Return the name of the replica's pod if it runs; None if it has ended.
 
     Raises:
-        NotFetched: the pod is about to start and needs its volume, or is just ending.
+        NotFetched: the pod is about to start and needs its volume, or has just ended its training.
     """
     known = next((reported for reported in job.status.replicas if reported.index == replica), None)
     name = known.pod.name if known is not None and known.pod is not None else None
@@ -177,7 +179,7 @@ def _running(api: Api, job: TrainingJob, replica: int) -> str | None:
             f"pod {name}: is about to start, and no other pod may use its volume; "
             "run the same command again when it runs"
         )
-    if phase == "Running" and _trainer_ended(status):  # and the pod's simulators are stopped
+    if phase == "Running" and _trainer_ended(status):  # the pod still stops its simulators
         raise NotFetched(f"pod {name}: its trainer has just ended; run the same command again in a minute")
     if phase == "Running":
         return name
@@ -191,7 +193,7 @@ def _running(api: Api, job: TrainingJob, replica: int) -> str | None:
 
 
 def _status(api: Api, namespace: str, name: str) -> Object:
-    """Return the status of a pod; an empty one if the pod does not exist."""
+    """Return the status of a pod; an empty status if the pod does not exist."""
     try:
         status: Object = api.get(PODS, namespace, name)["status"]
     except NotFound:
@@ -209,9 +211,9 @@ def _trainer_ended(status: Object) -> bool:
 
 @contextmanager
 def _reader(api: Api, job: TrainingJob, replica: int, template: Object, deadline: float) -> Iterator[str]:
-    """Yield the name of a temporary pod that reads the volume, and delete the pod in any case.
+    """Yield the name of a temporary pod that mounts the volume, and always delete this pod afterwards.
 
-    An error of the deletion is ignored, because the pod ends by itself at the deadline.
+    An error of the deletion is ignored, because the pod has a deadline of its own.
     """
     name = f"{job.metadata.name}-{replica}-fetch-{secrets.token_hex(3)}"
     lives_s = max(round(deadline - time.monotonic()), 1)
@@ -245,7 +247,7 @@ def _await(api: Api, pod: Object, deadline: float) -> None:
 
 
 def hindrance(pod: Object) -> str:
-    """Return the cluster's reason for which a pod does not run; empty: no reason is reported."""
+    """Return the cluster's reason for which a pod does not run; empty if the pod's status has no reason."""
     status = pod["status"]
     waiting = [
         (container.get("state") or {}).get("waiting") for container in status.get("containerStatuses", ())

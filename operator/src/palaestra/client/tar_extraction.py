@@ -1,7 +1,7 @@
 """Unpack an untrusted tar stream from a container.
 
-Only requested regular files are written, below one folder. Their number, their total size, the length of
-their names and the memory are limited.
+The module writes only requested regular files, below one folder. It limits the number of files, their total
+size, the length of their names and the memory in use.
 """
 
 import io
@@ -16,12 +16,12 @@ from palaestra.api.text import one_line
 MOST_FILES = 10_000
 MOST_PARTS = 16
 MOST_NAME_BYTES = 255
-# The limit between two files, for their headers and the blocks that are read ahead.
+# The limit of bytes between the contents of two files: headers, and blocks that are read ahead.
 MOST_HEAD_BYTES = 2**16
 
 
 class WrongArchive(tarfile.TarError):
-    """A tar is damaged, or has an unrequested file; the message is for people."""
+    """A tar stream is damaged, or contains a file that was not requested; the message is for people."""
 
 
 def unpack(chunks: Iterator[bytes], into: Path, wanted: Collection[str], most_bytes: int) -> None:
@@ -29,12 +29,12 @@ def unpack(chunks: Iterator[bytes], into: Path, wanted: Collection[str], most_by
 
     Args:
         chunks: the chunks of the stream.
-        into: the folder.
-        wanted: names of the requested files, and of folders with requested files.
-        most_bytes: the most bytes of all files together.
+        into: the new folder.
+        wanted: names of the requested files and folders.
+        most_bytes: the limit of bytes of all files together.
 
     Raises:
-        WrongArchive: it is not a tar, has other members, or is too large.
+        WrongArchive: the stream is not a tar, has members that were not requested, or is too large.
         OSError: a file cannot be written.
     """
     stream = _Stream(chunks)
@@ -53,12 +53,12 @@ def unpack(chunks: Iterator[bytes], into: Path, wanted: Collection[str], most_by
         raise
     except (tarfile.TarError, ValueError, UnicodeError) as error:  # tarfile raises all three
         raise WrongArchive(f"it is damaged ({one_line(str(error), 200)})") from error
-    for _ in chunks:  # The exit code of the command comes last.
+    for _ in chunks:  # The exit code of the command is at the end of the stream.
         pass
 
 
 class _Seen:
-    """The files of an archive so far, and their folders."""
+    """The files that were read from an archive, and their folders."""
 
     def __init__(self) -> None:
         self.files: set[PurePosixPath] = set()
@@ -69,15 +69,15 @@ class _Seen:
         self._folders.update(path.parents)
 
     def clashes_with(self, path: PurePosixPath) -> bool:
-        """Return whether a file cannot exist together with the earlier files."""
+        """Return whether the path conflicts with an earlier file or folder."""
         return path in self.files or path in self._folders or not self.files.isdisjoint(path.parents)
 
 
 def _path(member: tarfile.TarInfo, wanted: Collection[str], seen: _Seen) -> PurePosixPath:
-    """Return the path of a member, if it may be written.
+    """Return the path of a member that may be written.
 
     Raises:
-        WrongArchive: it must not be written.
+        WrongArchive: the member must not be written.
     """
     name, path = member.name, PurePosixPath(member.name)
     shown = one_line(name, 100) or "a member without a name"
@@ -109,8 +109,8 @@ class _Stream(io.RawIOBase):
     """An iterator of chunks as a readable file.
 
     Attributes:
-        left: bytes that may be read before the next member is known; tarfile would keep a larger header in
-            memory as a whole.
+        left: bytes that may be read until the next member is known. The limit is for headers, because tarfile
+            keeps a whole header in memory.
     """
 
     def __init__(self, chunks: Iterator[bytes]) -> None:
@@ -126,7 +126,7 @@ class _Stream(io.RawIOBase):
         """Copy received bytes into the buffer and return their number; 0 at the end.
 
         Raises:
-            WrongArchive: too many bytes are between two files.
+            WrongArchive: more bytes are between two files than `left` allows.
         """
         while not self._rest:
             try:

@@ -1,8 +1,8 @@
-"""Write parts of a folder to standard output as one tar: run as `python3 -I -c TEXT FOLDER NAME...`.
+"""Write files of a folder to standard output as one tar: run as `python3 -I -c TEXT FOLDER NAME...`.
 
-The text of this file is sent to a container, so it uses the standard library only. The run may continue in
-the meantime. Each file is opened before its size is read: a growing file is truncated at that size, and a
-replaced file is complete. Missing files are skipped.
+The client sends the text of this file to a container, so the program imports only the standard library. The
+run may write to its files meanwhile. Each file is opened before its size is read. So a growing file is
+truncated at that size, and the old content of a replaced file is complete. Missing files are skipped.
 """
 
 import os
@@ -24,7 +24,7 @@ def files(folder: str, name: str) -> list[str]:
 
 
 def pack(folder: str, names: list[str]) -> None:
-    """Write the tar."""
+    """Write the tar with the named files and folders."""
     with tarfile.open(fileobj=sys.stdout.buffer, mode="w|") as tar:
         for name in names:
             for file in files(folder, name):

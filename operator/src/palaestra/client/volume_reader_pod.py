@@ -1,8 +1,8 @@
 """The pod that reads the volume of a run after the run's own pod has ended.
 
-Pure. The pod is built from the template of the replica's Job in the cluster, so it has the same security
-context, scheduling, pull secrets and trainer image as the run's pods. It mounts the volume read-only, has no
-token, and ends by itself even if it is not deleted.
+This module is pure. The pod is built from the template of the replica's Job in the cluster. So the reader pod
+has the same security context, scheduling, pull secrets and trainer image as the run's pods. The pod mounts
+the volume read-only, has no service account token, and ends by itself even if nobody deletes it.
 """
 
 import copy
@@ -20,13 +20,13 @@ GRACE_S = 1
 
 
 def reading_pod(job: TrainingJob, template: Mapping[str, Any], name: str, lives_s: int) -> dict[str, Any]:
-    """Return the pod; it is deleted with the TrainingJob.
+    """Return the pod; the TrainingJob owns it, so that the two are deleted together.
 
     Args:
         job: the job of the run.
         template: the pod template of the replica's Job.
         name: name of the pod, different for each call.
-        lives_s: whole seconds after which it ends by itself.
+        lives_s: whole seconds after which the pod ends by itself.
     """
     spec = copy.deepcopy(dict(template["spec"]))
     spec.pop("initContainers", None)
@@ -51,9 +51,10 @@ def reading_pod(job: TrainingJob, template: Mapping[str, Any], name: str, lives_
 
 
 def _reader(template: Mapping[str, Any], lives_s: int) -> dict[str, Any]:
-    """Return the container: the trainer's image and security context, and only the run as a read-only mount.
+    """Return the container: the trainer's image and security context, with only the run mounted, read-only.
 
-    It has the resources of the ROS master, the smallest that a quota of the namespace is known to admit.
+    Its resources are the resources of the ROS master, which are small, and which the namespace's quotas have
+    admitted before.
     """
     trainer = trainer_of(template)
     [master] = (each for each in template["spec"]["initContainers"] if each["name"] == ROS_MASTER)
@@ -76,7 +77,7 @@ def trainer_of(template: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def run_directory(template: Mapping[str, Any]) -> str:
-    """Return the path of the run in the trainer and in the reading pod."""
+    """Return the path of the run in the trainer's container, which is the same in the reader pod."""
     return next(
         str(variable["value"]) for variable in trainer_of(template)["env"] if variable["name"] == RUN_VARIABLE
     )

@@ -1,4 +1,4 @@
-"""The progress of a job in its status, as lines of text, and the reason of its phase."""
+"""Convert the progress in a job's status to lines of text, and find the reason for its phase."""
 
 import re
 from collections.abc import Iterator
@@ -14,18 +14,18 @@ _NUMBERS = re.compile(r"\d+")
 class News:
     """Reports each phase of a job, and each waiting reason of a replica, once.
 
-    The kubelet alternates between two messages and counts its retries. A known message, or one that differs
-    only in its numbers, is reported again only after the reason has changed.
+    The kubelet alternates between two messages and counts its retries. So a message that was reported before
+    is reported again only after the reason has changed; numbers in the message are not compared.
     """
 
     def __init__(self, name: str) -> None:
-        """Start without reported lines; each line begins with `name`."""
+        """Begin; each line will start with `name`."""
         self._name = name
         self._phase = ""
         self._reported: set[tuple[object, ...]] = set()
 
     def of(self, phase: str, status: Status) -> Iterator[str]:
-        """Yield a line for a new phase, then one for each replica with a new waiting reason."""
+        """Yield a line for a new phase, then a line for each replica with a new waiting reason."""
         if phase != self._phase:
             self._phase = phase
             yield f"{self._name}: {phase}"
@@ -42,7 +42,7 @@ def current(job: TrainingJob) -> bool:
 
 
 def why(status: Status) -> str:
-    """Return reason and message of the condition of the phase; empty without that condition."""
+    """Return reason and message of the condition of the phase; "" if that condition is not true."""
     for condition in status.conditions:
         if (
             status.phase

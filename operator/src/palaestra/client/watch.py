@@ -1,6 +1,6 @@
 """The changes of one object, until it is deleted or a deadline passes.
 
-A watch that ends, fails or expires is restarted from the current object; no version is yielded twice.
+A watch that ends, fails or expires is restarted from the current object, but no version is yielded twice.
 """
 
 import threading
@@ -24,19 +24,19 @@ def changes(
 ) -> Iterator[Object]:
     """Yield the object, then yield it again after each change, until it does not exist.
 
-    A new object of the same name ends the iteration.
+    If the object is replaced by a new object of the same name, the iteration ends too.
 
     Args:
         api: the cluster.
         resource: kind of the object.
         namespace: the namespace of the object.
         name: the name of the object.
-        deadline: on the monotonic clock.
-        uid: uid of the object; empty: that of the first object found.
+        deadline: the end of the iteration, on the monotonic clock.
+        uid: uid of the object; empty: the uid of the first object found.
 
     Raises:
         TookTooLong: the deadline passed.
-        ApiError: the API server refuses. After the object was found, retryable errors are retried.
+        ApiError: a request failed. After the object was found once, retryable errors are retried instead.
     """
     version, failures = "", 0
     while True:
@@ -66,7 +66,7 @@ def changes(
 def _until_the_watch_ends(
     api: Api, resource: Resource, namespace: str, name: str, deadline: float
 ) -> Iterator[Object]:
-    """Yield the object, then yield it again after each change; raises _Gone."""
+    """Yield the object, then yield it again after each change until the watch ends; may raise _Gone."""
     only = f"metadata.name={name}"
     [page] = api.pages(resource, namespace, fields=only)
     if not page.items:

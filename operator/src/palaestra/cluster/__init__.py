@@ -1,22 +1,22 @@
 """The only package that connects to an API server.
 
-Requests and responses are plain JSON. The official client merges the files of a kubeconfig; its models are
-not used (docs/decisions/0004). These modules know Kubernetes, but not TrainingJobs:
+Requests and responses are plain JSON. The official client only merges the files of a kubeconfig; its models
+are not used (docs/decisions/0004). These modules depend on Kubernetes, but not on TrainingJobs:
 
 - `resources`: the kinds of objects and their API paths
-- `connection`: the API server and the identity to use; `client_config`: its address and credentials
-- `kubeconfig`, `service_account`: their sources, outside a pod and in a pod
-- `identity`, `plugin`, `tokens`, `impersonation`: the user who sends requests, and the user for whom they act
+- `connection`: the choice of API server and identity; `client_config`: address and credentials of the server
+- `kubeconfig`, `service_account`: the sources of address and credentials, outside a pod and in a pod
+- `identity`, `plugin`, `tokens`, `impersonation`: the user who sends requests, and the impersonated user
 - `proxies`, `connection_pool`, `tls`: the route to the server, and the verification of its certificate
 - `timeouts`: deadlines, and waits before a retry
 - `api`: one request, with a deadline
 - `transport`: the bytes of requests and responses
-- `errors`: one exception for each kind of refusal
+- `errors`: the exceptions, one for each kind of refusal
 - `watch`: one watch, until it ends
 - `reflector`: a cache that follows the API server
-- `store`: the objects of that cache
-- `workqueue`: keys to reconcile, each with one worker at a time
-- `lease`: leader election; `lease_timing`: its arithmetic
+- `store`: the objects in such a cache
+- `workqueue`: the keys to reconcile; only one worker at a time has a key
+- `lease`: leader election; `lease_timing`: the arithmetic of its durations
 - `recorder`: events for people
 - `pod_logs`: the log of a running container
 - `pod_exec`: a command in a container

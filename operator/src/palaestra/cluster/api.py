@@ -1,7 +1,8 @@
-"""Requests to an API server: plain JSON, a deadline on each, and a typed exception for each kind of refusal.
+"""Requests to an API server in plain JSON; each has a deadline, and each kind of refusal its own exception.
 
-Only two kinds of requests are retried, within the deadline of the call: a request that a busy server rejected
-(429), and a read whose connection broke. All others are retried by the caller's queue.
+This module retries only two kinds of requests, within the deadline of the call: a request that a busy server
+rejected (429), and a read whose connection broke. For all other failed requests, the caller decides on a
+retry.
 """
 
 import time
@@ -33,10 +34,10 @@ READS = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Page:
-    """A part of a list.
+    """One page of a list.
 
     Attributes:
-        items: the objects, with apiVersion and kind, which lists leave out.
+        items: the objects; apiVersion and kind are added, because the items of a list lack them.
         version: the resourceVersion of the whole list, from which a watch continues.
     """
 
@@ -45,10 +46,10 @@ class Page:
 
 
 class Api:
-    """An API server, as one identity; safe to use from several threads.
+    """An API server, used with one identity; several threads may use one object.
 
     Attributes:
-        limits: the deadlines.
+        limits: the deadlines and the waits before retries.
     """
 
     def __init__(self, transport: Transport, call_s: float | None = None) -> None:
@@ -62,9 +63,9 @@ class Api:
 
     @property
     def on_request(self) -> OnRequest:
-        """Called after every request, also of `within`: verb, plural, HTTP status (0: no response), seconds.
+        """The hook that is called after every request: verb, plural, HTTP status (0: no response), seconds.
 
-        A watch is reported when it ends.
+        The objects that `within` returns have the same hook. A watch is reported when it ends.
         """
         return self._transport.on_request
 
@@ -73,11 +74,11 @@ class Api:
         self._transport.on_request = hook
 
     def version(self) -> str:
-        """Return the API server's version: `v1.36.4`."""
+        """Return the API server's version, such as `v1.36.4`."""
         return str(self._object(Call(verb="get", plural="version", path="/version")).get("gitVersion", ""))
 
     def serves(self, group_version: str) -> bool:
-        """Return whether the API server has a group and version, such as `kueue.x-k8s.io/v1beta1`."""
+        """Return whether the API server serves a group and version, such as `kueue.x-k8s.io/v1beta1`."""
         try:
             self._object(Call(verb="get", plural="groups", path=f"/apis/{group_version}"))
         except NotFound:
@@ -87,10 +88,11 @@ class Api:
     def schema(self, group_version: str, kind: str) -> Object:
         """Return the OpenAPI schema of a kind, which the API server publishes to every account.
 
-        The schema of a custom resource is published some seconds after its definition.
+        The API server publishes the schema of a custom resource some seconds after its definition was
+        applied.
 
         Raises:
-            NotFound: the kind is not published.
+            NotFound: the API server publishes no schema of this kind.
         """
         path = f"/openapi/v3/apis/{group_version}"
         document = self._object(Call(verb="get", plural="openapi", path=path))
@@ -111,9 +113,9 @@ class Api:
         fields: str | None = None,
         limit: int = PAGE,
     ) -> Objects:
-        """Return all matching objects, as a consistent list, read in pages of `limit`.
+        """Return all matching objects as a consistent list, which is read in pages of `limit` objects.
 
-        Namespace None means all namespaces. `labels` and `fields` are selectors as in kubectl:
+        Namespace None means all namespaces. `labels` and `fields` are selectors as in kubectl, such as
         `palaestra.dev/job=x,palaestra.dev/replica` and `involvedObject.uid=…`.
         """
         for attempt in range(LISTS_FROM_THE_START):
@@ -137,7 +139,7 @@ class Api:
         """Yield a list page by page, so that at most one page is in memory.
 
         Raises:
-            Gone: the version of the list has expired; start again.
+            Gone: the version of the list has expired; read the list again from its first page.
         """
         query = {"limit": str(limit), "labelSelector": labels, "fieldSelector": fields, "continue": None}
         while True:
@@ -145,7 +147,7 @@ class Api:
             metadata = answer.get("metadata") or {}
             items = tuple(_complete(resource, item) for item in answer.pop("items", None) or ())
             yield Page(items=items, version=str(metadata.get("resourceVersion", "")))
-            del items  # frees this page before the next one is read
+            del items  # frees this page before the next page is read
             query["continue"] = metadata.get("continue")
             if not query["continue"]:
                 return
@@ -175,13 +177,13 @@ class Api:
         return self._object(replace(call, accept=TABLE))
 
     def create(self, resource: Resource, obj: Object, *, dry_run: bool = False) -> Object:
-        """Create an object in its `metadata.namespace`, and return it as stored.
+        """Create an object in its `metadata.namespace`, and return the stored object.
 
         With `dry_run` the API server runs all its checks, including admission, and does not store the object.
 
         Raises:
-            AlreadyExists: the name is taken.
-            Invalid: the API server names the wrong field.
+            AlreadyExists: an object of this name exists.
+            Invalid: the object is invalid; the message names the field.
         """
         query = {"dryRun": "All" if dry_run else None}
         return self._object(
@@ -198,10 +200,10 @@ class Api:
         subresource: str | None = None,
         resource_version: str | None = None,
     ) -> Object:
-        """Change the fields in `patch` (RFC 7386: null removes, lists are replaced), and return the object.
+        """Change the fields in `patch` (RFC 7386: null removes, lists are replaced); return the new object.
 
-        `subresource` is `status`, for instance. With a `resource_version` the API server refuses the change
-        if the object has another version.
+        `subresource` may be `status`. With a `resource_version`, the API server refuses the change if the
+        object has another version.
 
         Raises:
             Conflict: the object has another version.
@@ -213,9 +215,9 @@ class Api:
         return self._object(call.sending(patch, method="PATCH", media_type=MERGE_PATCH))
 
     def apply(self, obj: Object, *, manager: str = MANAGER, force: bool = True) -> Object:
-        """Apply the fields in `obj` (server-side apply), and return the object as stored.
+        """Apply the fields in `obj` (server-side apply), and return the stored object.
 
-        Fields that the same manager applied before and that `obj` leaves out are removed.
+        A field that the same manager applied before and that `obj` does not contain is removed.
 
         Raises:
             Conflict: another manager owns a field, and `force` is false.
@@ -235,10 +237,10 @@ class Api:
         resource_version: str | None = None,
         propagation: str = "Background",
     ) -> None:
-        """Delete one object; `propagation` applies to its dependents: `Background`, `Foreground` or `Orphan`.
+        """Delete one object; `propagation` selects how the API server deletes its dependent objects.
 
-        With a `uid`, a later object of the same name is not deleted. With a `resource_version`, the object is
-        deleted only if it has this version.
+        `propagation` is `Background`, `Foreground` or `Orphan`. With a `uid`, a later object of the same name
+        is not deleted. With a `resource_version`, the object is deleted only if it still has this version.
 
         Raises:
             NotFound: the object does not exist.
@@ -257,7 +259,8 @@ class Api:
     def evict(self, namespace: str, name: str, *, uid: str) -> None:
         """Evict the pod with this uid.
 
-        A disruption budget refuses with 429, like a busy server, maybe for days, so this is not retried.
+        If a disruption budget refuses the eviction, the API server responds with 429, as if it were busy.
+        This may last for days, so the request is not retried.
 
         Raises:
             NotFound: no pod has this name.
@@ -283,12 +286,13 @@ class Api:
         fields: str | None = None,
         seconds: float,
     ) -> Watch:
-        """Return the changes after `version`, the version of a list or of an earlier watch's last event.
+        """Return the changes after `version`: that of a list, or of the last event of an earlier watch.
 
-        The API server ends the watch after `seconds`. Iterate over it once, to its end or to `close`.
+        The API server ends the watch after `seconds`. Iterate over the watch once, until it ends or is
+        closed.
 
         Raises:
-            Gone: the version has expired; raised here or by the iterator.
+            Gone: the version has expired; this method or the iterator raises the error.
         """
         query = {
             "watch": "true",
@@ -312,7 +316,7 @@ class Api:
         tail: int | None = None,
         within_s: float,
     ) -> Iterator[str]:
-        """Yield the last `tail` lines of a container's log; with `follow` until the container has ended.
+        """Yield the last `tail` lines of a container's log; with `follow`, also all later lines.
 
         Raises:
             NotFound: the pod does not exist.
@@ -328,7 +332,7 @@ class Api:
         yield from self._lines(call, within_s)
 
     def proxied(self, namespace: str, pod: str, port: int, path: str) -> str:
-        """Return a pod's response to a GET through the API server; `path` has no leading slash.
+        """Return a pod's response to a GET request through the API server; `path` has no leading slash.
 
         Raises:
             ApiError: the pod responds with an error, or the API server cannot reach it.
@@ -342,9 +346,9 @@ class Api:
         """Run a command in a container, without input, and yield its standard output.
 
         Raises:
-            CommandFailed: its exit code is not 0.
-            Unreachable: the connection broke, or the command did not end within `within_s`; output is
-                missing.
+            CommandFailed: the exit code of the command is not 0.
+            Unreachable: the connection broke, or the command did not end within `within_s`, so the output is
+                incomplete.
             ApiError: the API server refuses.
         """
         deadline = time.monotonic() + within_s

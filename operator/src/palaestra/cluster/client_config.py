@@ -1,4 +1,4 @@
-"""The address, connections and credentials of an API server."""
+"""The address of an API server, the connections to it, and the credentials for it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,10 +17,11 @@ class Access:
     Attributes:
         host: the address, such as `https://10.0.0.1:443`.
         pool: connections with the TLS settings for that server, through its proxy.
-        authorization: returns the header `Authorization`, or None; called by one thread at a time. Raises
-            Unreachable if the credentials cannot be read.
-        headers: further headers of every request, for impersonation. A name may occur several times.
-        proxy: the proxy of all connections, for messages.
+        authorization: returns the header `Authorization`, or None. Only one thread at a time calls the
+            function. The function raises Unreachable if the credentials cannot be read.
+        headers: additional headers of every request, for impersonation. The same name may occur several
+            times.
+        proxy: the proxy of all connections, which messages name.
     """
 
     host: str

@@ -1,4 +1,4 @@
-"""The API server to connect to, and the identity: from a kubeconfig, or from the pod's service account."""
+"""Choose the API server and the identity: from a kubeconfig, or from the pod's service account."""
 
 import os
 from pathlib import Path
@@ -15,12 +15,13 @@ DEFAULT = "default"
 
 
 def connect(kubeconfig: str | None = None, context: str | None = None, limits: Timeouts | None = None) -> Api:
-    """Return the API server to use; no request is sent yet.
+    """Return the API server to use, without a request to it.
 
     Args:
-        kubeconfig: a file; None for $KUBECONFIG, then ~/.kube/config, then the pod's service account.
-        context: the context of the kubeconfig; None for its current one.
-        limits: deadlines; None for the usual ones.
+        kubeconfig: the kubeconfig file; None for $KUBECONFIG, then ~/.kube/config, then the pod's service
+            account.
+        context: the context of the kubeconfig; None for the current context.
+        limits: the deadlines; None for the defaults.
 
     Raises:
         NotConfigured: no API server is configured, or its credentials cannot be read.
@@ -31,7 +32,7 @@ def connect(kubeconfig: str | None = None, context: str | None = None, limits: T
 
 def _access(files: str | None, context: str | None) -> Access:
     if files:
-        from palaestra.cluster.kubeconfig import access  # noqa: PLC0415 - 10 MiB that no pod needs
+        from palaestra.cluster.kubeconfig import access  # noqa: PLC0415 - 10 MiB, not needed in a pod
 
         return access(files, context)
     try:
@@ -41,7 +42,7 @@ def _access(files: str | None, context: str | None) -> Access:
 
 
 def namespace_of(kubeconfig: str | None = None, context: str | None = None) -> str:
-    """Return the namespace of the connection that `connect` makes from the same arguments.
+    """Return the namespace of the context or pod that `connect` uses with the same arguments.
 
     Raises:
         NotConfigured: the kubeconfig has no such context, or cannot be read.
@@ -55,7 +56,7 @@ def namespace_of(kubeconfig: str | None = None, context: str | None = None) -> s
 
 
 def own_namespace(default: str) -> str:
-    """Return the namespace of the pod in which this process runs; outside a cluster, `default`."""
+    """Return the namespace of the pod in which this process runs; outside a cluster, return `default`."""
     try:
         return OWN_NAMESPACE.read_text(encoding="ascii").strip() or default
     except (OSError, UnicodeDecodeError):
@@ -65,6 +66,6 @@ def own_namespace(default: str) -> str:
 def _home() -> str | None:
     try:
         file = Path.home() / ".kube" / "config"
-    except RuntimeError:  # the user has no home, for example a pod's numeric user
+    except RuntimeError:  # the user has no home directory, for example the numeric user of a pod
         return None
     return str(file) if file.is_file() else None

@@ -1,4 +1,4 @@
-"""Connections to an API server, directly or through a proxy: a pool of them, and one for a websocket."""
+"""Connections to an API server, directly or through a proxy: a pool, and a single one for a websocket."""
 
 import socket
 import ssl
@@ -11,11 +11,12 @@ from urllib3.util import make_headers
 
 from palaestra.cluster.proxies import Proxy
 
-POOL = 32  # connections kept open: more than the number of workers and watches
-# With these options the kernel detects dead peers, also behind silent proxies.
+POOL = 32  # connections that stay open: more than the number of workers and watches
+# With these options the kernel detects dead peers, even behind proxies that do not report them.
 _TIMES = (("TCP_KEEPIDLE", 30), ("TCP_KEEPINTVL", 30), ("TCP_KEEPCNT", 9))
 KEPT_ALIVE = (
-    (socket.IPPROTO_TCP, socket.TCP_NODELAY, 1),  # urllib3's own default, which these options replace
+    # Urllib3's own option, which must be repeated because these options replace it.
+    (socket.IPPROTO_TCP, socket.TCP_NODELAY, 1),
     (socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1),
     # macOS has no TCP_KEEPIDLE.
     *((socket.IPPROTO_TCP, getattr(socket, name), value) for name, value in _TIMES if hasattr(socket, name)),
@@ -28,9 +29,9 @@ def connections(
     """Return connections with these TLS settings, through `proxy` if it is not None.
 
     Args:
-        context: verifies the server, and also a proxy with an https address.
-        proxy: the proxy of all connections.
-        server_name: the name that the server's certificate must have; None: the host's name.
+        context: the TLS settings that verify the server, and also a proxy with an https address.
+        proxy: the proxy of all connections, or None.
+        server_name: the name that the server's certificate must contain; None: the name of the host.
     """
     options: dict[str, Any] = {
         "maxsize": POOL,
@@ -49,19 +50,19 @@ def connections(
 def _through_socks(proxy: Proxy, options: dict[str, Any]) -> PoolManager:
     manager = SOCKSProxyManager(proxy.address, proxy.user, proxy.password, **options)
     its = manager.connection_pool_kw["_socks_options"]
-    its["proxy_host"] = its["proxy_host"].strip("[]")  # an IPv6 address comes in brackets
+    its["proxy_host"] = its["proxy_host"].strip("[]")  # an IPv6 address from urllib3 is in brackets
     return manager
 
 
 def dialed(pool: PoolManager, server: str, wait_s: float) -> socket.socket:
-    """Return a new connection to a server, with TLS, for one request only; the caller closes it.
+    """Return a new TLS connection to a server, for one request only; the caller closes the connection.
 
     Raises:
         urllib3.exceptions.HTTPError, OSError: the connection was not established within `wait_s` seconds.
     """
     target = pool.connection_from_url(server)
     first = target.proxy or target
-    # mypy knows only the protocol of these classes, which has no `sock`.
+    # mypy sees only the protocol of these classes, which does not declare `sock`.
     connection: Any = target.ConnectionCls(
         host=first.host or "", port=first.port, timeout=wait_s, **target.conn_kw
     )

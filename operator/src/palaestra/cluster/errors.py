@@ -16,7 +16,8 @@ ApiError                    any response but success; `retryable`: whether a ret
 NotConfigured               no API server is configured, or its credentials cannot be read
 CommandFailed               the exit code of a command in a container is not 0
 
-A message is the API server's own: it names the object and, if the object is invalid, the field.
+The message of an ApiError is the API server's own message. The message names the object and, if the object is
+invalid, the field.
 """
 
 import math
@@ -69,7 +70,7 @@ class NoSuchKind(NotFound):
 
 
 class AlreadyExists(ApiError):
-    """An object of this name exists; its owner reference names its owner."""
+    """An object of this name exists; its owner reference shows whether it is the expected object."""
 
 
 class Conflict(ApiError):
@@ -79,11 +80,11 @@ class Conflict(ApiError):
 
 
 class Forbidden(ApiError):
-    """RBAC, a quota, Pod Security or a webhook refuses; a person must act."""
+    """RBAC, a quota, Pod Security or a webhook refuses the request; a person must act."""
 
     @property
     def lacks_right(self) -> bool:
-        """Return whether RBAC refuses, by its message; no field of the response shows it."""
+        """Return whether RBAC refuses the request; only the text of the message shows this."""
         return re.search(r" cannot \S+ resource ", self.message) is not None
 
 
@@ -92,11 +93,11 @@ class NamespaceTerminating(Forbidden):
 
 
 class Invalid(ApiError):
-    """The object is wrong; the message names the field."""
+    """The object is invalid; the message names the field."""
 
 
 class Gone(ApiError):
-    """The version or the page to continue from has expired: list again."""
+    """The version or the list page from which to continue has expired: list again."""
 
     retryable = True
 
@@ -105,7 +106,7 @@ class TooManyRequests(ApiError):
     """The API server is busy.
 
     Attributes:
-        retry_after_s: seconds that the API server requests to wait.
+        retry_after_s: seconds to wait before a retry, from the API server.
     """
 
     retryable = True
@@ -122,7 +123,7 @@ class ServerError(ApiError):
 
 
 class Unreachable(ApiError):
-    """No response in time, or an unreadable one; a write may or may not have happened."""
+    """No readable response came in time, so a write may or may not have happened."""
 
     retryable = True
 
@@ -145,8 +146,8 @@ class CommandFailed(PalaestraError):
     """A command in a container failed.
 
     Attributes:
-        code: its exit code; -1: unknown.
-        said: the first bytes of its standard error, as text.
+        code: the exit code of the command; -1: unknown.
+        said: the first bytes of the command's standard error, as text.
     """
 
     def __init__(self, code: int, said: str) -> None:
@@ -175,13 +176,14 @@ def from_status(code: int, status: Mapping[str, Any], retry_after: str | None = 
 
     Args:
         code: the HTTP status, or the code in the Status of an ERROR event.
-        status: the body; any field may be missing.
+        status: the `Status` object; each field may be missing.
         retry_after: the Retry-After header, in seconds.
     """
-    if code == NOT_FOUND and not status:  # for a path that is not served, the response is plain text
+    # If a path is not served, the response is plain text instead of a Status.
+    if code == NOT_FOUND and not status:
         return NoSuchKind(code, "NoSuchKind", "the API server does not serve this kind of objects")
     reason = str(status.get("reason") or f"HTTP{code}")
-    # `error` is what our own servers send, by way of the API server.
+    # Palaestra's own servers, reached through the API server, use the field `error`.
     message = str(status.get("message") or status.get("error") or "the API server gave no message")
     fallback = ServerError if code >= SERVER_ERROR else ApiError
     kind = _by_cause(status) or BY_REASON.get(reason, BY_CODE.get(code, fallback))
@@ -192,7 +194,7 @@ def from_status(code: int, status: Mapping[str, Any], retry_after: str | None = 
 
 
 def _by_cause(status: Mapping[str, Any]) -> type[ApiError] | None:
-    """Return the exception for a cause, because several exceptions share a reason."""
+    """Return the exception for the cause in a Status, or None; several exceptions share a reason."""
     causes = (status.get("details") or {}).get("causes") or ()
     return next((BY_CAUSE[cause["reason"]] for cause in causes if cause.get("reason") in BY_CAUSE), None)
 
@@ -200,6 +202,6 @@ def _by_cause(status: Mapping[str, Any]) -> type[ApiError] | None:
 def _seconds(text: str | None) -> float:
     try:
         seconds = float(text) if text is not None else DEFAULT_RETRY_AFTER_S
-    except ValueError:  # a date: allowed by HTTP, never sent by Kubernetes
+    except ValueError:  # the header is a date, which HTTP allows but Kubernetes never sends
         return DEFAULT_RETRY_AFTER_S
     return max(seconds, 0.0) if math.isfinite(seconds) else DEFAULT_RETRY_AFTER_S

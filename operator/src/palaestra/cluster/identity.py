@@ -1,6 +1,7 @@
-"""The credentials of a kubeconfig's user, as a header and as a certificate of the client.
+"""The credentials of a kubeconfig's user: the header `Authorization`, and a client certificate.
 
-The rules are client-go's: at most one way to log in, a token file before a token, a plugin without both.
+The rules are those of client-go. A user may have a token or a password, not both. A token file has priority
+over a token. A plugin is used only if the user has neither a token nor a password.
 """
 
 import ssl
@@ -25,16 +26,16 @@ EXEC, PROVIDER = "exec", "auth-provider"
 def authorization(
     user: Mapping[str, Any], folder: Path, cluster: Mapping[str, Any], context: ssl.SSLContext
 ) -> Authorization:
-    """Return a function for the header `Authorization` of a user; it ignores an auth-provider.
+    """Return a function that returns the header `Authorization` of a user; an auth-provider is ignored.
 
     Args:
         user: the user in a kubeconfig.
-        folder: the folder of that kubeconfig; relative paths start there.
-        cluster: the information about the cluster for a plugin.
-        context: receives the certificate of a plugin's credentials.
+        folder: the folder of the kubeconfig; relative paths start in this folder.
+        cluster: the information about the cluster that a plugin gets.
+        context: the TLS settings, to which a plugin's certificate is added.
 
     Raises:
-        NotConfigured: the user has several ways to log in, or one is wrong.
+        NotConfigured: the user has several kinds of credentials, or they are invalid.
     """
     by_token = bool(user.get(TOKEN) or user.get(TOKEN_FILE))
     by_password = bool(user.get(NAME) or user.get(PASSWORD))
@@ -59,7 +60,7 @@ def authorization(
 
 
 class _OfPlugin:
-    """The header from a plugin's credentials, which are cached until they expire."""
+    """A function that returns the header from a plugin's credentials, which it caches until they expire."""
 
     def __init__(self, plugin: Plugin, context: ssl.SSLContext) -> None:
         self._plugin = plugin

@@ -1,4 +1,4 @@
-"""Headers for impersonation, from `as` and its related fields of a kubeconfig's user.
+"""Headers for impersonation, from `as` and the related fields of a kubeconfig's user.
 
 Source of the names and the escape rules: NewImpersonatingRoundTripper in k8s.io/client-go/transport.
 """
@@ -16,7 +16,7 @@ _LEGAL = frozenset((string.ascii_letters + string.digits + "!#$&'*+-.^_`|~").enc
 
 
 def impersonation(user: Mapping[str, Any]) -> Headers:
-    """Return the headers of a kubeconfig's user; empty without impersonation.
+    """Return the impersonation headers of a kubeconfig's user; empty without impersonation.
 
     Raises:
         NotConfigured: a value has a wrong type, or `as` does not name a user.

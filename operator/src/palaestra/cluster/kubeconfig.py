@@ -1,8 +1,8 @@
 """Read a kubeconfig by the rules of kubectl.
 
-The official client merges the files and supports auth-providers. It ignores `as` and the errors of plugins,
-so this module reads the rest. It is imported only if a kubeconfig is used, because the client needs 10 MiB of
-memory.
+The official client merges the files and supports auth-providers. The official client ignores `as` and the
+errors of plugins, so this module reads all other fields. The module is imported only if a kubeconfig is used,
+because the official client needs 10 MiB of memory.
 """
 
 import base64
@@ -43,13 +43,13 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class _Entry:
-    """A part of a kubeconfig, and the folder of its file, where relative paths start."""
+    """A cluster or user of a kubeconfig, and the folder of its file, in which relative paths start."""
 
     content: Mapping[str, Any]
     folder: Path
 
     def bytes_of(self, field: str) -> bytes | None:
-        """Return the content of a field's `-data`, else of the file that the field names, as kubectl does."""
+        """Return the content of the field's `-data`, or of the file that the field names, or None."""
         given, path = self.content.get(f"{field}-data"), self.content.get(field)
         if given:
             try:
@@ -60,10 +60,10 @@ class _Entry:
 
 
 def access(files: str, context: str | None) -> Access:
-    """Return the access of a context in a kubeconfig; None is the current context.
+    """Return the address and credentials of a context in a kubeconfig; context None: the current context.
 
     Raises:
-        NotConfigured: it cannot be read, or a field in it is wrong.
+        NotConfigured: the kubeconfig cannot be read, or one of its fields is invalid.
     """
     try:
         merger, config = _merged(files)
@@ -77,7 +77,7 @@ def access(files: str, context: str | None) -> Access:
 
 
 def namespace(files: str, context: str | None) -> str | None:
-    """Return the namespace of a context of a kubeconfig, or None.
+    """Return the namespace of a context in a kubeconfig, or None.
 
     Raises:
         NotConfigured: the kubeconfig does not have the context, or cannot be read.
@@ -95,7 +95,7 @@ def namespace(files: str, context: str | None) -> str | None:
 
 
 def _merged(files: str) -> tuple[KubeConfigMerger, Any]:
-    """Return the kubeconfig's files and their merged ConfigNode; the first current context is used."""
+    """Return the kubeconfig's files and their merged content, with the first current context."""
     merger = KubeConfigMerger(files)
     config = merger.config
     if config is None:
@@ -113,7 +113,7 @@ def _entry(node: ConfigNode) -> _Entry:
 
 
 def _user(config: ConfigNode, chosen: ConfigNode) -> _Entry:
-    """Return the user of a context; without fields if the context has no user, or the user is missing."""
+    """Return the user of a context; an entry without fields if the kubeconfig has no such user."""
     name = chosen.safe_get("user")
     found = config["users"].get_with_name(name, safe=True) if name and config.safe_get("users") else None
     if found is None or not found.safe_get("user"):
@@ -142,7 +142,8 @@ def _access(files: str, merger: KubeConfigMerger, context: str, cluster: _Entry,
 
 def _verification(authority: bytes | None, user: _Entry, *, insecure: bool) -> ssl.SSLContext:
     try:
-        pem = authority.decode("ascii", "ignore") if authority else None  # comments may be non-ASCII
+        # Comments in a PEM file may be non-ASCII.
+        pem = authority.decode("ascii", "ignore") if authority else None
         found = verification(pem=pem, verified=not insecure)
     except (OSError, ValueError) as error:
         raise NotConfigured(f"{AUTHORITY} is not a certificate in PEM ({error}); copy it again") from error
@@ -161,7 +162,7 @@ def _verification(authority: bytes | None, user: _Entry, *, insecure: bool) -> s
 
 
 def _host(cluster: _Entry, *, secure: bool) -> str:
-    """Return the server's address; if it has no scheme, `secure` selects https."""
+    """Return the server's address; if the kubeconfig gives no scheme, `secure` selects https."""
     text = str(cluster.content.get(SERVER) or "").strip().rstrip("/")
     if text and "://" not in text:
         text = f"{'https' if secure else 'http'}://{text}"
@@ -175,7 +176,7 @@ def _host(cluster: _Entry, *, secure: bool) -> str:
 
 
 def _proxy(cluster: _Entry, host: str) -> Proxy | None:
-    """Return the proxy of a cluster: its own, even if NO_PROXY excludes the server, or the environment's."""
+    """Return the kubeconfig's proxy of a cluster, even if NO_PROXY lists the server, or the environment's."""
     named = cluster.content.get(PROXY)
     return proxy_named(str(named), PROXY) if named else proxy_of_environment(host, os.environ)
 
@@ -194,7 +195,7 @@ def _of_provider(merger: KubeConfigMerger, context: str, provider: Mapping[str, 
     if (name := provider.get("name")) != OIDC:
         raise NotConfigured(f"{PROVIDER}: {name!r} is not known any more; use a plugin under `exec`")
     configuration = Configuration()
-    base: Any = None  # None stands for each file's own folder
+    base: Any = None  # None selects each file's own folder
     loader = KubeConfigLoader(
         merger.config, active_context=context, config_base_path=base, config_persister=merger.save_changes
     )
@@ -202,7 +203,7 @@ def _of_provider(merger: KubeConfigMerger, context: str, provider: Mapping[str, 
 
     def header() -> str | None:
         try:
-            settings = configuration.auth_settings()  # requests a new token if it has expired
+            settings = configuration.auth_settings()  # requests a new token if the old one has expired
         except (*WRONG, OpenApiException) as error:
             raise Unreachable(0, "NoCredentials", f"{PROVIDER} returned no token ({error})") from error
         return str(settings["BearerToken"]["value"]) if "BearerToken" in settings else None
@@ -211,7 +212,7 @@ def _of_provider(merger: KubeConfigMerger, context: str, provider: Mapping[str, 
 
 
 def _told_to_plugins(cluster: _Entry) -> dict[str, Any]:
-    """Return the cluster information for a plugin with `provideClusterInfo`."""
+    """Return the information about the cluster for a plugin with `provideClusterInfo`."""
     authority = cluster.bytes_of(AUTHORITY)
     told = {
         name: cluster.content[name] for name in (SERVER, NAME, INSECURE, PROXY) if cluster.content.get(name)
@@ -225,7 +226,7 @@ def _told_to_plugins(cluster: _Entry) -> dict[str, Any]:
 
 
 def _warn(files: str, host: str, proxy: Proxy | None) -> None:
-    """Warn once, instead of urllib3's warning at every request."""
+    """Log one warning; suppress urllib3's warning, which would appear at every request."""
     log.warning(
         "%s: %s is set, so the certificate of %s is not verified: others may read your credentials",
         files,
@@ -238,5 +239,5 @@ def _warn(files: str, host: str, proxy: Proxy | None) -> None:
 
 
 def _fact(files: str, error: Exception) -> str:
-    said = " ".join(str(error).split())  # messages about YAML have several lines
+    said = " ".join(str(error).split())  # messages about invalid YAML have several lines
     return f"{files}: {said}" if isinstance(error, NotConfigured) else f"{files}: {said}; {CONFIGURE}"

@@ -1,9 +1,10 @@
-"""Leader election: only one of several operators works.
+"""Leader election: only one of several operators reconciles at a time.
 
 Candidates take and renew one Lease object with its resourceVersion, so the API server refuses the second of
-two concurrent writes. `leads()` reads the clock each time: after a process was paused for a minute, its first
-call returns False (see lease_timing.py). Election only saves work. Correctness does not depend on it: names
-are deterministic, and the API server refuses a second object of the same name.
+two concurrent writes. `leads()` reads the clock at each call. So the first call after a process was paused
+for a minute returns False (see lease_timing.py). The election only avoids duplicate work. Correctness does
+not depend on the election: names are deterministic, and the API server refuses a second object of the same
+name.
 """
 
 import threading
@@ -23,7 +24,7 @@ from palaestra.objects import Object
 log = structlog.get_logger("palaestra.cluster")
 
 DURATION_S = 15.0
-RENEW_S = 3.0  # three renewals may fail before the leader must stop
+RENEW_S = 3.0  # between renewals; three may fail before the leader must stop
 
 
 def _nothing() -> None:
@@ -31,7 +32,7 @@ def _nothing() -> None:
 
 
 class Leadership:
-    """A candidate for one Lease, and its leader while `leads()` is true."""
+    """A candidate for one Lease, which leads while `leads()` returns True."""
 
     def __init__(
         self,
@@ -43,7 +44,7 @@ class Leadership:
         duration_s: float = DURATION_S,
         renew_s: float = RENEW_S,
     ) -> None:
-        """Prepare; no request is sent before `start`.
+        """Prepare the candidate; it sends no request before `start`.
 
         Args:
             api: the API server that stores the Lease.
@@ -51,8 +52,8 @@ class Leadership:
             name: the name of the Lease.
             identity: the identity of this process; no other process may have it.
             duration_s: whole seconds after which another candidate may replace a leader that has died.
-            renew_s: seconds between renewals, or between reads of another leader's Lease; at most a third of
-                `duration_s`.
+            renew_s: seconds between two renewals, or between two reads of another leader's Lease; at most a
+                third of `duration_s`.
         """
         self._api = api.within(renew_s)
         self._namespace, self._name, self._identity = namespace, name, identity
@@ -78,11 +79,11 @@ class Leadership:
         """Join the election; call it once.
 
         Args:
-            started: called when this process becomes the leader; must return soon.
-            stopped: called when this process is no longer the leader, maybe some time after `leads()` became
-                false.
-            renewed: called when a renewal succeeds after a failed one in the same tenure: work refused in the
-                meantime can be done now; must return soon.
+            started: called when this process becomes the leader; the function must return soon.
+            stopped: called when this process is no longer the leader. `leads()` may have become False some
+                time before.
+            renewed: called when a renewal succeeds after a failed renewal in the same term. Work that was
+                refused after the failure can be done now. The function must return soon.
         """
         self._started, self._stopped, self._renewed = started, stopped, renewed
         self._thread.start()
@@ -90,8 +91,8 @@ class Leadership:
     def stop(self, deadline_s: float = 2.0) -> None:
         """Stop leading, and release the Lease so that another candidate can take it at once.
 
-        `leads()` is false from now on, so stop all writers first. If the release takes longer than
-        `deadline_s`, the lease expires instead.
+        `leads()` returns False from now on, so stop all writers first. If the release takes longer than
+        `deadline_s`, the Lease expires instead.
         """
         self._stopping.set()
         if self._thread.ident is not None:
@@ -103,9 +104,9 @@ class Leadership:
         return tenure is not None and not self._stopping.is_set() and tenure.holds(time.monotonic())
 
     def term(self) -> int | None:
-        """Return the number of this tenure, from 1; None if this process may not act as the leader.
+        """Return the number of the current term, from 1; None if this process may not act as the leader.
 
-        Do not execute the decisions of one tenure in a later one: another process may have led in between.
+        Do not execute the decisions of one term in a later term: another process may have led in between.
         """
         term = self._terms
         return term if self.leads() else None
@@ -124,7 +125,7 @@ class Leadership:
                 return
 
     def _turn(self) -> None:
-        """Renew the lease, or take it if it is free."""
+        """Renew the Lease, or take it if it is free."""
         sent = time.monotonic()
         try:
             if self._tenure is not None:
@@ -134,7 +135,8 @@ class Leadership:
         except NotFound:
             self._create(sent)
             return
-        except Conflict:  # another process wrote it, or this one did and lost the response
+        # Another process wrote the Lease, or this process did but did not receive the response.
+        except Conflict:
             found = self._api.get(LEASES, self._namespace, self._name)
         claim = LeaseSpec.read(found)
         self._version = str(found["metadata"]["resourceVersion"])

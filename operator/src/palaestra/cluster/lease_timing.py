@@ -1,16 +1,18 @@
-"""The arithmetic of a Lease: the time at which a leader stops, and another may start. The clock is passed in.
+"""The arithmetic of a Lease: when a leader must stop, and when another may start. The clock is an argument.
 
-Each process compares durations on its own monotonic clock; the times in a Lease are for people. A follower
-counts from the time at which it *saw* the last renewal, which is after the write. A leader counts from the
-time at which it *sent* the renewal, which is before the write, and stops after two thirds of the duration. So
-a leader has stopped before another starts, unless one clock runs at two thirds of the other's speed.
+Each process compares durations on its own monotonic clock; the times in a Lease are only for people. A
+follower counts from the time at which it *saw* the last renewal, which is after the write. A leader counts
+from the time at which it *sent* the renewal, which is before the write. The leader stops after two thirds of
+the duration. So a leader has stopped before another leader starts, as long as their clocks run at similar
+speeds (faster than two thirds of each other).
 """
 
 from dataclasses import dataclass, field
 
 from palaestra.objects import Object
 
-SHARE = 2 / 3  # a leader uses this share of a Lease's duration; the rest is for writes in flight
+# A leader acts for this share of a Lease's duration; the remaining time is for writes in flight.
+SHARE = 2 / 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -19,9 +21,9 @@ class LeaseSpec:
 
     Attributes:
         holder: identity of the leader; "" without a leader.
-        duration_s: seconds without a renewal after which another candidate may take it.
-        renewed: time of the last renewal by the leader's clock; compared for equality only, never with a
-            clock.
+        duration_s: seconds without a renewal after which another candidate may take the Lease.
+        renewed: time of the last renewal by the leader's clock. This time is compared only with earlier
+            values of the Lease, never with a clock.
         transitions: number of changes of the leader.
     """
 
@@ -44,7 +46,7 @@ class LeaseSpec:
 
 @dataclass(slots=True)
 class ObservedLease:
-    """A follower's view of the Lease: its last spec, and the time at which the follower saw it change."""
+    """A follower's view of the Lease: its last spec, and the time at which the follower first saw it."""
 
     claim: LeaseSpec = field(default_factory=LeaseSpec)
     since: float = float("-inf")
@@ -55,7 +57,7 @@ class ObservedLease:
             self.claim, self.since = claim, now
 
     def free(self, now: float) -> bool:
-        """Return whether the Lease may be taken: it has no holder, or was not renewed for its duration."""
+        """Return whether a candidate may take the Lease: it has no holder, or was not renewed in time."""
         return not self.claim.holder or now >= self.since + self.claim.duration_s
 
 
@@ -72,5 +74,5 @@ class Tenure:
     duration_s: float
 
     def holds(self, now: float) -> bool:
-        """Return whether the leader may still act; it becomes false before another may act."""
+        """Return whether the leader may still act; the result is False before another process may act."""
         return now < self.sent + self.duration_s * SHARE

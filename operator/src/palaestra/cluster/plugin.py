@@ -18,7 +18,7 @@ from palaestra.cluster.errors import NotConfigured, Unreachable
 
 VERSIONS = ("client.authentication.k8s.io/v1", "client.authentication.k8s.io/v1beta1")
 WAIT_S = 300.0  # a person may have to log in
-MOST_SAID = 300  # characters of a failed plugin's standard error, the last ones
+MOST_SAID = 300  # the last characters of a failed plugin's standard error that a message quotes
 ALWAYS, NEVER = "Always", "Never"
 MODES = (ALWAYS, NEVER, "IfAvailable")
 
@@ -28,10 +28,10 @@ class Credentials:
     """The credentials from a plugin.
 
     Attributes:
-        token: for the header `Authorization`, or None.
+        token: the bearer token for the header `Authorization`, or None.
         certificate: the certificate of the client, as PEM, or None.
         key: the key of that certificate.
-        expires: time after which the plugin must run again; None: never.
+        expires: the time after which the plugin must run again; None: the credentials do not expire.
     """
 
     token: str | None
@@ -41,18 +41,18 @@ class Credentials:
 
 
 class Plugin:
-    """The program of a kubeconfig's user; it runs again when its credentials have expired."""
+    """The program of a kubeconfig's user, which returns credentials."""
 
     def __init__(self, entry: Mapping[str, Any], folder: Path, cluster: Mapping[str, Any]) -> None:
-        """Check the entry.
+        """Check the entry in the kubeconfig.
 
         Args:
-            entry: `exec` of the user.
-            folder: folder of the kubeconfig; a command with a `/` is relative to it.
-            cluster: the information about the cluster for the plugin.
+            entry: the field `exec` of the user.
+            folder: folder of the kubeconfig; a command with a `/` is relative to this folder.
+            cluster: the information about the cluster that the plugin gets.
 
         Raises:
-            NotConfigured: the entry is wrong.
+            NotConfigured: the entry is invalid.
         """
         command, version = entry.get("command"), entry.get("apiVersion")
         if not isinstance(command, str) or not command:
@@ -75,7 +75,7 @@ class Plugin:
         """Run the program and return its credentials.
 
         Raises:
-            Unreachable: it did not return credentials; the message has the reason.
+            Unreachable: the program returned no credentials; the message has the reason.
         """
         interactive = self._mode != NEVER and sys.stdin is not None and sys.stdin.isatty()
         if self._mode == ALWAYS and not interactive:

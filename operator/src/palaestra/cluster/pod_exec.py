@@ -1,7 +1,7 @@
-"""A command in a container: its output, byte for byte, and its result.
+"""Run a command in a container: its unchanged output, and its result.
 
-The first byte of each message of the websocket is the number of a stream. At the end the API server sends the
-result on a separate stream. Without a result the output is incomplete.
+The first byte of each websocket message is the number of a stream. At the end, the API server sends the
+result of the command on a separate stream. If the API server sends no result, the output is incomplete.
 """
 
 import json
@@ -17,7 +17,7 @@ from palaestra.cluster.errors import SERVER_ERROR, ApiError, CommandFailed, Unre
 
 PROTOCOLS = ["v5.channel.k8s.io", "v4.channel.k8s.io"]
 STDOUT, STDERR, STATUS = 1, 2, 3
-MOST_STDERR = 4096  # the first bytes are kept, because they name the cause
+MOST_STDERR = 4096  # the first bytes of standard error are kept, because they name the cause
 EXIT_CODE = "ExitCode"
 UNKNOWN_CODE = -1
 
@@ -26,10 +26,10 @@ def open_socket(connection: socket, url: str, headers: Headers, wait_s: float) -
     """Return the socket of a running command; the caller closes it. A read waits at most `wait_s`.
 
     Args:
-        connection: to the API server, with TLS and the proxy, if any.
+        connection: the TLS connection to the API server, which may go through a proxy.
         url: the url of the command.
         headers: the headers of the request.
-        wait_s: longest time until the command runs.
+        wait_s: longest time in seconds until the command runs.
 
     Raises:
         ApiError: the API server refuses, or cannot be reached.
@@ -44,7 +44,7 @@ def open_socket(connection: socket, url: str, headers: Headers, wait_s: float) -
             subprotocols=PROTOCOLS,
             suppress_origin=True,
             skip_utf8_validation=True,
-            redirect_limit=0,  # credentials are not sent to another server
+            redirect_limit=0,  # a redirect would send the credentials to another server
         )
     except websocket.WebSocketBadStatusException as error:
         raise from_status(error.status_code, _decoded(error.resp_body)) from error
@@ -56,12 +56,12 @@ def output(command: websocket.WebSocket, deadline: float) -> Iterator[bytes]:
     """Yield the command's standard output until it has succeeded.
 
     Args:
-        command: from `open_socket`; closed at the end.
-        deadline: on the monotonic clock, for all of it.
+        command: the socket from `open_socket`; it is closed at the end.
+        deadline: the time at which the command must have ended, on the monotonic clock.
 
     Raises:
         CommandFailed: its exit code is not 0.
-        ApiError: it could not be started.
+        ApiError: the command could not be started.
         Unreachable: the connection broke, or the command did not end in time.
     """
     said = bytearray()
@@ -77,8 +77,8 @@ def output(command: websocket.WebSocket, deadline: float) -> Iterator[bytes]:
                     raise failure
                 return
     finally:
-        # No closing handshake: a dead peer would not respond to it. The library does not close TLS within
-        # TLS.
+        # The socket is closed without the websocket's closing handshake, to which a dead peer would not
+        # respond. The socket must be closed here, because the library does not close TLS within TLS.
         if command.sock is not None:
             command.sock.close()
         command.shutdown()
@@ -98,7 +98,7 @@ def _message(command: websocket.WebSocket, deadline: float) -> tuple[int, bytes]
     if opcode == websocket.ABNF.OPCODE_CLOSE:
         raise Unreachable(0, "Unreachable", "the command's output broke off (the connection was closed)")
     if opcode not in (websocket.ABNF.OPCODE_BINARY, websocket.ABNF.OPCODE_TEXT) or not frame.data:
-        return -1, b""  # a ping, to which the library has responded, or an empty frame
+        return -1, b""  # the frame is a ping, to which the library has responded, or empty
     return frame.data[0], frame.data[1:]
 
 
@@ -116,6 +116,6 @@ def _failure(status: Mapping[str, Any], said: str) -> CommandFailed | ApiError |
 def _decoded(body: bytes | str | None) -> dict[str, Any]:
     try:
         found = json.loads(body or b"")
-    except ValueError:  # a proxy in between responds with HTML
+    except ValueError:  # a proxy may respond with HTML
         return {}
     return found if isinstance(found, dict) else {}

@@ -10,14 +10,15 @@ from palaestra.cluster.transport import read_some
 
 
 def lines(response: BaseHTTPResponse, deadline: float) -> Iterator[str]:
-    """Yield each line without its line end, as soon as it is complete; the last line needs no line end.
+    """Yield each line without its line end, as soon as the line is complete; the last may lack a line end.
 
     Args:
-        response: closed at the end.
-        deadline: on the monotonic clock; checked after each read.
+        response: the response, which is closed at the end.
+        deadline: the latest time for the end of the response, on the monotonic clock; checked after each
+            read.
 
     Raises:
-        Unreachable: the connection broke, was silent for too long, or the response did not end in time.
+        Unreachable: the connection broke or was silent for too long, or the response did not end in time.
     """
     pending = b""
     try:

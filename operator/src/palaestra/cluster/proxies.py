@@ -1,6 +1,6 @@
 """The proxy of a connection, from environment variables and a kubeconfig, by the rules of kubectl.
 
-Source of the rules: golang.org/x/net/http/httpproxy, which kubectl uses for the environment.
+Source of the rules: golang.org/x/net/http/httpproxy, with which kubectl reads the environment.
 """
 
 import ipaddress
@@ -34,14 +34,14 @@ class Proxy:
 
     @property
     def socks(self) -> bool:
-        """Whether it uses SOCKS; other proxies use CONNECT."""
+        """Whether the proxy uses SOCKS; other proxies use CONNECT."""
         return self.address.startswith(SOCKS)
 
 
 def proxy_named(text: str, where: str) -> Proxy:
-    """Return the proxy at the address in a text; without a scheme it is an HTTP proxy, as for curl.
+    """Return the proxy whose address is `text`; without a scheme it is an HTTP proxy, as in curl.
 
-    SOCKS5 proxies resolve host names, as with kubectl.
+    A SOCKS5 proxy also resolves host names, as in kubectl.
 
     Raises:
         NotConfigured: the text is not an address, or the scheme is unknown; the message begins with `where`.
@@ -57,10 +57,10 @@ def proxy_named(text: str, where: str) -> Proxy:
 
 
 def proxy_of_environment(server: str, environment: Mapping[str, str]) -> Proxy | None:
-    """Return the proxy in the environment for a server's address; None: connect directly.
+    """Return the proxy that environment variables set for a server; None: connect directly.
 
     Raises:
-        NotConfigured: the variable is not the address of a proxy.
+        NotConfigured: the variable does not contain the address of a proxy.
     """
     url = _parsed(server)
     if url is None or not url.host:
@@ -75,13 +75,13 @@ def proxy_of_environment(server: str, environment: Mapping[str, str]) -> Proxy |
 
 
 def connects_directly(host: str, port: int, exceptions: str) -> bool:
-    """Return whether no proxy is used: for this machine itself, and for the hosts in NO_PROXY.
+    """Return whether to connect without a proxy: to this machine itself, and to the hosts in NO_PROXY.
 
     Args:
-        host: a name or an address, the latter without brackets.
+        host: the name or address of the server; an IPv6 address is without brackets.
         port: the port of the connection.
-        exceptions: the text of NO_PROXY: names with their subdomains, addresses, networks, each with a port
-            or without one, separated by commas; `*` is everything.
+        exceptions: the text of NO_PROXY: names (including their subdomains), addresses and networks,
+            separated by commas. Names and addresses may have a port. `*` matches all hosts.
     """
     host = host.lower().rstrip(".")
     address = _address(host)
@@ -104,13 +104,13 @@ def _covers(
     its_address = _address(name)
     if address is not None or its_address is not None:
         return address == its_address
-    if name.startswith(("*.", ".")):  # matches subdomains, but not the domain itself
+    if name.startswith(("*.", ".")):  # such an entry matches subdomains, but not the domain itself
         return host.endswith(name.removeprefix("*"))
     return host == name or host.endswith(f".{name}")
 
 
 def _split(entry: str) -> tuple[str, str]:
-    """Return name and port of an entry; the port may be ""."""
+    """Return name and port of an entry; the port is "" if the entry has no port."""
     if _address(entry.strip("[]")) is not None:
         return entry.strip("[]"), ""
     name, colon, port = entry.rpartition(":")

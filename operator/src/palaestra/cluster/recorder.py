@@ -1,10 +1,10 @@
-"""Events, which `kubectl describe` shows below an object.
+"""Write events, which `kubectl describe` shows below an object.
 
-There is one Event for each (object, reason, message); a repetition increases its count and sets its last
-time. Its name is derived from these three, so a restarted operator increases the count of the existing event.
-If an event cannot be written, the recorder logs that and drops the event, so that no caller waits for it. If
-the namespace is being deleted, it raises an exception instead, because the log would have a line for every
-event in that namespace.
+One Event exists for each combination of object, reason and message. A repetition increases the Event's count
+and sets its last time. The name of the Event is derived from these three values, so a restarted operator
+increases the count of the existing Event. If an event cannot be written, the recorder logs the error and
+drops the event, so that its caller does not wait. If the namespace is being deleted, the recorder raises an
+exception instead, because otherwise the log would get a line for every event in that namespace.
 """
 
 import hashlib
@@ -29,10 +29,10 @@ COMPONENT = "palaestra-operator"
 
 
 class Recorder:
-    """Writes events; safe to use from several threads."""
+    """Writes events; several threads may use one recorder."""
 
     def __init__(self, api: Api, component: str = COMPONENT, instance: str = "") -> None:
-        """Prepare; no request is sent.
+        """Prepare the recorder, without a request.
 
         Args:
             api: the API server.
@@ -49,11 +49,11 @@ class Recorder:
         """Write an event about an object.
 
         Args:
-            obj: with apiVersion, kind, and name, namespace and uid in its metadata.
+            obj: the object, with apiVersion and kind, and with name, namespace and uid in its metadata.
             kind: `Normal` or `Warning`.
             reason: one word.
             message: a sentence; cut at 1024 characters.
-            once: do not change an existing event.
+            once: if the event exists, do not increase its count.
 
         Raises:
             NamespaceTerminating: events about this object can no longer be written.
@@ -78,13 +78,13 @@ class Recorder:
                 self._remember(name, 1)
             else:
                 self._again(event, count + 1)
-        except AlreadyExists:  # an earlier operator process has written it
+        except AlreadyExists:  # an earlier operator process has written the event
             if once:
                 self._remember(name, 1)
                 return
             found = self._api.get(EVENTS, namespace, name)
             self._again(event, int(found.get("count") or 1) + 1)
-        except NotFound:  # the API server forgets events after an hour
+        except NotFound:  # the API server deletes events after an hour
             self._api.create(EVENTS, event)
             self._remember(name, 1)
 

@@ -1,9 +1,9 @@
-"""A cache that follows the API server: list in pages, then watch, forever.
+"""A cache that follows the API server: the reflector lists the objects in pages, and then watches forever.
 
-- If a watch is silent for longer than the interval of bookmarks, the reflector closes it and opens another.
-- If the version has expired (410, as a response or as an event), it lists again. A new list removes deleted
-  objects and reports each, so no deletion is missed.
-- After each failure it waits longer.
+- If a watch is silent for longer than the interval of bookmarks, the reflector opens a new watch.
+- If the version has expired (410, as a response or as an event), the reflector lists again. The reflector
+  then removes and reports each object that the new list lacks, so no deletion is missed.
+- After each consecutive failure, the reflector waits longer before it retries.
 """
 
 import random
@@ -43,17 +43,18 @@ class Reflector:
         keep: Keep,
         changed: Changed,
     ) -> None:
-        """Prepare; no request is sent before `start`.
+        """Prepare the reflector, which sends no request before `start`.
 
         Args:
             api: the API server.
             resource: the kind of objects.
-            namespace: None for all namespaces.
+            namespace: the namespace to watch; None for all namespaces.
             labels: a label selector.
-            keep: returns the part of an object to cache; its metadata must keep namespace, name and labels.
-            changed: called after the store is updated, with the cached part of the object; for a deleted
-                object, with the part that was cached last. The reflector's thread calls it, so it must return
-                at once.
+            keep: returns the reduced copy of an object that is cached; the metadata must keep namespace, name
+                and labels.
+            changed: called after the store is updated, with the cached copy of the object; for a deleted
+                object, with the last cached copy. The reflector's thread calls this function, so it must
+                return at once.
         """
         self.store = Store()
         self._api = api
@@ -71,11 +72,11 @@ class Reflector:
 
     @property
     def synced(self) -> bool:
-        """Return whether a whole list was read at least once."""
+        """Return whether a complete list was read at least once."""
         return self._synced.is_set()
 
     def wait_synced(self, deadline_s: float) -> bool:
-        """Wait for the first whole list; return whether it was read within `deadline_s`."""
+        """Wait for the first complete list; return whether it was read within `deadline_s`."""
         return self._synced.wait(deadline_s)
 
     def start(self) -> None:
@@ -123,13 +124,13 @@ class Reflector:
         return None
 
     def _relist(self) -> str:
-        """Update the store from a whole list, and return the list's version."""
+        """Update the store from a complete list, and return the list's version."""
         gone, version = self.store.keys(), ""
         size = self._resource.page
         for page in self._api.pages(self._resource, self._namespace, labels=self._labels, limit=size):
             version = page.version
             gone -= self._put_all(page)
-            del page  # otherwise it would stay in memory while the next one is read
+            del page  # otherwise this page would stay in memory while the next page is read
         for key in gone:
             self._drop(key)
         self._synced.set()
@@ -142,12 +143,12 @@ class Reflector:
 
     def _follow(self, version: str) -> None:
         shortest_s, longest_s = self._api.limits.watch_s
-        seconds = random.uniform(shortest_s, longest_s)  # noqa: S311 - spreads load, hides nothing
+        seconds = random.uniform(shortest_s, longest_s)  # noqa: S311 - spreads load, not a secret
         watch = self._api.watch(
             self._resource, self._namespace, version=version, labels=self._labels, seconds=seconds
         )
         self._watch = watch
-        if self._stopping.is_set():  # stopped while the watch was opened
+        if self._stopping.is_set():  # `stop` was called while the watch was opened
             watch.close()
         for event in watch:
             self._heard = True
@@ -166,11 +167,11 @@ class Reflector:
             kept = self._keep(obj)
             before = self.store.relabeled(kept)
             different = self.store.put(kept)
-            if before is not None:  # the job of its old label no longer owns it
+            if before is not None:  # the job in the old label no longer owns the object
                 self._changed(before)
             if different:
                 self._changed(kept)
-        except Exception:  # one unexpected object must not hide all others
+        except Exception:  # an error from one object must not hide the others
             log.exception("object not cached", resource=self._resource.plural, key=key_of(obj))
 
     def _drop(self, key: Key) -> None:
@@ -179,5 +180,5 @@ class Reflector:
             return
         try:
             self._changed(known)
-        except Exception:  # one unexpected object must not hide all others
+        except Exception:  # an error from one object must not hide the others
             log.exception("deletion not reported", resource=self._resource.plural, key=key)

@@ -11,12 +11,12 @@ class Resource:
     """One kind of object.
 
     Attributes:
-        api_version: group and version as objects carry them: `batch/v1`; `v1` for the core group.
-        kind: as in objects: `Job`.
-        plural: as in addresses and RBAC rules: `jobs`.
-        namespaced: false for cluster-scoped kinds.
-        metadata_only: whether to read only the metadata of objects, so that the contents of ConfigMaps and
-            Secrets, for example, are not transferred.
+        api_version: group and version, such as `batch/v1`; `v1` for the core group.
+        kind: the kind, as in objects, such as `Job`.
+        plural: the plural name, as in paths and RBAC rules, such as `jobs`.
+        namespaced: whether objects are in namespaces; False for cluster-scoped kinds.
+        metadata_only: whether to read only the metadata of objects, for example so that the content of
+            Secrets is not transferred.
         page: number of objects that a cache reads in one page, so that pages stay small.
     """
 
@@ -25,15 +25,16 @@ class Resource:
     plural: str
     namespaced: bool = True
     metadata_only: bool = False
-    # Items of about 25 kB each; pages of 200 fragmented 70 MiB of memory, pages of 25 only 5 MiB.
+    # With items of about 25 kB each, pages of 200 items fragmented 70 MiB of memory, and pages of 25 only 5
+    # MiB.
     page: int = 25
 
     def address(self, namespace: str | None = None, name: str | None = None) -> str:
         """Return the path of one object, or of the collection.
 
         Args:
-            namespace: None for all namespaces, and for cluster-scoped kinds.
-            name: None for the collection.
+            namespace: the namespace; None for all namespaces, and for cluster-scoped kinds.
+            name: the name of the object; None for the collection.
         """
         root = "/api/" if "/" not in self.api_version else "/apis/"
         parts = [root + self.api_version]
@@ -45,7 +46,7 @@ class Resource:
         return "/".join(parts)
 
     def only_metadata(self) -> "Resource":
-        """Return the same kind, reduced to its metadata."""
+        """Return the same kind, of whose objects only the metadata is read."""
         return replace(self, metadata_only=True)
 
 
@@ -66,7 +67,8 @@ EVENTS = Resource(
 NETWORK_POLICIES = Resource(
     api_version="networking.k8s.io/v1", kind="NetworkPolicy", plural="networkpolicies"
 )
-# Kueue serves this version since 0.15, and stores it since 0.16, so that no webhook must convert it.
+# Kueue serves this version since 0.15. Kueue also stores this version since 0.16, so that no webhook must
+# convert objects.
 WORKLOADS = Resource(api_version="kueue.x-k8s.io/v1beta2", kind="Workload", plural="workloads")
 LEASES = Resource(api_version="coordination.k8s.io/v1", kind="Lease", plural="leases")
 NODES = Resource(api_version="v1", kind="Node", plural="nodes", namespaced=False)
@@ -77,12 +79,12 @@ DEFINITIONS = Resource(
     plural="customresourcedefinitions",
     namespaced=False,
 )
-# Only the command line reads these.
+# Only the command line reads the next two kinds.
 DEPLOYMENTS = Resource(api_version="apps/v1", kind="Deployment", plural="deployments")
 STORAGE_CLASSES = Resource(
     api_version="storage.k8s.io/v1", kind="StorageClass", plural="storageclasses", namespaced=False
 )
-# Access reviews: the response to their creation says whether this or another account has a permission.
+# The kinds for access reviews: the response to a creation contains whether an account has a permission.
 OWN_RIGHTS = Resource(
     api_version="authorization.k8s.io/v1",
     kind="SelfSubjectAccessReview",

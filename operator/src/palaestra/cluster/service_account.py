@@ -1,6 +1,6 @@
-"""A pod's service account: two files, which the kubelet updates, and two environment variables.
+"""Read a pod's service account: two files, which the kubelet updates, and two environment variables.
 
-This module reads them, because the official client would need 10 MiB of memory for that.
+The official client could read them too, but needs 10 MiB of memory.
 """
 
 import os
@@ -22,10 +22,10 @@ HOST, PORT = "KUBERNETES_SERVICE_HOST", "KUBERNETES_SERVICE_PORT"
 
 
 def account(files: Path | None = None, clock: Callable[[], float] = time.monotonic) -> Access:
-    """Return the access of the pod in which this process runs; `files` is the folder of its account.
+    """Return address and credentials for the pod in which this process runs; `files` is the account's folder.
 
     Raises:
-        NotConfigured: this process does not run in a pod, or the pod has no usable account.
+        NotConfigured: this process does not run in a pod, or the pod has no usable service account.
     """
     folder = files or FILES
     host, port = os.environ.get(HOST), os.environ.get(PORT)
@@ -51,10 +51,10 @@ def account(files: Path | None = None, clock: Callable[[], float] = time.monoton
 
 
 class _Kept:
-    """The header and the certificate authority of an account; the kubelet replaces both files.
+    """The header and the certificate authority of a service account; the kubelet replaces both files.
 
-    A new authority is trusted in addition to the old one, which stays trusted until the process ends, as in
-    client-go.
+    A new authority is trusted in addition to the old authority. As in client-go, the old authority stays
+    trusted until the process ends.
     """
 
     def __init__(

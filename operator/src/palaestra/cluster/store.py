@@ -1,7 +1,7 @@
 """The objects of a reflector by namespace and name, with an index on one label.
 
-They are stored as compressed JSON. It needs a fortieth of the memory of dicts, and a reader cannot change the
-object of another reader.
+Objects are stored as compressed JSON, which needs a fortieth of the memory of dicts. Each reader gets its own
+copy, so it cannot change the object of another reader.
 """
 
 import json
@@ -15,7 +15,7 @@ from palaestra.objects import Key, Object
 
 JOB_LABEL = "palaestra.dev/job"  # the label by which children are looked up
 
-FASTEST = 1  # level of zlib: it compresses 5 kB to 1.4 kB in 50 µs
+FASTEST = 1  # compression level of zlib, which compresses 5 kB to 1.4 kB in 50 µs
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,7 +27,7 @@ class Kept:
 
 
 class Store:
-    """Objects of one kind; safe to use from several threads."""
+    """Objects of one kind; several threads may use one store."""
 
     def __init__(self, index: str = JOB_LABEL) -> None:
         self._index = index
@@ -40,13 +40,13 @@ class Store:
             return sum(map(len, self._kept.values()))
 
     def get(self, namespace: str | None, name: str) -> Object | None:
-        """Return a copy of one object, or None; namespace None or "" for cluster-scoped kinds."""
+        """Return a copy of one object, or None; for cluster-scoped kinds, namespace is None or ""."""
         with self._lock:
             kept = self._kept.get(namespace or "", {}).get(name)
         return _object(kept.text) if kept else None
 
     def holds(self, namespace: str, name: str) -> bool:
-        """Return whether an object exists, without decoding it."""
+        """Return whether an object exists, without decoding the stored copy."""
         with self._lock:
             return name in self._kept.get(namespace, {})
 
@@ -54,9 +54,9 @@ class Store:
         """Return copies of all objects with these labels, in the order of their names.
 
         Args:
-            namespace: None for all namespaces.
-            labels: labels that the objects must have; with `palaestra.dev/job` the index is used; {} selects
-                all objects.
+            namespace: the namespace of the objects; None for all namespaces.
+            labels: labels that the objects must have; {} selects all objects. The label `palaestra.dev/job`
+                has an index.
         """
         with self._lock:
             namespaces = list(self._kept) if namespace is None else [namespace]
@@ -74,7 +74,7 @@ class Store:
             return {(namespace, name) for namespace, kept in self._kept.items() for name in kept}
 
     def put(self, obj: Object) -> bool:
-        """Store an object, replace the one of its name, and return whether they differ."""
+        """Store an object in place of the object of the same name; return whether the two differ."""
         namespace, name = key_of(obj)
         labels = obj["metadata"].get("labels") or {}
         kept = Kept(labels=dict(labels), text=_text(obj))
@@ -89,7 +89,7 @@ class Store:
             return True
 
     def relabeled(self, obj: Object) -> Object | None:
-        """Return a copy of the stored object of this name if its label `palaestra.dev/job` differs."""
+        """Return a copy of the stored object of the same name if its label `palaestra.dev/job` differs."""
         namespace, name = key_of(obj)
         label = (obj["metadata"].get("labels") or {}).get(self._index)
         with self._lock:

@@ -1,10 +1,10 @@
-"""Deadlines for all requests to the API server, and the waits between attempts."""
+"""The deadlines of all requests to the API server, and the waits before retries."""
 
 import random
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-JITTER = 0.5  # a wait is shortened by up to this share, so that many clients do not retry at once
+JITTER = 0.5  # a wait is shortened by up to this share, so that many clients do not retry at the same time
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -12,9 +12,9 @@ class Backoff:
     """Waits that double from `first_s` to `cap_s`, each shortened at random.
 
     Attributes:
-        first_s: longest first wait in seconds, above 0.
-        cap_s: longest wait in seconds.
-        chance: returns numbers in [0, 1).
+        first_s: the upper limit of the first wait in seconds, above 0.
+        cap_s: the upper limit of all waits in seconds.
+        chance: returns random numbers in [0, 1).
     """
 
     first_s: float
@@ -24,7 +24,8 @@ class Backoff:
     def wait_s(self, failures: int) -> float:
         """Return the seconds to wait after `failures` consecutive failures.
 
-        At least half of `first_s` and at most `cap_s`; after n failures at most `first_s * 2**(n-1)`.
+        The wait is at least half of `first_s` and at most `cap_s`. After n failures it is at most `first_s *
+        2**(n-1)`.
         """
         doublings = min(max(failures, 1) - 1, 64)
         longest_s = min(self.first_s * 2.0**doublings, self.cap_s)
@@ -33,17 +34,17 @@ class Backoff:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Timeouts:
-    """Deadlines, in seconds; one place for all of them.
+    """All deadlines and waits of a connection, in seconds.
 
     Attributes:
-        connect_s: until a connection is established.
-        call_s: for one request and its whole response, including waits for a busy server.
-        watch_s: shortest and longest duration of one watch; it is random between them, so that watches end at
-            different times.
+        connect_s: the deadline for establishing a connection.
+        call_s: the deadline for one request and its whole response, including waits for a busy server.
+        watch_s: shortest and longest duration of one watch. The duration is random between these limits, so
+            that watches end at different times.
         silence_s: longest silence on a watch. An API server sends a bookmark about every 60 s, so a longer
             silence means a dead connection.
-        again: waits between failed lists or watches.
-        turned_away: waits after a response 429, in addition to the wait in its Retry-After header, if any.
+        again: the waits after failed lists or watches.
+        turned_away: the waits after a response 429, in addition to the wait in its Retry-After header.
     """
 
     connect_s: float = 5.0

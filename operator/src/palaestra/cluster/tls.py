@@ -1,4 +1,4 @@
-"""The verification of an API server's certificate, and the reason for a refusal."""
+"""The verification of an API server's certificate, and the reasons for which a certificate is refused."""
 
 import ssl
 import tempfile
@@ -6,7 +6,7 @@ from pathlib import Path
 
 # Source: OpenSSL's x509_vfy.h. All other codes are about the chain.
 DATES = {9: "is not valid yet", 10: "has expired"}
-NAMES = (62, 64)  # the certificate lacks the host's name, or the IP address
+NAMES = (62, 64)  # the certificate contains neither the host's name nor its IP address
 DATES_REMEDY = "compare this machine's clock with the certificate's dates, or have the certificate renewed"
 NAMES_REMEDY = (
     "connect by a name that the certificate has, or set `tls-server-name` of the kubeconfig's cluster"
@@ -20,19 +20,19 @@ CHAIN_REMEDY = (
 def verification(
     authority: Path | None = None, pem: str | None = None, *, verified: bool = True
 ) -> ssl.SSLContext:
-    """Return the TLS settings that verify a server; without an authority, those of this machine are trusted.
+    """Return the TLS settings that verify a server; by default, they trust this machine's authorities.
 
-    Chain, name and dates are checked, but not the authority's extensions: Python 3.13 requires extensions
-    that the authorities of many clusters lack, and kubectl does not.
+    Chain, name and dates are checked, but not the extensions of the authority's certificate. Python 3.13
+    requires extensions that the authorities of many clusters lack; kubectl does not require them.
 
     Args:
         authority: the file of the certificate authority.
-        pem: the certificate authority itself.
-        verified: False: any certificate is accepted.
+        pem: the certificate authority as PEM text.
+        verified: whether to verify the certificate; False accepts any certificate.
 
     Raises:
         OSError: the authority cannot be read.
-        ValueError: it is not a certificate.
+        ValueError: the authority is not a certificate.
     """
     found = ssl.create_default_context(cafile=authority, cadata=pem)
     found.verify_flags &= ~ssl.VERIFY_X509_STRICT
@@ -44,12 +44,13 @@ def verification(
 
 
 def add_identity(context: ssl.SSLContext, certificate: bytes, key: bytes) -> None:
-    """Make new connections of a context send a client's certificate.
+    """Add a client certificate, which new connections of the context will send.
 
     Raises:
         OSError: the certificate or key is unusable.
     """
-    with tempfile.TemporaryDirectory() as folder:  # ssl reads only files; other users cannot read the folder
+    # Ssl reads only files, so they are in a folder that other users cannot read.
+    with tempfile.TemporaryDirectory() as folder:
         files = Path(folder) / "certificate", Path(folder) / "key"
         for file, content in zip(files, (certificate, key), strict=True):
             file.write_bytes(content)
@@ -57,7 +58,7 @@ def add_identity(context: ssl.SSLContext, certificate: bytes, key: bytes) -> Non
 
 
 def refused_certificate(error: BaseException) -> tuple[str, str] | None:
-    """Return the reason and remedy for a refused server certificate; None if the error is another one."""
+    """Return reason and remedy if an error is a refused server certificate; None for any other error."""
     found = _verification_error(error)
     if found is None:
         return None
@@ -71,7 +72,7 @@ def refused_certificate(error: BaseException) -> tuple[str, str] | None:
 
 
 def _verification_error(error: BaseException) -> ssl.SSLCertVerificationError | None:
-    """Return the error of the ssl library that other libraries have wrapped."""
+    """Return the ssl library's error inside the errors of other libraries, or None."""
     seen: list[BaseException] = []
     waiting: list[BaseException | None] = [error]
     while waiting:

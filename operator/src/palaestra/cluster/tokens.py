@@ -9,7 +9,7 @@ FRESH_S = 60.0  # a kubelet replaces a token minutes before it expires
 
 
 class FileToken:
-    """The token in a file, read again every minute."""
+    """The token in a file, which is read again after a minute."""
 
     def __init__(self, file: Path, clock: Callable[[], float]) -> None:
         self._file = file
@@ -33,7 +33,7 @@ class FileToken:
 
 
 def text_of(file: Path) -> str:
-    """Return the text of a file without the space around it; "" if it cannot be read."""
+    """Return the text of a file without the white space around it; "" if the file cannot be read."""
     try:
         return file.read_text(encoding="ascii").strip()
     except (OSError, UnicodeDecodeError):

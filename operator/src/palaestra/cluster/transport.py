@@ -1,7 +1,7 @@
-"""The bytes of requests and responses, with a deadline on the whole response.
+"""Send requests and read responses as bytes, with a deadline for the whole response.
 
-The official client does not send the requests: its models need ten times the time and twice the memory of
-plain JSON, and its calls have no deadline for the response's body.
+This module replaces the official client, whose models need ten times the time and twice the memory of plain
+JSON. Also, the calls of the official client have no deadline for the body of a response.
 """
 
 import json
@@ -24,18 +24,19 @@ from palaestra.cluster.tls import refused_certificate
 
 OnRequest = Callable[[str, str, int, float], None]
 CHUNK = 1 << 16
-MOST_BYTES = 1 << 26  # an object has 1.5 MiB at most, a page 500 objects, of which few are large
+# Limit of a response; an object has at most 1.5 MiB, and few of the 500 objects of a page are large.
+MOST_BYTES = 1 << 26
 SWITCHED = 101  # HTTP status: switching to the websocket protocol
 FIRST_ERROR = 400
 JSON = "application/json"
 
 
 class ConnectionBroke(Unreachable):
-    """The connection broke before the end of the response: a read may be repeated at once."""
+    """The connection broke before the end of the response; a read may be repeated at once."""
 
 
 def nothing(verb: str, resource: str, code: int, seconds: float) -> None:
-    """Ignore a request; the default of `on_request`."""
+    """Do nothing; the default of `on_request`."""
     del verb, resource, code, seconds
 
 
@@ -44,13 +45,13 @@ class Call:
     """One request.
 
     Attributes:
-        verb: as in metrics and RBAC: `list`, `get`, `create`, `patch`, `apply`, `delete`, `watch`.
-        plural: the resource, for metrics.
-        path: from the root of the API server.
-        query: parameters; None is left out, a list repeats its name.
-        accept: media type of the response.
-        body: an object, sent as JSON.
-        waits: whether to retry within the deadline if the server is busy (429).
+        verb: the verb in metrics and RBAC: `list`, `get`, `create`, `patch`, `apply`, `delete`, `watch`.
+        plural: the plural name of the kind, for metrics.
+        path: the path from the root of the API server.
+        query: the parameters of the URL; None is left out, and for a list the name is repeated.
+        accept: the requested media type of the response.
+        body: an object, which is sent as JSON.
+        waits: whether to retry within the deadline if the server responds with 429.
     """
 
     verb: str
@@ -69,17 +70,17 @@ class Call:
 
     @property
     def address(self) -> str:
-        """Path and query."""
+        """The path with the query."""
         given = {key: value for key, value in self.query.items() if value is not None}
         query = urlencode(given, doseq=True)
         return f"{self.path}?{query}" if query else self.path
 
 
 class Transport:
-    """Connections to one API server, as one identity; safe to use from several threads.
+    """Connections to one API server with one identity; several threads may use one object.
 
     Attributes:
-        limits: the deadlines.
+        limits: the deadlines and the waits before retries.
         on_request: called after every request.
     """
 
@@ -94,17 +95,18 @@ class Transport:
     def call(self, call: Call, call_s: float) -> dict[str, Any]:
         """Return the object in the response to one request.
 
-        It takes at most twice `call_s`, even if the response arrives byte by byte.
+        The call takes at most twice `call_s`, even if the response arrives byte by byte.
 
         Raises:
-            ApiError: the API server refuses, cannot be reached, or returns something else.
+            ApiError: the API server refuses, cannot be reached, or returns another response than an object.
         """
         deadline = time.monotonic() + call_s
         broke, turned_away = False, 0
         while True:
             try:
                 return self._timed(call, deadline)
-            except TooManyRequests as error:  # rejected, so it was certainly not executed
+            # The server rejected the request, so it was certainly not executed.
+            except TooManyRequests as error:
                 turned_away += 1
                 wait_s = error.retry_after_s + self.limits.turned_away.wait_s(turned_away)
                 if not call.waits or time.monotonic() + wait_s >= deadline:
@@ -116,7 +118,7 @@ class Transport:
                 broke = True
 
     def open(self, call: Call, *, silence_s: float) -> BaseHTTPResponse:
-        """Return a streamed response, which the caller reads and closes; a read waits at most `silence_s`.
+        """Return a streamed response, which the caller must close; a read waits at most `silence_s`.
 
         Raises:
             ApiError: the API server refuses, or cannot be reached.
@@ -134,7 +136,7 @@ class Transport:
         Raises:
             ApiError: the API server refuses, or cannot be reached.
         """
-        from palaestra.cluster import pod_exec  # noqa: PLC0415 - it needs a library of people's tools
+        from palaestra.cluster import pod_exec  # noqa: PLC0415 - the operator needs no websockets
 
         started, code = time.monotonic(), 0
         try:
@@ -189,7 +191,8 @@ class Transport:
         response = self._send(call, Timeout(connect=min(self.limits.connect_s, left_s), read=left_s))
         try:
             return self._answer(response, call, deadline)
-        except BaseException:  # also Ctrl-C: the next request would read the rest of this response
+        # Ctrl-C is included: otherwise the next request would read the remaining bytes of this response.
+        except BaseException:
             response.close()
             raise
         finally:
@@ -221,12 +224,12 @@ class Transport:
             raise self._unreachable(error, f"{call.method} {self.host}{call.path}") from error
 
     def _authorization(self) -> Headers:
-        with self._credentials:  # one thread reads the token or runs the plugin, for all waiting threads
+        with self._credentials:  # one thread reads the token or runs the plugin, and the other threads wait
             header = self._access.authorization()
         return () if header is None else (("Authorization", header),)
 
     def _unreachable(self, error: Exception, what: str) -> Unreachable:
-        """Return the exception for a request without a response; it names the proxy, if any."""
+        """Return the exception for a request without a response; its message names the proxy."""
         if (refused := refused_certificate(error)) is not None:
             fact, remedy = refused
             return Untrusted(f"{self.host}{self._by_way}: {fact}", remedy)
@@ -240,7 +243,7 @@ class Transport:
         retry_after = response.headers.get("Retry-After")
         try:
             status = json.loads(_body(response, deadline))
-        except ValueError:  # a proxy in between responds with HTML
+        except ValueError:  # a proxy may respond with HTML
             status = None
         except Unreachable:
             status = None
@@ -248,14 +251,15 @@ class Transport:
 
 
 def read_some(response: BaseHTTPResponse) -> bytes:
-    """Return the next bytes of a response, as soon as they arrive; b"" at its end.
+    """Return the next bytes of a response as soon as they arrive; b"" at the end of the response.
 
     Raises:
         Unreachable: the connection broke, or was silent for too long.
     """
     try:
         return response.read1(CHUNK)
-    except (HTTPError, OSError, ValueError) as error:  # ValueError: another thread has shut down TLS
+    # ValueError: another thread has shut down the TLS connection.
+    except (HTTPError, OSError, ValueError) as error:
         raise _unreachable(error, "reading the response") from error
 
 

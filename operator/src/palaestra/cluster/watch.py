@@ -1,4 +1,4 @@
-"""One watch: events line by line until it ends, breaks, or is closed from another thread."""
+"""One watch: it yields events until it ends, its connection breaks, or another thread closes it."""
 
 import json
 import threading
@@ -13,10 +13,10 @@ from palaestra.cluster.transport import MOST_BYTES, Call, OnRequest, read_some
 
 
 class Watch:
-    """The changes after a version: iterate over events, which are dicts with `type` and `object`.
+    """An iterable over the changes after a version; each event is a dict with `type` and `object`.
 
-    Types are ADDED, MODIFIED, DELETED and BOOKMARK; an ERROR event is raised as an ApiError. An incomplete
-    last line is not yielded.
+    The types are ADDED, MODIFIED, DELETED and BOOKMARK. An ERROR event is raised as an ApiError. If the last
+    line is incomplete, the iterator raises Unreachable.
     """
 
     def __init__(self, response: BaseHTTPResponse, call: Call, on_request: OnRequest) -> None:
@@ -47,7 +47,7 @@ class Watch:
             self._on_request(self._call.verb, self._call.plural, code, time.monotonic() - self._started)
 
     def close(self) -> None:
-        """End the watch; a thread that waits for an event returns at once. A second call has no effect."""
+        """End the watch, and wake the thread that waits for an event. A second call has no effect."""
         self._closed.set()
         try:
             self._response.shutdown()

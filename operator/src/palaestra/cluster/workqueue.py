@@ -1,11 +1,11 @@
-"""A queue of work for the controller: names of objects, each once, each with one worker at a time.
+"""The controller's queue of names of objects; it has each name at most once, for one worker at a time.
 
-If a name is added while a worker has it, it is returned again after that worker is done. So no change is
-missed, and two workers never work on one object. The queue holds names, not events: a worker reads the
+If a name is added while a worker has it, `get` returns the name again after that worker is done. So no change
+is missed, and two workers never work on one object. The queue contains names, not events: a worker reads the
 current state of the object.
 
-Names are in lanes, which take turns. So a thousand names in one lane delay a name in another lane only by the
-work in progress.
+Each name is in a lane, and the lanes take turns. So a thousand names in one lane delay a name in another lane
+only by the work in progress.
 """
 
 import heapq
@@ -19,7 +19,7 @@ from typing import Generic, TypeVar
 from palaestra.cluster.timeouts import Backoff
 
 Item = TypeVar("Item", bound=Hashable)
-RETRY = Backoff(first_s=0.1, cap_s=60.0)  # with its jitter: 0.05 s to 60 s
+RETRY = Backoff(first_s=0.1, cap_s=60.0)  # with jitter, the waits are from 0.05 s to 60 s
 
 
 def _nobody(seconds: float) -> None:
@@ -32,11 +32,11 @@ def _one_lane(key: Hashable) -> Hashable:
 
 
 class WorkQueue(Generic[Item]):
-    """A deduplicating queue with delays; safe to use from several threads.
+    """A deduplicating queue with delays; several threads may use one queue.
 
     Args:
-        again: the wait before work on a name is retried.
-        waited: called with the seconds between a name's readiness and its start with a worker.
+        again: the waits before work on a name is retried.
+        waited: called with the seconds that a name was ready before a worker took it.
         lane: returns the lane of a name.
         clock: a monotonic clock, in seconds.
     """
@@ -54,8 +54,9 @@ class WorkQueue(Generic[Item]):
         self._lane = lane
         self._clock = clock
         self._changed = threading.Condition()
-        self._ready: dict[Hashable, deque[Item]] = {}  # by lane; the lane of the next turn is first
-        # Names that wait for a worker, even if another worker has the same name in work.
+        # Ready names by lane; the lane of the next turn is first.
+        self._ready: dict[Hashable, deque[Item]] = {}
+        # The names that wait for a worker, including names that a worker has now and that were added again.
         self._since: dict[Item, float] = {}
         self._working: set[Item] = set()
         self._later: list[tuple[float, int, Item]] = []
@@ -73,7 +74,7 @@ class WorkQueue(Generic[Item]):
 
     @property
     def closed(self) -> bool:
-        """Return whether `close` was called; after it, `get` returns None."""
+        """Return whether `close` was called; afterwards `get` returns None."""
         return self._closed
 
     def add(self, key: Item) -> None:
@@ -83,7 +84,7 @@ class WorkQueue(Generic[Item]):
             self._changed.notify_all()
 
     def add_after(self, key: Item, seconds: float) -> None:
-        """Queue a name after `seconds`; of several such calls the earliest time counts."""
+        """Queue a name after `seconds`; after several such calls, the earliest time counts."""
         with self._changed:
             due = self._clock() + seconds
             if due < self._due.get(key, float("inf")):
@@ -92,7 +93,7 @@ class WorkQueue(Generic[Item]):
                 self._changed.notify_all()
 
     def retry(self, key: Item) -> float:
-        """Queue a name after a failure, with a longer wait after each; return that wait in seconds."""
+        """Queue a name after a wait that doubles with each failure in a row; return the wait in seconds."""
         with self._changed:
             self._failures[key] = self._failures.get(key, 0) + 1
             wait_s = self._again.wait_s(self._failures[key])
@@ -110,7 +111,7 @@ class WorkQueue(Generic[Item]):
             self._failures.pop(key, None)
 
     def get(self, deadline_s: float) -> Item | None:
-        """Return a name, for which the caller must call `done`; None after `deadline_s`, or if closed."""
+        """Return a name, or None after `deadline_s` or if closed; the caller must then call `done`."""
         with self._changed:
             ends = self._clock() + deadline_s
             while not self._closed:
@@ -124,7 +125,7 @@ class WorkQueue(Generic[Item]):
             return None
 
     def done(self, key: Item) -> None:
-        """End a worker's work on a name; if it was added in the meantime, it is queued again."""
+        """End a worker's work on a name; if the name was added during the work, queue it again."""
         with self._changed:
             self._working.discard(key)
             if key in self._since:
@@ -160,6 +161,6 @@ class WorkQueue(Generic[Item]):
     def _promote(self, now: float) -> None:
         while self._later and self._later[0][0] <= now:
             due, _, key = heapq.heappop(self._later)
-            if self._due.get(key) == due:  # otherwise an earlier request has replaced it
+            if self._due.get(key) == due:  # otherwise a request with an earlier time has replaced this one
                 del self._due[key]
                 self._add(key, due)

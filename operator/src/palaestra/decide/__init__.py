@@ -1,7 +1,8 @@
-"""Decide the status of a job and the actions for it, from the job and an observation.
+"""Decide a job's status, actions and events from the job and an observation of the cluster.
 
-Pure: the clocks are passed in. Decisions are ordered lists of small named checks. `HOLDS` in `preconditions`
-lists the checks that keep a job from starting; `replica_policy` lists those of a replica.
+This package is pure: the clocks are arguments. A decision is an ordered list of small named checks. `HOLDS`
+in `preconditions` lists the checks that can keep a job from starting. `replica_policy` lists the checks of a
+replica.
 
     job = accept(raw)                                  # JobRefused: decision = reject(raw, refused, now)
     observed = observe(job, objects)
@@ -12,7 +13,7 @@ lists the checks that keep a job from starting; `replica_policy` lists those of 
     # emit decision.events;
     # decision.record is for the next reconcile
 
-Objects are created only after the status that accepts the job was written. That status holds the release's
+Objects are created only after the status that accepts the job was written. That status stores the release's
 images, so that an upgraded operator makes the same plan. Terminal replicas are never planned again.
 """
 

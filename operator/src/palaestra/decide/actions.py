@@ -1,6 +1,6 @@
 """The actions for a job, in order: stop, replace pods, suspend or resume, discard, create missing objects.
 
-The last one is the deletion of an ended TrainingJob when its time to live has passed.
+The last action is the deletion of an ended TrainingJob, after its time to live has passed.
 """
 
 from collections.abc import Iterator, Sequence
@@ -37,8 +37,8 @@ def wanted(plan: Plan, observed: Observed, replicas: Sequence[ReplicaStatus]) ->
     """Return the missing objects of unfinished replicas, in the order of creation.
 
     A Job is created only after the pods of the previous Job have ended, because two pods of a replica would
-    write to one volume. If a Job exists, its volumes keep the names in it, even if a newer release uses other
-    names.
+    write to one volume. If a Job exists, missing volumes are created only under the names in this Job, even
+    if a newer release uses other names.
     """
     going_on = [replica for replica in observed.replicas if replicas[replica.index].phase not in TERMINAL]
     if not going_on:
@@ -70,7 +70,7 @@ def _there(thing: Object, observed: Observed) -> bool:
 
 
 def _stops(observed: Observed, decided: Sequence[Decided]) -> Iterator[Stop]:
-    """Yield a stop for each replica that must end and was not stopped yet."""
+    """Yield a `Stop` for each replica that must end and was not stopped yet."""
     for seen, replica in zip(observed.replicas, decided, strict=True):
         if seen.job is None or seen.job.end is not None:
             continue
@@ -85,7 +85,7 @@ def _stops(observed: Observed, decided: Sequence[Decided]) -> Iterator[Stop]:
 
 
 def _replacements(observed: Observed, decided: Sequence[Decided]) -> Iterator[Replace]:
-    """Yield a replacement for each pod that must be replaced, unless it is being deleted."""
+    """Yield a `Replace` for each pod that must be replaced and is not being deleted."""
     for seen, replica in zip(observed.replicas, decided, strict=True):
         why = replica.course.replace
         if why is None or seen.job is None or seen.pod is None or seen.pod.gone_by is not None:
@@ -109,7 +109,7 @@ def _replacements(observed: Observed, decided: Sequence[Decided]) -> Iterator[Re
 def _switches(
     job: TrainingJob, observed: Observed, prepared: Prepared, decided: Sequence[Decided]
 ) -> Iterator[SetSuspend]:
-    """Yield a change for each Job whose `suspend` differs from the spec; a hold prevents a resumption.
+    """Yield a `SetSuspend` for each Job whose `suspend` differs from the spec; a hold prevents a resumption.
 
     The Job of a lost run is suspended, because its trainer would start at step 0.
     """
@@ -128,9 +128,9 @@ def _switches(
 
 
 def _discards(job: TrainingJob, observed: Observed) -> Iterator[Discard]:
-    """Yield the deletion of each stopped and suspended Job, once the status shows that its replica ended.
+    """Yield a `Discard` for each stopped and suspended Job whose replica has ended in the stored status.
 
-    The deadline of a suspended Job does not run, so nothing else would ever end it.
+    The deadline of a suspended Job does not run, so Kubernetes would never end the Job.
     """
     ended = {replica.index for replica in job.status.replicas if replica.phase in TERMINAL}
     for seen in observed.replicas:
@@ -145,7 +145,7 @@ def _basis(job: JobView, pods: Sequence[PodView] = ()) -> Basis:
 
 
 def expires(status: Status, ttl_s: int | None) -> datetime | None:
-    """Return the time at which to delete an ended job; None: never, or it has not ended."""
+    """Return the time at which to delete an ended job; None if it has not ended or has no time to live."""
     if ttl_s is None or status.phase not in TERMINAL or status.completion_time is None:
         return None
     return after(status.completion_time, ttl_s)
@@ -154,7 +154,7 @@ def expires(status: Status, ttl_s: int | None) -> datetime | None:
 def expired(
     name: str, uid: str | None, at: datetime | None, status: Status, now: datetime
 ) -> tuple[Delete, ...]:
-    """Return the deletion of the TrainingJob, if its time `at` has come."""
+    """Return the deletion of the TrainingJob if the time `at` has passed."""
     if at is None or at > now or uid is None:
         return ()
     return (Delete(name=name, uid=uid, after_s=seconds_between(status.completion_time or now, now)),)

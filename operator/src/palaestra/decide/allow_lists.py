@@ -1,8 +1,8 @@
-"""Check the settings of a job that affect other users of the cluster: the installation must allow them.
+"""Check that the installation allows those settings of a job that affect other users of the cluster.
 
-A job is checked until it is accepted, and never again. So neither a new check nor a removed value ends an
-accepted job. The schema of affinities is open: a value of an unexpected type is skipped here, and the API
-server refuses it.
+A job is checked until it is accepted, and never again. So an accepted job stays accepted if a newer release
+adds a check or an administrator removes an allowed value. The schema of affinities is open. These checks skip
+a value of an unexpected type, and the API server refuses it.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -16,7 +16,7 @@ from palaestra.plan import Allowed
 from palaestra.plan.replica import JOB_LABEL, UID_LABEL
 from palaestra.plan.resources import asks_for
 
-Term = Mapping[str, Any]  # one term of an affinity to pods, as in a pod
+Term = Mapping[str, Any]  # one term of an affinity to pods, in the format of a pod's spec
 Check = Callable[[TrainingJob, Allowed], Hold | None]
 
 REQUIRED = "requiredDuringSchedulingIgnoredDuringExecution"
@@ -65,7 +65,7 @@ def tolerations_are_allowed(job: TrainingJob, allowed: Allowed) -> Hold | None:
 
 
 def affinity_stays_in_its_namespace(job: TrainingJob, allowed: Allowed) -> Hold | None:
-    """An affinity to pods of other namespaces affects where they may run, and reveals where they run."""
+    """An affinity to pods of other namespaces affects where those pods may run, and reveals their nodes."""
     known = (job.metadata.namespace, *allowed.affinity_namespaces)
     terms = (term for kind, strength in product(KINDS, STRENGTHS) for term in _terms(job, kind, strength))
     for where, term in terms:
@@ -79,7 +79,7 @@ def affinity_stays_in_its_namespace(job: TrainingJob, allowed: Allowed) -> Hold 
 
 
 def no_pods_of_others_are_kept_away(job: TrainingJob, allowed: Allowed) -> Hold | None:
-    """A scheduler applies a required anti-affinity both ways: selected pods cannot use the job's nodes."""
+    """A required anti-affinity works in both directions: selected pods cannot use the job's nodes."""
     for where, term in _terms(job, ANTI_AFFINITY, REQUIRED):
         selector = term.get("labelSelector")
         if selector is not None and not _selects_own(job, term) and not _selects_allowed(selector, allowed):
@@ -92,7 +92,7 @@ def no_pods_of_others_are_kept_away(job: TrainingJob, allowed: Allowed) -> Hold 
     return None
 
 
-# All checks of a job against the installation's lists, in the order of the messages.
+# All checks of a job against the installation's lists; the first refusal becomes the message.
 CHECKS: tuple[Check, ...] = (
     pod_metadata_is_allowed,
     priority_is_allowed,
@@ -125,10 +125,11 @@ def _allows(allowed: Iterable[str], key: str) -> bool:
 
 
 def _requests(job: TrainingJob, resource: str) -> bool:
-    """Return whether the job requests an extended resource, as Kubernetes' ExtendedResourceToleration does.
+    """Return whether the job requests an extended resource, by the rule of ExtendedResourceToleration.
 
-    Such a pod runs only on nodes that have the resource. A scheduler ignores unknown resources of
-    kubernetes.io.
+    ExtendedResourceToleration is an admission plugin of Kubernetes. A pod with such a request runs only on
+    nodes that have the resource. Resources of the domain kubernetes.io do not count, because a scheduler
+    ignores unknown resources of that domain.
     """
     if "/" not in resource or "kubernetes.io/" in resource:
         return False
@@ -147,7 +148,7 @@ def _terms(job: TrainingJob, kind: str, strength: str) -> Iterator[tuple[str, Te
 
 
 def _selects_own(job: TrainingJob, term: Term) -> bool:
-    """Return whether a term selects only pods of the job; one requirement suffices, as all must hold."""
+    """Return whether a term selects only the job's pods: one of its requirements must ensure that."""
     own, selector = job.metadata.name, term.get("labelSelector")
     return (
         _mapping(selector, "matchLabels").get(JOB_LABEL) == own

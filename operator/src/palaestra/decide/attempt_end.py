@@ -1,6 +1,7 @@
-"""The end of one attempt, by its pod and its trainer's last report: the first check that holds.
+"""The reason for the end of an attempt: the first check that holds for its pod and its last message.
 
-The cause of a disruption precedes the trainer's reaction to it, as in the Job's podFailurePolicy.
+A disruption is checked before the exit code with which the trainer reacts to it. The Job's podFailurePolicy
+has the same order.
 """
 
 from collections.abc import Callable
@@ -30,7 +31,7 @@ from palaestra_protocol.pod.status import ExitCode, Termination
 BY_SIGNAL = frozenset({None, ExitCode.INTERRUPTED, 128 + 9, 128 + 15})  # exit codes that a deletion may cause
 GONE = "its pod is gone; it left no termination message"
 TAKEN, AGAIN = ", which evicted it", "; it continues when it is admitted again"
-_HUNG = "SimulatorHung"  # the start of a termination message
+_HUNG = "SimulatorHung"  # the first word of a termination message
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,11 +39,11 @@ class EndedAttempt:
     """An attempt that has ended.
 
     Attributes:
-        situation: the replica.
-        number: from 1.
-        name: of its pod.
-        pod: None if it is gone.
-        code: exit code of its trainer; None if unknown.
+        situation: the replica of the attempt.
+        number: the number of the attempt, from 1.
+        name: the name of its pod.
+        pod: its pod; None if the pod was deleted.
+        code: the exit code of its trainer; None if unknown.
     """
 
     situation: ReplicaContext
@@ -58,7 +59,7 @@ class EndedAttempt:
 
     @property
     def words(self) -> str:
-        """Return the most detailed known description of its end."""
+        """Return the most detailed known description of the attempt's end."""
         if self.word is not None:
             return self.word.reason
         return how_it_failed(self.situation, self.pod) if self.pod is not None else GONE
@@ -86,24 +87,24 @@ def completed(attempt: EndedAttempt) -> Explanation | None:
 
 
 def evicted_for_storage(attempt: EndedAttempt) -> Explanation | None:
-    """The pod was evicted because it wrote more than its limit."""
+    """The pod was evicted because it wrote more data than its limit allows."""
     return None if attempt.pod is None else storage_eviction(attempt.pod)
 
 
 def replaced(attempt: EndedAttempt) -> Explanation | None:
-    """The operator replaced the pod, because the kubelet does not repair it."""
+    """The operator replaced the pod, because the kubelet cannot repair it."""
     return None if attempt.pod is None else mark_of(attempt.situation, attempt.pod)
 
 
 def disrupted(attempt: EndedAttempt) -> Explanation | None:
-    """The cluster interrupted the pod, by a condition of the pod."""
+    """The cluster interrupted the pod; a condition of the pod has the cause."""
     if attempt.pod is None or not attempt.pod.disruption:
         return None
     return _disrupted(attempt, attempt.pod.disruption)
 
 
 def gone(attempt: EndedAttempt) -> Explanation | None:
-    """The pod is gone; report the cause under which its restart was counted."""
+    """The pod was deleted; report the cause under which its restart was counted."""
     if attempt.pod is not None:
         return None
     before, after = attempt.situation.old.restarts, attempt.situation.counted.restarts
@@ -126,7 +127,8 @@ def deleted(attempt: EndedAttempt) -> Explanation | None:
         return stop
     if job is not None and (job.suspended or ended_by_suspension(attempt.situation.seen, pod)):
         return paused(attempt.situation)
-    if attempt.code not in {None, ExitCode.INTERRUPTED} or failed_by_itself(pod):  # a failure for its Job too
+    # The Job counts this end as a failure too.
+    if attempt.code not in {None, ExitCode.INTERRUPTED} or failed_by_itself(pod):
         how = f"{how_it_failed(attempt.situation, pod)}; its pod was deleted, and it did not save in time"
         return explain(Reason.TRAINER_FAILED, how=how)
     return _disrupted(attempt, "it was deleted")
@@ -157,14 +159,14 @@ def configuration_refused(attempt: EndedAttempt) -> Explanation | None:
 
 
 def simulator_budget_spent(attempt: EndedAttempt) -> Explanation | None:
-    """The trainer gave up on a simulator."""
+    """The trainer ended because a simulator failed more often than its restart budget allows."""
     if attempt.code != ExitCode.FAULT_BUDGET:
         return None
     return explain(Reason.SIMULATOR_BUDGET_SPENT, words=attempt.words, memory=_memory(attempt))
 
 
 def diverged(attempt: EndedAttempt) -> Explanation | None:
-    """The learner diverged."""
+    """The learner diverged: a loss, weight or reward is NaN or infinite."""
     return _of_code(attempt, ExitCode.DIVERGED, Reason.DIVERGED)
 
 
@@ -188,7 +190,7 @@ def simulator_hung(attempt: EndedAttempt) -> Explanation | None:
 
 
 def stalled(attempt: EndedAttempt) -> Explanation | None:
-    """The trainer's watchdog ended it."""
+    """The trainer's watchdog ended the trainer."""
     if attempt.code != ExitCode.STALLED:
         return None
     seconds = attempt.situation.job.spec.stall_deadline_seconds
@@ -201,7 +203,7 @@ def storage_full(attempt: EndedAttempt) -> Explanation | None:
     return full_volume(attempt.word)
 
 
-# Causes that would end a new pod too.
+# These causes would end a new pod too.
 CAUSES: tuple[EndCheck, ...] = (
     configuration_refused,
     simulator_budget_spent,
@@ -237,7 +239,7 @@ def first(checks: tuple[EndCheck, ...], attempt: EndedAttempt) -> Explanation | 
 
 
 def stop_of(job: JobView) -> Explanation | None:
-    """Return the reason for the operator's stop of a replica, by the mark on its Job, or None."""
+    """Return the reason for which the operator stopped a replica, from the Job's annotation, or None."""
     if job.stopped is None:
         return None
     reason, message = job.stopped
@@ -245,7 +247,7 @@ def stop_of(job: JobView) -> Explanation | None:
 
 
 def paused(situation: ReplicaContext, why: str = "") -> Explanation:
-    """Return the reason for a Job's suspension; if it has a queue, Kueue suspended it with message `why`."""
+    """Return the reason for a Job's suspension; `why` is Kueue's message, if the Job has a queue."""
     queue = (
         situation.seen.job.queue if situation.seen.job else ""
     ) or situation.job.spec.scheduling.queue_name
@@ -270,7 +272,7 @@ def _disrupted(attempt: EndedAttempt, words: str) -> Explanation:
 
 
 def _memory(attempt: EndedAttempt) -> str:
-    """Return the simulators of the attempt that ran out of memory, with the remedy; "" if none did."""
+    """Return the text about the attempt's simulators that ran out of memory, with the remedy, or ""."""
     uid = attempt.pod.uid if attempt.pod is not None else None
     killed = [
         f"{kill.container} ran out of memory and was killed ({limit_of(kill.limit)})"

@@ -1,10 +1,10 @@
 """The clocks of one reconcile, and the record of the previous reconcile in this process.
 
-Clocks differ: a node's may be minutes off, and someone may set the operator's own. So a wait is measured on
-this process's monotonic clock, from the reconcile that first found it. After a restart or with a new leader
-every wait begins again, so it gets longer, never shorter. The wall clock is for the times in a status. Only
-the time to live is measured by it, from a time that the operator wrote. A status has times in whole seconds,
-so decisions use whole seconds too.
+The wall clock of a node may be minutes off, and an administrator may set the clock of the operator's node. So
+a wait is measured on this process's monotonic clock, from the reconcile that first found the wait. After a
+restart or with a new leader, every wait begins again, so a wait can become longer, but not shorter. The wall
+clock gives the times in a status. Only the time to live is measured on the wall clock, from a time that the
+operator wrote. A status has times in whole seconds, so decisions use whole seconds too.
 """
 
 from collections.abc import Iterable, Mapping
@@ -23,7 +23,8 @@ class Wait:
     Attributes:
         key: identifies the wait within a replica; a wait with another key begins again.
         seconds: the deadline.
-        begun_s: when it began, on the monotonic clock; None: it began when the operator first found it.
+        begun_s: the time at which the wait began, on the monotonic clock; None: the time of the first
+            reconcile that found it.
     """
 
     key: tuple[str, ...]
@@ -37,8 +38,8 @@ class WaitingReason:
 
     Attributes:
         explanation: the reason and its message.
-        gone_s: time of the first reconcile that did not find it, on the monotonic clock; None: it still
-            exists.
+        gone_s: time of the first reconcile that no longer found the cause, on the monotonic clock; None: the
+            cause still exists.
     """
 
     explanation: Explanation
@@ -47,7 +48,7 @@ class WaitingReason:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReconcileRecord:
-    """The record that one reconcile leaves to the next in the same process; a restart may lose it.
+    """The data that one reconcile passes to the next reconcile of the same process; a restart loses it.
 
     Attributes:
         waits: time at which each open wait was first found, on the monotonic clock.
@@ -78,7 +79,7 @@ class Times:
     record: ReconcileRecord = field(default_factory=ReconcileRecord)
 
     def since_s(self, replica: int, wait: Wait) -> float:
-        """Return the start time of a replica's wait."""
+        """Return the start time of a replica's wait, on the monotonic clock."""
         begun_s = self.clock_s if wait.begun_s is None else min(wait.begun_s, self.clock_s)
         return self.record.waits.get((replica, *wait.key), begun_s)
 
@@ -90,7 +91,7 @@ class Times:
 
 
 def whole(at: datetime) -> datetime:
-    """Return a time with a time zone in UTC and whole seconds, as a status holds it."""
+    """Return a time in UTC and whole seconds, as in a status; `at` has a time zone."""
     return at.astimezone(UTC).replace(microsecond=0)
 
 

@@ -1,4 +1,4 @@
-"""Checks for a replica that continues without a waiting reason: its state."""
+"""The checks that report the state of a replica that has no waiting reason."""
 
 from dataclasses import replace
 
@@ -12,11 +12,11 @@ from palaestra.observe.models import PodView
 
 UNASKED = "; the cause was not looked up, because too many other replicas wait"
 DESCRIBE = "; `kubectl describe` shows it"
-DESCRIBE_WORKLOAD = "; `kubectl describe workload` shows it"  # only this object has Kueue's message
+DESCRIBE_WORKLOAD = "; `kubectl describe workload` shows it"  # only the Workload has Kueue's message
 
 
 def held(situation: ReplicaContext) -> Finding | None:
-    """It does not start: its run is lost, or an object that the job names is missing or not for jobs."""
+    """The replica does not start: its run is lost, or an object in the spec is missing or not for jobs."""
     if situation.hold is None:
         return None
     job = situation.seen.job
@@ -25,7 +25,7 @@ def held(situation: ReplicaContext) -> Finding | None:
 
 
 def suspending(situation: ReplicaContext) -> Finding | None:
-    """It is or was just suspended, and its pod still saves a checkpoint."""
+    """The replica is or was just suspended, and its pod still saves a checkpoint."""
     pod = situation.pod if situation.seen.job is not None else None
     if pod is None or not (situation.suspended or ended_by_suspension(situation.seen, pod)):
         return None
@@ -34,7 +34,7 @@ def suspending(situation: ReplicaContext) -> Finding | None:
 
 
 def suspended(situation: ReplicaContext) -> Finding | None:
-    """`spec.suspend` or a queue keeps it from running."""
+    """`spec.suspend` or a queue keeps the replica from running."""
     if not situation.suspended:
         return None
     why = paused(situation, situation.seen.unadmitted or "")
@@ -42,7 +42,7 @@ def suspended(situation: ReplicaContext) -> Finding | None:
 
 
 def _with_words(situation: ReplicaContext, why: Explanation) -> str:
-    """Return the message of `why`; a restarted operator keeps Kueue's message until it reads the Workload."""
+    """Return the message of `why`; after a restart, keep the stored message until Kueue's is read again."""
     if situation.seen.unasked:
         return why.message + UNASKED + (DESCRIBE_WORKLOAD if why.reason == Reason.QUEUED else DESCRIBE)
     before, plain = situation.old.message or "", why.message.removesuffix(AGAIN)
@@ -60,7 +60,7 @@ def trainer_has_ended(situation: ReplicaContext) -> Finding | None:
 
 
 def trains(situation: ReplicaContext) -> Finding | None:
-    """The trainer runs and has responded."""
+    """The trainer runs and has responded at least once."""
     if not runs(situation):
         return None
     if situation.seen.polled is not None and not situation.trains:
@@ -72,7 +72,7 @@ def trains(situation: ReplicaContext) -> Finding | None:
 
 
 def starts(situation: ReplicaContext) -> Finding | None:
-    """Its objects are about to be created, or its containers start."""
+    """The replica's objects are about to be created, or its containers start."""
     there = [*situation.seen.in_the_way, *([situation.pod.name] if situation.pod is not None else [])]
     if situation.seen.job is None:
         waits = f"waits for pod {there[0]} to end" if there else "is about to be created"
@@ -89,7 +89,8 @@ def starts(situation: ReplicaContext) -> Finding | None:
 def runs(situation: ReplicaContext) -> bool:
     """Return whether the trainer runs, in a pod of the replica's Job, and has responded once.
 
-    The kubelet reports the first response to its startup probe. A custom program has no such probe.
+    The kubelet reports the first response to the trainer's startup probe. A custom program has no startup
+    probe, so a response to the operator's poll counts too.
     """
     pod = situation.pod if situation.seen.job is not None else None
     if pod is None or pod.trainer is None or not _in_trainer(pod):

@@ -1,4 +1,4 @@
-"""The result of `decide`: a status, actions and events, as data."""
+"""The result of `decide` as data: a status, actions and events."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -15,10 +15,10 @@ from palaestra.plan.job import suspend_set
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Basis:
-    """The versions on which a change of a Job was decided; if they have changed, the change is skipped.
+    """The versions of a Job and its pods at a decision; if they have changed, the action is skipped.
 
     Attributes:
-        uid, version: of the Job.
+        uid, version: uid and resourceVersion of the Job.
         pods: uid and resourceVersion of each pod of the replica.
     """
 
@@ -32,7 +32,7 @@ class Create:
     """Create `object` in its namespace; `replica` is None if it belongs to the whole job.
 
     AlreadyExists is not an error for a ConfigMap, claim or NetworkPolicy, because their names determine their
-    content. A Job that exists is added to `Objects.jobs`, even if another object owns it; `observe` finds its
+    content. An existing Job is added to `Objects.jobs`, even if another object owns it; `observe` checks the
     owner.
     """
 
@@ -42,7 +42,7 @@ class Create:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stop:
-    """Stop a replica for good, by one patch of its Job; it stays stopped if the operator restarts."""
+    """Stop a replica for good by one patch of its Job; the replica stays stopped if the operator restarts."""
 
     job: str
     replica: int
@@ -63,12 +63,12 @@ class Stop:
 class Replace:
     """Replace the pod of a replica: first patch its Job, then evict the pod with this uid.
 
-    In this order both steps can be repeated: if the marked pod still runs, the eviction is still to be done.
+    In this order both steps can be repeated: if the annotated pod still runs, the operator evicts it again.
 
     Attributes:
-        times: number of pods of the replica that were replaced this way, including this one.
-        marked: whether the Job already has the mark.
-        ended: whether the pod has ended, so that only the mark is needed.
+        times: number of pods of the replica that the operator has replaced, including this pod.
+        marked: whether the Job already has the annotation about this pod.
+        ended: whether the pod has ended, so that only the annotation is needed.
     """
 
     job: str
@@ -91,10 +91,10 @@ class Replace:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetSuspend:
-    """Suspend or resume the Job of a replica; never for a job with a queue, which Kueue suspends.
+    """Suspend or resume the Job of a replica; only Kueue does this for a job with a queue.
 
     Attributes:
-        mark: the pod that the suspension ends or ended; None leaves the Job's mark unchanged.
+        mark: the pod that the suspension ends or ended; None leaves the Job's annotation unchanged.
     """
 
     job: str
@@ -114,10 +114,10 @@ class SetSuspend:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Discard:
-    """Delete the suspended Job of an ended replica; otherwise a queue would admit it and preempt others.
+    """Delete the suspended Job of an ended replica; otherwise Kueue could admit it and preempt other Jobs.
 
-    The Job is marked as stopped, and the status says that the replica has ended, before the deletion. So an
-    operator that restarts in between reads both.
+    Before the deletion, the Job is annotated as stopped and the status reports that the replica has ended. So
+    an operator that restarts in between finds both facts.
     """
 
     job: str
@@ -127,7 +127,7 @@ class Discard:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Delete:
-    """Delete the TrainingJob with this `uid`, in the background; it ended `after_s` seconds ago."""
+    """Delete the TrainingJob with this `uid` (background propagation); it ended `after_s` seconds ago."""
 
     name: str
     uid: str
@@ -149,7 +149,7 @@ class EventType(StrEnum):
 class EmittedEvent:
     """An event about the TrainingJob, to be written after the status.
 
-    With `once` it describes a state: each reconcile yields it, and only the first one is written.
+    With `once`, the event describes a state: each reconcile yields it, and only the first is written.
     """
 
     type: EventType
@@ -164,11 +164,12 @@ class Decision:
     """The decision on one observation.
 
     Attributes:
-        status: the whole status; `write_in_s` returns when to write it. None leaves the status unchanged.
-        actions: in the order of their execution.
-        events: to be written after the status.
+        status: the whole status; `write_in_s` returns the time of the write. None leaves the status
+            unchanged.
+        actions: the actions in the order of their execution.
+        events: the events to write after the status.
         wake_after_s: seconds until the decision may change by time alone; None: never.
-        record: for the next reconcile of this process.
+        record: the record for the next reconcile in this process.
     """
 
     status: Status | None

@@ -1,4 +1,4 @@
-"""Events: for the changes between two statuses, for the actions, and for edits of the operator's objects."""
+"""The events about changes between two statuses, about actions, and about edits of the operator's objects."""
 
 from collections.abc import Iterator, Sequence
 
@@ -24,17 +24,17 @@ from palaestra.plan.replica import TRAINER
 
 _ENDS = (ConditionType.SUCCEEDED, ConditionType.FAILED)
 _BY_ACTION = {Reason.PLANNED, Reason.RESUMED, Reason.EXPIRED}
-_BY_ATTEMPT = {Reason.DISRUPTED}  # one event for each attempt, even if no reconcile saw it end
+_BY_ATTEMPT = {Reason.DISRUPTED}  # one event for each attempt, even if no reconcile observed its end
 
 
 def emitted(reason: Reason, message: str, replica: int | None = None) -> EmittedEvent:
-    """Return the event for a reason, of the type in docs/reference/reasons.md."""
+    """Return the event for a reason, with the event type from docs/reference/reasons.md."""
     kind = EventType.WARNING if ROWS[reason].warning else EventType.NORMAL
     return EmittedEvent(type=kind, reason=reason, message=message, replica=replica)
 
 
 def of_change(old: Status, new: Status) -> Iterator[EmittedEvent]:
-    """Yield an event for each change of a condition or replica that a person or program may wait for."""
+    """Yield an event for each change of a condition or replica on which a person or program may wait."""
     yield from _of_condition(old, new, ConditionType.ACCEPTED)
     before = {replica.index: replica for replica in old.replicas}
     for replica in new.replicas:
@@ -47,7 +47,7 @@ def of_change(old: Status, new: Status) -> Iterator[EmittedEvent]:
 
 
 def of_actions(actions: Sequence[Action], replicas: Sequence[ReplicaStatus] = ()) -> Iterator[EmittedEvent]:
-    """Yield an event for each action; the created objects of a replica share one."""
+    """Yield an event for each action; one event names all created objects of a replica."""
     saved = {replica.index for replica in replicas if replica.last_checkpoint is not None}
     created: dict[int | None, list[str]] = {}
     for action in actions:
@@ -59,7 +59,7 @@ def of_actions(actions: Sequence[Action], replicas: Sequence[ReplicaStatus] = ()
             case SetSuspend(suspend=False, replica=replica):
                 what = "resumes from the last checkpoint" if replica in saved else "continues"
                 yield emitted(Reason.RESUMED, say(Reason.RESUMED, what=what), replica)
-            case Discard() | Replace() | SetSuspend():  # an event reports the replica's end or reason
+            case Discard() | Replace() | SetSuspend():  # another event reports the replica's end or reason
                 continue
             case Delete():
                 yield emitted(Reason.EXPIRED, say(Reason.EXPIRED, seconds=action.after_s))
@@ -68,7 +68,7 @@ def of_actions(actions: Sequence[Action], replicas: Sequence[ReplicaStatus] = ()
 
 
 def _of_condition(old: Status, new: Status, kind: ConditionType) -> Iterator[EmittedEvent]:
-    """Yield an event if a condition changed, except for a condition of the end that does not hold yet."""
+    """Yield an event if a condition changed; Succeeded and Failed are reported only if true."""
     before, now = condition(old, kind), condition(new, kind)
     silent = now is None or (kind in _ENDS and now.status is ConditionStatus.FALSE)
     if now is None or silent or (before is not None and _same(before, now)):
@@ -90,7 +90,7 @@ def _of_replica(old: ReplicaStatus | None, new: ReplicaStatus) -> Iterator[Emitt
 
 
 def _of_attempt(old: ReplicaStatus | None, new: ReplicaStatus) -> Iterator[EmittedEvent]:
-    """Yield the event of a disrupted attempt; its pod may be gone and the next pod may run."""
+    """Yield the event about a disrupted attempt, even if its pod is deleted and the next pod runs."""
     last, before = new.last_attempt, old.last_attempt if old is not None else None
     if last is None or last.reason not in _BY_ATTEMPT:
         return
@@ -99,7 +99,7 @@ def _of_attempt(old: ReplicaStatus | None, new: ReplicaStatus) -> Iterator[Emitt
 
 
 def _of_memory(old: ReplicaStatus | None, new: ReplicaStatus) -> Iterator[EmittedEvent]:
-    """Yield an event for each container that ran out of memory, unless an event of the replica reports it."""
+    """Yield an event for each container that ran out of memory, unless the replica's event reports it."""
     before = {kill.container: kill.times for kill in old.memory_kills} if old is not None else {}
     reported = {event.message for event in _of_replica(old, new)}
     for kill in new.memory_kills:
@@ -110,16 +110,16 @@ def _of_memory(old: ReplicaStatus | None, new: ReplicaStatus) -> Iterator[Emitte
 
 
 def _of_lost_run(old: ReplicaStatus | None, new: ReplicaStatus) -> Iterator[EmittedEvent]:
-    """Yield an event if a person has given a lost run up since the old status."""
+    """Yield an event if a person has given up a lost run since the old status."""
     before = old.lost.restarted if old is not None and old.lost is not None else None
     if new.lost is not None and new.lost.restarted is not None and new.lost.restarted != before:
         yield emitted(Reason.RUN_RESTARTED, say(Reason.RUN_RESTARTED, step=new.lost.step), new.index)
 
 
 def edits(job: TrainingJob, observed: Observed) -> Iterator[EmittedEvent]:
-    """Yield an event for each edit by another client that is still there; none is reverted.
+    """Yield an event for each edit by another client that still exists; the operator does not revert edits.
 
-    Its message is unique, so it is written once.
+    Each edit has a unique message, so its event is written once.
     """
     for name, generation in observed.edited:
         fact = f"spec, generation {generation}; if you delete it, the operator creates it again as planned"
@@ -130,7 +130,7 @@ def edits(job: TrainingJob, observed: Observed) -> Iterator[EmittedEvent]:
 
 
 def _changed(job: TrainingJob, seen: JobView) -> str:
-    """Return the settings of a Job that differ from the plan; "" if none does."""
+    """Return the text about the settings of a Job that differ from the plan, or ""."""
     planned = {
         "parallelism": 1,
         "backoffLimit": job.spec.backoff_limit,

@@ -1,14 +1,15 @@
-"""Checks for pods that the kubelet does not repair or end: the operator evicts them, and counts that.
+"""Checks for pods that the kubelet cannot repair and does not end: the operator evicts and counts them.
 
-An eviction gives the pod the condition DisruptionTarget, so its Job counts no failure. The operator counts it
-in an annotation of the Job, the mark, before it evicts. If it is killed between the two writes, it finds the
-mark of a running pod after its restart, and evicts again.
+An eviction gives the pod the condition DisruptionTarget, so its Job counts no failure. Before the eviction,
+the operator counts the pod in an annotation of the Job, the mark. If the operator is killed between the two
+writes, it restarts, finds the mark of a running pod, and evicts that pod.
 
-A trainer that a failed probe interrupted exits with 75, which its Job does not count either. Its pod gets the
-mark too; it has ended, so no pod is evicted.
+A trainer that ends because a probe failed exits with 75, and its Job does not count this exit code either.
+The operator counts that pod in the mark too. The pod has already ended, so no eviction is needed.
 
-A service mesh or an agent may add a container to the pod. Then the pod does not end, or ends as failed, even
-if the trainer succeeded. The operator waits a minute for these foreign containers and then ends the pod.
+A service mesh or an agent may add a container to the pod. Then the pod may not end, or may end as failed,
+although the trainer succeeded. The operator waits a minute for these foreign containers and then ends the
+pod.
 """
 
 from dataclasses import replace
@@ -27,9 +28,10 @@ from palaestra.observe.pods import dropped
 from palaestra.plan.job import GIVEN_UP
 from palaestra_protocol.pod.status import ExitCode
 
-STALL_GRACE_S = 120  # time for the trainer's own watchdog to end it
-FORGOTTEN_S = 300  # the trainer starts in seconds: the ROS master has the same image
-OUTLIVED_S = 60  # a proxy that ends with the main process needs seconds
+STALL_GRACE_S = 120  # seconds in which the trainer's own watchdog should end the trainer
+# A trainer normally starts in seconds, because the ROS master has already pulled the same image.
+FORGOTTEN_S = 300
+OUTLIVED_S = 60  # seconds; a proxy that ends after the main process normally ends within this time
 
 
 def marked(situation: ReplicaContext) -> Finding | None:
@@ -50,7 +52,7 @@ def restart_policy_dropped(situation: ReplicaContext) -> Finding | None:
 
 
 def trainer_never_started(situation: ReplicaContext) -> Finding | None:
-    """All sidecars run, but the kubelet does not start the trainer."""
+    """All sidecars run, but the kubelet has not started the trainer for five minutes."""
     pod = situation.pod
     if pod is None or pod.trainer is None or not pod.sidecars or pod.gone_by is not None:
         return None
@@ -62,7 +64,7 @@ def trainer_never_started(situation: ReplicaContext) -> Finding | None:
 
 
 def stalled(situation: ReplicaContext) -> Finding | None:
-    """The trainer responds, its step count does not change, and its watchdog has not ended it."""
+    """The trainer responds, but its step count stays the same, and its watchdog has not ended it."""
     wait = standstill(situation)
     if wait is None or situation.pod is None or situation.pod.gone_by is not None or not situation.fresh:
         return None
@@ -74,7 +76,7 @@ def stalled(situation: ReplicaContext) -> Finding | None:
 
 
 def ended_by_probe(situation: ReplicaContext) -> Finding | None:
-    """The kubelet ended the trainer because a probe failed, and its Job does not count that."""
+    """The kubelet ended the trainer because a probe failed; the Job does not count this end."""
     pod = situation.seen.pod
     if pod is None or not pod.ended or not situation.seen.probe:
         return None
@@ -93,7 +95,7 @@ def replaced_too_often(situation: ReplicaContext) -> Finding | None:
 
 
 def kept_alive(situation: ReplicaContext) -> Finding | None:
-    """The trainer has ended, and foreign containers keep its pod alive."""
+    """The trainer has ended, but foreign containers keep its pod alive."""
     pod = _outlived(situation)
     if pod is None:
         return None
@@ -103,7 +105,7 @@ def kept_alive(situation: ReplicaContext) -> Finding | None:
 
 
 def trainer_is_done(situation: ReplicaContext) -> Finding | None:
-    """The trainer has ended for good, and foreign containers keep its pod alive or made it fail."""
+    """The trainer has ended for good, and foreign containers keep its pod alive or made the pod fail."""
     pod, job = situation.seen.pod, situation.seen.job
     if pod is None or job is None or job.end is not None:
         return None
@@ -116,7 +118,7 @@ def trainer_is_done(situation: ReplicaContext) -> Finding | None:
 
 
 def pod_outlives_trainer(situation: ReplicaContext) -> Finding | None:
-    """The trainer has ended and must be retried, and foreign containers keep its pod alive."""
+    """The trainer has ended and must be retried, but foreign containers keep its pod alive."""
     pod = _outlived(situation)
     if pod is None or exit_code(pod) in {ExitCode.DONE, *GIVEN_UP}:
         return None
@@ -124,7 +126,7 @@ def pod_outlives_trainer(situation: ReplicaContext) -> Finding | None:
 
 
 def _outlived(situation: ReplicaContext) -> PodView | None:
-    """Return the pod if only foreign containers keep it alive and it is not being deleted."""
+    """Return the pod if only foreign containers keep it alive and it is not being deleted; else None."""
     pod = situation.pod if situation.seen.job is not None else None
     if pod is None or pod.gone_by is not None or exit_code(pod) is None or not pod.keeping:
         return None

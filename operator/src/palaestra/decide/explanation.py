@@ -16,7 +16,7 @@ class Explanation:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Hold:
-    """A cause that keeps a job from being planned; if it is `final`, nothing can remove it."""
+    """A cause that keeps a job from being planned; `final`: nobody can remove the cause."""
 
     explanation: Explanation
     final: bool = False

@@ -1,7 +1,7 @@
-"""Checks that stop a replica for good: limits that its author set, and causes that a retry cannot remove.
+"""Checks that stop a replica for good: limits in the job's spec, and causes that a retry cannot remove.
 
-While a replica waits for its first step, `trouble` remembers the cause, because a kubelet that restarts stops
-reporting it for a moment.
+While a replica waits for its first step, `trouble` keeps the last cause of the delay for a minute. A kubelet
+that restarts does not report the cause for a moment.
 """
 
 from dataclasses import replace
@@ -17,13 +17,13 @@ from palaestra.decide.restart_counts import failed_by_itself, has_run
 from palaestra.decide.waiting_reasons import of_image
 
 FIRST_STEP = ("first step",)  # the key of the wait for the first step
-MOMENT_S = 60  # a kubelet that restarts or retries reports a reason again within this time
+MOMENT_S = 60  # seconds within which a kubelet that restarts or retries reports a reason again
 
 _NO_TROUBLE = frozenset({Reason.STARTING, Reason.TRAINING, Reason.DISRUPTED, Reason.INTERRUPTED})
 
 
 def active_deadline(situation: ReplicaContext) -> Finding | None:
-    """The job was active as long as `activeDeadlineSeconds` allows."""
+    """The job was active for `activeDeadlineSeconds`."""
     if situation.active_left_s is None or (seconds := situation.job.spec.active_deadline_seconds) is None:
         return None
     return Finding(
@@ -32,31 +32,31 @@ def active_deadline(situation: ReplicaContext) -> Finding | None:
 
 
 def cannot_be_planned(situation: ReplicaContext) -> Finding | None:
-    """Its objects cannot be created from its spec, and a spec does not change."""
+    """The replica's objects cannot be planned from the spec, and a spec does not change."""
     if situation.seen.job is not None or situation.hold is None or not situation.hold.final:
         return None
     return Finding(explanation=situation.hold.explanation)
 
 
 def image_name_is_invalid(situation: ReplicaContext) -> Finding | None:
-    """The name of an image is invalid, so it is in no registry."""
+    """The name of an image is invalid, so no registry can have the image."""
     stuck = first_waiting(situation.pod, frozenset({"InvalidImageName"}))
     return None if stuck is None else of_image(stuck)
 
 
 def no_progress(situation: ReplicaContext) -> Finding | None:
-    """Its pods are interrupted again and again without progress; Kubernetes has no limit for that."""
+    """The replica's pods are interrupted repeatedly without progress; Kubernetes does not limit this."""
     limit = situation.job.spec.most_fruitless
     pods = situation.counted.fruitless + _taken_and_not_replaced(situation)
     if limit == 0 or pods < limit:
         return None
     evictions = (storage_eviction(pod) for pod in reversed(situation.seen.pods) if pod.ended)
-    cause = next(evictions, None)  # of the last that ended
+    cause = next(evictions, None)  # the eviction of the pod that ended last
     return Finding(explanation=cause) if cause is not None else found(Reason.NO_PROGRESS, pods=pods)
 
 
 def start_timeout(situation: ReplicaContext) -> Finding | None:
-    """It has not done its first step within `startTimeoutSeconds`; the reason is the cause of the delay."""
+    """The replica has done no step within `startTimeoutSeconds`; the reason is the cause of the delay."""
     if (
         situation.suspended
         or situation.hold is not None
@@ -76,7 +76,7 @@ def start_timeout(situation: ReplicaContext) -> Finding | None:
 
 
 def trouble(situation: ReplicaContext, shown: Explanation) -> WaitingReason | None:
-    """Return the cause that delays the first step, even if the kubelet stops reporting it for a moment."""
+    """Return the cause that delays the first step; keep it if the kubelet stops reporting it for a moment."""
     if shown.reason not in _NO_TROUBLE:
         return WaitingReason(explanation=shown)
     last, now_s = situation.times.record.troubles.get(situation.seen.index), situation.times.clock_s
@@ -92,7 +92,10 @@ def _is_past_its_start(situation: ReplicaContext) -> bool:
 
 
 def _taken_and_not_replaced(situation: ReplicaContext) -> bool:
-    """Return whether the newest pod was interrupted; Kubernetes doubles the wait for the next each time."""
+    """Return whether the newest pod was interrupted, and the Job has not created the next pod yet.
+
+    Kubernetes doubles the wait for the next pod each time, so the interrupted pod is counted at once.
+    """
     pod = situation.seen.pod
     if pod is None or not situation.counted.furthest_step or mark_of(situation, pod) is not None:
         return False

@@ -1,4 +1,4 @@
-"""The decision: first on each replica, then on the whole job, then the actions."""
+"""The decision: first the status of each replica, then the status of the job, then the actions."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -41,7 +41,8 @@ def decide(job: TrainingJob, observed: Observed, prepared: Prepared, times: Time
     """Return the status of a job and the actions for it.
 
     A second decision on the resulting status and record, with the same observation, returns the same status
-    and no event of a change. It returns only actions that have had no effect so far.
+    and no event about a change. The second decision returns only the actions whose effect is not in the
+    observation yet.
     """
     now = whole(times.now)
     times = replace(times, now=now)
@@ -107,12 +108,12 @@ def _replica(job: TrainingJob, seen: ReplicaObserved, prepared: Prepared, times:
 
 
 def _with_lost_run(found: Decided, job: TrainingJob, prepared: Prepared, times: Times) -> Decided:
-    """Return a replica with its lost run; a person's annotation gives up a run that the status shows."""
+    """Return a replica with its lost run; a new annotation gives up a lost run that the status shows."""
     shown, lost = found.status.lost, prepared.lost.get(found.status.index)
     if found.status.phase in TERMINAL:
         return found
     if lost is None:
-        gone = shown is not None and shown.restarted is None  # the claim exists again
+        gone = shown is not None and shown.restarted is None  # a person has restored the claim
         return replace(found, status=found.status.model_copy(update={"lost": None})) if gone else found
     if shown == lost and new_word(job) is not None:
         return replace(found, status=restarted(found.status, lost, times.now))
@@ -120,13 +121,13 @@ def _with_lost_run(found: Decided, job: TrainingJob, prepared: Prepared, times: 
 
 
 def _kept(job: TrainingJob, decided: Sequence[Decided]) -> tuple[ReplicaStatus, ...]:
-    """Return the replicas of an ended job that its status has."""
+    """Return those replicas of an ended job that are in its stored status."""
     had = {replica.index for replica in job.status.replicas}
     return tuple(replica.status for replica in decided if replica.status.index in had)
 
 
 def _still_to_stop(old: ReplicaStatus, seen: ReplicaObserved) -> Explanation | None:
-    """Return the reason to stop a failed replica whose Job still runs, for example a Job just created."""
+    """Return the reason to stop a failed replica whose Job still runs, for example because it is new."""
     going_on = seen.job is not None and seen.job.end is None and seen.job.stopped is None
     if not going_on or old.phase is not Phase.FAILED:
         return None
@@ -174,14 +175,17 @@ def _status(
 def _reconciliation(
     job: TrainingJob, where: ReplicaVerdict, replicas: Sequence[ReplicaStatus]
 ) -> ConditionStates:
-    """Return the states of `Stalled` and `Reconciling`; a replica that ignores `suspend` gives the reason."""
+    """Return the states of `Stalled` and `Reconciling`.
+
+    If a suspended job still runs, the first running replica gives the reason.
+    """
     unheeded = where.phase is Phase.RUNNING and job.spec.suspend
     why = as_first(replicas, Phase.RUNNING).explanation if unheeded else where.explanation
     return reconciliation(where.phase, why, suspend=job.spec.suspend)
 
 
 def _waits(observed: Observed, prepared: Prepared) -> bool:
-    """Return whether a hold prevents the plan of all replicas, so that no active time passes."""
+    """Return whether a hold keeps all replicas from being planned; then no active time passes."""
     return prepared.hold is not None and all(replica.job is None for replica in observed.replicas)
 
 

@@ -1,7 +1,8 @@
-"""The end of a replica, by its Job.
+"""The end of a replica whose Job has ended or was stopped.
 
-`palaestra.decide.replica_policy` has the order: first a stop mark, because it caused everything after it;
-then the trainer's exit code and termination message; then the Job's own message.
+`palaestra.decide.replica_policy` has the order of these checks. A stop mark comes first, because the stop
+caused the later ends of trainer and Job. The trainer's exit code and termination message come next, and the
+Job's own message comes last.
 """
 
 import re
@@ -19,12 +20,12 @@ from palaestra.decide.restart_counts import exit_code
 from palaestra.observe.models import JobEnd, JobView, PodView
 from palaestra_protocol.pod.status import ExitCode
 
-LAST_WORD_S = 30  # after the end of a Job, the longest wait for the end of its pod
-_EXIT_CODE = re.compile(r"exit code (\d{1,3})\b")  # in the Job's message, if the pod is gone
+LAST_WORD_S = 30  # longest wait in seconds for the end of a pod, after the end of its Job
+_EXIT_CODE = re.compile(r"exit code (\d{1,3})\b")  # matches the Job's message, for a pod that was deleted
 
 
 def ended_by_others(situation: ReplicaContext) -> Finding | None:
-    """The Job is complete, but the built-in loop did not report it: a library ended its process."""
+    """The Job is complete, but the built-in loop did not report its end: a library ended the process."""
     job, pod = situation.seen.job, situation.seen.pod
     if job is None or job.end is not JobEnd.COMPLETE or pod is None:
         return None
@@ -42,14 +43,14 @@ def job_is_complete(situation: ReplicaContext) -> Finding | None:
 
 
 def stopped(situation: ReplicaContext) -> Finding | None:
-    """The operator stopped it; the mark on the Job has the reason."""
+    """The operator stopped the replica; the mark on the Job has the reason."""
     job = situation.seen.job
     why = stop_of(job) if job is not None else None
     return None if job is None or why is None else _with_phase(_ended(situation, job, why))
 
 
 def trainer_was_done(situation: ReplicaContext) -> Finding | None:
-    """The Job has failed, but its trainer was done: a foreign container has failed."""
+    """The Job has failed, but its trainer had completed: a foreign container has failed."""
     job, pod = situation.seen.job, situation.seen.pod
     if job is None or job.end is not JobEnd.FAILED or pod is None or exit_code(pod) != ExitCode.DONE:
         return None
@@ -63,7 +64,7 @@ def _with_phase(end: Finding) -> Finding:
 
 
 def would_end_the_same(situation: ReplicaContext) -> Finding | None:
-    """The Job has failed, and the last attempt ended by itself for a known cause."""
+    """The Job has failed, and its last attempt ended for a known cause that a retry cannot remove."""
     job, pod = situation.seen.job, situation.seen.pod
     if job is None or job.end is None:
         return None
@@ -76,7 +77,7 @@ def would_end_the_same(situation: ReplicaContext) -> Finding | None:
 
 
 def backoff_limit_spent(situation: ReplicaContext) -> Finding | None:
-    """The Job has failed: it was tried as often as `backoffLimit` allows."""
+    """The Job has failed: its pods failed more often than `backoffLimit` allows."""
     job = situation.seen.job
     if job is None or job.end_reason != "BackoffLimitExceeded":
         return None
@@ -85,7 +86,7 @@ def backoff_limit_spent(situation: ReplicaContext) -> Finding | None:
 
 
 def job_failed(situation: ReplicaContext) -> Finding | None:
-    """The Job has failed for another cause; the reason has the Job's own message."""
+    """The Job has failed for another cause; the replica's reason has the Job's own message."""
     job = situation.seen.job
     if job is None or job.end is None:
         return None
@@ -94,10 +95,10 @@ def job_failed(situation: ReplicaContext) -> Finding | None:
 
 
 def _ended(situation: ReplicaContext, job: JobView, why: Explanation) -> Finding:
-    """Return an end that holds once the end of the pod is observed too, or after `LAST_WORD_S`.
+    """Return an end that holds as soon as the pod's end is observed too, or after `LAST_WORD_S`.
 
-    The two watches have different delays, so the Job's end may be observed before the pod's. Only the pod has
-    the termination message.
+    The watches of Jobs and pods have different delays, so the Job's end may be observed first. Only the pod
+    has the termination message.
     """
     if job.stopped is not None or situation.pod is None:
         return Finding(explanation=why, phase=Phase.FAILED)

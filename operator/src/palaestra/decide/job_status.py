@@ -1,12 +1,13 @@
-"""The status of the whole job: one phase, one reason, the conditions, and the columns of `kubectl get`.
+"""The status of the whole job: its phase, its reason, its conditions, and the columns of `kubectl get`.
 
-Five of its conditions always exist, each with a reason, whether it holds or not. The condition of the job's
-phase carries the job's message. A Pending job has no such condition; there the message is in Accepted until
-it holds, then in Running.
+Five conditions always exist, each with a reason, whether true or false. The job's message is in the condition
+of the job's phase. No condition exists for the phase Pending: then the message is in Accepted while that is
+false, and in Running afterwards.
 
-Two more exist only while they hold. Flux and `helm --wait` read them through the library kstatus. A job is
-`Reconciling` while its state differs from its spec, and `Stalled` if only a person can change that. The state
-of a job with neither matches its spec: it trains, has succeeded, or is suspended.
+Two more conditions exist only while they are true. Flux and `helm --wait` read them through the library
+kstatus. A job is `Reconciling` while its state differs from its spec, and `Stalled` if only a person can make
+them equal. If a job has neither condition, its state matches its spec: it trains, has succeeded, or is
+suspended.
 """
 
 from collections import Counter
@@ -33,7 +34,7 @@ from palaestra.decide.replica_context import ReplicaVerdict
 from palaestra.observe.models import Observed
 
 LONGEST_NODES = 256  # characters of the names of all nodes
-LONGEST_LEFT_OUT = 230  # of a line: a group's name, and 200 characters from a simulator
+LONGEST_LEFT_OUT = 230  # characters of one line: a group's name, and 200 characters from a simulator
 _CONDITION_OF = {
     Phase.RUNNING: ConditionType.RUNNING,
     Phase.SUSPENDED: ConditionType.SUSPENDED,
@@ -44,7 +45,7 @@ _CONDITION_OF = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ConditionState:
-    """Whether a condition holds, and why."""
+    """Whether a condition holds, and the reason."""
 
     holds: bool
     explanation: Explanation
@@ -54,7 +55,7 @@ ConditionStates = Mapping[ConditionType, ConditionState]
 
 
 def standing(replicas: Sequence[ReplicaStatus]) -> ReplicaVerdict:
-    """Return the phase of the job, and the reason."""
+    """Return the phase of the job with its reason."""
     phases = Counter(replica.phase for replica in replicas)
     if all(replica.phase in TERMINAL for replica in replicas):
         return _ended(replicas)
@@ -84,7 +85,7 @@ def started(old: Status, observed: Observed) -> datetime | None:
 
 
 def columns(job: TrainingJob, replicas: Sequence[ReplicaStatus]) -> dict[str, Any]:
-    """Return the columns of `kubectl get tj`; each has the value of the replica that is worst in it."""
+    """Return the columns of `kubectl get tj`; each column has the worst value among the replicas."""
     up = sum(replica.phase in {Phase.RUNNING, Phase.SUCCEEDED} for replica in replicas)
     steps = [replica.step for replica in replicas if replica.step is not None]
     saved = [replica.last_checkpoint.time for replica in replicas if replica.last_checkpoint is not None]
@@ -102,7 +103,7 @@ def columns(job: TrainingJob, replicas: Sequence[ReplicaStatus]) -> dict[str, An
 
 
 def left_out(old: Status, observed: Observed) -> tuple[str, ...] | None:
-    """Return the parts of the worlds that the simulators left out, by the last report; None without a report.
+    """Return those parts of the worlds that the simulators last reported as left out; None without a report.
 
     All replicas have the same worlds and simulators, so one report is enough.
     """
@@ -138,7 +139,7 @@ def _ended(replicas: Sequence[ReplicaStatus]) -> ReplicaVerdict:
 
 
 def as_first(replicas: Sequence[ReplicaStatus], phase: Phase) -> ReplicaVerdict:
-    """Return the reason of the first replica in this phase."""
+    """Return this phase with the reason of the first replica in it."""
     first = next(replica for replica in replicas if replica.phase is phase)
     of = f"replica {first.index}: " if len(replicas) > 1 else ""
     explanation = Explanation(
@@ -150,8 +151,8 @@ def as_first(replicas: Sequence[ReplicaStatus], phase: Phase) -> ReplicaVerdict:
 def condition_states(accepted: ConditionState, phase: Phase, why: Explanation) -> ConditionStates:
     """Return the state of each condition of a job in `phase` for the reason `why`.
 
-    All have the reason, but only one has the whole message; otherwise `kubectl describe` would print it four
-    times.
+    All conditions of the phase have the reason, but only one has the whole message. Otherwise `kubectl
+    describe` would print the message four times.
     """
     true = _CONDITION_OF.get(phase)
     subject = true or (ConditionType.RUNNING if accepted.holds else ConditionType.ACCEPTED)
@@ -164,10 +165,10 @@ def condition_states(accepted: ConditionState, phase: Phase, why: Explanation) -
 
 
 def reconciliation(phase: Phase, why: Explanation, *, suspend: bool) -> ConditionStates:
-    """Return `Stalled` or `Reconciling` if the state of a job differs from its spec, else neither.
+    """Return `Stalled` or `Reconciling` if the state of a job differs from its spec, else {}.
 
-    Both have the whole message, because kstatus shows nothing else. A job in a queue is `Reconciling` even if
-    `spec.suspend` is true, because Kueue ignores `spec.suspend`.
+    Each has the whole message, because kstatus shows only this message. A job in a queue is `Reconciling`
+    even if `spec.suspend` is true, because Kueue ignores `spec.suspend`.
 
     Args:
         phase: the job's phase.
@@ -183,9 +184,10 @@ def reconciliation(phase: Phase, why: Explanation, *, suspend: bool) -> Conditio
 
 
 def conditions_of_ended(ended: Status) -> tuple[Condition, ...]:
-    """Return the conditions of an ended job: its existing ones, and `Stalled` if it failed.
+    """Return the conditions of an ended job: the existing ones, and `Stalled` if the job failed.
 
-    `Stalled` may be missing: the cluster's definition was not yet known to have this condition.
+    `Stalled` may be missing, because the status was written before the operator read that the cluster's
+    definition allows it.
     """
     failed = condition(ended, ConditionType.FAILED)
     if ended.phase is not Phase.FAILED or failed is None or condition(ended, ConditionType.STALLED):
@@ -204,7 +206,7 @@ def conditions(
 
 
 def condition(status: Status, kind: ConditionType) -> Condition | None:
-    """Return the condition of a type; None if the status has none."""
+    """Return the condition of a type; None if the status does not have it."""
     return next((condition for condition in status.conditions if condition.type is kind), None)
 
 

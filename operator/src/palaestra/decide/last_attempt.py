@@ -1,6 +1,6 @@
 """The record of the newest ended attempt in the status, because a pod's logs are deleted with the pod.
 
-The record is written as soon as the trainer has ended, and stays after the pod is gone. If no reconcile
+The record is written as soon as the trainer has ended, and stays after the pod is deleted. If no reconcile
 observed the end of a pod, the record is written once the next pod exists.
 """
 
@@ -22,7 +22,8 @@ from palaestra_protocol.pod.status import MOST_FAULTS, MOST_LINE, MOST_LINES, Fa
 def last_attempt(situation: ReplicaContext, end: ReplicaVerdict | None = None) -> LastAttempt | None:
     """Return the record of the newest ended attempt; None if no attempt has ended.
 
-    `end` is the verdict on the replica, if it has ended; it describes the attempt whose pod is gone.
+    `end` is the phase and reason of an ended replica. They become the record of an attempt whose pod was
+    deleted.
     """
     known, newest = situation.old.last_attempt, situation.seen.pod
     attempt = (
@@ -46,9 +47,9 @@ def last_attempt(situation: ReplicaContext, end: ReplicaVerdict | None = None) -
 
 
 def late_word(situation: ReplicaContext) -> LastAttempt | None:
-    """Return the record of the last attempt of a replica whose end was observed before that of its pod.
+    """Return the record of the last attempt of a replica whose end was observed before its pod's end.
 
-    If the pod disappears without a termination message, the record has the reason of the replica's end. The
+    If the pod is deleted without a termination message, the record has the reason of the replica's end. The
     caches of Jobs and pods are updated in any order, and the record must not depend on that order.
     """
     known, newest, named = situation.old.last_attempt, situation.seen.pod, situation.old.pod
@@ -67,7 +68,7 @@ def late_word(situation: ReplicaContext) -> LastAttempt | None:
 
 
 def has_ended(pod: PodView) -> bool:
-    """Return whether a pod's trainer has ended, or the whole pod."""
+    """Return whether a pod or its trainer has ended."""
     return pod.ended or exit_code(pod) is not None
 
 
@@ -76,7 +77,7 @@ def _knows(known: LastAttempt | None, number: int) -> bool:
 
 
 def _replaced(situation: ReplicaContext) -> EndedAttempt | None:
-    """Return the attempt before the newest pod, if that pod is observed for the first time."""
+    """Return the attempt before the newest pod, if the newest pod was not observed before."""
     named, newer = situation.old.pod, newer_pods(situation.old, situation.seen.pods)
     if not newer:
         return None
@@ -109,7 +110,7 @@ def _record(attempt: EndedAttempt, explanation: Explanation) -> LastAttempt:
 
 
 def _counted_restarts(attempt: EndedAttempt) -> int:
-    """Return the counted restarts of simulators in an attempt whose trainer does not report them."""
+    """Return the counted restarts of simulators in an attempt, if the trainer does not report any."""
     now, before = attempt.situation.counted, attempt.situation.old
     for counts in (now, before):
         if counts.pod is not None and counts.pod.name == attempt.name:
@@ -118,7 +119,7 @@ def _counted_restarts(attempt: EndedAttempt) -> int:
 
 
 def _log(attempt: EndedAttempt) -> tuple[str, ...]:
-    """Return the last lines of a trainer's log, from its termination message or else from Kubernetes."""
+    """Return the last lines of a trainer's log: from its termination message, or else from the pod."""
     lines: tuple[str, ...] = ()
     if attempt.word is not None:
         lines = attempt.word.log
@@ -129,7 +130,7 @@ def _log(attempt: EndedAttempt) -> tuple[str, ...]:
 
 
 def _faults(records: tuple[FaultRecord, ...]) -> list[Fault]:
-    """Return the last faults, without those whose time is not a valid date."""
+    """Return the last faults, without faults whose time is not a valid date."""
     timed = [(record, at) for record in records if (at := as_time(record.time)) is not None]
     return [
         Fault(

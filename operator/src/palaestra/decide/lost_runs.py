@@ -1,8 +1,9 @@
-"""Lost runs: the claim of a replica is gone, or its run directory is empty, although it has trained.
+"""Lost runs: a replica has trained, but its claim does not exist or its run directory is empty.
 
-Such a replica would train from step 0 again. It is held instead, and its Job is suspended, until a person
-restores the run or gives it up. To give it up, the person sets an annotation of the TrainingJob to any new
-value, such as the time. The status keeps the value that was applied last, so each value has one effect.
+Such a replica would train from step 0 again. So the operator holds the replica and suspends its Job until a
+person restores the run or gives it up. To give the run up, the person sets an annotation of the TrainingJob
+to any new value, such as the time. The status stores the value that was applied last, so each value has one
+effect.
 """
 
 from collections.abc import Collection, Iterable
@@ -21,7 +22,7 @@ from palaestra.plan.replica import RESTART_LOST_RUNS
 def lost_runs(
     job: TrainingJob, replicas: Iterable[ReplicaObserved], present: Collection[tuple[str, str]]
 ) -> dict[int, LostRun]:
-    """Return the lost runs that no person has given up yet, by replica; `present` has the claims."""
+    """Return the lost runs that no person has given up yet, by replica; `present` has the existing claims."""
     before = {replica.index: replica for replica in job.status.replicas}
     found = {
         seen.index: _lost(job, before.get(seen.index, ReplicaStatus(index=seen.index)), seen, present)
@@ -46,7 +47,7 @@ def new_word(job: TrainingJob) -> str | None:
 
 
 def restarted(replica: ReplicaStatus, lost: LostRun, now: datetime) -> ReplicaStatus:
-    """Return the status of a replica whose lost run was given up: it starts at step 0 again."""
+    """Return the status of a replica whose lost run was given up: the replica starts at step 0 again."""
     forgotten = (
         "step",
         "furthest_step",
@@ -81,7 +82,7 @@ def _lacks_claim(
 
 
 def _is_empty(job: TrainingJob, old: ReplicaStatus, seen: ReplicaObserved) -> bool:
-    """Return whether a later attempt reports the number 1, because it found no record of earlier attempts.
+    """Return whether a later attempt reports number 1, because it found no record of earlier attempts.
 
     An ephemeral run is deleted with its pod. A custom program does not report the number of its attempt.
     """

@@ -1,7 +1,8 @@
-"""How a pod and its containers ended: in words, and as the count of those that ran out of memory.
+"""The end of a pod and its containers: its description, and the count of out-of-memory kills.
 
-On cgroup v2 the kernel kills a whole container, including the sidecar process, and the kubelet restarts it
-within a second. Then only the container's last termination state shows that the simulator ran out of memory.
+On cgroup v2 the kernel kills a whole container, including the sidecar process, and the kubelet restarts the
+container within a second. Then only the container's last termination state shows that the simulator ran out
+of memory.
 """
 
 from datetime import datetime
@@ -18,7 +19,7 @@ from palaestra_protocol.pod.status import Termination
 
 OUT_OF_MEMORY = "OOMKilled"
 MOST_CONTAINERS = 64  # the limit of the status field
-FULL = "StorageFull"  # beginning of a termination message
+FULL = "StorageFull"  # the first word of a termination message
 
 
 def how_it_failed(situation: ReplicaContext, pod: PodView) -> str:
@@ -43,7 +44,7 @@ def how_it_failed(situation: ReplicaContext, pod: PodView) -> str:
 
 
 def left_by(pod: PodView) -> str:
-    """Return the end of the log of a pod's trainer, or of the init container that kept it from starting."""
+    """Return the last log lines of a pod's trainer, or of the failed init container before it."""
     failed = _failed_before(pod)
     trainer = pod.trainer
     ends = [
@@ -62,7 +63,7 @@ def probe_failed(situation: ReplicaContext, pod: PodView) -> Explanation:
 
 
 def mark_of(situation: ReplicaContext, pod: PodView) -> Explanation | None:
-    """Return the reason for the replacement of a pod, by the mark on its Job, or None."""
+    """Return the reason for the replacement of a pod, from the mark on its Job; None without a mark."""
     mark = situation.seen.job.replaced if situation.seen.job is not None else None
     if mark is None or mark.pod != pod.uid:
         return None
@@ -70,7 +71,7 @@ def mark_of(situation: ReplicaContext, pod: PodView) -> Explanation | None:
 
 
 def storage_eviction(pod: PodView) -> Explanation | None:
-    """Return the reason if a node evicted the pod because it wrote too much, else None."""
+    """Return the reason if a node evicted the pod because the pod wrote too much data, else None."""
     if pod.reason != "Evicted" or "ephemeral" not in pod.message.lower():
         return None
     return explain(Reason.EPHEMERAL_STORAGE, pod=pod.name, words=pod.message)
@@ -80,7 +81,8 @@ def full_volume(word: Termination | None) -> Explanation | None:
     """Return the reason if a trainer could not write to its full volume, else None."""
     if word is None or not word.reason.startswith(FULL):
         return None
-    fact = word.reason.partition(": ")[2].partition("; ")[0]  # the reason has its own remedy
+    # Cut the remedy, because the status reason has its own.
+    fact = word.reason.partition(": ")[2].partition("; ")[0]
     return explain(Reason.STORAGE_FULL, words=fact or "no space left")
 
 
@@ -90,10 +92,10 @@ def killed_for_memory(container: ContainerView) -> bool:
 
 
 def memory_kills(situation: ReplicaContext) -> tuple[MemoryKills, ...]:
-    """Return the kills by container, including the new ones in this observation.
+    """Return the out-of-memory kills by container, including the new kills in this observation.
 
-    A kill is identified by its pod and the container's run in it. All kills in pods older than the one in the
-    status are counted already.
+    A kill is identified by its pod and the number of the container's run in this pod. All kills in pods older
+    than the pod in the status were counted before.
     """
     kills = {kill.container: kill for kill in situation.old.memory_kills}
     named = [
@@ -121,7 +123,7 @@ def limit_of(limit: str | None) -> str:
 
 
 def _failed_before(pod: PodView) -> ContainerView | None:
-    """Return the failed container among those that must succeed before the others start, if any."""
+    """Return the first failed init container; the other containers start only after it succeeds."""
     init = (container for container in pod.containers if container.kind is ContainerKind.INIT)
     return next((container for container in init if container.exit is not None and container.exit.code), None)
 
@@ -133,10 +135,10 @@ def _last_line(container: ContainerView | None) -> str:
 
 
 def _known(before: MemoryKills | None, pod: PodView, container: ContainerView) -> bool:
-    """Return whether a kill was counted.
+    """Return whether a kill was counted before.
 
-    If the status had no room for its pod and run, a kill is recognized by its time. The two times may come
-    from the clocks of two nodes.
+    If `fitted` dropped pod and run from the status because it was too long, a kill is recognized by its time.
+    The two compared times may come from the clocks of two nodes.
     """
     if before is None:
         return False

@@ -1,7 +1,7 @@
 """Plan the missing objects, or return the hold that keeps the job from being planned.
 
-A replica with all its objects is not planned at all, so a later change of its worlds' ConfigMaps, or a newer
-release, has no effect on it.
+A replica whose objects all exist is not planned. So a later change of its worlds' ConfigMaps, or a newer
+release, has no effect on this replica.
 """
 
 import dataclasses
@@ -27,10 +27,10 @@ from palaestra_sim.errors import WorldError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Prepared:
-    """The plan with its images, or the hold that prevents it; neither if no object is missing.
+    """The plan with its images, or the hold that prevents it; both are None if all objects exist.
 
-    `closed` keeps existing Jobs from being resumed: an object that they use is no longer for jobs. `lost` has
-    the lost runs by replica; those replicas must not train.
+    `closed` is the hold that keeps existing Jobs from being resumed: an object that they use is no longer
+    labeled for jobs. `lost` has the lost runs by replica; these replicas must not train.
     """
 
     plan: Plan | None = None
@@ -60,7 +60,7 @@ _MISSING = {ReferenceKind.SECRET: Reason.SECRET_MISSING, ReferenceKind.CLAIM: Re
 
 
 def prepare(job: TrainingJob, observed: Observed, layout: ClusterLayout) -> Prepared:
-    """Return the plan of a job with missing objects, with the images from its acceptance."""
+    """Return the plan of a job's missing objects, with the images from the job's acceptance."""
     closed = sources_are_still_for_jobs(job, observed) if resuming(job, observed) else None
     lost = _lost(job, observed)
     if complete(job, observed):
@@ -89,12 +89,12 @@ def _planned(job: TrainingJob, observed: Observed, layout: ClusterLayout) -> Pre
 
 
 def worlds_to_check(job: TrainingJob, observed: Observed, layout: ClusterLayout) -> tuple[GivenWorld, ...]:
-    """Return the worlds whose verdicts the plan of a job needs; empty while the job is not planned next."""
+    """Return the worlds that must be checked for the plan of a job; empty if the job is not planned next."""
     if complete(job, observed) or _held(job, observed, layout) is not None:
         return ()
     try:
         return given_worlds(job, _worlds(job, observed))
-    except PlanError:  # the plan fails in the same way for any verdicts
+    except PlanError:  # the plan fails in the same way, whatever the results of the checks
         return ()
 
 
@@ -114,8 +114,8 @@ def _held_as_new(job: TrainingJob, layout: ClusterLayout) -> Hold | None:
 def wants_whole(job: TrainingJob, observed: Observed, layout: ClusterLayout, lacks: Lacking | None) -> bool:
     """Return whether the whole job must be read before `prepare`, because the job is planned next.
 
-    `lacks` is the part of the API server's object that is missing in `job`. While a hold remains, the worlds
-    are not read.
+    `lacks` is the part of the API server's object that the trimmed `job` lacks. While a hold remains, the
+    worlds are not read.
     """
     if observed.worlds_wait:
         return False
@@ -144,7 +144,7 @@ def unfinished(job: TrainingJob, observed: Observed) -> tuple[ReplicaObserved, .
 
 
 def worlds_are_checked(job: TrainingJob, observed: Observed) -> Hold | None:
-    """The check of a large world takes seconds, and the checks of one namespace run one after the other."""
+    """The checks of a namespace's large worlds run one after the other, and each takes seconds."""
     del job
     return held(Reason.CHECKING_WORLDS) if observed.worlds_wait else None
 
@@ -162,12 +162,15 @@ def sources_are_there(job: TrainingJob, observed: Observed) -> Hold | None:
 
 
 def sources_are_for_jobs(job: TrainingJob, observed: Observed) -> Hold | None:
-    """A TrainingJob must not give its author access to objects that the author cannot read."""
+    """A TrainingJob must not give its author access to objects that the author has no permission to read."""
     return next((found for reference in references(job) if (found := _closed(reference, observed))), None)
 
 
 def sources_are_still_for_jobs(job: TrainingJob, observed: Observed) -> Hold | None:
-    """A resumed Job creates a new pod, so its sources must still be for jobs; its worlds were copied."""
+    """A resumed Job creates a new pod, so the objects that it uses must still be for jobs.
+
+    A ConfigMap of a world may be missing, because the replica has a copy of the world.
+    """
     for source in references(job):
         if (found := _missing(source, observed)) is not None:
             if source.kind is not ReferenceKind.CONFIG_MAP:
@@ -210,14 +213,14 @@ HOLDS: tuple[Check, ...] = (
 
 
 def complete(job: TrainingJob, observed: Observed) -> bool:
-    """Return whether every replica that has not ended has its Job and the volumes of the Job's pods."""
+    """Return whether each unfinished replica has its Job and the volumes of the Job's pods."""
     policy = any(kind == "NetworkPolicy" for kind, _ in observed.present)
     accepted = job.status.release is not None
     return not unfinished(job, observed) or (policy and accepted and not _lacking(job, observed))
 
 
 def _lacking(job: TrainingJob, observed: Observed) -> tuple[int, ...]:
-    """Return the unfinished replicas with a missing object, without those whose run is lost."""
+    """Return the unfinished replicas with a missing object, except replicas whose run is lost."""
     named = {source.name for source in references(job) if source.kind is ReferenceKind.CLAIM}
     there = {name for _, name in observed.present} | named
     lost = _lost(job, observed)

@@ -1,6 +1,6 @@
-"""The trainer's last report as fields of the status, and the start of its wait for progress.
+"""The trainer's last report as fields of the status, and the wait for the trainer's next progress.
 
-If the trainer no longer reports a value, the last one stays, because an unknown value is not zero.
+If the trainer no longer reports a value, the last value stays, because an unknown value is not zero.
 """
 
 from datetime import datetime
@@ -23,15 +23,16 @@ from palaestra_protocol.control import SidecarState
 from palaestra_protocol.pod import status as protocol
 from palaestra_protocol.pod.status import CheckpointStatus, Termination, TrainerStatus
 
-EVALUATING = "evaluating"  # the trainer's phase of an evaluation, in which it does not learn
-LONGEST_NAME = 63  # of a simulator; those in a plan have 23 characters at most
+EVALUATING = "evaluating"  # the trainer's phase during an evaluation, in which the trainer does not learn
+LONGEST_NAME = 63  # characters of a simulator's name; the names in a plan have 23 characters at most
 LONGEST_FAULT = 200
 
 
 def progress(situation: ReplicaContext, phase: Phase) -> dict[str, object]:
     """Return the fields of a replica's status from its trainer's report.
 
-    A trainer that has not read its run directory yet reports step 0, even if earlier attempts trained.
+    A trainer that has not read its run directory yet reports step 0, even after earlier attempts. Then the
+    earlier step stays.
     """
     if situation.seen.pod is not None and situation.seen.pod.uid not in of_this_run(
         situation.old, situation.seen.pods
@@ -58,10 +59,10 @@ def progress(situation: ReplicaContext, phase: Phase) -> dict[str, object]:
 
 
 def last_progress(situation: ReplicaContext) -> datetime | None:
-    """Return the time of the last step of the current attempt or of its evaluation.
+    """Return the time of the last step of the current attempt or of its evaluation, or None.
 
-    None if it is not known to have started training. A step of an environment alone is not progress, because
-    the trainer may not learn from it.
+    The result is None until the attempt has reported training. The step of an environment alone is not
+    progress, because the trainer may not learn from that step.
     """
     same_attempt = situation.old.pod is not None and situation.counted.pod == situation.old.pod
     known = situation.old.last_progress if same_attempt else None
@@ -77,10 +78,11 @@ def last_progress(situation: ReplicaContext) -> datetime | None:
 
 
 def standstill(situation: ReplicaContext) -> Wait | None:
-    """Return the wait for the next step of learning or of an evaluation; None if the trainer does not train.
+    """Return the wait for the next step of training or evaluation; None if the trainer does not train.
 
-    The wait began when an environment stepped last, by the age that the trainer reports. The time of that
-    step is by the trainer's own clock, so it is compared only with its earlier reports.
+    The wait began at the last step of an environment, whose age the trainer reports. The trainer also reports
+    the time of this step by its own clock, so the operator compares this time only with the trainer's earlier
+    reports.
     """
     polled = situation.seen.polled
     if polled is None or not situation.trains or situation.pod is None:
@@ -93,12 +95,12 @@ def standstill(situation: ReplicaContext) -> Wait | None:
 
 
 def _step(report: TrainerStatus | Termination) -> int | None:
-    """Return the step of a run; None if its trainer does not know it yet."""
+    """Return the step of a run; None if the trainer has not read it yet."""
     return None if report.attempt is None and report.step == 0 else min(report.step, MOST_COUNT)
 
 
 def _spent(situation: ReplicaContext, polled: TrainerStatus) -> dict[str, object]:
-    """Return the time, faults and lost steps of the run; {} if the trainer's release does not report them."""
+    """Return goodput, faults and lost steps of the run; {} if the trainer's release has no goodput."""
     if not polled.goodput:
         return {}
     before = situation.old.goodput or Goodput()
@@ -137,7 +139,7 @@ def _checkpoint(checkpoint: CheckpointStatus | None) -> LastCheckpoint | None:
 
 
 def _figure(new: float | None, old: float | None) -> float | None:
-    """Return the new value, rounded to four decimals; the old value if the new one is None."""
+    """Return the new value, rounded to four decimals; the old value if the new value is None."""
     return old if new is None else round(new, 4)
 
 

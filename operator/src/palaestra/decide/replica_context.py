@@ -15,8 +15,8 @@ from palaestra.plan.replica import SIMULATOR_PREFIX
 
 RESUMES = "the next pod resumes from the last checkpoint"
 BEGINS = "the next pod starts the run again, because no checkpoint was reported"
-FRESH_S = 45  # an older response does not describe the current state
-STARTING = "starting"  # the trainer's phase until all its simulators are up
+FRESH_S = 45  # seconds; an older response does not describe the current state
+STARTING = "starting"  # the trainer's phase until all of its simulators run
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -24,15 +24,16 @@ class ReplicaContext:
     """One replica that has not ended.
 
     Attributes:
-        old: its status so far.
-        seen: the observation.
-        counted: its attempts and restarts, including this observation.
-        times: the clocks; the wall clock in UTC and whole seconds.
-        active_left_s: remaining seconds of the job's active time; None: it has no deadline, or its active
-            time does not run now.
-        hold: the cause that keeps its objects from being created, or None.
-        shown: the reason in its status if it continues; only the checks of `STOPS` have it.
-        causes: the causes to replace its pod, also those that will hold later; only for `STOPS` too.
+        old: the replica's stored status.
+        seen: the observation of the replica.
+        counted: the attempts and restarts of the replica, including this observation.
+        times: the clocks; the wall clock is in UTC and whole seconds.
+        active_left_s: remaining seconds of the job's active time; None: the job has no active deadline, or
+            its active time does not run now.
+        hold: the cause that keeps the replica's objects from being created, or None.
+        shown: the reason in the status if the replica continues; set only for the checks of `STOPS`.
+        causes: the causes to replace the pod, including causes that will hold later; set only for the checks
+            of `STOPS`.
     """
 
     job: TrainingJob
@@ -47,12 +48,12 @@ class ReplicaContext:
 
     @property
     def now(self) -> datetime:
-        """Return the wall clock, in whole seconds, to stamp a status with."""
+        """Return the wall clock in whole seconds, for the times in a status."""
         return self.times.now
 
     @property
     def pod(self) -> PodView | None:
-        """Return the newest pod while it has not ended."""
+        """Return the newest pod, or None if it has ended."""
         pod = self.seen.pod
         return pod if pod is not None and not pod.ended else None
 
@@ -61,11 +62,11 @@ class ReplicaContext:
         return self.times.clock_s - self.times.since_s(self.seen.index, wait)
 
     def left_s(self, wait: Wait) -> float:
-        """Return the remaining seconds of a wait; 0 or less: it is over."""
+        """Return the remaining seconds of a wait; 0 or less: the wait is over."""
         return wait.seconds - self.waited_s(wait)
 
     def start_deadline_s(self, container: str) -> int:
-        """Return the start deadline of a container in seconds; for trainer and master, the longest of all."""
+        """Return the start deadline of a simulator in seconds; for other containers, the longest deadline."""
         deadlines = {_container(group, i): group.start_deadline_seconds for group, i in _members(self.job)}
         return deadlines.get(container, max(deadlines.values()))
 
@@ -94,9 +95,9 @@ class Finding:
 
     Attributes:
         explanation: the reason and its message.
-        left_s: seconds until it holds; 0 or less: it holds now.
-        wait: the wait to keep until the next reconcile, or None.
-        phase: the phase of the replica; None: it follows from the state of its trainer's container.
+        left_s: seconds until the finding holds; 0 or less: the finding holds now.
+        wait: the wait that the next reconcile continues, or None.
+        phase: the phase of the replica; None: the state of the trainer's container determines the phase.
     """
 
     explanation: Explanation
@@ -107,7 +108,7 @@ class Finding:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReplicaVerdict:
-    """The phase of a replica, and the reason."""
+    """The phase of a replica or job with its reason."""
 
     phase: Phase
     explanation: Explanation
@@ -122,7 +123,7 @@ def found(reason: Reason, **facts: object) -> Finding:
 
 
 def after(situation: ReplicaContext, wait: Wait, why: Explanation) -> Finding:
-    """Return a finding that holds once a wait is over."""
+    """Return a finding that holds as soon as a wait is over."""
     return Finding(explanation=why, left_s=situation.left_s(wait), wait=wait)
 
 
@@ -141,10 +142,10 @@ def _container(group: SimulatorGroup, index: int) -> str:
 
 
 def next_pod(situation: ReplicaContext) -> str:
-    """Return the text about the start of a replica's next pod; a run resumes only from a reported checkpoint.
+    """Return the text about the start of a replica's next pod: it resumes only from a reported checkpoint.
 
     A custom program (`spec.trainer.command`) need not report its checkpoints, so its reported step counts as
-    one.
+    a checkpoint.
     """
     return RESUMES if has_checkpoint(situation) else BEGINS
 

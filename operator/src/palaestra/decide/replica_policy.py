@@ -1,13 +1,13 @@
-"""The judgment on a replica: three ordered lists of checks, and its new status and actions by them.
+"""The decision on a replica: three ordered lists of checks, and the status and actions that follow from them.
 
 `make golden` writes the lists into docs/explain/judging.md. Each reconcile runs all checks, because a check
-may also return the time after which it will hold. Of each list, the first check that holds now counts:
+may also return the time after which it will hold. In each list, the first check that holds now decides:
 
 - `ENDS`: the replica has ended for this reason; the other lists are ignored.
-- `STOPS`: the operator stops the replica for good, by a mark on its Job. These checks see the results of
+- `STOPS`: the operator stops the replica for good, by a mark on its Job. These checks use the results of
   `REASONS`.
-- `REASONS`: the reason in the status of a replica that continues. By its kind, the operator replaces the pod,
-  or does nothing.
+- `REASONS`: the reason in the status of a replica that continues. The kind of the check determines whether
+  the operator replaces the pod.
 """
 
 from collections.abc import Sequence
@@ -25,17 +25,17 @@ from palaestra.decide.pod_end import memory_kills
 from palaestra.decide.progress import progress
 from palaestra.decide.replica_context import Check, Finding, ReplicaContext, ReplicaVerdict
 
-LONGEST_NODE = 253  # characters of a node's name, as the API server bounds it
+LONGEST_NODE = 253  # characters of a node's name; the API server has the same limit
 
 
 class CheckKind(StrEnum):
-    """The kind of a check in `REASONS`, which sets the consequence if its reason is the first that holds."""
+    """The kind of a check in `REASONS`: the consequence if this check is the first that holds."""
 
     COUNTED = "counted"
-    """The operator replaces the pod, or its Job does, at most `backoffLimit` times."""
+    """The operator or the Job replaces the pod, at most `backoffLimit` times."""
 
     WAITING = "waiting"
-    """The status shows why the replica waits; nothing is ended or counted."""
+    """The status shows the reason for which the replica waits; no pod is ended or counted."""
 
     SHOWN = "shown"
     """The status shows the state of the replica."""
@@ -97,12 +97,12 @@ class ReplicaActions:
     """The actions and waits that follow from the checks on a replica.
 
     Attributes:
-        stop: the reason to stop it for good; None: it continues.
-        replace: the reason to replace its pod; None: the pod stays.
-        left_s: seconds after which the verdict may change by time alone.
-        waits: the open waits, kept until the next reconcile.
-        trouble: the cause that delays its first step, kept too; None if no cause is known, or if the first
-            step was done.
+        stop: the reason to stop the replica for good; None: the replica continues.
+        replace: the reason to replace the replica's pod; None: the pod stays.
+        left_s: the times in seconds after which the decision may change by time alone.
+        waits: the open waits, which the next reconcile continues.
+        trouble: the cause that delays the first step, passed to the next reconcile; None if no cause is
+            known, or if the first step was done.
     """
 
     stop: Explanation | None = None
@@ -121,7 +121,7 @@ class Decided:
 
 
 def decided(situation: ReplicaContext) -> Decided:
-    """Return the status and actions of a replica that had not ended."""
+    """Return the status and actions of a replica that has not ended in its stored status."""
     verdict, course = judge(situation)
     return Decided(status=_status(situation, verdict), course=course)
 
@@ -151,13 +151,13 @@ def _status(situation: ReplicaContext, verdict: ReplicaVerdict) -> ReplicaStatus
 
 
 def _node(situation: ReplicaContext) -> str | None:
-    """Return the node of the newest pod; after the pod is gone, its last node."""
+    """Return the node of the newest pod; if no pod exists, the node in the stored status."""
     pod = situation.seen.pod
     return situation.old.node if pod is None else one_line(pod.node, LONGEST_NODE) or None
 
 
 def judge(situation: ReplicaContext) -> tuple[ReplicaVerdict, ReplicaActions]:
-    """Return the verdict on a replica and its actions, by the first check of each order that holds."""
+    """Return the phase, reason and actions of a replica: the first check of each list that holds decides."""
     ends = _findings(ENDS, situation)
     reasons = [(kind, finding) for kind, check in REASONS if (finding := check(situation)) is not None]
     kind, shown = next((kind, finding) for kind, finding in reasons if finding.left_s <= 0)
@@ -168,7 +168,8 @@ def judge(situation: ReplicaContext) -> tuple[ReplicaVerdict, ReplicaActions]:
     if (end := _first(ends)) is not None:
         return _verdict(situation, end), ReplicaActions(waits=waits)
     stop = _first(stops)
-    if stop is not None and situation.seen.job is None:  # no Job exists, and none will be created
+    # The replica has no Job, and the operator will not create it.
+    if stop is not None and situation.seen.job is None:
         return ReplicaVerdict(phase=Phase.FAILED, explanation=stop.explanation), ReplicaActions()
     replaced = kind is CheckKind.COUNTED and stop is None
     waits_to_step = failure_checks.FIRST_STEP in {wait.key for wait in waits}
@@ -192,7 +193,7 @@ def _first(findings: Sequence[Finding]) -> Finding | None:
 
 
 def _refused(situation: ReplicaContext, shown: Finding) -> Finding:
-    """Return the reason to replace a pod, with the API server's reason if it refuses the eviction."""
+    """Return the reason to replace a pod, with the API server's message if it refused the eviction."""
     if not situation.seen.denied:
         return shown
     words = one_line(

@@ -1,22 +1,22 @@
-"""Exact counts of a replica's attempts and restarts, from the current state instead of from events.
+"""Exact counts of a replica's attempts and restarts, derived from the current state and not from events.
 
-The status is the memory. It names the pod of the current attempt (`pod`), and every pod created after that
-one is a new attempt. Trainers record their attempts in the run directory, and report the number in /status
-and in the termination message. So this module also counts attempts whose pods the operator never observed.
+The earlier counts are in the status, which also names the pod of the current attempt (`pod`). Every pod that
+was created after this pod is a new attempt. Trainers record their attempts in the run directory, and report
+the number in /status and in the termination message. So this module also counts attempts whose pods the
+operator never observed.
 
-Each replaced pod has one of four causes. The attempt's number is 1 + trainer + disruption + suspension +
-operator:
+Each replaced pod is counted under one of four causes. The attempt's number is 1 plus the sum of these counts:
 
 - trainer: the pod failed by itself, according to its own status or the Job's count of failures.
 - operator: the operator replaced the pod, according to the mark on its Job.
 - suspension: the operator suspended the Job while the pod ran, according to the mark on the Job. If another
-  controller suspended it, the status between the two pods or the times of the Job show it.
-- disruption: all others. The cluster or a person deleted the pod, or it exited with 75.
+  controller suspended the Job, the status between the two pods or the times of the Job show the suspension.
+- disruption: all other causes. The cluster or a person deleted the pod, or the trainer exited with 75.
 
-A failed pod without a successor is not counted as a restart yet. The trainer counts the restarts of
-simulators within its attempt. The status holds that count (`simulatorRestarts`) next to the sum, so that only
-the difference is added. One write of the status updates all counts, and it fails if the job has changed since
-it was read. So nothing is counted twice.
+A failed pod counts as a restart only when its successor exists. The trainer counts the restarts of simulators
+within its attempt. The status stores this count (`simulatorRestarts`) next to the sum over all attempts, so
+that only the difference is added to the sum. One write of the status updates all counts, and the write fails
+if the job has changed since the operator read it. So no restart is counted twice.
 """
 
 from collections.abc import Iterable, Sequence
@@ -29,16 +29,17 @@ from palaestra.observe.json_access import MOST_COUNT
 from palaestra.observe.models import JobView, PodView, ReplicaObserved
 from palaestra_protocol.pod.status import ExitCode
 
-# A trainer's record may add this many attempts to the observed pods, because a pod can report any number.
+# A pod can report any number, so its report may exceed the observed attempts by at most this number.
 MOST_UNSEEN = 100
 
-# The Job controller creates the pod before it records the time of the resumption; both are whole seconds.
+# The Job controller creates the pod first and records the time of the resumption later. Both times are whole
+# seconds.
 _RESUMED_LATE = timedelta(seconds=2)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Counted:
-    """The counts of a replica; `ReplicaStatus` has a field of the same name for each."""
+    """The counts of a replica; `ReplicaStatus` has a field of the same name for each count."""
 
     attempt: int
     pod: PodReference | None
@@ -49,7 +50,7 @@ class Counted:
 
 
 def counted(old: ReplicaStatus, seen: ReplicaObserved) -> Counted:
-    """Return the counts after the observation `seen`; `old` is the status so far."""
+    """Return the counts after the observation `seen`; `old` is the stored status."""
     newer = newer_pods(old, seen.pods)
     attempt = _attempt(old, seen, newer)
     restarts = _restarts(old, seen, newer, attempt)
@@ -68,11 +69,11 @@ def counted(old: ReplicaStatus, seen: ReplicaObserved) -> Counted:
 
 
 def newer_pods(old: ReplicaStatus, pods: Sequence[PodView]) -> tuple[PodView, ...]:
-    """Return the pods created after the one that the status names, oldest first.
+    """Return the pods that were created after the pod in the status, oldest first.
 
-    Times are whole seconds. If the named pod is gone, a pod created in the same second is newer. An older one
-    would have failed, and after a failure the Job controller waits for seconds before it creates the next
-    pod.
+    Times are whole seconds. If the pod in the status no longer exists, a pod created in the same second
+    counts as newer. Such a pod cannot be older: after the failure of an older pod, the Job controller would
+    have waited several seconds before it created the pod in the status.
     """
     named = old.pod
     if named is None:
@@ -84,7 +85,7 @@ def newer_pods(old: ReplicaStatus, pods: Sequence[PodView]) -> tuple[PodView, ..
 
 
 def of_this_run(old: ReplicaStatus, pods: Sequence[PodView]) -> frozenset[str]:
-    """Return the uids of the pods whose reports count: all, or those since a lost run was given up."""
+    """Return the uids of the pods whose reports count; after a lost run was given up, only of newer pods."""
     if old.lost is not None and old.lost.restarted is not None and old.lost.pod is not None:
         pods = newer_pods(old.model_copy(update={"pod": old.lost.pod}), pods)
         return frozenset(pod.uid for pod in pods if pod.uid != old.lost.pod.uid)
@@ -109,7 +110,7 @@ def lives(pod: PodView) -> bool:
 
 
 def exit_code(pod: PodView) -> int | None:
-    """Return the exit code of a pod's trainer; None if it has not ended, or its code is unknown."""
+    """Return the exit code of a pod's trainer; None if the trainer has not ended, or its code is unknown."""
     trainer = pod.trainer
     ended = trainer is not None and trainer.running_since is None and trainer.exit is not None
     return trainer.exit.code if ended and trainer and trainer.exit else None
@@ -156,7 +157,7 @@ def _have_run(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodView
 
 
 def _by_the_job(old: ReplicaStatus, seen: ReplicaObserved) -> int:
-    """Return the number of older pods whose failure the Job has counted and the status has not."""
+    """Return the number of older pods whose failure is in the Job's count but not in the status yet."""
     if seen.job is None:
         return 0
     last = seen.pod is not None and failed_by_itself(seen.pod)
@@ -164,7 +165,7 @@ def _by_the_job(old: ReplicaStatus, seen: ReplicaObserved) -> int:
 
 
 def _by_the_operator(old: ReplicaStatus, seen: ReplicaObserved) -> int:
-    """Return the number of older pods that the operator replaced and the status does not count yet."""
+    """Return the number of older pods that the operator replaced and that the status does not count yet."""
     mark = seen.job.replaced if seen.job is not None else None
     if mark is None:
         return 0
@@ -194,11 +195,12 @@ def _ended_otherwise(old: ReplicaStatus) -> bool:
 
 
 def _suspended_by_times(old: ReplicaStatus, job: JobView, newer: Sequence[PodView]) -> int:
-    """Return 1 if the Job was suspended after the named pod was created, and resumed for the newest."""
+    """Return 1 if the Job was suspended after the pod in the status, and resumed before the newest pod."""
     if old.pod is None:
         return 0
     named, newest = old.pod.created, newer[-1].created
-    if (paused := job.paused) is not None:  # the new pod is observed before the Job's resumption
+    # The operator has observed the new pod, but not the Job's resumption yet.
+    if (paused := job.paused) is not None:
         return int(named <= paused < newest)
     resumed = job.resumed
     return int(resumed is not None and named + _RESUMED_LATE < resumed <= newest + _RESUMED_LATE)

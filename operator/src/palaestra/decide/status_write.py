@@ -1,12 +1,14 @@
-"""The status as it is written: as data, at which time, and cut to the size that its object may have.
+"""The write of a status: its data, its time, and its size limit.
 
-A write is due at once for new states and first values, else every 30 seconds. The amounts in Kueue's message,
-which the job lacks, count as progress: other jobs change them often.
+A status with a new state or a first value is written at once; progress is written every 30 seconds. Kueue's
+message contains the missing amounts of resources. These amounts count as progress, because other jobs change
+them often.
 
 etcd refuses an object of more than 1.5 MiB, and the operator would retry the write forever. Each field of a
-status has its own limit, but the status of a hundred replicas with 32 simulators each exceeds that size, and
-the author's spec adds to it. So the least important details are removed first. They are only for people. No
-decision and no event depends on them; otherwise each reconcile would emit the event again.
+status has its own limit. But the status of a hundred replicas with 32 simulators each exceeds 1.5 MiB, and
+the spec needs space too. So the least important details are removed until the object fits. These details are
+only for people. Decisions and events must not depend on removed details, because each reconcile would then
+emit the event again.
 """
 
 import json
@@ -20,9 +22,9 @@ from palaestra.observe.cache_trim import SIZE, SMALL
 from palaestra.observe.json_access import part, text
 
 PROGRESS_EVERY_S = 30
-_WITH_OTHERS = frozenset({"activeSeconds", "activeSince"})  # written with other changes, never alone
+_WITH_OTHERS = frozenset({"activeSeconds", "activeSince"})  # written together with other changes, never alone
 _OF_JOB = frozenset({"lastCheckpointTime", "leftOut", "nodes", "step", "successRate"})
-_FIRST = frozenset(  # once present, always present
+_FIRST = frozenset(  # fields that stay in the status after their first value
     {"step", "target", "successRate", "successInterval", "lastCheckpoint"}
 )
 _OF_REPLICA = frozenset(
@@ -30,10 +32,11 @@ _OF_REPLICA = frozenset(
      "lastCheckpoint", "node",
      "furthestStep", "simulatorRestarts", "lastProgress", "faults", "goodput", "stepsLost"}
 )  # fmt: skip
-_AMOUNT = re.compile(r"\d[\w.]*")  # such as 425m or 1.5Gi
+_AMOUNT = re.compile(r"\d[\w.]*")  # an amount, such as 425m or 1.5Gi
 
-MOST_BYTES = 1_400_000  # of the whole object as sent; etcd accepts 1,572,864, including managedFields
-SHORT = 100  # bytes of a shortened message as sent
+# Of the whole object in a request; etcd accepts 1,572,864 bytes, including managedFields.
+MOST_BYTES = 1_400_000
+SHORT = 100  # bytes of a shortened message in a request
 
 Data = dict[str, Any]
 Cut = Callable[[Data], Data]
@@ -43,9 +46,10 @@ _OF_KILL = ("container", "times", "last")
 
 
 def as_data(status: Status) -> dict[str, Any]:
-    """Return the status as the API server stores it: camelCase, without absent fields and empty lists.
+    """Return the status in the form that the API server stores: camelCase, no absent fields, no empty lists.
 
-    `kubectl describe` prints a heading for each empty list, and readers treat an absent list as empty.
+    `kubectl describe` would print a heading for each empty list. Programs that read a status treat an absent
+    list as empty.
     """
     data: dict[str, Any] = _without_empty(status.model_dump(mode="json", by_alias=True, exclude_none=True))
     return data
@@ -59,15 +63,15 @@ def _without_empty(data: Any) -> Any:
 
 
 def write_in_s(old: Mapping[str, Any] | None, new: Mapping[str, Any], since_s: float | None) -> float | None:
-    """Return the seconds after which to write a status; 0: now; None: never.
+    """Return the seconds until the status must be written; 0: now; None: no write is needed.
 
     Args:
-        old: from the API server.
-        new: from `as_data`.
-        since_s: seconds since this job's status was last written, on a monotonic clock; None: this process
-            has not written it.
+        old: the status from the API server.
+        new: the status from `as_data`.
+        since_s: seconds since this process last wrote the job's status, on a monotonic clock; None: it has
+            not written the status.
     """
-    # An API server with an older CRD adds the empty lists again.
+    # An older CRD has defaults for lists, so the API server adds the empty lists again.
     before = _without_empty(_without(old if isinstance(old, Mapping) else {}, _WITH_OTHERS))
     after = _without(new, _WITH_OTHERS)
     if before == after:
@@ -90,7 +94,7 @@ def _without_progress(status: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _without_amounts(reported: Any) -> Any:
-    """Return a condition or replica; if it waits in a queue, the amounts in its message are removed."""
+    """Return a condition or replica; if its reason is `Queued`, remove the amounts from its message."""
     if not isinstance(reported, Mapping) or reported.get("reason") != Reason.QUEUED:
         return reported
     return {**reported, "message": _AMOUNT.sub("", str(reported.get("message")))}
@@ -100,18 +104,18 @@ def _rest(replica: Any) -> Any:
     if not isinstance(replica, Mapping):
         return replica
     kept = {name: value for name, value in _without_amounts(replica).items() if name not in _OF_REPLICA}
-    kept |= dict.fromkeys(_FIRST & replica.keys())  # only the first value is urgent
+    kept |= dict.fromkeys(_FIRST & replica.keys())  # a first value is written at once, a changed value later
     restarts = kept.get("restarts")
-    if isinstance(restarts, Mapping):  # restarts of simulators are as frequent as faults
+    if isinstance(restarts, Mapping):  # simulators may restart often, so their restarts count as progress
         kept["restarts"] = {name: value for name, value in restarts.items() if name != "simulator"}
     return kept
 
 
 def fitted(job: Mapping[str, Any], status: Data) -> Data:
-    """Return a status from `as_data` without the details that do not fit into its object.
+    """Return a status from `as_data` without the details that do not fit into the TrainingJob.
 
-    The same status gives the same result, and a second call changes nothing. If the spec leaves less than
-    450,000 bytes for the status, the result may still be too large.
+    The function is deterministic, and a second call on the result returns it unchanged. If the spec leaves
+    less than 450,000 bytes for the status, the result may still be too large.
     """
     room = MOST_BYTES - _taken(job)
     for cut in CUTS:
@@ -122,17 +126,17 @@ def fitted(job: Mapping[str, Any], status: Data) -> Data:
 
 
 def _size(data: Any) -> int:
-    return len(json.dumps(data))  # in ASCII, like requests
+    return len(json.dumps(data))  # JSON in ASCII, as in requests
 
 
 def _taken(job: Mapping[str, Any]) -> int:
-    """Return the bytes of a job without its status; for a small job, the upper limit of small jobs."""
+    """Return the bytes of a job without its status; all small jobs count as the largest small job."""
     noted = text(part(job, "metadata", "annotations"), SIZE)
     return int(noted) if noted.isdecimal() else SMALL
 
 
 def _of_replicas(cut: Cut, *, healthy: bool | None = None) -> Cut:
-    """Return a cut of all replicas, or only of the healthy or the unhealthy ones."""
+    """Return a cut that applies `cut` to all replicas, or only to the healthy or to the unhealthy ones."""
 
     def cuts(replica: Data) -> bool:
         return healthy is None or (replica.get("phase") in _HEALTHY) is healthy
@@ -165,7 +169,7 @@ def _messages(replica: Data) -> Data:
 
 
 def _memory_kills(replica: Data) -> Data:
-    """Return a replica with only the count and the time of each kill, which identify a kill."""
+    """Return a replica with only container, count and time of each kill, which identify the kill."""
     kills = [{name: kill[name] for name in _OF_KILL} for kill in replica.get("memoryKills", ())]
     return {**replica, "memoryKills": kills}
 
@@ -178,7 +182,7 @@ def _conditions(status: Data) -> Data:
     return {**status, "conditions": [_shortened(condition) for condition in status.get("conditions", ())]}
 
 
-# Applied in this order until the status fits.
+# The cuts are applied in this order until the status fits.
 CUTS: tuple[Cut, ...] = (
     _of_replicas(_simulators, healthy=True),
     _of_replicas(_faults, healthy=True),

@@ -6,24 +6,24 @@ from palaestra.decide.restart_counts import lives
 from palaestra.observe.models import JobView, PodView, ReplicaObserved, Suspended
 
 BY_SPEC = "spec.suspend; set it to false to continue"
-SOMEBODY = "somebody else"  # if no field manager is known
+SOMEBODY = "somebody else"  # the name of the client if no field manager is known
 
 
 def set_last(seen: JobView) -> bool:
     """Return the `spec.suspend` that the operator last set on a Job, according to the Job's annotation.
 
-    If another client has removed the annotation, the current value counts as the operator's.
+    If another client has removed the annotation, the current value counts as set by the operator.
     """
     return seen.suspended if seen.suspend_set is None else seen.suspend_set
 
 
 def to_set(job: TrainingJob, seen: JobView | None, *, suspend: bool | None = None) -> bool:
-    """Return whether the operator must suspend or resume a Job; Kueue does it for a Job with a queue.
+    """Return whether the operator must suspend or resume a Job; only Kueue does so for a Job with a queue.
 
     `suspend` is the wanted value; None: the value in the spec.
 
-    The spec is compared with the value that the operator set last, not with the current one. Otherwise the
-    operator and another client would undo each other's writes forever.
+    The wanted value is compared with the value that the operator set last, not with the current value.
+    Otherwise the operator and another client would undo each other's writes forever.
     """
     if seen is None or job.spec.scheduling.queue_name is not None or seen.queue or seen.end is not None:
         return False
@@ -36,30 +36,32 @@ def to_resume(job: TrainingJob, seen: JobView | None) -> bool:
 
 
 def mark(seen: ReplicaObserved, current: PodReference | None, *, suspend: bool) -> Suspended | None:
-    """Return the mark about the current pod for the patch that suspends or resumes a Job; None: no mark.
+    """Return the mark about the current pod, for the patch that suspends or resumes a Job; None: no mark.
 
-    A pod may be created before the suspension and observed after it. The patch that resumes the Job names
-    such a pod, because a suspended Job does not create pods.
+    A pod may be created before the suspension and be observed only after the suspension. Then the patch that
+    resumes the Job adds the mark. This pod existed before the suspension, because a suspended Job does not
+    create pods.
     """
     job = seen.job
     if job is None or current is None or job.suspended == suspend:
         return None
     named = job.suspension is not None and job.suspension.pod == current.uid
     lived = seen.pod is not None and lives(seen.pod)
-    if suspend:  # suspended again before the next pod is created: the existing mark is right
+    # If the Job is suspended again before the next pod is created, the existing mark stays correct.
+    if suspend:
         return None if named and not lived else Suspended(pod=current.uid, lived=lived)
     late = job.suspend_set is True and not named
     return Suspended(pod=current.uid, lived=True) if late else None
 
 
 def ended_by_suspension(seen: ReplicaObserved, pod: PodView) -> bool:
-    """Return whether a pod was deleted because the operator suspended its Job, even if resumed since."""
+    """Return whether a pod was deleted because the operator suspended its Job, even if it resumed the Job."""
     mark = seen.job.suspension if seen.job is not None else None
     return mark is not None and mark.lived and mark.pod == pod.uid and pod.gone_by is not None
 
 
 def overruled(job: TrainingJob, seen: JobView) -> bool:
-    """Return whether another client has suspended or resumed a Job since the operator set it."""
+    """Return whether another client has changed the Job's `suspend` since the operator set it."""
     queued = job.spec.scheduling.queue_name is not None or seen.queue
     return not queued and seen.end is None and seen.suspended != set_last(seen)
 
@@ -74,7 +76,7 @@ def suspended_by(job: TrainingJob, seen: ReplicaObserved) -> str:
 
 
 def unheeded(job: TrainingJob, seen: ReplicaObserved) -> str:
-    """Return the text about a suspension that has no effect; "" if it has one."""
+    """Return the text about a `spec.suspend` that has no effect on a replica; "" in all other cases."""
     if seen.job is None or not job.spec.suspend or seen.job.suspended:
         return ""
     if seen.job.queue:

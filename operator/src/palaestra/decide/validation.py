@@ -1,4 +1,4 @@
-"""Read a TrainingJob from the API server's JSON, or refuse it, so that a bad object delays no other."""
+"""Read a TrainingJob from the API server's JSON, or refuse it: invalid objects must not delay others."""
 
 from collections.abc import Mapping
 from datetime import datetime
@@ -19,15 +19,16 @@ from palaestra.decide.job_status import ConditionState, condition_states, condit
 from palaestra.errors import SpecErrors, TrainingJobError
 from palaestra.observe.json_access import count, part, text
 
-MANAGER = "palaestra.dev/operator"  # `spec.managedBy` of this operator's jobs, if they set it
+# The value of `spec.managedBy` in jobs of this operator; the field may be absent.
+MANAGER = "palaestra.dev/operator"
 
 
 class JobRefused(TrainingJobError, ValueError):
-    """The operator cannot run this TrainingJob as it is; retrying cannot help.
+    """The operator cannot run this TrainingJob, and a retry cannot help.
 
     Attributes:
-        reason: one word.
-        message: a sentence.
+        reason: the reason, one word.
+        message: the message for the status, a sentence.
     """
 
     def __init__(self, reason: Reason, problem: str) -> None:
@@ -37,7 +38,7 @@ class JobRefused(TrainingJobError, ValueError):
 
 
 def managed_here(raw: Mapping[str, Any]) -> bool:
-    """Return whether this operator runs the job: it names no other controller and is not being deleted."""
+    """Return whether this operator runs the job: no other controller manages it and nobody deletes it."""
     manager = part(raw, "spec").get("managedBy")
     ours = manager is None or manager == MANAGER
     return ours and "deletionTimestamp" not in part(raw, "metadata")
@@ -59,8 +60,8 @@ def accept(raw: Mapping[str, Any]) -> TrainingJob:
 def reject(raw: Mapping[str, Any], refused: JobRefused, now: datetime) -> Decision:
     """Return the decision about a refused job.
 
-    A job that was never accepted has failed for good, because a spec does not change. A job that an older
-    release accepted continues as it is; this release does not touch its pods.
+    A job that was never accepted fails for good, because a spec does not change. A job that an older release
+    accepted continues unchanged; this release does not change its pods or its status.
     """
     now = whole(now)
     explanation = Explanation(reason=refused.reason, message=refused.message)

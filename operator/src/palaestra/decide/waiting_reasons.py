@@ -1,4 +1,4 @@
-"""Checks for a waiting replica: the status shows the reason, and nothing is ended or counted.
+"""Checks for a waiting replica: the status shows the reason, and no pod is ended or counted.
 
 The API server, the scheduler and the kubelet retry by themselves. `palaestra.decide.replica_policy` has the
 order of these checks.
@@ -28,8 +28,8 @@ from palaestra.plan.job import GIVEN_UP
 from palaestra.plan.replica import INSTALL_SIDECAR, ROS_MASTER, SIMULATOR_PREFIX, TRAINER
 from palaestra_protocol.pod.status import SimulatorStatus
 
-LOST_AFTER_S = 30  # after the end of a deleted pod's grace period
-CRASHES = 3  # of one sidecar, after which the status reports a crash loop
+LOST_AFTER_S = 30  # seconds after the end of a deleted pod's grace period
+CRASHES = 3  # crashes of one sidecar after which the status reports a crash loop
 PULLING = frozenset(
     {"ErrImagePull", "ImagePullBackOff", "InvalidImageName", "ErrImageNeverPull", "ImageInspectError",
      "RegistryUnavailable", "SignatureValidationFailed"}
@@ -39,7 +39,7 @@ MAKING = frozenset(
      "PostStartHookError"}
 )  # fmt: skip
 
-# These match the messages of Kubernetes' admission plugins ResourceQuota and LimitRanger.
+# These expressions match the messages of Kubernetes' admission plugins ResourceQuota and LimitRanger.
 _UNSPECIFIED = re.compile(r"must specify (?P<containers>.+)$")
 _NAMES = re.compile(r"for: (?P<names>[a-z0-9,-]+)")
 _SIZES = re.compile(r"\b(?:usage|ratio) per (?:Container|Pod) is ")
@@ -48,7 +48,7 @@ _EVERY = "spec.rosMaster.resources, spec.simulators[].resources and spec.trainer
 
 
 def objects_refused(situation: ReplicaContext) -> Finding | None:
-    """The API server refuses to create an object of the replica; no event in the cluster reports it."""
+    """The API server refuses to create an object of the replica; no event in the cluster reports this."""
     if situation.seen.job is not None or not situation.seen.denied or situation.pod is not None:
         return None
     phase = Phase.SUSPENDED if situation.job.spec.suspend else Phase.PENDING
@@ -56,7 +56,7 @@ def objects_refused(situation: ReplicaContext) -> Finding | None:
 
 
 def name_taken(situation: ReplicaContext) -> Finding | None:
-    """Another Job has the replica's name."""
+    """A Job of another owner has the name that the replica's Job needs."""
     obstacle = situation.seen.obstacle
     if situation.seen.job is not None or obstacle is None:
         return None
@@ -65,7 +65,7 @@ def name_taken(situation: ReplicaContext) -> Finding | None:
 
 
 def old_pod_holds_claim(situation: ReplicaContext) -> Finding | None:
-    """A pod of an earlier TrainingJob of this name may still write to the claim that both name."""
+    """A pod of an earlier TrainingJob of the same name may still write to the common `existingClaim`."""
     old = next(iter(situation.seen.former), None)
     if situation.seen.job is not None or old is None:
         return None
@@ -74,7 +74,7 @@ def old_pod_holds_claim(situation: ReplicaContext) -> Finding | None:
 
 
 def pods_refused(situation: ReplicaContext) -> Finding | None:
-    """The API server refuses to create the pod; only the Job's events have the reason."""
+    """The API server refuses to create the pod; only events of the Job have the reason."""
     refused = situation.seen.refused
     words = situation.seen.denied or (refused.message if refused is not None else "")
     if situation.pod is not None or not words:
@@ -83,18 +83,18 @@ def pods_refused(situation: ReplicaContext) -> Finding | None:
 
 
 def _not_admitted(words: str) -> Explanation:
-    """Quote the API server's message, and add the fields of the job that it does not name."""
+    """Return the reason with the API server's message, and the fields of the job that a person must set."""
     return explain(Reason.PODS_REFUSED, words=words, remedy=_remedy_of(words))
 
 
 def node_lost(situation: ReplicaContext) -> Finding | None:
-    """A deleted pod still exists long after its grace period."""
+    """A deleted pod still exists 30 seconds after the end of its grace period."""
     pod = situation.pod
     if pod is None or pod.gone_by is None:
         return None
     why = explain(Reason.NODE_LOST, pod=pod.name, node=pod.node, seconds=LOST_AFTER_S)
     wait = Wait(key=("gone", pod.uid), seconds=pod.grace_s + LOST_AFTER_S)
-    # By the last report of its node, it runs.
+    # The node's last report says that the pod runs, so the phase is set here.
     return replace(after(situation, wait, why), phase=Phase.PENDING)
 
 
@@ -106,20 +106,20 @@ def unschedulable(situation: ReplicaContext) -> Finding | None:
 
 
 def volume_not_mounted(situation: ReplicaContext) -> Finding | None:
-    """The pod is on a node, and a volume is not mounted; only the pod's events have the reason."""
+    """The pod has a node, but a volume is not mounted; only events of the pod have the reason."""
     if situation.pod is None or not situation.seen.unmounted:
         return None
     return found(Reason.VOLUME_NOT_MOUNTED, pod=situation.pod.name, words=situation.seen.unmounted)
 
 
 def image_does_not_come(situation: ReplicaContext) -> Finding | None:
-    """An image cannot be pulled; the kubelet retries."""
+    """An image cannot be pulled; the kubelet retries the pull."""
     stuck = first_waiting(situation.pod, PULLING)
     return None if stuck is None else of_image(stuck)
 
 
 def container_refused(situation: ReplicaContext) -> Finding | None:
-    """The node cannot create a container; the kubelet retries."""
+    """The node cannot create a container; the kubelet retries the creation."""
     stuck = first_waiting(situation.pod, MAKING)
     if stuck is None:
         return None
@@ -128,7 +128,7 @@ def container_refused(situation: ReplicaContext) -> Finding | None:
 
 
 def sidecar_out_of_memory(situation: ReplicaContext) -> Finding | None:
-    """A sidecar was killed because it ran out of memory; the kubelet restarts it."""
+    """A sidecar ran out of memory and was killed; the kubelet restarts the sidecar."""
     stuck = next(
         (each for each in crashing(situation.pod) if each.simulates and killed_for_memory(each)), None
     )
@@ -136,7 +136,7 @@ def sidecar_out_of_memory(situation: ReplicaContext) -> Finding | None:
 
 
 def sidecar_crash_loops(situation: ReplicaContext) -> Finding | None:
-    """A sidecar crashes again and again; the kubelet restarts it."""
+    """A sidecar crashes repeatedly; the kubelet restarts the sidecar."""
     looping = next(
         (container for container in crashing(situation.pod) if container.restarts >= CRASHES), None
     )
@@ -144,7 +144,7 @@ def sidecar_crash_loops(situation: ReplicaContext) -> Finding | None:
 
 
 def simulator_not_up(situation: ReplicaContext) -> Finding | None:
-    """A simulator is slow to start; the trainer gives it up when its restart budget is spent."""
+    """A simulator is slow to start; the trainer gives up when the simulator's restart budget is spent."""
     polled = situation.seen.polled
     if situation.pod is None or polled is None or situation.trains or not situation.fresh:
         return None
@@ -161,19 +161,19 @@ def simulator_not_up(situation: ReplicaContext) -> Finding | None:
 
 
 def pod_filled_its_storage(situation: ReplicaContext) -> Finding | None:
-    """The newest pod was evicted because it wrote too much, and the next does not exist yet."""
+    """The newest pod was evicted because it wrote too much data, and the next pod does not exist yet."""
     why = None if situation.seen.pod is None else storage_eviction(situation.seen.pod)
     return None if why is None else Finding(explanation=why)
 
 
 def pod_was_taken(situation: ReplicaContext) -> Finding | None:
-    """The newest pod was interrupted, and the next does not exist yet."""
+    """The newest pod was interrupted, and the next pod does not exist yet."""
     pod = situation.seen.pod
     if pod is None or pod.phase != "Failed" or failed_by_itself(pod):
         return None
     if (mark := mark_of(situation, pod)) is not None:
         return Finding(explanation=mark)
-    if ended_by_suspension(situation.seen, pod):  # and resumed: the next pod is on its way
+    if ended_by_suspension(situation.seen, pod):  # the Job was resumed and will create the next pod
         return None
     if pod.disruption or pod.gone_by is not None:
         words = pod.disruption or "it was deleted"
@@ -183,7 +183,7 @@ def pod_was_taken(situation: ReplicaContext) -> Finding | None:
 
 
 def volume_is_full(situation: ReplicaContext) -> Finding | None:
-    """The newest pod could not write to its full volume; another pod will retry."""
+    """The newest pod could not write to its full volume; the Job will create another pod."""
     pod = situation.seen.pod
     if pod is None or not failed_by_itself(pod) or no_other_comes(situation, pod):
         return None
@@ -192,7 +192,7 @@ def volume_is_full(situation: ReplicaContext) -> Finding | None:
 
 
 def pod_failed(situation: ReplicaContext) -> Finding | None:
-    """The newest pod failed; another pod will retry."""
+    """The newest pod failed; the Job will create another pod."""
     pod = situation.seen.pod
     if pod is None or not failed_by_itself(pod) or no_other_comes(situation, pod):
         return None
@@ -201,11 +201,11 @@ def pod_failed(situation: ReplicaContext) -> Finding | None:
 
 
 def no_other_comes(situation: ReplicaContext, pod: PodView) -> bool:
-    """Return whether a failed pod is the last one, because its Job is about to fail."""
+    """Return whether a failed pod is the last pod, because its Job is about to fail."""
     booked = situation.seen.job.failures if situation.seen.job is not None else 0
     failures = max(
         booked, situation.counted.restarts.trainer + 1
-    )  # the Job may not have counted the newest yet
+    )  # the Job may not have counted the newest pod yet
     return failures > situation.job.spec.backoff_limit or exit_code(pod) in GIVEN_UP
 
 
@@ -244,10 +244,11 @@ def of_crash(situation: ReplicaContext, container: ContainerView) -> Explanation
 
 
 def _remedy_of(words: str) -> str:
-    """Return the clause that names the fields to set, for the end of a message; "" for any other refusal.
+    """Return the clause that names the fields to set, for the end of a message; "" if no field helps.
 
-    A quota on limits or a LimitRange refuses the pod. The API server's message names containers, but a person
-    sets fields. No field has the name of the ROS master's container or of `install-sidecar`.
+    Fields help if a quota on limits or a LimitRange refused the pod. The API server's message names
+    containers, but a person sets fields. The fields for the ROS master's container and for `install-sidecar`
+    have other names.
     """
     if (unspecified := _UNSPECIFIED.search(words)) is not None:
         names = ",".join(_NAMES.findall(unspecified["containers"])).split(",")

@@ -1,13 +1,13 @@
-"""Check a cluster and report why TrainingJobs do not run in it, with the remedy.
+"""Check a cluster, and report the problems that keep TrainingJobs from running, with their remedies.
 
-The order of the checks is here: causes come before their consequences. The modules have the checks:
+`CHECKS` has the order of the checks: causes come before their consequences. The checks are in these modules:
 
 - `check_result`: the result of a check
 - `platform`: the cluster: version, CRD, namespace, sidecars and storage
 - `installation`: the operator: its replicas, images, leader, rights and metrics
 - `rbac`: the permissions of the operator and of users
 
-No check changes anything; a check that must create an object does a dry run.
+The checks do not change the cluster; a check that must create an object does a dry run.
 """
 
 from collections.abc import Iterator, Mapping
@@ -34,8 +34,8 @@ CHECKS: tuple[tuple[str, Check], ...] = (
     ("operator's rights", operator_rights),
     ("metrics", metrics),
 )
-# If the key check fails, the other checks would fail too or mislead: RBAC also grants rights in a namespace
-# that does not exist.
+# If the check that is the key fails, the checks in its set are skipped, because they would fail too or
+# mislead. For example, RBAC also grants permissions in a namespace that does not exist.
 POINTLESS: Mapping[Check, frozenset[Check]] = {
     answers: frozenset(check for _, check in CHECKS),
     namespace: frozenset({own_rights, sidecars, operator_rights}),

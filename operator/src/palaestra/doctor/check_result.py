@@ -1,4 +1,4 @@
-"""The input and the result of a check."""
+"""The input of a check, `Site`, and its result, `CheckResult`."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ class CheckStatus(StrEnum):
     """The result of a check."""
 
     RIGHT = "ok"
-    WARNING = "warning"  # the subject works, but may cause problems later
+    WARNING = "warning"  # the checked subject works, but may cause problems later
     WRONG = "wrong"
     UNKNOWN = "unknown"
 

@@ -46,12 +46,12 @@ def runs(site: Site) -> Iterator[CheckResult]:
 def images(site: Site) -> Iterator[CheckResult]:
     """Check whether the operator's image and the default images of jobs are pinned by digest."""
     deployment = _deployment(site)
-    if deployment is not None:  # `runs` reports a missing Deployment
+    if deployment is not None:  # the check `runs` reports a missing Deployment
         yield judged_images(_container(deployment))
 
 
 def judged_images(container: Object) -> CheckResult:
-    """Return the result for the images in the operator's container: a warning if one has no digest."""
+    """Return the result for the images in the operator's container: a warning if an image has no digest."""
     release = Images.of_release(version("palaestra"))
     named = (
         container["image"],
@@ -70,7 +70,7 @@ def judged_images(container: Object) -> CheckResult:
 
 
 def leads(site: Site) -> Iterator[CheckResult]:
-    """Check whether an operator leads: wait for a renewal of its Lease, because clocks cannot be compared."""
+    """Check whether an operator leads: wait until it renews its Lease, because clocks cannot be compared."""
     deployment = _deployment(site)
     if deployment is not None and NOT_ELECTED in _container(deployment).get("command", ()):
         yield right("leader", "leader election is disabled")
@@ -83,7 +83,7 @@ def leads(site: Site) -> Iterator[CheckResult]:
     seen = False
     try:
         for lease in changes(site.api, LEASES, site.operator_namespace, NAME, deadline=deadline):
-            holder = lease["spec"].get("holderIdentity")  # empty: the last leader released it
+            holder = lease["spec"].get("holderIdentity")  # empty if the last leader has released the Lease
             if seen and holder:
                 yield right("leader", f"is {holder}")
                 return
@@ -144,7 +144,7 @@ def metrics(site: Site) -> Iterator[CheckResult]:
 
 
 def trainer_image(site: Site) -> str:
-    """Return the default image of trainers: from the operator's options, else that of this release."""
+    """Return the default image of trainers: the operator's option, or else the image of this release."""
     try:
         deployment = _deployment(site)
     except Forbidden:
@@ -154,7 +154,7 @@ def trainer_image(site: Site) -> str:
 
 
 def _chosen(container: Object, option: str, otherwise: str) -> str:
-    """Return the value of an option of the operator's command line; `otherwise` if it is absent."""
+    """Return the value of an option in the operator's command line; `otherwise` if the option is absent."""
     given = container.get("command", ())
     return next(
         (argument.removeprefix(option) for argument in given if argument.startswith(option)), otherwise

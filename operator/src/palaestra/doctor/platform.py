@@ -16,13 +16,13 @@ from palaestra.objects import Object
 from palaestra.plan.containers import SECURITY
 from palaestra.plan.pod import UNPRIVILEGED
 
-# The values are small, and every limit is set, so that no quota requires another one.
+# The values are small, and all limits are set, so that a quota cannot require a missing limit.
 RESOURCES = {
     "requests": {"cpu": "10m", "memory": "32Mi"},
     "limits": {"cpu": "10m", "memory": "96Mi"},
 }
 
-FIRST = (1, 33)  # the first version in which sidecar containers are stable
+FIRST = (1, 33)  # the first version of Kubernetes in which sidecar containers are stable
 DEFAULT_CLASS = "storageclass.kubernetes.io/is-default-class"
 OVER_QUOTA = "exceeded quota"
 
@@ -56,7 +56,7 @@ def release(text: str) -> tuple[int, int]:
 
 
 def definition(site: Site) -> Iterator[CheckResult]:
-    """Check whether the cluster serves TrainingJobs, with the definition of this release."""
+    """Check whether the cluster serves TrainingJobs with the definition of this release."""
     what, remedy = "TrainingJobs", INSTALL
     if not site.api.serves(API_VERSION):
         yield wrong(what, f"the cluster does not serve {API_VERSION}", remedy)
@@ -87,7 +87,10 @@ def namespace(site: Site) -> Iterator[CheckResult]:
 
 
 def difference(ours: Any, found: Any, path: str) -> str | None:
-    """Return the path of the first part of `ours` that differs in `found`; `found` may have more parts."""
+    """Return the path of the first value in `ours` that differs in `found`, or None.
+
+    Additional values in `found` are ignored.
+    """
     if isinstance(ours, Mapping) and isinstance(found, Mapping):
         pairs = [(f"{path}.{key}", value, found.get(key)) for key, value in ours.items()]
     elif isinstance(ours, list) and isinstance(found, list) and len(ours) == len(found):
@@ -98,7 +101,7 @@ def difference(ours: Any, found: Any, path: str) -> str | None:
 
 
 def sidecars(site: Site) -> Iterator[CheckResult]:
-    """Check by a dry run whether the sidecars of a pod stay unchanged when the API server admits it."""
+    """Check by a dry run whether the API server admits a pod without a change of its sidecars."""
     what = "sidecars"
     try:
         made = site.api.create(PODS, trial_pod(site.namespace, trainer_image(site)), dry_run=True)
@@ -110,17 +113,17 @@ def sidecars(site: Site) -> Iterator[CheckResult]:
             return
         yield wrong(
             what,
-            f"a pod like those of jobs is refused in {site.namespace}: {error.message}",
+            f"a pod like the pods of jobs is refused in {site.namespace}: {error.message}",
             "allow what the message names",
         )
-    except Invalid as error:  # a dry run fails if a webhook has side effects
+    except Invalid as error:  # the API server refuses a dry run if a webhook has side effects
         yield unknown(what, f"could not be checked: {error.message}", "start a job and read its status")
     else:
         yield judged_pod(made)
 
 
 def judged_pod(made: Object) -> CheckResult:
-    """Return the result for the trial pod in the API server's response."""
+    """Return the result for the pod of the dry run, as the API server returned it."""
     found = {
         container["name"]: container.get("restartPolicy")
         for container in made["spec"].get("initContainers", ())
@@ -135,7 +138,7 @@ def judged_pod(made: Object) -> CheckResult:
 
 
 def trial_pod(namespace: str, image: str) -> Object:
-    """Return the pod of the dry run: it meets *restricted* Pod Security and has one sidecar."""
+    """Return the pod of the dry run, which has one sidecar and meets *restricted* Pod Security."""
     common = {"image": image, "command": ["true"], "securityContext": SECURITY, "resources": RESOURCES}
     return {
         "apiVersion": "v1",
@@ -152,7 +155,7 @@ def trial_pod(namespace: str, image: str) -> Object:
 
 
 def storage(site: Site) -> Iterator[CheckResult]:
-    """Check whether a claim without a storage class gets a default one."""
+    """Check whether the cluster has a default storage class, which claims without a class get."""
     classes = site.api.list(STORAGE_CLASSES)
     default = [
         class_["metadata"]["name"]
@@ -165,6 +168,6 @@ def storage(site: Site) -> Iterator[CheckResult]:
     names = ", ".join(class_["metadata"]["name"] for class_ in classes)
     yield wrong(
         "storage class",
-        f"none is the default; the classes are {names}" if names else "the cluster has no storage class",
+        f"no class is the default; the classes are {names}" if names else "the cluster has no storage class",
         f"annotate one with {DEFAULT_CLASS}=true, or name one in spec.storage.storageClassName of each job",
     )

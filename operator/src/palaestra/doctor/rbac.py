@@ -1,6 +1,6 @@
-"""Permissions, checked with access reviews of the API server instead of by reading roles.
+"""Checks of permissions, by access reviews of the API server and not by reading roles.
 
-A test compares the table of the operator's permissions with the installed role.
+A test compares the table `OPERATOR` with the role that the chart installs.
 """
 
 from collections.abc import Iterable, Iterator
@@ -20,7 +20,7 @@ class Right:
     verbs: tuple[str, ...]
 
     def reviewed(self, namespace: str) -> Iterator[tuple[str, Object]]:
-        """Yield for each verb a text such as `list pods`, and the attributes for an access review."""
+        """Yield, for each verb, a text such as `list pods` and the attributes of an access review."""
         plural, _, subresource = self.resource.partition("/")
         for verb in self.verbs:
             attributes = {"namespace": namespace, "group": self.group, "resource": plural, "verb": verb}
@@ -60,7 +60,7 @@ OPERATOR = (
     may("networking.k8s.io", "networkpolicies", "list watch create patch"),
     may("", "events", "get list create patch"),
 )
-# Used only for messages in a status; an operator whose role lacks it works without it.
+# The operator uses this permission only for messages in a status, and works without it.
 OPERATOR_WITH_KUEUE = (may("kueue.x-k8s.io", "workloads", "list"),)
 
 TASKS: tuple[tuple[str, tuple[Right, ...]], ...] = (
@@ -76,7 +76,8 @@ TASKS: tuple[tuple[str, tuple[Right, ...]], ...] = (
         ),
     ),
 )
-NECESSARY = frozenset({"read jobs", "author jobs"})  # only some people need the other permissions
+# Only some users need the permissions for the other tasks.
+NECESSARY = frozenset({"read jobs", "author jobs"})
 
 
 def own_rights(site: Site) -> Iterator[CheckResult]:

@@ -1,7 +1,7 @@
-"""The simulators of a job in a cluster, read from its sidecars by way of the API server.
+"""The simulators of a job in a cluster, read from their sidecars through the API server.
 
-No port of a pod is opened for it. It needs the right `get` on pods/proxy, and the API server has to reach the
-ports of health of the pods.
+The view opens no additional port of a pod. The user needs the permission `get` on pods/proxy, and the API
+server must be able to reach the health ports of the pods.
 """
 
 from __future__ import annotations
@@ -26,16 +26,17 @@ from palaestra.live_view.source import (
 from palaestra.plan import ClusterLayout, Images
 from palaestra.plan.replica import PlannedSimulator, Replica
 
-_OF_THE_SIDECAR: Final = ("HTTP404", "HTTP503")  # the API server itself would give a reason
+# Reasons of errors from a sidecar; errors of the API server have a Kubernetes reason.
+_OF_THE_SIDECAR: Final = ("HTTP404", "HTTP503")
 
 
 class ClusterJob:
     """One replica of a job in a cluster.
 
     Args:
-        client: of the cluster.
-        name: of the job.
-        replica: its number.
+        client: the client for the cluster.
+        name: the name of the job.
+        replica: the number of the replica.
     """
 
     def __init__(self, client: Client, name: str, replica: int) -> None:
@@ -44,7 +45,7 @@ class ClusterJob:
         self._replica = replica
 
     def sources(self) -> tuple[SidecarSource, ...]:
-        """Return the simulators of its newest pod.
+        """Return the simulators of the replica's newest pod.
 
         Raises:
             NoSuchJob: no job has this name.

@@ -1,16 +1,17 @@
-"""viser's server, on loopback, for pages of its own, with few messages of a browser.
+"""A viser server that is restricted to loopback, to its own page, and to a few kinds of messages.
 
-As it comes, viser listens on all addresses, accepts pages of any origin, and obeys 15 kinds of messages of
-its clients. One of them publishes the view through a tunnel to the internet; others upload files, or set any
-property of a control. A page on another site could send all of them. Here
+By default, viser listens on all addresses, accepts connections from pages of any origin, and executes 15
+kinds of messages from clients. One kind publishes the view through a tunnel to the internet; other kinds
+upload files, or set any property of a control. A page of another site could send all these messages. In this
+module
 - the server listens on 127.0.0.1;
-- a request must name this host, so that no foreign name can be bound to the address, and a websocket must
-  come from the page of this server;
-- each message of a client is dropped before any handler sees it, unless it is the pose of the camera, or a
-  value of one of our own controls.
+- a request must name this host, which prevents DNS rebinding, and a websocket must come from the page of this
+  server;
+- each message of a client is dropped before a handler gets it, except the pose of the camera and the values
+  of this page's own controls.
 
-viser has no options for these, so its classes are replaced while a server is made; this process has no other
-server of that kind.
+viser has no options for these restrictions, so this module replaces viser's classes while a server is
+created. This process must not create another viser server meanwhile.
 """
 
 from __future__ import annotations
@@ -39,21 +40,21 @@ _lock = threading.Lock()
 
 
 class Dropped:
-    """What becomes of a message that is not accepted; it has no handler."""
+    """The type that replaces a refused message; no handler exists for this type."""
 
 
 class Gate:
-    """Reads the messages of clients in place of viser's own reader, and drops those that are not accepted."""
+    """Decodes the messages of clients in place of viser's own decoder, and drops forbidden messages."""
 
     def __init__(self) -> None:
         self._controls: dict[str, Any] = {}
 
     def allow(self, control: Any) -> None:
-        """Let clients set the value of a control."""
-        self._controls[control._impl.uuid] = control  # viser has no public name for it
+        """Allow clients to set the value of a control."""
+        self._controls[control._impl.uuid] = control  # viser has no public name for this id
 
     def deserialize(self, message: bytes) -> Any:
-        """Return a message of a client, or `Dropped`."""
+        """Return the decoded message of a client; `Dropped` if it is not allowed."""
         try:
             content = msgspec.msgpack.decode(message)
             accepted = content["type"] == _CAMERA or self._is_own_value(content)
@@ -67,16 +68,16 @@ class Gate:
 
 
 def guarded(port: int, label: str) -> tuple[viser.ViserServer, Gate]:
-    """Return a running server on loopback, and the gate that decides which controls clients may use.
+    """Return a running server on loopback, and the gate that allows clients to use controls.
 
     Args:
-        port: to listen on; the next free one is taken if it is in use, and any for 0.
+        port: the port to listen on; if it is in use, the next free port is taken. 0: any free port.
         label: the title of the page.
     """
     gate = Gate()
 
     class GuardedServer(viser.infra.WebsockServer):
-        """Listens on loopback, reads messages through the gate, and serves its own page only."""
+        """Listens on loopback, decodes messages with the gate, and serves only its own page."""
 
         def __init__(self, *, host: str, message_class: Any, **options: Any) -> None:
             del host, message_class
@@ -91,7 +92,8 @@ def guarded(port: int, label: str) -> tuple[viser.ViserServer, Gate]:
         plain = viser.infra.WebsockServer
         viser.infra.__dict__["WebsockServer"] = GuardedServer
         try:
-            with contextlib.redirect_stdout(io.StringIO()):  # viser prints a table of addresses
+            # Suppress the table of addresses that viser prints.
+            with contextlib.redirect_stdout(io.StringIO()):
                 server = viser.ViserServer(host=LOOPBACK, port=port, label=label, verbose=False)
         finally:
             viser.infra.__dict__["WebsockServer"] = plain
@@ -99,16 +101,16 @@ def guarded(port: int, label: str) -> tuple[viser.ViserServer, Gate]:
 
 
 def stop(server: viser.ViserServer) -> None:
-    """End a server."""
-    with contextlib.redirect_stdout(io.StringIO()):  # viser prints that it has stopped
+    """Stop a server."""
+    with contextlib.redirect_stdout(io.StringIO()):  # suppress the line that viser prints about the stop
         server.stop()
 
 
 def refusal(request: Request) -> Response | None:
-    """Return the response to a request that is not of this server's page; None for others."""
+    """Return the refusal of a request that does not come from this server's page; None if it is allowed."""
     host = request.headers.get("Host", "")
     if _name(f"//{host}") not in _OWN_NAMES:
-        return _forbidden("this view answers only as 127.0.0.1 or localhost")
+        return _forbidden("this view accepts only requests to 127.0.0.1 or localhost")
     upgrade = request.headers.get("Upgrade", "").lower() == "websocket"
     if upgrade and request.headers.get("Origin") != f"http://{host}":
         return _forbidden("only the page of this view may connect")
@@ -133,7 +135,7 @@ _Process = Callable[[Any, Request], Response | None]
 
 
 def _serve_own_page(*args: Any, process_request: _Process, **options: Any) -> Any:
-    """Serve as websockets does, with a look at each request before anything is sent."""
+    """Serve like websockets' own function, but check each request before a response is sent."""
 
     def process(connection: Any, request: Request) -> Response | None:
         return refusal(request) or process_request(connection, request)

@@ -1,4 +1,4 @@
-"""The simulators of a run on this machine, from the files in its run directory."""
+"""The simulators of a run on this machine; their addresses are in a file of the run directory."""
 
 from __future__ import annotations
 
@@ -18,27 +18,27 @@ from palaestra.plan.training import FILE, RunAddresses, SimulatorAddress
 
 
 class NoRun(ViewError):
-    """The folder has no run with simulators; the text says what to do."""
+    """The folder has no run with simulators; the message has the remedy."""
 
 
 class LocalRun:
     """One replica on this machine.
 
     Args:
-        folder: its run directory, or the folder of a job with one replica.
+        folder: the run directory of the replica, or the folder of a job with one replica.
 
     Raises:
-        NoRun: the folder is neither.
+        NoRun: the folder is neither of the two.
     """
 
     def __init__(self, folder: Path) -> None:
         self.directory = _replica_in(folder)
 
     def sources(self) -> tuple[SidecarSource, ...]:
-        """Return the simulators of its newest start, which has addresses of its own.
+        """Return the simulators of the newest start of the run; each start has new addresses.
 
         Raises:
-            NoRun: its configuration cannot be read.
+            NoRun: the file with the addresses cannot be read.
         """
         file = self.directory / FILE
         try:

@@ -1,6 +1,6 @@
-"""The page of a live view: one simulator, its newest poses, its episode, and the progress of its run.
+"""The page of a live view: one simulator with its newest poses and its episode, and the run's progress.
 
-It reads nothing while no browser is connected.
+While no browser is connected, the page reads nothing from the simulator.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from palaestra_protocol.scene import SceneState, VisibleScene
 _PERIOD_S: Final = 1.0 / 30.0
 _TEXT_S: Final = 0.2
 _PICTURE_S: Final = 0.2
-_NO_PICTURE_S: Final = 2.0  # until a simulator without a picture is asked again
+_NO_PICTURE_S: Final = 2.0  # seconds until the next request to a simulator that had no picture
 _IDLE_S: Final = 0.2
 _AGAIN_S: Final = 0.1
 _MOST_ROWS: Final = 24
@@ -32,28 +32,28 @@ _SKY: Final = 2.0
 
 
 class SceneSource(Protocol):
-    """One simulator that can be seen."""
+    """The interface of a simulator that the page can show."""
 
     @property
     def name(self) -> str:
-        """Its name, for people."""
+        """The name of the simulator, for people."""
         ...
 
     @property
     def here(self) -> bool:
-        """Whether `signal` works, because its processes are those of this machine and this person."""
+        """Whether the simulator's processes run on this machine as this user, so that `signal` works."""
         ...
 
     def signal(self, number: int) -> None:
-        """Send a signal to its process."""
+        """Send a signal to the simulator's process."""
         ...
 
     def scene(self) -> VisibleScene:
-        """Return the looks of its world."""
+        """Return the visible shapes of the simulator's world."""
         ...
 
     def state(self) -> SceneState:
-        """Return its newest poses."""
+        """Return the newest poses."""
         ...
 
     def picture(self) -> CameraPicture | None:
@@ -61,7 +61,7 @@ class SceneSource(Protocol):
         ...
 
     def progress(self) -> TrainerStatus | None:
-        """Return the progress of its run; None if that is not known."""
+        """Return the progress of the simulator's run; None if it is unknown."""
         ...
 
 
@@ -69,13 +69,13 @@ class ViewPage:
     """A page for the simulators of one run.
 
     Args:
-        title: of the page.
-        sources: returns the simulators; it is called again when one does not respond.
-        port: of the page; the next free one is taken if it is in use.
+        title: the title of the page.
+        sources: returns the simulators; the page calls it again when a simulator does not respond.
+        port: the port of the page; if it is in use, the next free port is taken.
         simulator: the name of the simulator that is shown first.
 
     Attributes:
-        address: of the page.
+        address: the URL of the page.
     """
 
     def __init__(
@@ -105,7 +105,7 @@ class ViewPage:
         while not ended():
             began = time.monotonic()
             if not self._server.get_clients():
-                time.sleep(_IDLE_S)  # a view that nobody looks at costs the training nothing
+                time.sleep(_IDLE_S)  # without a browser, the view must not slow the training
                 continue
             try:
                 self._show()
@@ -114,7 +114,7 @@ class ViewPage:
             time.sleep(max(0.0, began + _PERIOD_S - time.monotonic()))
 
     def close(self) -> None:
-        """End the page."""
+        """Stop the server of the page."""
         stop(self._server)
 
     def _show(self) -> None:
@@ -135,7 +135,7 @@ class ViewPage:
         self._show_picture(source)
 
     def _show_picture(self, source: SceneSource) -> None:
-        """Show the newest picture of a camera, if it is time for one."""
+        """Show the newest picture of a camera, if the next picture is due."""
         if time.monotonic() < self._picture_due:
             return
         picture = source.picture()
@@ -151,18 +151,18 @@ class ViewPage:
         self._picture.label, self._picture.image = _cell(picture.name), pixels
 
     def _wait(self, reason: str) -> None:
-        """Say why nothing moves, and look for the simulator again: a new start has new addresses."""
+        """Show the reason for which the scene stands still, and read the simulators' addresses again."""
         self._stage.revision = None
         self._text.content = _paragraphs(summarized(self._sources[self._shown].progress()), reason)
         self._away_since = self._away_since or time.monotonic()
         time.sleep(_AGAIN_S)
-        with contextlib.suppress(ViewError):  # a run that starts again writes its addresses now
+        with contextlib.suppress(ViewError):  # a run that starts again may not have written its addresses yet
             self._sources = {source.name: source for source in self._read()}
 
     def _light(self) -> None:
         scene = self._server.scene
         scene.set_up_direction("+z")
-        scene.configure_environment_map(None)  # a view asks no other host for pictures
+        scene.configure_environment_map(None)  # an environment map would be loaded from another host
         scene.configure_default_lights()
         scene.add_light_hemisphere("/sky", intensity=_SKY, ground_color=(150, 150, 150))
 
@@ -175,11 +175,11 @@ class ViewPage:
             choice.on_update(lambda _: self._choose(choice.value))
         if all(source.here for source in self._sources.values()):
             self._add_fault("kill it", "The simulator ends at once, as after a crash.", signal.SIGKILL)
-            self._add_fault("hang it", "The simulator stops, and answers nothing.", signal.SIGSTOP)
+            self._add_fault("hang it", "The simulator stops, and does not respond any more.", signal.SIGSTOP)
         return gui.add_markdown("waits for the first pose")
 
     def _add_fault(self, label: str, hint: str, number: int) -> None:
-        """Add a button that sends the simulator a signal; only the simulators of this person have it."""
+        """Add a button that sends the simulator a signal; the page has it only for local simulators."""
         button = self._server.gui.add_button(label, hint=hint)
         self._gate.allow(button)
 
@@ -199,7 +199,7 @@ class ViewPage:
             self._picture_due = 0.0
 
     def _look_at(self, scene: VisibleScene) -> None:
-        """Let new clients look at the whole scene, from above and aside."""
+        """Set the camera of all clients so that it sees the whole scene, from above and from the side."""
         if self._looked:
             return
         self._looked = True
@@ -229,7 +229,7 @@ def summarized(run: TrainerStatus | None) -> str:
 
 
 def described(state: SceneState) -> str:
-    """Return what is known about the moment of a state, as Markdown."""
+    """Return the known values of a state as Markdown: time, episode, step, rewards and joints."""
     lines = [f"**{state.time_s:.1f} s**"]
     if state.episode is not None:
         lines[0] += f" · episode {state.episode}"
@@ -247,5 +247,5 @@ def _paragraphs(*texts: str) -> str:
 
 
 def _cell(name: str) -> str:
-    """Return a name as text of a table's cell: a pod chose it."""
+    """Return a name without special characters, for the cell of a table: names come from pods."""
     return "".join(letter if letter.isalnum() or letter in " _-./#" else " " for letter in name)[:40]

@@ -1,4 +1,4 @@
-"""Read the scene and the state of one simulator from its sidecar, or from anything that serves the same."""
+"""Read the scene and the state of one simulator from its sidecar, or from a server like a sidecar."""
 
 from __future__ import annotations
 
@@ -32,18 +32,18 @@ class ViewError(PalaestraError):
 
 
 class NotShown(ViewError):
-    """This simulator is not shown; the text says why, and what to do."""
+    """This simulator cannot be shown; the message has the reason and the remedy."""
 
 
 class NotNow(ViewError):
-    """The simulator does not respond now; it may later."""
+    """The simulator does not respond now, but may respond later."""
 
 
 Fetch = Callable[[str, int], tuple[int, bytes]]
 
 
 class _SpacedReader(Generic[_Value]):
-    """Reads a value at most once in `every_s` seconds, and returns the newest one in between."""
+    """Reads a value at most once in `every_s` seconds; in between, it returns the last value."""
 
     def __init__(self, read: Callable[[], _Value], every_s: float, clock: Callable[[], float]) -> None:
         self._read = read
@@ -53,7 +53,7 @@ class _SpacedReader(Generic[_Value]):
         self._last: _Value | None = None
 
     def newest(self) -> _Value | None:
-        """Return the newest value; None if none has been read."""
+        """Return the newest value, or None."""
         if self._clock() >= self._due:
             self._due = self._clock() + self._every_s
             self._last = self._read()
@@ -61,10 +61,10 @@ class _SpacedReader(Generic[_Value]):
 
 
 class EpisodeReader:
-    """Where the simulators of a run are in their episodes, as its trainer reports it; a few times a second.
+    """Reads from a run's trainer the episodes of its simulators, a few times a second.
 
     Args:
-        fetch: reads from the trainer, as `SidecarSource.fetch`.
+        fetch: sends a request to the trainer, with the interface of `SidecarSource.fetch`.
         clock: returns seconds, from any origin.
     """
 
@@ -73,7 +73,7 @@ class EpisodeReader:
         self._states = _SpacedReader(self._read, _EPISODES_S, clock)
 
     def of(self, name: str) -> SceneState | None:
-        """Return the episode of a simulator; None if the trainer does not report it."""
+        """Return the episode of a simulator; None if the trainer does not report this episode."""
         return (self._states.newest() or {}).get(name)
 
     def _read(self) -> dict[str, SceneState]:
@@ -84,14 +84,14 @@ class EpisodeReader:
                 return {}
             return {str(name): SceneState.from_json(moment) for name, moment in content.items()}
         except (OSError, http.client.HTTPException, ProtocolError):
-            return {}  # between two attempts, or of an older release
+            return {}  # the trainer is between two attempts, or of an older release
 
 
 class StatusReader:
-    """The progress of a run, as its trainer reports it; once a second.
+    """Reads from a run's trainer the progress of the run, once a second.
 
     Args:
-        fetch: reads from the trainer, as `SidecarSource.fetch`.
+        fetch: sends a request to the trainer, with the interface of `SidecarSource.fetch`.
         clock: returns seconds, from any origin.
     """
 
@@ -100,7 +100,7 @@ class StatusReader:
         self._progress = _SpacedReader(self._read, _PROGRESS_S, clock)
 
     def newest(self) -> TrainerStatus | None:
-        """Return the progress; None if the trainer does not report it."""
+        """Return the progress of the run; None if the trainer does not report it."""
         return self._progress.newest()
 
     def _read(self) -> TrainerStatus | None:
@@ -108,20 +108,21 @@ class StatusReader:
             status, body = self._fetch("status", MOST_BYTES)
             return TrainerStatus.from_json(decoded(body, MOST_BYTES)) if status == HTTPStatus.OK else None
         except (OSError, http.client.HTTPException, ProtocolError, NotShown):
-            return None  # between two attempts, or not allowed
+            return None  # the trainer is between two attempts, or the request is not allowed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SidecarSource:
-    """One simulator behind its sidecar.
+    """One simulator, read from its sidecar.
 
     Attributes:
-        name: of the simulator, for people.
-        fetch: returns status and body of the response to a GET of a path, at most so many bytes and one more.
-            It raises OSError or HTTPException if there is no response.
-        episodes: of the run's trainer; None if they are not known.
-        run: the progress of the run; None if it is not known.
-        here: whether its processes are those of this machine and this person, so that `signal` works.
+        name: the name of the simulator, for people.
+        fetch: sends a GET request for a path, and returns status and body of the response. The body has at
+            most the given number of bytes plus one, so that a longer body can be detected. The function
+            raises OSError or HTTPException without a response.
+        episodes: reads the episodes from the run's trainer; None if they are unknown.
+        run: reads the progress of the run; None if it is unknown.
+        here: whether the simulator's processes run on this machine as this user, so that `signal` works.
     """
 
     name: str
@@ -131,16 +132,16 @@ class SidecarSource:
     here: bool = False
 
     def scene(self) -> VisibleScene:
-        """Return the looks of the world.
+        """Return the visible shapes of the world.
 
         Raises:
-            NotShown: this simulator has no scene, or sends something else.
-            NotNow: it does not run, or does not respond.
+            NotShown: this simulator has no scene, or sends an invalid scene.
+            NotNow: the simulator does not run, or does not respond.
         """
         return self._read(VisibleScene, "scene", MOST_SCENE_BYTES)
 
     def state(self) -> SceneState:
-        """Return the newest poses, with what is known about the episode; raises as `scene`."""
+        """Return the newest poses, with the values of the episode; raise the same errors as `scene`."""
         state = self._read(SceneState, "watch", MOST_STATE_BYTES)
         moment = None if self.episodes is None else self.episodes.of(self.name)
         if moment is None:
@@ -162,17 +163,17 @@ class SidecarSource:
                 return None
             return CameraPicture.from_json(content)
         except (OSError, http.client.HTTPException, ProtocolError, NotShown):
-            return None  # the rest of the page needs no picture
+            return None  # the page works without the picture
 
     def progress(self) -> TrainerStatus | None:
-        """Return the progress of the run; None if it is not known."""
+        """Return the progress of the run; None if it is unknown."""
         return None if self.run is None else self.run.newest()
 
     def signal(self, number: int) -> None:
-        """Send a signal to the simulator's process, as a fault would; its trainer has it restarted.
+        """Send a signal to the simulator's process as a fault; the trainer then restarts the simulator.
 
         Raises:
-            NotNow: it does not run, or is not of this machine.
+            NotNow: the simulator does not run, or does not run on this machine.
         """
         try:
             pid = (
@@ -181,7 +182,7 @@ class SidecarSource:
                 else None
             )
             if pid is None:
-                raise NotNow(f"{self.name}: no process of this machine runs")
+                raise NotNow(f"{self.name}: its process does not run on this machine")
             os.kill(pid, number)
         except (OSError, http.client.HTTPException, ProtocolError) as error:
             raise NotNow(f"{self.name}: has no process to signal ({error})") from error
@@ -202,7 +203,7 @@ class SidecarSource:
 
 
 def at_address(host: str, port: int) -> Fetch:
-    """Return a function that reads from a sidecar at an address of this machine."""
+    """Return a function that reads from the sidecar at an address."""
 
     def fetch(path: str, most_bytes: int) -> tuple[int, bytes]:
         connection = http.client.HTTPConnection(host, port, timeout=_DEADLINE_S)
@@ -217,9 +218,9 @@ def at_address(host: str, port: int) -> Fetch:
 
 
 def of_either(fetch: Fetch) -> Fetch:
-    """Return a function that reads the simulator of a sidecar that runs, where the sidecar has a standby too.
+    """Return a function that reads the running simulator of a sidecar with a standby.
 
-    It stays with one of the two until that one does not respond.
+    The function reads from the same simulator until the sidecar responds that it does not run.
     """
     slots = deque(("", _STANDBY))
 
@@ -236,4 +237,4 @@ def _reason(body: bytes) -> str:
     try:
         return Fields(decoded(body, _MOST_ERROR_BYTES)).text("error")
     except ProtocolError:
-        return "its sidecar answered with something else than a scene; is it of an older release?"
+        return "its sidecar did not return a scene; the sidecar may be from an older release"

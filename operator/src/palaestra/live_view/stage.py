@@ -1,7 +1,7 @@
-"""Draw a scene with viser, and move its parts.
+"""Draw a scene with viser, and move its nodes.
 
-The nodes of the scene are frames, and their shapes are below them; names of nodes are not those of viser,
-where a slash means a child.
+Each node of the scene becomes a frame of viser, with its shapes below. The frames have numbers as names,
+because in viser's names a slash means a child.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from palaestra_protocol.scene import (
     VisualShape,
 )
 
-_ENDLESS_M: Final = 20.0  # the size of a plane without end
+_ENDLESS_M: Final = 20.0  # the drawn size of an infinite plane
 _SHEET_M: Final = 0.002
 _TARGET: Final = (220, 60, 50)
-_RINGS: Final = 8  # of a capsule's cap
+_RINGS: Final = 8  # rings of a capsule's cap
 _SIDES: Final = 24
 _OPAQUE: Final = 0.999
 
@@ -31,10 +31,10 @@ class Stage:
     """The scene of one simulator in a viser server.
 
     Args:
-        server: of viser.
+        server: the viser server.
 
     Attributes:
-        revision: of the scene that is shown; None before the first one.
+        revision: the revision of the drawn scene; None before the first scene.
     """
 
     def __init__(self, server: Any) -> None:
@@ -48,7 +48,7 @@ class Stage:
         self.revision: int | None = None
 
     def clear(self) -> None:
-        """Remove everything."""
+        """Remove all drawn objects."""
         for handle in self._nodes.values():
             handle.remove()
         if self._target is not None:
@@ -56,7 +56,7 @@ class Stage:
         self._nodes, self._target, self.revision = {}, None, None
 
     def show(self, scene: VisibleScene) -> None:
-        """Draw a scene in place of the one before."""
+        """Draw a scene in place of the earlier scene."""
         with self._server.atomic():
             self.clear()
             for index, node in enumerate(scene.nodes):
@@ -71,7 +71,7 @@ class Stage:
             self.revision = scene.revision
 
     def move(self, state: SceneState) -> None:
-        """Put everything where a state has it."""
+        """Move all nodes to their poses in a state; nodes that it lacks return to their first pose."""
         with self._server.atomic():
             for name, pose in state.poses.items():
                 if (frame := self._nodes.get(name)) is not None:

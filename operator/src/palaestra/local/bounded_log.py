@@ -1,8 +1,9 @@
 """Log files of limited size, which keep their first and last parts.
 
-The first part has the start of a run, and the last part its end. A program that prints without end would fill
-the disk, and a full disk would end the run. The middle is cut out of the file itself, because a second file
-might not fit on the disk. So a writer needs a descriptor that can read and append.
+The first part has the start of a run, and the last part has its end. Without a limit, a program that prints
+forever would fill the disk, and a full disk would end the run. The middle is cut out of the file itself,
+because a second file might not fit on the disk. So the descriptor of a writer must be able to read and
+append.
 """
 
 import os
@@ -11,16 +12,16 @@ from contextlib import suppress
 from io import RawIOBase
 from typing import Any
 
-FIRST = 4 << 20  # bytes; some hours of a trainer's own lines
+FIRST = 4 << 20  # bytes: the lines that a trainer itself writes in some hours
 LAST = 4 << 20
 _NOTE = re.compile(rb"--- ([0-9]+) bytes were left out here; [^\n]*\n")
 _LONGEST_NOTE = 200
 
 
 class LimitedFile(RawIOBase):
-    """The end of a log file, for writing; the file never has more than `first + 2 * last` bytes.
+    """A log file for appending, which never has more than `first + 2 * last` bytes.
 
-    One write that is longer than `last` is written as a whole.
+    One exception: data that is longer than `last` is written whole.
     """
 
     def __init__(self, descriptor: int, first: int = FIRST, last: int = LAST) -> None:
@@ -35,7 +36,8 @@ class LimitedFile(RawIOBase):
     def write(self, data: Any, /) -> int:
         """Append all bytes in `data`; first cut the middle out of the file if it would be too long.
 
-        Bytes that cannot be written, for example on a full disk, are lost: a log must not end its run.
+        Bytes that cannot be written, for example on a full disk, are dropped: an error of a log must not end
+        the run.
         """
         with suppress(OSError):
             size = os.fstat(self._descriptor).st_size
@@ -45,7 +47,7 @@ class LimitedFile(RawIOBase):
         return len(data)
 
     def _cut(self, size: int) -> None:
-        """Keep whole lines at both ends; the noted number of bytes includes earlier cuts."""
+        """Cut the middle of the file, but keep whole lines; the note also counts earlier cuts."""
         start = os.pread(self._descriptor, self._first, 0).rfind(b"\n") + 1
         tail = os.pread(self._descriptor, self._last, size - self._last)
         tail = tail[tail.find(b"\n") + 1 :]

@@ -1,12 +1,12 @@
-"""Run one replica for another program, and end with it: `python -m palaestra.local.child_main`.
+"""Run one replica for another program, and end with that program: `python -m palaestra.local.child_main`.
 
-`palaestra.run` starts it in a session of its own, so that it has its own event loop and signals, and Ctrl-C
-in a terminal or notebook does not reach it. Standard input is a file with the request, and standard output a
-log file of limited size.
+`palaestra.run` starts this process in a session of its own. So the process has its own event loop and
+signals, and Ctrl-C in a terminal or notebook does not reach it. Standard input is a file with the request,
+and standard output is a log file of limited size.
 
-The run saves a checkpoint and ends when the other program closes its end of a pipe, writes to it, or ends in
-any way. A copy of that end in a forked child would keep the pipe open, so the end of the process is watched
-too.
+The run saves a checkpoint and ends when the other program closes its end of a pipe, writes to the pipe, or
+ends in any way. A forked child of the other program has a copy of that end, which would keep the pipe open.
+So this process also watches whether the other program has ended.
 """
 
 import json
@@ -30,15 +30,16 @@ from palaestra.local.run import RunOptions, run
 from palaestra_protocol.pod.status import ExitCode
 from palaestra_sim.errors import SimError
 
-PARENT_CHECK_S = 0.5  # the kernel reports a parent's end only through a pidfd, which some systems lack
+# Polling, because the kernel reports a parent's end only through a pidfd, which some systems lack.
+PARENT_CHECK_S = 0.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChildRequest:
-    """The job as YAML, the options of its run, and the process and descriptors that it depends on.
+    """The job as YAML, the options of its run, and the process and descriptors on which the run depends.
 
-    `process` is the process with which the run ends. `control` is the descriptor of this end of the pipe, and
-    `lock` that of the run directory's lock.
+    `process` is the id of the process with which the run ends. `control` is the descriptor of this end of the
+    pipe, and `lock` is the descriptor of the run directory's lock.
     """
 
     job: str
@@ -63,7 +64,8 @@ def main() -> int:
     """Run the request on standard input, and return the exit code of `palaestra run`."""
     request = ChildRequest.from_json(sys.stdin.buffer.read())
     sys.stdout = TextIOWrapper(BufferedWriter(LimitedFile(sys.stdout.fileno())), errors="replace")
-    if os.getppid() != request.process:  # it has already ended, so another process is the parent
+    # The other program has already ended, so another process is the parent.
+    if os.getppid() != request.process:
         return int(ExitCode.INTERRUPTED)
     Thread(target=_end_with, args=(request.control, request.process), daemon=True).start()
     options = RunOptions(

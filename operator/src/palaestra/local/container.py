@@ -1,7 +1,7 @@
-"""One container as a process: started, probed, restarted with back-off, stopped within a grace period.
+"""Run one container as a process: start, probes, restarts with back-off, and a stop within a grace period.
 
-The rules are the kubelet's. SIGTERM goes to the first process only, SIGKILL to all processes of the
-container. The wait before a restart doubles each time, and is reset after the container has run long enough.
+The rules are those of the kubelet. SIGTERM goes only to the first process, and SIGKILL to all processes of
+the container. The wait before a restart doubles each time, and is reset after a long run.
 """
 
 import asyncio
@@ -15,15 +15,16 @@ from palaestra.local.output import Log
 from palaestra.local.pod_spec import Container, Pod
 from palaestra.local.process import NOT_RUNNABLE, Process, end_marked, marked
 
-DRAIN_S = 0.5  # for output that is still in the pipe; another process may keep the pipe open longer
+# Longest wait for output that is still in the pipe; another process may keep the pipe open longer.
+DRAIN_S = 0.5
 TERMINATED = 128 + signal.SIGTERM
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BackOff:
-    """The wait of a container before its next start, by the kubelet's rule with shorter times.
+    """The waits of a container before its restarts, by the kubelet's rule, but with shorter times.
 
-    The wait doubles with each end from `first_s` to `most_s`; after a run longer than `calm_s` it is reset.
+    The wait doubles with each end, from `first_s` to `most_s`. After a run longer than `calm_s`, it is reset.
     """
 
     first_s: float = 0.5
@@ -42,7 +43,7 @@ class Running:
         self.spec = spec
         self.log = log
         self.ends = 0
-        self.started = False  # it has passed its startup probe once, or has no startup probe
+        self.started = False  # the container has passed its startup probe once, or has no startup probe
         self._news = asyncio.Event()  # set when the container has started or ended
         self._pod = pod
         self._env = marked(spec.env, pod.uid, spec.name)
@@ -53,7 +54,7 @@ class Running:
     async def run_once(self, terminal: int | None = None) -> int:
         """Run the container once and return the exit code.
 
-        `terminal` is the descriptor of a terminal that it may draw on.
+        `terminal` is the descriptor of a terminal on which the container may draw.
         """
         if self._stopping.is_set():
             return TERMINATED
@@ -94,7 +95,7 @@ class Running:
         return self.started
 
     async def stop(self, grace_s: float) -> None:
-        """Send SIGTERM and wait for the end; send SIGKILL when the grace period is over."""
+        """Send SIGTERM and wait for the end; after the grace period, send SIGKILL."""
         self._stopping.set()
         if self._process is not None:
             await self._end(self._process, grace_s)
@@ -110,7 +111,7 @@ class Running:
             os.close(writer)
 
     async def _watch(self, process: Process) -> None:
-        """Run the startup probe, then the liveness probe; end the process when one fails."""
+        """Run the startup probe, then the liveness probe; end the process when a probe fails."""
         startup, liveness = self.spec.startup, self.spec.liveness
         if startup is not None and not await probe.until_passed(startup, self._env):
             await self._end_for("startup", process)

@@ -28,7 +28,7 @@ class RunRefused(LocalError, ValueError):
 
 
 class StartFailed(LocalError, RuntimeError):
-    """A container that others wait for did not start."""
+    """A container for which other containers wait did not start."""
 
 
 class StorageFailed(LocalError, OSError):
@@ -36,4 +36,4 @@ class StorageFailed(LocalError, OSError):
 
 
 class StillRunning(LocalError, TimeoutError):
-    """A run in the background has not ended by a deadline; the same call may be repeated."""
+    """A run in the background did not end within a deadline; the same call may be repeated."""

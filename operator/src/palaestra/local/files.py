@@ -10,7 +10,7 @@ from palaestra.local.errors import StorageFailed
 
 
 def write(path: Path, content: bytes) -> None:
-    """Create or replace `path`, with its folders.
+    """Create or replace the file `path`, and create its folders.
 
     Raises:
         StorageFailed: the file cannot be written; the old content is unchanged.
@@ -34,16 +34,16 @@ def make_folder(path: Path) -> None:
     """Create `path` and its parents if they do not exist.
 
     Raises:
-        StorageFailed: it cannot be created.
+        StorageFailed: the folder cannot be created.
     """
     with storage(path):
         path.mkdir(parents=True, exist_ok=True)
 
 
 def without_locks(path: Path, error: OSError) -> str:
-    """Return the message for a file or folder that cannot be locked."""
+    """Return the message about a file or folder that cannot be locked."""
     return (
-        f"{path}: the file system has no locks ({error.strerror}), and without one two runs could write "
+        f"{path}: the file system has no locks ({error.strerror}), and without locks two runs could write "
         "into the same directory; choose a folder on a local disk with --dir"
     )
 

@@ -1,6 +1,6 @@
-"""End a run early: the first Ctrl-C saves a checkpoint, the second kills; a deadline ends the run too.
+"""End a run early: the first Ctrl-C or a deadline saves a checkpoint, and the second Ctrl-C kills.
 
-A signal that was ignored when the program started stays ignored, except SIGTERM, which always ends a run.
+A signal that was ignored when the program started stays ignored. Only SIGTERM always ends a run.
 """
 
 import asyncio
@@ -15,7 +15,7 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class Stoppable(Protocol):
-    """A target that can be stopped and killed."""
+    """A program or pod that can be stopped and killed."""
 
     def stop(self) -> None:
         """Start the shutdown."""
@@ -25,7 +25,7 @@ class Stoppable(Protocol):
 
 
 class Interrupt:
-    """Counts the signals of a run and passes them to the current target.
+    """Counts the signals to a run and passes them to the current target.
 
     `expired`: whether the deadline passed before any signal.
     """
@@ -38,18 +38,18 @@ class Interrupt:
 
     @property
     def killed(self) -> bool:
-        """Return whether a second signal arrived, so that the run was killed."""
+        """Return whether a second signal has arrived, which kills the run."""
         return self.signals > 1
 
     def pass_to(self, target: Stoppable) -> None:
-        """Set the target of the next signals; an earlier signal is passed on now."""
+        """Set the target of later signals; if a signal has arrived before, stop the target now."""
         self._target = target
         if self.asked.is_set():
             target.stop()
 
     @contextmanager
     def listening(self, deadline_s: float | None = None) -> Iterator[None]:
-        """Handle the signals while the block runs; stop the target at the deadline."""
+        """Handle signals while the block runs; stop the target at the deadline."""
         loop = asyncio.get_running_loop()
         numbers = obeyed(SIGNALS)
         timer = None if deadline_s is None else loop.call_later(deadline_s, self._expire)

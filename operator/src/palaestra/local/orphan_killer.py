@@ -1,18 +1,19 @@
 """End every process of a pod when the runner ends, for any reason.
 
-This is a separate program; one runs for each pod. Its standard input is a pipe whose other end only the
-runner has, so the pipe closes when the runner ends or closes the pod. It ignores the signals of a terminal.
+This module is a separate program, and one process of it runs for each pod. Its standard input is a pipe whose
+other end only the runner has. So the pipe closes when the runner ends or closes the pod. The program ignores
+the signals of a terminal.
 
-A marker in their environment identifies a pod's processes. Grandchildren inherit it through `setsid`, double
-forks and new process groups, where a parent-death signal or a process group would miss them. Between a fork
-and its exec a child still holds the pipe, so no process is missed.
+A marker in the environment identifies a pod's processes. Grandchildren inherit the marker through `setsid`,
+double forks and new process groups, in which a parent-death signal or a process group would miss them.
+Between its fork and its exec, a child of the runner has no marker yet, but keeps the pipe open, so the
+program waits for it.
 
-The reaper of a sidecar works in another way: it is the parent of a simulator's processes, so it needs no
-marker and also finds those that change their environment. This program cannot be the parent, because the
-runner itself starts and restarts the processes of a pod.
+The reaper of a sidecar works in another way. The reaper is the parent of a simulator's processes, so it needs
+no marker and also finds processes that change their environment. This program cannot be the parent, because
+the runner itself starts and restarts the processes of a pod.
 
-It uses only the standard library and nothing from this package, because it is started as a file, with `python
--I -S`.
+The program imports only the standard library, because it is started as a file, with `python -I -S`.
 """
 
 import contextlib
@@ -21,8 +22,8 @@ import signal
 import sys
 import time
 
-MARKER = "PALAESTRA_LOCAL_CONTAINER"  # environment: <pod uid>/<container>/
-QUIET_ROUNDS = 3  # a process in an exec while /proc is read is found in the next round
+MARKER = "PALAESTRA_LOCAL_CONTAINER"  # environment variable with the value <pod uid>/<container>/
+QUIET_ROUNDS = 3  # rounds without a found process; a round misses a process that is in an exec
 ROUND_S = 0.02
 DEADLINE_S = 20.0  # a process that survives SIGKILL for this long hangs in the kernel
 
@@ -38,9 +39,10 @@ def kill_marked(prefix: str) -> int:
 
 
 def _kill_if_marked(pid: int, wanted: bytes) -> bool:
-    """Kill `pid` through a handle opened before its environment is read, so that a reused pid is not killed.
+    """Kill `pid` if its marker matches; a handle prevents that a reused pid is killed.
 
-    Without handles, another process could get the pid in the microseconds after the environment was read.
+    The handle is opened before the environment is read. Without a handle, another process could get the pid
+    in the microseconds after the environment was read.
     """
     with contextlib.suppress(OSError):  # the process has ended, or belongs to another user
         handle = _handle(pid)
@@ -59,7 +61,7 @@ def _kill_if_marked(pid: int, wanted: bytes) -> bool:
 def _handle(pid: int) -> int | None:
     """Return a handle by which `pid` can be killed.
 
-    None: an old kernel or an old Python has no handles, or the container runtime forbids them.
+    The result is None if the kernel or Python is too old for handles, or the container runtime forbids them.
     """
     with contextlib.suppress(AttributeError, OSError):
         handle = os.pidfd_open(pid)
@@ -80,7 +82,7 @@ def _kill(pid: int, handle: int | None) -> None:
 
 
 def sweep(prefix: str) -> None:
-    """Kill marked processes until none is found, or the deadline has passed."""
+    """Kill marked processes until some rounds find no process, or the deadline has passed."""
     deadline = time.monotonic() + DEADLINE_S
     quiet = 0
     while quiet < QUIET_ROUNDS and time.monotonic() < deadline:

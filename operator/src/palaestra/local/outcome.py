@@ -19,10 +19,10 @@ FILE = "outcome.json"
 class RunOutcome:
     """The result of a replica's run; a value is None if it was not measured.
 
-    `exit_code` is the last trainer's, unless the run was killed or took too long. `interrupted`: whether a
-    person ended it. `saved` is the step of the newest checkpoint. `faults` is the number of faults of all
-    simulators and pods. `trained_share` is the share of the wall-clock time, 0 to 1, that was spent on steps
-    and on learning from them.
+    `exit_code` is the exit code of the last trainer, unless the run was killed or took too long.
+    `interrupted` is whether a person ended the run. `saved` is the step of the newest checkpoint. `faults` is
+    the number of faults of all simulators and pods. `trained_share` is the share of the wall-clock time, 0 to
+    1, in which the run did steps and learned from them.
     """
 
     exit_code: int
@@ -45,7 +45,7 @@ class RunOutcome:
         """Write the result into the run directory.
 
         Raises:
-            StorageFailed: it cannot be written.
+            StorageFailed: the file cannot be written.
         """
         write(run_directory / FILE, json.dumps(asdict(self), indent=1).encode() + b"\n")
 
@@ -54,7 +54,7 @@ class RunOutcome:
         """Remove the result of an earlier run in this directory.
 
         Raises:
-            StorageFailed: it cannot be removed.
+            StorageFailed: the file cannot be removed.
         """
         path = run_directory / FILE
         with storage(path):
@@ -62,17 +62,17 @@ class RunOutcome:
 
     @classmethod
     def of(cls, run_directory: Path) -> Self | None:
-        """Return the result of the run in this directory; None if it has not ended, or was killed."""
+        """Return the result of the run in this directory; None if the run has not ended, or was killed."""
         try:
             return cls(**json.loads((run_directory / FILE).read_bytes()))
-        except (OSError, ValueError, TypeError):  # missing, or written by another program
+        except (OSError, ValueError, TypeError):  # the file is missing, or another program wrote it
             return None
 
 
 def summary(outcome: RunOutcome, run_directory: Path) -> tuple[str, ...]:
-    """Return the lines to show at the end.
+    """Return the lines that a person sees at the end of a run.
 
-    Values that were not measured are left out: a custom program need not measure any.
+    A value that was not measured is left out; a custom program need not measure any value.
     """
     facts = {
         "success rate": _success(outcome.success_rate, run_directory),
@@ -86,10 +86,10 @@ def summary(outcome: RunOutcome, run_directory: Path) -> tuple[str, ...]:
 
 
 def uses(run_directory: Path) -> tuple[str, ...]:
-    """Return the commands for the results of a run.
+    """Return lines with commands for the results of a run.
 
-    palaestra-eval reads models of the built-in loop, which records its attempts; a custom program may write a
-    model of another kind.
+    palaestra-eval reads only models of the built-in loop, which also records its attempts. A custom program
+    may write a model in another format, so palaestra-eval is not shown for it.
     """
     curves = run_directory / "tensorboard"
     measurable = all((run_directory / name).exists() for name in ("model.zip", "attempts.jsonl"))
@@ -104,12 +104,12 @@ def uses(run_directory: Path) -> tuple[str, ...]:
 
 
 def typed(program: str, *words: str | Path) -> str:
-    """Return a command for a shell: each path is one word, even if it has a space or a quote."""
+    """Return a command for a shell; each path is one word, even if it contains a space or a quote."""
     return shlex.join([_place_of(program), *map(str, words)])
 
 
 def _place_of(program: str) -> str:
-    """Return the path of a program of this installation, or its name if the shell finds it."""
+    """Return the path of a program of this installation, or only its name if the shell finds it."""
     beside = Path(sys.executable).with_name(program)
     if shutil.which(program) or not beside.exists():
         return program
@@ -118,7 +118,7 @@ def _place_of(program: str) -> str:
 
 
 def _success(rate: float | None, run_directory: Path) -> str:
-    """Return the rate with its interval, if the run has one; an unfinished run has none."""
+    """Return the rate, with its interval if the run has finished."""
     try:
         content = json.loads((run_directory / "summary.json").read_bytes())
         interval = SuccessInterval.from_json(content["success_interval"])

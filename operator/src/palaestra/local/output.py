@@ -3,9 +3,9 @@
 Every line goes to `logs/<container>.log`, a file of limited size (`bounded_log`). The lines of some
 containers are also shown.
 
-The trainer may draw on the person's terminal instead. It gets a pseudo terminal of the same size, and its
-output is copied unchanged. The log gets only whole lines, without colors and without text that was redrawn in
-place, such as a progress bar.
+The trainer may draw on the person's terminal instead. Then it gets a pseudo terminal of the same size, and
+its output is copied unchanged. The log gets only whole lines, without colors and without overwritten text,
+such as the earlier states of a progress bar.
 """
 
 import asyncio
@@ -24,21 +24,21 @@ from palaestra.local.bounded_log import LimitedFile
 from palaestra.local.errors import StorageFailed
 
 Show = Callable[[str], None]
-KEPT_LINES = 20  # enough to see the reason of a program's end, without opening the file
+KEPT_LINES = 20  # enough to show the reason for a program's end without the log file
 CHUNK = 65536
-RESTORED = b"\x1b[0m\x1b[?25h"  # no color, and a visible cursor; a killed program does not restore them
+RESTORED = b"\x1b[0m\x1b[?25h"  # no color, and a visible cursor, which a killed program does not restore
 _CONTROL = re.compile(r"\x1b(?:\[[0-?]*[ -/]*[@-~]|[@-_])")
 _NO_SIZE = struct.pack("HHHH", 24, 80, 0, 0)
 
 
 class Log:
-    """One container's output, including its restarts, which are appended to the file."""
+    """The log of one container; the output after a restart is appended to the same file."""
 
     def __init__(self, name: str, folder: Path, show: Show | None = None) -> None:
         """Open the file.
 
         Raises:
-            StorageFailed: it cannot be written.
+            StorageFailed: the file cannot be written.
         """
         self.path = folder / f"{name}.log"
         self._show = show
@@ -55,7 +55,7 @@ class Log:
     def begin(self, terminal: int | None = None) -> int:
         """Return a descriptor for the output of a program; the caller closes it after the program's start.
 
-        With `terminal`, it is a pseudo terminal, and the output is copied to `terminal`.
+        With `terminal`, the descriptor is a pseudo terminal, and the output is copied to `terminal`.
         """
         reader, writer = os.pipe() if terminal is None else open_like(terminal)
         os.set_blocking(reader, False)
@@ -66,12 +66,12 @@ class Log:
         return writer
 
     async def finished(self, deadline_s: float) -> None:
-        """Wait at most `deadline_s` until the programs have closed their ends."""
+        """Wait at most `deadline_s` until all programs have closed their descriptors."""
         if self._open:
             await asyncio.wait(self._open, timeout=deadline_s)
 
     def note(self, text: str) -> None:
-        """Write a line of the runner itself, such as one about the end of a program."""
+        """Write a line of the runner itself, for example about the end of a program."""
         self._write(f"--- {text}")
 
     @property
@@ -88,7 +88,7 @@ class Log:
             data = os.read(reader, CHUNK)
         except BlockingIOError:  # no bytes to read
             return
-        except OSError:  # EIO: every program has closed its end of the terminal
+        except OSError:  # EIO: all programs have closed their end of the pseudo terminal
             data = b""
         if terminal is not None:
             resize(reader, terminal)  # the person may have resized the window
@@ -116,7 +116,7 @@ class Log:
 
 
 def say(text: str) -> None:
-    """Show a line to the person at once; lines are dropped if the reader has ended, as after `| head`."""
+    """Print a line at once; lines are dropped if the program that reads them has ended, such as `| head`."""
     try:
         sys.stdout.write(text + "\n")
         sys.stdout.flush()
@@ -125,7 +125,7 @@ def say(text: str) -> None:
 
 
 def open_like(terminal: int) -> tuple[int, int]:
-    """Return (ours, theirs): the two ends of a pseudo terminal with the size of `terminal`."""
+    """Return the two ends (ours, theirs) of a pseudo terminal with the size of `terminal`."""
     ours, theirs = os.openpty()
     tty.setraw(theirs)  # line ends stay unchanged; the person's terminal converts them
     resize(ours, terminal)
@@ -133,14 +133,14 @@ def open_like(terminal: int) -> tuple[int, int]:
 
 
 def resize(ours: int, terminal: int) -> None:
-    """Set the size of our end to that of `terminal`."""
+    """Set the size of the pseudo terminal to the size of `terminal`."""
     try:
         size = fcntl.ioctl(terminal, termios.TIOCGWINSZ, _NO_SIZE)
-    except OSError:  # not a terminal, so it has no size
+    except OSError:  # `terminal` is not a terminal, so it has no size
         size = _NO_SIZE
     fcntl.ioctl(ours, termios.TIOCSWINSZ, size)
 
 
 def as_seen(line: str) -> str:
-    """Return the visible text of a line, without overwritten text."""
+    """Return the visible text of a line, without control sequences and overwritten text."""
     return _CONTROL.sub("", line.rstrip("\r").rpartition("\r")[2])

@@ -1,9 +1,9 @@
-"""One attempt of a replica: a pod's containers, from the start of the first to the end of the last.
+"""Run one attempt of a replica: a pod's containers, from the first start to the last end.
 
-The order is that of KEP-753. The init containers start one after another; the successor of a sidecar waits
-for the sidecar's startup probe. Then the main container runs; its end is the end of the pod. Then the
-sidecars stop in reverse order, within the rest of one grace period. `stop` begins this shutdown early. The
-main container stops first, so that it can still use its simulators while it writes the last checkpoint.
+The order is the order of KEP-753. The init containers start one after another; the successor of a sidecar
+waits for the sidecar's startup probe. Then the main container runs, and its end ends the pod. Then the
+sidecars stop in reverse order, within the remaining grace period. `stop` begins this shutdown early. The main
+container stops first, so that it can still use its simulators while it writes the last checkpoint.
 """
 
 import asyncio
@@ -19,13 +19,13 @@ from palaestra.local.output import Log, Show
 from palaestra.local.pod_spec import Container, Pod
 from palaestra.local.process import OrphanKiller
 
-LONG_S = 10.0  # for the start of a container; the import of PyTorch takes several seconds
-TRIES = 3  # if a sidecar that other containers wait for has failed so often, the pod fails
+LONG_S = 10.0  # seconds after which a start is shown as slow; the import of PyTorch takes several seconds
+TRIES = 3  # failures of a sidecar before its startup after which the pod fails
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Kubelet:
-    """The settings of this machine for a pod: its output and its deadlines.
+    """The settings for pods on this machine: output and deadlines.
 
     `show` is called with a line for each container that has not started within `long_s`.
     """
@@ -35,7 +35,7 @@ class Kubelet:
     start_deadline_s: float = 60.0
     show: Show | None = None
     long_s: float = LONG_S
-    terminal: int | None = None  # the person's terminal, on which the main container may draw
+    terminal: int | None = None  # descriptor of the person's terminal, on which the main container may draw
 
 
 class _Stopped(Exception):
@@ -43,7 +43,7 @@ class _Stopped(Exception):
 
 
 class RunningPod:
-    """A pod that runs or will run."""
+    """A pod on this machine, before, during and after its run."""
 
     def __init__(self, pod: Pod, kubelet: Kubelet) -> None:
         self._pod = pod
@@ -65,12 +65,12 @@ class RunningPod:
             self._watchdog.close()
 
     async def run(self) -> int | None:
-        """Run the pod and return the main container's exit code; None if it was stopped before that.
+        """Run the pod and return the main container's exit code; None if `stop` was called before its start.
 
         When this returns or raises, no process of the pod is left.
 
         Raises:
-            StartFailed: a sidecar that others wait for did not start.
+            StartFailed: a sidecar for which other containers wait did not start.
         """
         self._watchdog = OrphanKiller(self._pod.uid)
         try:
@@ -126,9 +126,9 @@ class RunningPod:
 
     @contextmanager
     def _reported(self, running: Running) -> Iterator[None]:
-        """If the block takes long, show that a container has not started, with the time.
+        """If the block takes longer than `long_s`, show that a container has not started, with the time.
 
-        A main container counts as started once it has written a line; it reports its own waits.
+        The main container counts as started as soon as it has written a line; later waits it reports itself.
         """
         since = time.strftime("%H:%M:%S")
         main = running.spec is self._pod.main
@@ -159,7 +159,7 @@ class RunningPod:
             await asyncio.gather(task, stop, return_exceptions=True)
 
     def _grace_left_s(self) -> float:
-        """Return the rest of the grace period, which begins with the first call."""
+        """Return the remaining seconds of the grace period, which begins with the first call."""
         now = asyncio.get_running_loop().time()
         if self._end_of_grace is None:
             self._end_of_grace = now + self._pod.grace_s

@@ -1,7 +1,7 @@
-"""Read a planned pod as a kubelet does: containers in order, commands, environment, probes, volumes.
+"""Read a planned pod by the rules of a kubelet: containers, commands, environment, probes and volumes.
 
-Only settings that apply to a process on this machine are read; images, resources, security contexts and
-scheduling are ignored. Two settings are refused, because a program cannot run without them: a value from an
+Only settings that apply to a process on this machine are read. Images, resources, security contexts and
+scheduling are ignored. Two settings are refused, because this machine cannot provide them: a value from an
 object of the cluster, and a second main container.
 """
 
@@ -16,7 +16,7 @@ GRACE_S = 30.0  # Kubernetes' default terminationGracePeriodSeconds
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Probe:
-    """A startup or liveness probe: a command or an address, not both."""
+    """A startup or liveness probe: either a command or a URL."""
 
     command: tuple[str, ...] = ()
     url: str = ""
@@ -30,7 +30,8 @@ class Probe:
 class Container:
     """One container of a pod.
 
-    `sidecar`: it is a native sidecar, an init container that is restarted for as long as the pod runs.
+    `sidecar` is whether the container is a native sidecar: an init container that is restarted while the pod
+    runs.
     """
 
     name: str
@@ -61,7 +62,7 @@ def read_pod(template: Mapping[str, Any], uid: str) -> Pod:
     """Return the pod of a Job's template, for the attempt with `uid`.
 
     Raises:
-        RunRefused: it needs a feature or an object that only a cluster has.
+        RunRefused: the pod needs a feature or an object that only a cluster has.
     """
     spec = template["spec"]
     main, *others = spec["containers"]
@@ -99,13 +100,13 @@ def _value(container: str, entry: Mapping[str, Any], uid: str) -> str:
     if source.get("fieldRef", {}).get("fieldPath") == "metadata.uid":
         return uid
     raise RunRefused(
-        f"env {entry['name']} of container {container}: its value is in a cluster; "
+        f"env {entry['name']} of container {container}: its value is in an object of a cluster; "
         "give it as `value` to run the job here"
     )
 
 
 def _read(text: str) -> str:
-    """Return a text as the kubelet passes it to a container: $$ becomes $. Plans do not use variables."""
+    """Return a text as a kubelet passes it to a container: $$ becomes $. Plans use no `$(VARIABLE)`."""
     return text.replace("$$", "$")
 
 

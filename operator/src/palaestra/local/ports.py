@@ -1,9 +1,9 @@
-"""Free ports, all chosen at the same time and held while the run needs them.
+"""Choose free ports for a run, and reserve them while the run needs them.
 
-If a free port were released after the choice, another program could take it before the container listens. So
-each port stays bound here, without listening. The kernel does not assign a bound port to a program that
-requests any port, nor to an outgoing connection. Containers can still listen on it, because they set
-SO_REUSEADDR too.
+If a free port were released after the choice, another program could take the port before the container
+listens. So a socket of this process stays bound to each port, but does not listen. The kernel does not assign
+a bound port to a program that requests any free port, nor to an outgoing connection. Containers can still
+listen on the port, because they set SO_REUSEADDR too.
 """
 
 import socket
@@ -17,20 +17,20 @@ LOOPBACK = "127.0.0.1"
 
 
 class HeldPorts:
-    """Ports of the loopback interface that no other program gets until `close`."""
+    """Ports of the loopback interface that stay reserved for this run until `close`."""
 
     def __init__(self) -> None:
         self._sockets = ExitStack()
 
     def any(self) -> int:
-        """Hold and return a free port."""
+        """Reserve and return a free port."""
         return self._bind(0)
 
     def this(self, port: int) -> int:
-        """Hold and return `port`.
+        """Reserve and return `port`.
 
         Raises:
-            RunRefused: another program has it.
+            RunRefused: another program uses the port.
         """
         try:
             return self._bind(port)

@@ -1,4 +1,4 @@
-"""Checks before the start of a run; each problem has its remedy."""
+"""Checks before the start of a run; each reported problem has a remedy."""
 
 import fcntl
 import os
@@ -21,9 +21,9 @@ from palaestra_sim import world
 from palaestra_sim.errors import RootError, WorldError
 from palaestra_sim.world.bounded_read import read_bounded
 
-LEAST_FREE = 100 * 2**20  # bytes; logs and three checkpoints of the examples take 40 MB
+LEAST_FREE = 100 * 2**20  # bytes; logs and three checkpoints of an example take 40 MB
 PYTHON_PATH = "PYTHONPATH"
-POLICY = "policy.pth"  # in a zip of Stable-Baselines3
+POLICY = "policy.pth"  # the file with the policy's tensors in a zip of Stable-Baselines3
 INSTALLATION = "this installation"
 
 
@@ -50,7 +50,7 @@ def check(request: PreflightRequest) -> None:
 
 
 def processes_can_be_found(request: PreflightRequest) -> Iterator[str]:
-    """The system has Linux' /proc, in which the runner finds the processes that a container leaves behind."""
+    """The system has Linux' /proc, in which the runner finds the processes that a container left behind."""
     del request
     if (problem := lack_of_linux()) is not None:
         yield f"a run on this machine {problem}"
@@ -62,7 +62,7 @@ def processes_can_be_found(request: PreflightRequest) -> Iterator[str]:
 
 
 def no_module_is_shadowed(request: PreflightRequest) -> Iterator[str]:
-    """No module on PYTHONPATH has the name of a module that the ROS master or the trainer needs."""
+    """No module on PYTHONPATH has the same name as a module that the ROS master or the trainer needs."""
     own = (each.value for each in request.job.spec.trainer.env if each.name == PYTHON_PATH)
     for python_path in {os.environ.get(PYTHON_PATH, ""), *own}:
         yield from shadows(python_path or "")
@@ -75,7 +75,7 @@ def nothing_is_put_off(request: PreflightRequest) -> Iterator[str]:
 
 
 def programs_exist(request: PreflightRequest) -> Iterator[str]:
-    """The program of every container exists, with the library that it needs."""
+    """The program of each container is installed, with the library that it needs."""
     spec = request.job.spec
     own = spec.trainer.command[:1]
     programs = {"palaestra-ros-master": INSTALLATION, "palaestra-sidecar": INSTALLATION}
@@ -88,7 +88,7 @@ def programs_exist(request: PreflightRequest) -> Iterator[str]:
 
 
 def worlds_are_right(request: PreflightRequest) -> Iterator[str]:
-    """Each world in a file is correct; it is read here too, although the sidecar reads it again."""
+    """Each world in a file is valid; without this check, only the sidecar would find an error."""
     for index, group in enumerate(request.job.spec.simulators):
         if group.world.file is not None:
             field = f"spec.simulators[{index}].world"
@@ -97,9 +97,10 @@ def worlds_are_right(request: PreflightRequest) -> Iterator[str]:
 
 
 def initial_policy_is_there(request: PreflightRequest) -> Iterator[str]:
-    """The file of the initial policy is a zip with a policy's tensors; the trainer compares their shapes.
+    """The file of the initial policy is a zip with a policy's tensors; the trainer checks their shapes.
 
-    It may be missing once every replica has a checkpoint, because they resume from their checkpoints.
+    The file may be missing if every replica has a checkpoint, because replicas then resume from their
+    checkpoints.
     """
     initial = request.job.spec.trainer.initial_policy
     if initial is None:
@@ -130,9 +131,10 @@ def space_is_left(request: PreflightRequest) -> Iterator[str]:
 
 
 def locks_work(request: PreflightRequest) -> Iterator[str]:
-    """The file system of the runs has locks; the check locks a file without a name, which leaves no file."""
+    """The file system of the runs supports locks; the check locks a temporary file without a name."""
     folder = _existing(request.runs)
-    with suppress(OSError), TemporaryFile(dir=folder) as file:  # if not writable, `space_is_left` reports it
+    # If the folder is not writable, `space_is_left` reports that.
+    with suppress(OSError), TemporaryFile(dir=folder) as file:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
@@ -152,7 +154,7 @@ CHECKS: tuple[Check, ...] = (
 
 
 def _existing(path: Path) -> Path:
-    """Return a path if it exists, else its nearest existing parent."""
+    """Return the path if it exists; otherwise return its nearest existing parent."""
     return next(parent for parent in (path, *path.parents) if parent.exists())
 
 

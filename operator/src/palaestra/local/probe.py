@@ -1,4 +1,4 @@
-"""Check by a command or by HTTP whether a container has started or is alive."""
+"""Run the probes of a container: check by a command or by HTTP whether it has started or is alive."""
 
 import asyncio
 import signal
@@ -10,18 +10,19 @@ from http import HTTPStatus
 from palaestra.local.pod_spec import Probe
 from palaestra.local.process import Process
 
-DIRECT = urllib.request.build_opener(urllib.request.ProxyHandler({}))  # no proxy: the address is on loopback
+# Without a proxy, because the address is on loopback.
+DIRECT = urllib.request.build_opener(urllib.request.ProxyHandler({}))
 
 
 async def passes(probe: Probe, env: Mapping[str, str]) -> bool:
-    """Return whether one try succeeds within the probe's timeout."""
+    """Try once, and return whether the try succeeds within the probe's timeout."""
     if probe.command:
         return await _command_succeeds(probe, env)
     return await asyncio.to_thread(_answers, probe.url, probe.timeout_s)
 
 
 async def until_passed(probe: Probe, env: Mapping[str, str]) -> bool:
-    """Try until one try succeeds; return False if the failure threshold is reached first."""
+    """Try until a try succeeds; return False if the failure threshold is reached before."""
     await asyncio.sleep(probe.initial_delay_s)
     for failures in range(probe.failure_threshold):
         if failures:
@@ -32,7 +33,7 @@ async def until_passed(probe: Probe, env: Mapping[str, str]) -> bool:
 
 
 async def until_failed(probe: Probe, env: Mapping[str, str]) -> None:
-    """Return after as many consecutive failed tries as the threshold."""
+    """Return as soon as the number of consecutive failed tries reaches the threshold."""
     await asyncio.sleep(probe.initial_delay_s)
     failures = 0
     while failures < probe.failure_threshold:
@@ -41,7 +42,7 @@ async def until_failed(probe: Probe, env: Mapping[str, str]) -> None:
 
 
 async def _command_succeeds(probe: Probe, env: Mapping[str, str]) -> bool:
-    """Run the command; after a timeout or a cancellation no process is left."""
+    """Run the command and return whether it succeeds; kill it after a timeout or a cancellation."""
     process = Process.start(probe.command, env, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
         return await process.ended_within(probe.timeout_s) and await process.wait() == 0
@@ -50,9 +51,9 @@ async def _command_succeeds(probe: Probe, env: Mapping[str, str]) -> bool:
 
 
 def _answers(url: str, timeout_s: float) -> bool:
-    """Return whether the response to a GET has a status from 200 to 399."""
+    """Return whether the response to a GET request has an HTTP status from 200 to 399."""
     try:
         with DIRECT.open(url, timeout=timeout_s) as answer:
-            return bool(answer.status < HTTPStatus.BAD_REQUEST)  # the kubelet's own rule
-    except OSError:  # refused, timed out, or an HTTP error status
+            return bool(answer.status < HTTPStatus.BAD_REQUEST)  # the same rule as in the kubelet
+    except OSError:  # the connection was refused or timed out, or the HTTP status is an error
         return False

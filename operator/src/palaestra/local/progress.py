@@ -1,4 +1,4 @@
-"""The progress of a run, as its trainer reports it at `/status`."""
+"""The progress of a run, which its trainer reports at `/status`."""
 
 from contextlib import suppress
 from dataclasses import dataclass
@@ -19,13 +19,13 @@ class RunProgress:
 
     Attributes:
         phase: `starting`, then the trainer's phase, finally `ended`.
-        step: environment steps learned from, over all attempts.
+        step: environment steps from which the run has learned, over all attempts.
         target: steps at which the run ends; 0 before the trainer's first response.
-        steps_per_second: recently.
-        success_rate: of the last evaluation, 0 to 1.
+        steps_per_second: recent environment steps per second.
+        success_rate: success rate of the last evaluation, 0 to 1.
         success_interval: the interval around `success_rate`.
-        mean_return: of recent training episodes.
-        faults: of all simulators, over all attempts.
+        mean_return: mean return of recent training episodes.
+        faults: number of faults of all simulators, over all attempts.
     """
 
     phase: str = "starting"
@@ -39,16 +39,16 @@ class RunProgress:
 
 
 class ProgressReader:
-    """Reads the progress of one run, beginning with its start."""
+    """Reads the progress of a run that is about to start."""
 
     def __init__(self, directory: Path) -> None:
-        """Record the file of an earlier run in the directory; another program may have its address by now."""
+        """Record the file of an earlier run, which is ignored: another program may use its addresses now."""
         self._file = directory / FILE
         self._stale = self._written()
         self._last = RunProgress()
 
     def progress(self) -> RunProgress:
-        """Return the newest values; the last known ones while the trainer does not respond."""
+        """Return the newest values; while the trainer does not respond, return the last known values."""
         if (status := self._status()) is not None:
             self._last = RunProgress(
                 phase=status.phase,
@@ -70,7 +70,7 @@ class ProgressReader:
             address = RunAddresses.read(self._file.read_bytes()).status
             with DIRECT.open(f"http://{address}/status", timeout=ANSWER_S) as answer:
                 return TrainerStatus.from_json(decoded(answer.read(MOST_BYTES)))
-        return None  # the trainer has not started, is between two attempts, or has ended
+        return None  # the trainer has not started yet, has ended, or is between two attempts
 
     def _written(self) -> int | None:
         try:

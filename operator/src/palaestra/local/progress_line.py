@@ -1,4 +1,4 @@
-"""The progress of a run as lines for a person: how far, how good, how fast, and how long it will take."""
+"""The progress of a run as lines for a person: steps, success rate, speed, faults and remaining time."""
 
 import asyncio
 
@@ -13,7 +13,7 @@ _MINUTE_S = 60
 
 
 def progress_line(progress: RunProgress) -> str:
-    """Return one line; it leaves out unknown values.
+    """Return the progress as one line, without unknown values.
 
     For example: step 12,500 of 50,000 · 96 % (87 to 99) of 50 episodes · 122 steps/s · 0 faults · 5 min left
     """
@@ -33,12 +33,13 @@ async def show_progress(
 ) -> None:
     """Show a line at the trainer's first response, and then every `every_s` seconds, until cancelled.
 
-    Before that response, it is requested every `first_s` seconds.
+    Until that response, send a request every `first_s` seconds.
     """
     wait_s = first_s
     while True:
         await asyncio.sleep(wait_s)
-        # In a thread, because the trainer may take seconds to respond while the pod needs its runner.
+        # The request is in a thread, because the trainer may take seconds to respond, and the event loop must
+        # serve the pod meanwhile.
         progress = await asyncio.to_thread(reader.progress)
         if progress.target:
             show(progress_line(progress))
@@ -57,7 +58,7 @@ def _success(progress: RunProgress) -> str:
 
 
 def _left(progress: RunProgress) -> str:
-    """Return the time to the last step at the present speed."""
+    """Return the text about the time until the last step at the present speed, or ""."""
     left = progress.target - progress.step
     if not progress.steps_per_second or left <= 0:
         return ""

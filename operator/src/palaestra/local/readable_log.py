@@ -1,6 +1,6 @@
-"""The trainer's log for a person: warnings and errors as sentences, and the output of the user's own code.
+"""Convert the trainer's log for a person: show warnings and errors as sentences, and the user's own output.
 
-`logs/trainer.log` has all lines unchanged; `palaestra run --verbose` shows them.
+`logs/trainer.log` has all lines unchanged, and `palaestra run --verbose` shows all lines.
 """
 
 import ast
@@ -16,8 +16,8 @@ def readable(line: str) -> str | None:
     """Return the text to show for a line of the trainer's output.
 
     A warning or an error becomes its message, the fields that are sentences, and the other fields in
-    parentheses. Output of the user's code stays as it is. None: nothing is shown, because the progress line
-    has the values.
+    parentheses. Output of the user's code is unchanged. The result is None for lines that are not shown,
+    because the progress line has their values.
     """
     found = _LINE.match(line)
     if found is None:

@@ -1,4 +1,4 @@
-"""One replica on this machine, from its planned Job to its outcome: pods in turn, by the Job's rules."""
+"""Run one replica on this machine: its pods, one after another, by the rules of its planned Job."""
 
 import asyncio
 import contextlib
@@ -33,9 +33,9 @@ ENDED_BY_OTHERS = f"ProgramEnded: {SILENT}"
 class Setting:
     """The folder of a replica, its output, and its deadline.
 
-    `shown` are functions that show a line of a container's output, by container. `terminal` is the descriptor
-    of a terminal on which the trainer may draw, or None. `deadline_s` is for all pods together; None: no
-    deadline.
+    `shown` has the functions that show a line of a container's output, by container. `terminal` is the
+    descriptor of a terminal on which the trainer may draw, or None. `deadline_s` is the deadline for all pods
+    together; None: no deadline.
     """
 
     directory: Path
@@ -70,7 +70,7 @@ async def run_replica(planned: ReplicaPlan, setting: Setting) -> RunOutcome:
 
 
 def meaning(exit_code: int) -> str:
-    """Return the text about an exit code."""
+    """Return an exit code with its meaning, such as `exit code 82 (stalled)`."""
     try:
         return f"exit code {exit_code} ({ExitCode(exit_code).name.lower().replace('_', ' ')})"
     except ValueError:
@@ -109,9 +109,10 @@ def _logs(pod: Pod, setting: Setting, opened: contextlib.ExitStack) -> dict[str,
 
 
 def _ended_early(outcome: RunOutcome, interrupt: Interrupt) -> RunOutcome:
-    """Return the outcome of a run that was ended early; a complete run stays complete.
+    """Return the outcome of a run that a signal or its deadline ended; a complete run stays complete.
 
-    An interrupted trainer saves a checkpoint and exits with 75. No other exit code is changed to 75.
+    An interrupted trainer saves a checkpoint and exits with 75. If it exits with another code, that code
+    stays.
     """
     if outcome.finished:
         return outcome
@@ -126,7 +127,7 @@ def _ended_early(outcome: RunOutcome, interrupt: Interrupt) -> RunOutcome:
 def _outcome(planned: ReplicaPlan, directory: Path, code: int | None, pods: int) -> RunOutcome:
     """Return the outcome from the trainer's report, in summary.json or in its termination message.
 
-    If the built-in loop exits with 0 but without a report, a library has ended its process.
+    If the built-in loop exits with 0 but without a report, a library has ended the process.
     """
     word, summary = _json(_termination(directory)), _json(directory / "summary.json")
     said = {**word, **summary}
@@ -148,7 +149,7 @@ def _outcome(planned: ReplicaPlan, directory: Path, code: int | None, pods: int)
 
 
 def trains_by_itself(planned: ReplicaPlan) -> bool:
-    """Return whether the trainer is the built-in loop, and not a program of the job."""
+    """Return whether the trainer is the built-in loop, and not the job's own program."""
     (trainer,) = planned.job["spec"]["template"]["spec"]["containers"]
     return bool(trainer.get("command") == [BUILT_IN])
 
@@ -160,13 +161,13 @@ def _termination(directory: Path) -> Path:
 def _json(path: Path) -> dict[str, Any]:
     try:
         content = json.loads(path.read_bytes())
-    except (OSError, ValueError):  # missing, or incomplete because its writer was killed
+    except (OSError, ValueError):  # the file is missing, or incomplete because its writer was killed
         return {}
     return content if isinstance(content, dict) else {}
 
 
 def mount(pod: Pod, volumes: list[Mapping[str, Any]], config_map: Mapping[str, Any]) -> None:
-    """Create every volume at its mount path in the pod; an emptyDir is emptied for each pod.
+    """Create each volume as a folder at its mount path; remove the content of an emptyDir.
 
     Raises:
         StorageFailed: a volume cannot be written.

@@ -1,4 +1,4 @@
-"""Make the report of a run whose trainer could not make it, because it was killed."""
+"""Write the report of a run whose trainer could not write it, because the trainer was killed."""
 
 import asyncio
 import os
@@ -12,13 +12,14 @@ from palaestra.local.simulators import lack
 PROGRAM = "palaestra-report"
 REPORT = "report.html"
 DEADLINE_S = 60.0
-_WRITTEN_BY_THE_TRAINER = "end.json"  # each attempt removes it at its start, and writes it with its report
+# Each attempt removes this file at its start, and writes it with its report.
+_WRITTEN_BY_THE_TRAINER = "end.json"
 
 
 def complete_report(run_directory: Path) -> None:
-    """Make the report of an ended run, unless its trainer has made it; do nothing if that is not possible.
+    """Write the report of an ended run if its trainer has not written it; do nothing if this fails.
 
-    A run of another program than ours has no report, because it need not have the files for one.
+    A run of a custom program gets no report, because it need not have the necessary files.
     """
     began = (run_directory / "attempts.jsonl").exists()
     if began and not (run_directory / _WRITTEN_BY_THE_TRAINER).exists() and lack(PROGRAM) is None:
@@ -32,5 +33,6 @@ async def _make(run_directory: Path) -> None:
     try:
         await asyncio.wait_for(asyncio.shield(process.wait()), DEADLINE_S)
     except (TimeoutError, asyncio.CancelledError):
-        process.send(signal.SIGKILL)  # safe: a report gets its name only when it is complete
+        # SIGKILL is safe, because a report gets its name only when it is complete.
+        process.send(signal.SIGKILL)
         await process.wait()

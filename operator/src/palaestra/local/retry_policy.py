@@ -1,8 +1,8 @@
 """The Job controller of this machine: after the end of a pod, decide whether the replica gets another pod.
 
-`verdict` applies the planned Job's podFailurePolicy as Kubernetes does: the first matching rule decides, and
-a failure without a matching rule counts against `backoffLimit`. In Kubernetes, ignored failures have no
-limit; here, as in the operator, they have a limit if the pods make no progress.
+`verdict` applies the planned Job's podFailurePolicy as Kubernetes does. The first matching rule decides, and
+a failure without a matching rule counts against `backoffLimit`. Kubernetes has no limit for ignored failures.
+Here, as in the operator, ignored failures without progress have a limit.
 """
 
 from collections.abc import Mapping
@@ -11,12 +11,13 @@ from enum import Enum
 from typing import Any
 
 IDLE_PODS = 5  # consecutive ignored pod failures without progress before the replica fails
-FIRST_WAIT_S = 1.0  # before the next pod; it doubles, as in Kubernetes, where the first wait is 10 s
+# The first wait before the next pod; the wait doubles as in Kubernetes, where it starts at 10 s.
+FIRST_WAIT_S = 1.0
 MOST_WAIT_S = 60.0
 
 
 class RetryVerdict(Enum):
-    """The meaning of one pod's end."""
+    """The consequence of one pod's end."""
 
     COMPLETE = "complete"
     FAIL_JOB = "fail"
@@ -25,7 +26,7 @@ class RetryVerdict(Enum):
 
 
 def verdict(job: Mapping[str, Any], exit_code: int) -> RetryVerdict:
-    """Return the verdict on the trainer's exit code by the rules of `job`, a batch/v1 Job."""
+    """Return the consequence of the trainer's exit code by the rules of `job`, a batch/v1 Job."""
     if exit_code == 0:
         return RetryVerdict.COMPLETE
     for rule in job["spec"].get("podFailurePolicy", {}).get("rules", ()):
@@ -43,7 +44,7 @@ def _matches(codes: Mapping[str, Any], exit_code: int) -> bool:
 
 @dataclass(slots=True, kw_only=True)
 class Tries:
-    """The pods of one replica so far, in this run of the runner."""
+    """The counts of one replica's pods since the start of the runner."""
 
     limit: int
     counted: int = 0
@@ -65,5 +66,5 @@ class Tries:
 
     @property
     def wait_s(self) -> float:
-        """Return the seconds before the next pod; it doubles with every pod without progress."""
+        """Return the seconds to wait before the next pod; they double with each pod without progress."""
         return float(min(FIRST_WAIT_S * 2 ** max(self.idle - 1, 0), MOST_WAIT_S))

@@ -1,8 +1,8 @@
-"""`palaestra run`: a TrainingJob file becomes a trained policy on this machine.
+"""`palaestra run`: train the policy of a TrainingJob file on this machine.
 
-No process is started and no file is written before every check has passed. Replicas run one after another,
-because each needs a whole small machine. `--replica` selects one, so that two terminals can run two replicas
-at the same time.
+All checks pass before a process is started or a file is written. Replicas run one after another, because each
+needs a whole small machine. `--replica` selects one replica, so that two terminals can run two replicas at
+the same time.
 """
 
 import asyncio
@@ -27,15 +27,15 @@ from palaestra.plan import Images, LocalLayout, Ports, ReplicaPlan, identified, 
 from palaestra.plan.replica import TRAINER
 from palaestra_protocol.pod.status import ExitCode
 
-SHOWN_LINES = 5  # the end of the log that is shown if the trainer failed without a termination message
+SHOWN_LINES = 5  # last lines of the log that are shown if the trainer failed without a termination message
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunOptions:
     """The options of the command line.
 
-    `lock` is the descriptor of the run directory's lock, which the parent process has already taken for this
-    process; None: not taken.
+    `lock` is the descriptor of the run directory's lock, if the parent process has already taken the lock for
+    this process; else None.
     """
 
     runs: Path
@@ -51,9 +51,9 @@ def run(job: TrainingJob, options: RunOptions) -> int:
     """Run a job's replicas and return 0, or the exit code of the first unfinished replica.
 
     Raises:
-        LocalError: it cannot be run here; the message has one line for each reason.
-        PlanError: it cannot be run on one machine.
-        WorldError: one of its worlds is wrong.
+        LocalError: the job cannot be run here; the message has one line for each reason.
+        PlanError: the job cannot be run on one machine.
+        WorldError: a world of the job is invalid.
     """
     directory = run_directory.job_directory(options.runs, job.metadata.name)
     job = identified(job, run_directory.uid_of(directory))
@@ -68,7 +68,7 @@ def run(job: TrainingJob, options: RunOptions) -> int:
 
 
 def check(job: TrainingJob, directory: Path, chosen: range, options: RunOptions) -> None:
-    """Run all checks that do not write files; raises the same errors as `run`."""
+    """Run all checks that do not write files; raise the same errors as `run`."""
     planned = plan(job, layout(directory, options, Ports()), replicas=chosen)
     for replica in planned.replicas.values():
         read_pod(replica.job["spec"]["template"], uid="")
@@ -82,7 +82,7 @@ def layout(directory: Path, options: RunOptions, ports: Ports) -> LocalLayout:
 
 
 def chosen_ports(held: HeldPorts, job: TrainingJob, options: RunOptions) -> Ports:
-    """Return free ports for one replica; all are chosen before the first one is used.
+    """Return free ports for one replica; all ports are chosen before the first port is used.
 
     Raises:
         RunRefused: the port that the person chose is in use.
@@ -149,7 +149,7 @@ def _trained(planned: ReplicaPlan, path: Path, options: RunOptions, deadline_s: 
 
 
 async def _run(planned: ReplicaPlan, setting: Setting, reader: ProgressReader | None) -> RunOutcome:
-    """Run the replica, and show its progress in the meantime if there is a reader."""
+    """Run the replica; if a reader is given, show the progress meanwhile."""
     if reader is None:
         return await run_replica(planned, setting)
     showing = asyncio.create_task(show_progress(reader, say))
@@ -160,7 +160,7 @@ async def _run(planned: ReplicaPlan, setting: Setting, reader: ProgressReader | 
 
 
 def _shown(planned: ReplicaPlan, *, verbose: bool, built_in: bool) -> dict[str, Show]:
-    """Return what shows the lines of containers: all containers, or the trainer only."""
+    """Return the functions that show lines of output, for all containers or for the trainer only."""
     if not verbose and built_in:
         return {TRAINER: _say_readable}
     pod = planned.job["spec"]["template"]["spec"]

@@ -6,8 +6,8 @@
     <dir>/<job name>/<replica>.log  the output of a runner in the background
     <dir>/<job name>/<replica>.old-<n>/   what --fresh or a correction has set aside; no run is ever deleted
 
-The uid of a job on a laptop is derived from this path. So it is the same for every `palaestra run` of one
-directory, and different for two directories, and is not stored in a file that could be lost.
+The uid of a job on a laptop is derived from the path of its directory. So each `palaestra run` with this
+directory has the same uid, and different directories have different uids. No file has to store the uid.
 """
 
 import fcntl
@@ -42,7 +42,8 @@ Record = Mapping[str, Any]
 def _mutable() -> Iterator[str]:
     """Yield the fields that may differ between two runs of one directory.
 
-    They affect the end of the training or the number of replicas, but never the learning of one replica.
+    These fields affect the end of the training or the number of replicas, but never the learning of one
+    replica.
     """
     yield from ("spec.backoffLimit", "spec.replicas")
     for path, model in walk(TrainingJob):
@@ -51,7 +52,7 @@ def _mutable() -> Iterator[str]:
                 yield shown((*path, name))
 
 
-MUTABLE = frozenset(_mutable())  # `STEPS` may be raised, which prolongs the run
+MUTABLE = frozenset(_mutable())  # in addition, `STEPS` may be raised, which prolongs the run
 
 
 def job_directory(runs: Path, job: str) -> Path:
@@ -60,7 +61,7 @@ def job_directory(runs: Path, job: str) -> Path:
 
 
 def uid_of(directory: Path) -> str:
-    """Return the uid of the job whose runs are in `directory`; the same path has the same uid."""
+    """Return the uid of the job whose runs are in `directory`; it depends only on the path."""
     return str(uuid.uuid5(uuid.NAMESPACE_URL, directory.absolute().as_uri()))
 
 
@@ -69,12 +70,12 @@ def locked(directory: Path, taken: int | None = None) -> Iterator[int]:
     """Lock a run directory for this process, and yield the descriptor of the lock.
 
     The kernel releases the lock when every process with this descriptor has closed it or ended. A process
-    that was started with the descriptor passes it as `taken`; a record lock, which the trainer uses, could
-    not be passed on.
+    that inherited the descriptor passes the descriptor as `taken`. The lock is not a record lock, as in the
+    trainer, because a child process cannot inherit a record lock.
 
     Raises:
-        RunRefused: another runner has it, or its file system has no locks.
-        StorageFailed: its parent cannot be written.
+        RunRefused: another runner has the lock, or the file system has no locks.
+        StorageFailed: the parent folder cannot be written.
     """
     path = directory.with_name(f"{directory.name}.lock")
     descriptor = _take(directory, path) if taken is None else taken
@@ -115,8 +116,8 @@ def refuse_another_job(directory: Path, record: Record) -> None:
     """Compare a job with the record of the run in the directory.
 
     Raises:
-        RunRefused: they differ in fields that a run cannot change, and the job is not a correction; one line
-            for each field.
+        RunRefused: job and record differ in fields that a run cannot change, and the job is not a correction.
+            The message has one line for each field.
     """
     changes = _changes(directory, record)
     if changes and not _learned_nothing(directory):
@@ -127,9 +128,9 @@ def refuse_another_job(directory: Path, record: Record) -> None:
 
 
 def is_correction(directory: Path, record: Record) -> bool:
-    """Return whether a job corrects the job of a run that ended at step 0 because its job was wrong.
+    """Return whether a job corrects the job of a run that the trainer refused at step 0.
 
-    Then the directory must be set aside, because the trainer has stored the wrong hyperparameters in it.
+    Then the old directory must be set aside, because the trainer has stored the wrong hyperparameters in it.
     """
     return bool(_changes(directory, record)) and _learned_nothing(directory)
 
@@ -161,7 +162,7 @@ def _raised(was: Any, is_now: Any) -> bool:
 def _learned_nothing(directory: Path) -> bool:
     """Return whether the trainer refused the job of a run at step 0, and the run has no checkpoint.
 
-    A custom program that does not report its step may have trained.
+    If no step was reported, the result is False, because a custom program may have trained without a report.
     """
     outcome, checkpoints = RunOutcome.of(directory), directory / "checkpoints"
     return (
@@ -173,7 +174,7 @@ def _learned_nothing(directory: Path) -> bool:
 
 
 def changed_fields(before: Record, now: Record) -> Iterator[str]:
-    """Yield `field: was x, is y` for every field that differs and must not."""
+    """Yield `field: was x, is y` for each field that differs although a run cannot change it."""
     old, new = dict(_flat(before)), dict(_flat(now))
     for field in sorted(old.keys() | new.keys()):
         name, was, is_now = _INDEX.sub("", field), old.get(field), new.get(field)
@@ -184,10 +185,10 @@ def changed_fields(before: Record, now: Record) -> Iterator[str]:
 
 
 def _completed(record: Any) -> Record:
-    """Return the record of an older release, with the defaults of fields that it did not have.
+    """Return the record of an older release, completed with the defaults of newer fields.
 
-    A job without a newer field is the same job with the field's default. If this release cannot read a
-    record, for example one of a newer release, it compares the record unchanged.
+    A job that lacks a newer field equals the job with that field's default. If this release cannot read a
+    record, for example because a newer release wrote it, the record is compared unchanged.
     """
     try:
         return record_of(validate(record))
@@ -196,20 +197,20 @@ def _completed(record: Any) -> Record:
 
 
 def prepare(directory: Path, record: Record) -> None:
-    """Create the directory, write the record of its job and remove the outcome of an earlier run.
+    """Create the directory, write the record of the job and remove the outcome of an earlier run.
 
     Raises:
-        StorageFailed: it cannot be written.
+        StorageFailed: the directory cannot be written.
     """
     RunOutcome.forget(directory)
     write(directory / RECORD, yaml.safe_dump(dict(record), sort_keys=False).encode())
 
 
 def set_aside(directory: Path) -> Path | None:
-    """Rename a run directory; return its new path, or None if it did not exist.
+    """Rename a run directory and return its new path; return None if it did not exist.
 
     Raises:
-        StorageFailed: it cannot be moved.
+        StorageFailed: the directory cannot be renamed.
     """
     if not directory.exists():
         return None

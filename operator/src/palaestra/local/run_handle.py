@@ -1,7 +1,8 @@
-"""`palaestra.run`: a TrainingJob trains in the background of a Python program.
+"""`palaestra.run`: train a TrainingJob in the background of a Python program.
 
-The run is a separate process (`child_main`), so it does not take over signals or the terminal, and several
-runs at the same time do not affect each other. All its processes end with this process, even after SIGKILL.
+The run is a separate process (`child_main`). So it does not take over signals or the terminal, and several
+runs at the same time do not affect each other. All processes of the run end with this process, even if
+SIGKILL ends this process.
 """
 
 import os
@@ -27,8 +28,9 @@ from palaestra.local.progress import ProgressReader, RunProgress
 from palaestra.local.run import RunOptions, check
 from palaestra.plan import identified
 
-STOP_S = 90.0  # A pod has 60 s for its last checkpoint; the rest is for its processes.
-_RUNNING: set["RunHandle"] = set()  # a run continues if the program drops its handle
+STOP_S = 90.0  # A pod has 60 s for its last checkpoint; the other 30 s are for the end of its processes.
+# Keeps each running handle alive, so that a run continues if the program drops its handle.
+_RUNNING: set["RunHandle"] = set()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,15 +38,15 @@ class Result:
     """The end of a run; a value is None if it was not measured.
 
     Attributes:
-        exit_code: that of `palaestra run`.
+        exit_code: the exit code, as of `palaestra run`.
         succeeded: whether the training is complete.
         reason: the reason for the end; empty if no reason was reported.
         directory: the run directory.
         policy: the best policy by evaluation, `model.zip`; None if it does not exist yet.
-        steps: environment steps that were learned from.
-        success_rate: of the policy, 0 to 1.
-        steps_per_second: over the whole run.
-        faults: of all simulators.
+        steps: environment steps from which the run has learned.
+        success_rate: success rate of the policy, 0 to 1.
+        steps_per_second: environment steps per second over the whole run.
+        faults: number of faults of all simulators.
     """
 
     exit_code: int
@@ -59,9 +61,9 @@ class Result:
 
 
 class RunHandle:
-    """One replica that trains in the background; as a context manager, it is stopped at the end of the block.
+    """One replica that trains in the background; at the end of a `with` block, it is stopped.
 
-    Safe to use from several threads.
+    Several threads may use one handle.
 
     Attributes:
         directory: the run directory.
@@ -96,7 +98,7 @@ class RunHandle:
 
     @property
     def progress(self) -> RunProgress:
-        """Return the newest values; after the end, those of the result."""
+        """Return the newest values; after the end, return the values of the result."""
         newest = self._watch.progress()
         if not self.ended:
             return newest
@@ -116,7 +118,7 @@ class RunHandle:
         return self.wait(0.0)
 
     def fileno(self) -> int:
-        """Return a descriptor that is readable once the run has ended, for `select`; valid until `wait`."""
+        """Return a descriptor for `select`, readable as soon as the run has ended; valid until `wait`."""
         return self._end
 
     def wait(self, deadline_s: float) -> bool:
@@ -132,7 +134,7 @@ class RunHandle:
         """Wait for the end and return the result.
 
         Raises:
-            StillRunning: the run has not ended after `deadline_s`; it continues.
+            StillRunning: the run has not ended after `deadline_s`, and continues.
         """
         if not self.wait(deadline_s):
             raise StillRunning(
@@ -141,9 +143,9 @@ class RunHandle:
         return self._result()
 
     def interrupt(self) -> None:
-        """Request a checkpoint and the end of the run; return at once. The same job resumes from there."""
+        """Request a checkpoint and the end of the run, and return at once; the job can resume from there."""
         if not self.ended:
-            with suppress(BrokenPipeError, ValueError):  # it has ended in the meantime
+            with suppress(BrokenPipeError, ValueError):  # the run has just ended
                 self._control.write(b"\n")
 
     def stop(self, deadline_s: float = STOP_S) -> Result:
@@ -160,7 +162,7 @@ class RunHandle:
         self._let_go()
 
     def _let_go(self) -> None:
-        with suppress(KeyError):  # another thread has already done this
+        with suppress(KeyError):  # another thread has already called `_let_go`
             _RUNNING.remove(self)
             self._control.close()
             os.close(self._end)
@@ -169,7 +171,8 @@ class RunHandle:
         code = self._process.returncode
         code = KILLED if code < 0 else code
         outcome = RunOutcome.of(self.directory)
-        if outcome is None or outcome.exit_code != code:  # this run did not write it; an earlier run may have
+        # This run wrote no outcome; the file may be from an earlier run.
+        if outcome is None or outcome.exit_code != code:
             last = self.log.read_text(errors="replace").splitlines()[-1:]
             outcome = RunOutcome(exit_code=code, reason="".join(last))
         policy = self.directory / "model.zip"
@@ -196,16 +199,16 @@ def run(
     and ends.
 
     Args:
-        job: the path of a file, YAML text, plain data or the model.
+        job: the job, as the path of a file, YAML text, plain data or the model.
         runs: folder of all runs; the run directory is `<runs>/<job>/<replica>`.
-        replica: its number; None only if the job has one replica.
+        replica: the number of the replica; None only if the job has one replica.
         fresh: start at step 0; an existing run is set aside.
 
     Raises:
-        SpecErrors: the job is wrong; the error lists every problem.
-        LocalError: it cannot be run here, or another process runs it.
-        PlanError: it cannot be run on one machine.
-        WorldError: one of its worlds is wrong.
+        SpecErrors: the job is invalid; the error lists every problem.
+        LocalError: the job cannot be run here, or another process runs it.
+        PlanError: the job cannot be run on one machine.
+        WorldError: a world of the job is invalid.
         OSError: the file cannot be read.
     """
     given = job_of(job)
@@ -221,7 +224,7 @@ def run(
 
 
 def _emptied(log: Path) -> BinaryIO:
-    """Empty a log file, and open it as `LimitedFile` needs it."""
+    """Empty a log file, and open it for reading and appending, as `LimitedFile` requires."""
     log.write_bytes(b"")
     return log.open("a+b")
 
@@ -230,11 +233,13 @@ def _replica(job: TrainingJob, replica: int | None) -> int:
     """Return the number of the replica to run.
 
     Raises:
-        RunRefused: the replica does not exist, or the job has several and none was chosen.
+        RunRefused: the replica does not exist, or the job has several replicas and `replica` is None.
     """
     count = job.spec.replicas
     if replica is None and count > 1:
-        raise RunRefused(f"spec.replicas: the job has {count}; choose one with replica=, all may run at once")
+        raise RunRefused(
+            f"spec.replicas: the job has {count}; choose one with replica=, because a handle runs one replica"
+        )
     number = replica or 0
     if not 0 <= number < count:
         raise RunRefused(

@@ -1,6 +1,6 @@
-"""The simulators of this machine: the program of each driver, and whether it is installed.
+"""The simulators of this machine: the program of each driver, and a check whether it is installed.
 
-The operator's package does not import simulators, so it only checks that their libraries exist.
+This package does not import simulators, so it only checks that their programs and libraries exist.
 """
 
 import importlib.util
@@ -21,7 +21,7 @@ _EXTRA = "install palaestra-sim[mujoco] (`make setup` does)"
 
 
 def lack(program: str) -> str | None:
-    """Return the reason that prevents a program's start on this machine, with the remedy, or None."""
+    """Return the reason for which a program cannot start on this machine, with the remedy, or None."""
     library = _LIBRARIES.get(program)
     if shutil.which(program, path=program_path()) is None:
         return f"{program} is not a program on this machine; {'install it' if library is None else _EXTRA}"

@@ -1,7 +1,7 @@
-"""Run a program of palaestra-trainer, which needs PyTorch; this package does not.
+"""Run a program of the package palaestra-trainer, which needs PyTorch, in a separate process.
 
-The program writes to the person's terminal itself. Ctrl-C reaches this process, which asks the program to
-end; a second one kills it. No process of the program outlives this one.
+The program itself writes to the person's terminal. Ctrl-C reaches this process, which sends SIGTERM to the
+program; a second Ctrl-C kills the program. All processes of the program end with this process.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def run_program(
     Args:
         command: the program's name and its arguments.
         env: variables that differ from those of this process.
-        reads_keys: whether it reads this process's standard input.
+        reads_keys: whether the program reads this process's standard input.
 
     Raises:
         RunRefused: the program is not installed here.
@@ -44,11 +44,11 @@ class _Program:
         self._process = process
 
     def stop(self) -> None:
-        """Ask it to end."""
+        """Send SIGTERM to the program."""
         self._process.send(signal.SIGTERM)
 
     def kill(self) -> None:
-        """End it at once."""
+        """Kill the program."""
         self._process.send(signal.SIGKILL)
 
 

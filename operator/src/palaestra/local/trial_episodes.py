@@ -1,7 +1,8 @@
-"""`palaestra try --local`: a few episodes of a job's environment on this machine; nothing is learned.
+"""`palaestra try --local`: play a few episodes of a job's environment on this machine, without training.
 
-The job is planned and checked as by `palaestra run`, into a temporary folder, and the trainer's program
-`palaestra-try` plays there in the first collecting simulator, which it starts as `palaestra-eval` does.
+The job is planned and checked as by `palaestra run`, but into a temporary folder. There the trainer's program
+`palaestra-try` plays in the first collecting simulator. It starts this simulator in the same way as
+`palaestra-eval`.
 """
 
 from __future__ import annotations
@@ -21,12 +22,13 @@ from palaestra.plan import Images, LocalLayout, identified, plan
 from palaestra_protocol.pod.enums import Role
 
 PROGRAM = "palaestra-try"
-_OF_A_RUNNING_MASTER = ("ROS_MASTER_URI", "ROS_HOSTNAME")  # the program starts a master if none responds
+# Without these variables, the program starts its own ROS master.
+_OF_A_RUNNING_MASTER = ("ROS_MASTER_URI", "ROS_HOSTNAME")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TryOptions:
-    """The options of the command line; `version` is that of this release."""
+    """The options of the command line; `version` is the version of this release."""
 
     agent: str
     episodes: int
@@ -38,9 +40,9 @@ def try_here(job: TrainingJob, options: TryOptions) -> int:
     """Play the episodes and return the exit code of the program that plays.
 
     Raises:
-        LocalError: it cannot be played here; the message has one line for each reason.
-        PlanError: it cannot be run on one machine.
-        WorldError: one of its worlds is wrong.
+        LocalError: the job cannot be played here; the message has one line for each reason.
+        PlanError: the job cannot be run on one machine.
+        WorldError: a world of the job is invalid.
     """
     _refuse_own_program(job)
     with tempfile.TemporaryDirectory(prefix="palaestra-try-") as folder:
@@ -54,7 +56,7 @@ def try_here(job: TrainingJob, options: TryOptions) -> int:
 
 
 def _prepare(job: TrainingJob, directory: Path, options: TryOptions) -> dict[str, str]:
-    """Write the files of the first replica as a run would; return the variables of its trainer."""
+    """Write the files of the first replica, as for a run; return the environment variables of its trainer."""
     layout = LocalLayout(images=Images.of_release(options.version), job_directory=str(directory))
     planned = plan(job, layout, replicas=[0]).replicas[0]
     template = planned.job["spec"]["template"]

@@ -1,6 +1,6 @@
-"""Check a world with the simulators of this machine: each runs with `--check`.
+"""Check a world with the simulators of this machine, each of which is run with `--check`.
 
-The operator's package does not know simulators, so the result comes from the simulator itself.
+This package does not import simulators, so the simulator's own program makes the check.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _TIMED_OUT: Final = 124
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WorldCheckResult:
-    """The result of one simulator.
+    """The result of one simulator's check.
 
     Attributes:
         driver: the driver, as in a TrainingJob.
@@ -39,9 +39,10 @@ class WorldCheckResult:
 
 
 def check_world(world: Path, options: Sequence[str] = ()) -> tuple[WorldCheckResult, ...]:
-    """Return the result of each simulator that can check a world; one that does not respond cannot start it.
+    """Return the result of each simulator; a simulator that does not respond counts as not starting.
 
-    The stub always runs, others run if they are installed; each gets the options of its start.
+    The stub is always run, and MuJoCo if it is installed. Each program gets the options with which it would
+    start.
     """
     asked = [driver for driver in _CHECKERS if driver is Driver.STUB or lack(PROGRAMS[driver]) is None]
     return tuple(asyncio.run(_ask(driver, world, options)) for driver in asked)

@@ -1,7 +1,7 @@
-"""The observation of a TrainingJob in a cluster: raw JSON in, checked values out.
+"""Convert the raw JSON of a TrainingJob's objects into checked values, the observation.
 
-Pure and total: for any response of an API server or a pod it returns an `Observed` and raises no exception.
-An unreadable value counts as absent.
+`observe` is pure and total: it returns an `Observed` for any response of an API server or a pod, and raises
+no exception. An unreadable value counts as absent.
 
     observed = observe(job, Objects(jobs=..., pods=..., ...))
     if not complete(job, observed):  # of palaestra.decide

@@ -1,7 +1,7 @@
-"""Trim an object for a cache to the fields that observation reads.
+"""Trim an object for a cache to the fields that `observe` reads.
 
-Most of an object is its pod template and its managedFields, but two hundred jobs with their pods must fit
-into little memory. The observation of trimmed objects equals that of whole objects.
+The pod template and the managedFields are most of an object's size, but two hundred jobs with their pods must
+fit into little memory. The observation of trimmed objects equals the observation of whole objects.
 """
 
 import json
@@ -25,14 +25,15 @@ _POD_STATUS = (
 )  # fmt: skip
 _ANNOTATIONS = (STOPPED, REPLACED, SUSPENDED, SUSPEND_SET, RESTART_LOST_RUNS)
 
-SIZE = "palaestra.dev/size"  # annotation of a cached TrainingJob: bytes of the whole job without status
-SMALL = 65_536  # bytes; a cached TrainingJob up to this size has no such annotation
+# Annotation of a cached TrainingJob: the size of the whole job without its status, in bytes.
+SIZE = "palaestra.dev/size"
+SMALL = 65_536  # bytes; a cached TrainingJob of at most this size does not get the annotation
 
 
 def trimmed(raw: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the fields of an object that are needed except for a plan.
+    """Return a copy of an object with all fields that the operator needs, except fields for a plan only.
 
-    Objects of unknown kinds are returned whole, without managedFields.
+    An object of an unknown kind keeps all fields except managedFields.
     """
     kind = raw.get("kind")
     kept = {name: raw[name] for name in ("apiVersion", "kind") if name in raw}
@@ -49,12 +50,12 @@ def trimmed(raw: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def whole(raw: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a whole object, but without managedFields."""
+    """Return an object with all fields except managedFields."""
     return {**raw, "metadata": _metadata(raw)}
 
 
 def _measured(job: Mapping[str, Any], kept: dict[str, Any]) -> dict[str, Any]:
-    """Return the trimmed job; a large job gets an annotation with its size, including all annotations."""
+    """Return the trimmed job; a large job gets an annotation with the size of the untrimmed job."""
     metadata = job.get("metadata")
     given = {**metadata, "managedFields": None} if isinstance(metadata, Mapping) else None
     size = len(json.dumps({**job, "metadata": given, "status": None}))

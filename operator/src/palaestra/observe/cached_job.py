@@ -1,8 +1,8 @@
-"""A TrainingJob in a cache: a small copy, for any content of its fields.
+"""The copy of a TrainingJob in a cache, which is small whatever the content of the job's fields.
 
-Only the plan needs the removed parts, and it reads the object from the API server. An annotation on the copy
-names the removed parts, so that the copy is never planned. The copy does not have the object's own
-annotations, so users cannot set this one.
+Only the plan needs the removed fields, so for a plan the operator reads the object from the API server. An
+annotation on the copy names the removed fields, so that the copy itself is never planned. Users cannot set
+this annotation, because the object's other annotations are not copied.
 """
 
 import hashlib
@@ -13,11 +13,11 @@ from typing import Any
 
 from palaestra.observe.json_access import part, parts
 
-LACKS = "palaestra.dev/lacks"  # annotation of a cached copy
-LONGEST_TEXT = 256  # most characters of an inline world that is kept unchanged
-MOST_CHARACTERS = 32_768  # a cached copy without its status may have so many; a usual job has 4,000
+LACKS = "palaestra.dev/lacks"  # annotation of a cached copy: the value of `Lacking`
+LONGEST_TEXT = 256  # characters; a longer inline world is replaced by its digest
+MOST_CHARACTERS = 32_768  # limit of a cached copy without its status; a usual job has 4,000 characters
 
-# Fields that may be large: lists and maps of texts. No decision needs them once the objects exist.
+# These fields may be large: lists and maps of texts. After the objects exist, no decision needs these fields.
 _LARGE_OF_SPEC = frozenset({"imagePullSecrets", "rosMaster"})
 _LARGE_OF_TRAINER = frozenset({"algorithm", "command", "env", "environment", "resources"})
 _LARGE_OF_GROUP = frozenset({"command", "driver", "env", "image", "options", "resources", "world"})
@@ -26,19 +26,19 @@ _LARGE_OF_METADATA = frozenset({"labels", "ownerReferences"})
 
 
 class Lacking(StrEnum):
-    """The parts that are missing in a cached copy."""
+    """The fields that a cached copy lacks."""
 
     TEXTS = "texts"
-    """The inline worlds, replaced by digests."""
+    """The texts of the inline worlds, which digests replace."""
 
     FIELDS = "fields"
-    """Every field that may be large, including references to other objects."""
+    """All fields that may be large, including references to other objects."""
 
 
 def shortened(job: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a TrainingJob with digests of its worlds, and, if it is still large, without its large fields.
+    """Return a TrainingJob with digests of its worlds; if it is still large, remove its large fields too.
 
-    The result is a TrainingJob too, and valid if the whole one is.
+    The result is a valid TrainingJob if the whole TrainingJob is valid.
     """
     kept = {**job, "spec": _with_digests(part(job, "spec"))}
     lacking = None if kept["spec"] == job.get("spec") else Lacking.TEXTS
@@ -50,7 +50,7 @@ def shortened(job: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def lacking(job: Mapping[str, Any]) -> Lacking | None:
-    """Return the missing parts of a cached copy; None if it is whole."""
+    """Return the value of `Lacking` for a cached copy; None if the copy is whole."""
     mark = part(job, "metadata", "annotations").get(LACKS)
     return Lacking(mark) if mark in tuple(Lacking) else None
 

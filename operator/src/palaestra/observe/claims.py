@@ -1,4 +1,4 @@
-"""Claims that were never bound to a volume, so that their deletion loses no data."""
+"""Find claims that were never bound to a volume; the deletion of such a claim loses no data."""
 
 from palaestra.observe.json_access import part, text
 from palaestra.observe.models import Raw
@@ -8,9 +8,9 @@ FIELDS = ("volumeName", "dataSource", "dataSourceRef")  # the fields of a claim'
 
 
 def is_unused(raw: Raw) -> bool:
-    """Return whether a claim that the operator created was never bound, and is not being deleted.
+    """Return whether the operator created a claim that was never bound and that nobody has deleted.
 
-    A claim with a data source is being restored, and its volume may not exist yet.
+    A claim with a data source is not unused: it is being restored, and its volume may not exist yet.
     """
     metadata = part(raw, "metadata")
     ours = part(metadata, "labels").get(MANAGED) == "palaestra" and "deletionTimestamp" not in metadata

@@ -10,13 +10,14 @@ MOST_NAME = 128  # the API server's limit for a field manager's name
 # The fields of a Job's spec, besides `suspend`, that other clients can change.
 SETTINGS = ("parallelism", "backoffLimit", "activeDeadlineSeconds", "ttlSecondsAfterFinished")
 STOPPED = "palaestra.dev/stopped"  # annotation of a Job: "<reason>: <message>"
-SUSPENDED = "palaestra.dev/suspended"  # annotation of a Job: "<uid of the pod> lived", or "<uid> ended"
+# Annotation of a Job: "<uid of the pod> lived" or "<uid of the pod> ended".
+SUSPENDED = "palaestra.dev/suspended"
 REPLACED = "palaestra.dev/replaced"  # annotation of a Job: "<times> <uid of the pod> <reason>: <message>"
 _REPLACED = re.compile(r"(\d{1,9}) (\S{1,253}) (\w{1,60}): (.{0,1024})")
 _SUSPENDED = re.compile(r"(\S{1,253}) (lived|ended)")
 
-# Kubernetes sets the last two before the last pod has ended. They are needed, because a pod on a lost node
-# never ends.
+# Kubernetes sets the last two conditions before the last pod has ended. The operator needs them because a pod
+# on a lost node never ends.
 _ENDS = (
     ("Complete", JobEnd.COMPLETE),
     ("Failed", JobEnd.FAILED),
@@ -66,13 +67,13 @@ def _suspend_set(annotations: dict[str, object]) -> bool | None:
 
 
 def _suspension(annotations: dict[str, object]) -> Suspended | None:
-    """Return the mark of the pod that a suspension ended; None without a valid mark."""
+    """Return the mark about the pod of the last suspension; None without a valid mark."""
     mark = _SUSPENDED.fullmatch(text(annotations, SUSPENDED, 300))
     return None if mark is None else Suspended(pod=mark[1], lived=mark[2] == "lived")
 
 
 def _replaced(annotations: dict[str, object]) -> Replaced | None:
-    """Return the mark of the replaced pods; None without a valid mark."""
+    """Return the mark about the replaced pods; None without a valid mark."""
     mark = _REPLACED.fullmatch(text(annotations, REPLACED, 1400))
     if mark is None:
         return None
@@ -80,7 +81,7 @@ def _replaced(annotations: dict[str, object]) -> Replaced | None:
 
 
 def _failures(status: dict[str, object]) -> int:
-    """Return the number of failed pods: those that the Job controller has counted, and uncounted ones."""
+    """Return the number of failed pods, including those that the Job controller has not counted yet."""
     uncounted = part(status, "uncountedTerminatedPods").get("failed")
     return count(status, "failed") + (len(uncounted) if isinstance(uncounted, list) else 0)
 

@@ -1,4 +1,4 @@
-"""Read untrusted JSON: every value has the expected type and size, or counts as absent."""
+"""Read untrusted JSON: a value of a wrong type counts as absent, and a value that is too large is cut."""
 
 from collections.abc import Iterator
 from datetime import UTC, datetime
@@ -8,7 +8,7 @@ from palaestra.api.text import one_line
 
 MOST_TEXT = 600
 MOST_ITEMS = 128  # containers or conditions of a pod; a planned pod has at most 34 containers
-MOST_COUNT = 2_000_000_000  # the limit of the counts in a status
+MOST_COUNT = 2_000_000_000  # the maximum of a count in a status
 
 
 def part(raw: Any, *path: str) -> dict[str, Any]:
@@ -27,13 +27,13 @@ def parts(raw: Any, *path: str) -> Iterator[dict[str, Any]]:
 
 
 def text(raw: Any, name: str, most: int = MOST_TEXT) -> str:
-    """Return the text of a field on one line, cut to `most` characters; "" without text."""
+    """Return the text of a field on one line, cut to `most` characters; "" if the field has no text."""
     value = raw.get(name) if isinstance(raw, dict) else None
     return one_line(value, most) if isinstance(value, str) else ""
 
 
 def count(raw: Any, name: str) -> int:
-    """Return the whole number of a field, from 0 to 2·10⁹; 0 without a number."""
+    """Return the whole number in a field, limited to 0 to 2·10⁹; 0 if the field has no whole number."""
     value = raw.get(name) if isinstance(raw, dict) else None
     if not isinstance(value, int) or isinstance(value, bool):
         return 0
@@ -41,7 +41,7 @@ def count(raw: Any, name: str) -> int:
 
 
 def time(raw: Any, name: str) -> datetime | None:
-    """Return the time of a field in UTC; None without a valid time."""
+    """Return the time in a field in UTC; None if the field has no valid time."""
     value = raw.get(name) if isinstance(raw, dict) else None
     return as_time(value) if isinstance(value, str) else None
 

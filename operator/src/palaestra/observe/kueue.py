@@ -1,4 +1,4 @@
-"""Kueue's Workloads of a Job: the reason for which the Job is not admitted."""
+"""Find the reason for which Kueue does not admit a Job, in the Job's Workloads."""
 
 from collections.abc import Iterable, Iterator
 
@@ -9,13 +9,14 @@ NO_WORKLOAD = (
     "Kueue has created no Workload; check that Kueue runs and manages this namespace, "
     "and that the PriorityClass exists"
 )
-_READY = "Ready"  # the state of an admission check that lets a Workload pass
+_READY = "Ready"  # the state of an admission check that has passed
 
 
 def why_not_admitted(workloads: Iterable[Raw]) -> str:
     """Return Kueue's reason not to admit a Job, on one line, from the Workloads that Kueue created for it.
 
-    The reason is Kueue's own message, if any; "" if Kueue has admitted the Job, or reports no reason yet.
+    The reason is Kueue's own message where Kueue has one. The result is "" if Kueue has admitted the Job, or
+    reports no reason yet.
     """
     newest = max(workloads, key=lambda raw: text(part(raw, "metadata"), "creationTimestamp"), default=None)
     if newest is None:

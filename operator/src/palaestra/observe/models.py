@@ -1,7 +1,7 @@
 """The observation of a TrainingJob's objects, as values: the interface between `observe` and `decide`.
 
-All values were checked when they were read (`palaestra.observe.json_access`): sizes are limited, times are
-valid, and a pod's report is valid in the protocol or absent.
+`palaestra.observe.json_access` has checked all values: sizes are limited, times are valid, and a pod's report
+is absent unless it is valid in the protocol.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,7 +15,7 @@ from palaestra.plan.pod import GRACE_S
 from palaestra.plan.replica import ROS_MASTER, SIMULATOR_PREFIX, TRAINER
 from palaestra_protocol.pod.status import Termination, TrainerStatus
 
-SIDECARS = (SIMULATOR_PREFIX, ROS_MASTER)  # the names of a plan's sidecars begin with these
+SIDECARS = (SIMULATOR_PREFIX, ROS_MASTER)  # the names of the planned sidecars begin with these texts
 
 Raw = Mapping[str, Any]  # an object as untrusted JSON
 
@@ -32,7 +32,7 @@ class ReferenceKind(StrEnum):
 class ReferencedObject:
     """An object of the job's namespace to which its spec refers; `field` is the first such field.
 
-    Two are equal if they name the same object.
+    Two references are equal if they name the same object.
     """
 
     kind: ReferenceKind
@@ -42,7 +42,7 @@ class ReferencedObject:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Polled:
-    """A trainer's response, and its time on this process's monotonic clock."""
+    """A trainer's response, and the time of the response on this process's monotonic clock."""
 
     status: TrainerStatus
     at_s: float
@@ -50,20 +50,22 @@ class Polled:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Objects:
-    """All objects that were read for one TrainingJob, as raw JSON.
+    """All objects that the operator has read for one TrainingJob, as raw JSON.
 
     Attributes:
-        jobs, pods, claims, config_maps, policies: objects in its namespace with its label palaestra.dev/job;
-            `jobs` also has Jobs of other owners with a name that the TrainingJob needs.
+        jobs, pods, claims, config_maps, policies: objects in the TrainingJob's namespace whose label
+            palaestra.dev/job has its name; `jobs` also has Jobs of other owners with a name that the
+            TrainingJob needs.
         events: FailedCreate events about those Jobs, warnings about pods that wait for volumes, and events
             about trainers that the kubelet ended.
-        unadmitted: by a Job's uid, Kueue's reason not to admit it; absent if the reason was not requested.
-        unasked: uids of incomplete Jobs and pods about which the operator sends no request.
-        polled: the last responses of trainers by pod UID; a pod that was not reached is absent.
-        denied: by replica, the API server's message of the last refusal of one of its objects; None: an
-            object of the whole job. A replica without a refusal is absent.
-        switchers: by a Job's uid, the field manager that set its `spec.suspend`, if it differs from the
-            operator's value.
+        unadmitted: Kueue's reason not to admit a Job, by the Job's uid; absent if it was not requested.
+        unasked: uids of incomplete Jobs and pods about which the operator sends no request, because of their
+            number.
+        polled: the last responses of trainers by pod UID; absent if the last request to the pod failed.
+        denied: the API server's message of the last refused creation, by replica; None: an object of the
+            whole job. A replica without a refusal is absent.
+        switchers: the field manager that set `spec.suspend` of a Job, by the Job's uid; absent if the value
+            is the operator's.
     """
 
     jobs: Sequence[Raw] = ()
@@ -102,12 +104,12 @@ class ContainerView:
     """One container of a pod.
 
     Attributes:
-        running_since: None if it does not run now.
-        started: its startup probe has passed, or it has none and runs.
-        waiting, waiting_message: the kubelet's reason, and its message, if the container waits; else "".
-        exit: its end, if it has ended; for a restarted sidecar, its last end.
+        running_since: the start of the container's current run; None if the container does not run.
+        started: whether the startup probe has passed; without a probe, whether the container runs.
+        waiting, waiting_message: the kubelet's reason and message, if the container waits; else "".
+        exit: the end of the container, if it has ended; for a restarted sidecar, its last end.
         restarts: the number of restarts by the kubelet.
-        memory_limit: the limit in its spec; "" without a limit.
+        memory_limit: the memory limit in the container's spec; "" without a limit.
     """
 
     name: str
@@ -123,7 +125,7 @@ class ContainerView:
 
     @property
     def simulates(self) -> bool:
-        """Return whether it is the ROS master or a simulator's sidecar, by its name."""
+        """Return whether the container's name is that of the ROS master or of a simulator's sidecar."""
         return self.name.startswith(SIDECARS)
 
     @property
@@ -138,18 +140,19 @@ class PodView:
 
     Attributes:
         version: its resourceVersion.
-        started: the time at which a kubelet accepted it.
+        started: the time at which a kubelet accepted the pod; None if no kubelet has.
         phase: Pending, Running, Succeeded, Failed or Unknown.
         reason, message: the pod's own reason and message, for example after an eviction; usually "".
-        ready: whether the kubelet reports it as ready; False if that is unknown.
-        mounted: whether its volumes are mounted: it pulls images, or has pulled them.
-        unschedulable: the scheduler's message; "" if it was scheduled.
-        disruption: the cluster's reason to interrupt it (condition DisruptionTarget); "" if it did not.
-        gone_by: the end of its grace period after a deletion; None if it was not deleted. It is a time of the
-            API server, so it is not compared with the operator's clocks.
-        grace_s: seconds between its deletion and `gone_by`.
-        containers: in the order of their start.
-        claims: names of the PersistentVolumeClaims that it mounts.
+        ready: whether the kubelet reports the pod as ready; False if unknown.
+        mounted: whether the pod's volumes are mounted, so that the node pulls images or has pulled them.
+        unschedulable: the scheduler's message; "" if the pod was scheduled.
+        disruption: the cluster's reason to interrupt the pod (condition DisruptionTarget); "" without a
+            disruption.
+        gone_by: the end of the grace period after a deletion; None if nobody has deleted the pod. The time is
+            from the API server's clock, so it is not compared with the operator's clocks.
+        grace_s: seconds between the deletion and `gone_by`.
+        containers: the containers in the order of their start.
+        claims: names of the PersistentVolumeClaims that the pod mounts.
     """
 
     name: str
@@ -172,12 +175,12 @@ class PodView:
 
     @property
     def ended(self) -> bool:
-        """Return whether all its containers have ended for good."""
+        """Return whether all containers of the pod have ended for good."""
         return self.phase in {"Succeeded", "Failed"}
 
     @property
     def trainer(self) -> ContainerView | None:
-        """Return the trainer's container; None if the pod has none.
+        """Return the trainer's container; None if the pod does not have it.
 
         A service mesh or an agent may add containers to a pod, even before the trainer.
         """
@@ -214,9 +217,9 @@ class Replaced:
     """The mark on a Job whose pod the operator replaces.
 
     Attributes:
-        times: number of pods that were replaced this way, including this one.
-        pod: uid of the last one.
-        reason, message: why.
+        times: number of pods that the operator has replaced, including the last one.
+        pod: uid of the pod that was replaced last.
+        reason, message: the reason for the last replacement, and its message.
     """
 
     times: int
@@ -231,7 +234,7 @@ class Suspended:
 
     Attributes:
         pod: uid of the current attempt's pod at that time.
-        lived: whether the suspension ended it; False if it had ended or was being deleted before.
+        lived: whether the suspension ended the pod; False if the pod had ended or was being deleted before.
     """
 
     pod: str
@@ -244,21 +247,21 @@ class JobView:
 
     Attributes:
         version: its resourceVersion.
-        suspended: `spec.suspend`.
-        suspend_set: the `spec.suspend` that the operator set last, by its annotation; None: the Job has no
-            annotation, for example because the operator created it for a queue.
-        suspension: the operator's mark of the pod that its last suspension ended, or None.
-        paused: the time of its suspension by the Job controller's clock; None: it is not suspended.
-        resumed: the time of its last resumption by the Job controller's clock; None: it was never suspended
-            or still is.
+        suspended: the current value of `spec.suspend`.
+        suspend_set: the value of `spec.suspend` that the operator set last, from its annotation; None: the
+            Job has no annotation, for example because the operator created the Job for a queue.
+        suspension: the operator's mark about the pod that its last suspension ended, or None.
+        paused: the time of the suspension by the Job controller's clock; None: the Job is not suspended.
+        resumed: the time of the last resumption by the Job controller's clock; None: the Job was never
+            suspended, or still is.
         stopped: reason and message of the operator's stop mark, or None.
-        replaced: the operator's mark of the pods that it replaced, or None.
+        replaced: the operator's mark about the pods that it replaced, or None.
         failures: number of pods that failed and count against backoffLimit.
-        end, end_reason, end_message: from its conditions; None and "" until it ends.
-        settings: fields of its spec that other clients may change; a missing field is absent.
-        deleting: it is being deleted.
-        volumes: names of the ConfigMaps and claims that its pods mount.
-        queue: its Kueue queue, from the spec or a namespace's default, or "".
+        end, end_reason, end_message: the end in the Job's conditions; None and "" until the Job ends.
+        settings: fields of the Job's spec that other clients may change; a missing field is absent.
+        deleting: whether the Job is being deleted.
+        volumes: names of the ConfigMaps and claims that the Job's pods mount.
+        queue: the Job's Kueue queue, from the spec or a namespace's default, or "".
     """
 
     name: str
@@ -283,7 +286,7 @@ class JobView:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ForeignJob:
-    """A Job of another owner that has a name of the operator's Jobs; `deleting`: it is being deleted."""
+    """A Job of another owner whose name a TrainingJob needs; `deleting`: whether it is being deleted."""
 
     name: str
     deleting: bool
@@ -302,25 +305,25 @@ class ReplicaObserved:
     """The observation of one replica.
 
     Attributes:
-        pods: the pods of its Job, and the pod that the status names; oldest first.
-        in_the_way: names of all other unfinished pods with the replica's labels. Their reports are ignored,
-            but they may write to its volume.
+        pods: the pods of the replica's Job, and the pod that the status names; oldest first.
+        in_the_way: names of all other unfinished pods with the replica's labels. The operator ignores their
+            reports, but they may write to the replica's volume.
         former: unfinished pods of an earlier TrainingJob of the same name that mount the `existingClaim` of
             this replica.
         polled: the response of the newest pod's trainer; None: unknown.
         terminations: valid termination messages of trainers, by pod UID.
         refused: the last refusal of a pod, if it is newer than the newest pod.
         denied: the reason for which an object of the replica could not be created, or "".
-        unmounted: the cluster's message about the newest pod's volumes that are not mounted; "": they are
+        unmounted: the cluster's message about unmounted volumes of the newest pod; "": all volumes are
             mounted, or no event has a reason.
         probe: the failed probe, "liveness" or "startup", for which the kubelet ended the newest pod's
             trainer; "": no probe failed, or no event reports it.
-        unadmitted: Kueue's reason not to admit the Job; "": Kueue has admitted it, or reports no reason;
-            None: not requested yet.
-        unasked: whether its pod, the pod's volumes or Kueue's admission are missing, and the operator sends
-            no request about it.
-        switcher: the field manager that set the Job's `spec.suspend`, if it differs from the operator's
-            value; "": it does not differ, or the manager is unknown.
+        unadmitted: Kueue's reason not to admit the Job; "": Kueue has admitted the Job, or reports no reason;
+            None: the reason was not requested yet.
+        unasked: whether the pod, its volumes or Kueue's admission are missing, and the operator sends no
+            request about the cause.
+        switcher: the field manager that set the Job's `spec.suspend`; "": the value is the operator's, or the
+            manager is unknown.
     """
 
     index: int
@@ -341,7 +344,7 @@ class ReplicaObserved:
 
     @property
     def pod(self) -> PodView | None:
-        """Return the newest pod."""
+        """Return the newest pod, or None."""
         return self.pods[-1] if self.pods else None
 
     @property
@@ -354,19 +357,20 @@ class ReplicaObserved:
 class Observed:
     """The observation of a TrainingJob.
 
-    The operator adds `sources`, `kueue`, `verdicts` and `worlds_wait`, which it needs only while objects of
-    the job are missing.
+    The operator adds `sources`, `kueue`, `verdicts` and `worlds_wait`. The operator needs these values only
+    while objects of the job are missing.
 
     Attributes:
-        replicas: one for each replica of the spec, by index.
+        replicas: the observations of the spec's replicas, by index.
         present: kind and name of the existing ConfigMaps, claims and NetworkPolicies.
         edited: name and generation of each NetworkPolicy whose spec was changed since its creation.
-        sources: the objects of `references(job)`; None: the object does not exist. For a Secret the metadata
-            is enough.
+        sources: the objects of `references(job)`; None: the object does not exist. Of a Secret, only the
+            metadata is needed.
         kueue: whether the cluster has Kueue.
-        verdicts: the known results of the checks of the job's worlds; None: the plan checks them itself.
-        worlds_wait: whether the job's worlds wait for their check or are being checked; then its sources were
-            not requested.
+        verdicts: the known results of the checks of the job's worlds; None: the plan checks the worlds
+            itself.
+        worlds_wait: whether the job's worlds wait for a check or are under check; then the sources were not
+            requested.
     """
 
     replicas: tuple[ReplicaObserved, ...]

@@ -1,4 +1,4 @@
-"""Sort the objects of a job by replica, and convert them to values."""
+"""Sort the objects of a job by replica, and convert the objects to values."""
 
 import re
 from collections.abc import Collection, Iterable, Iterator
@@ -23,13 +23,14 @@ from palaestra.observe.pods import BEGINNING, pod_view
 from palaestra.plan.replica import REPLICA_LABEL, TRAINER, UID_LABEL
 from palaestra_protocol.pod.status import ProtocolError, Termination
 
-UNMOUNTED = frozenset({"FailedMount", "FailedAttachVolume"})  # a kubelet's events, and a controller's
-KILLING = "Killing"  # a kubelet's event with the reason for which it ends a container
+# Reasons of events from a kubelet, and from the attach-detach controller.
+UNMOUNTED = frozenset({"FailedMount", "FailedAttachVolume"})
+KILLING = "Killing"  # reason of a kubelet's event; its message explains why the kubelet ends a container
 _PROBE = re.compile(rf"Container {TRAINER} failed (liveness|startup) probe\b")
 
 
 def observe(job: TrainingJob, objects: Objects) -> Observed:
-    """Return the observation of the job from `objects`, whose content is untrusted."""
+    """Return the observation of the job from the untrusted `objects`."""
     return Observed(
         replicas=tuple(_replica(job, index, objects) for index in range(job.spec.replicas)),
         present=frozenset(
@@ -47,7 +48,7 @@ def observe(job: TrainingJob, objects: Objects) -> Observed:
 
 
 def _edited(job: TrainingJob, objects: Objects) -> Iterator[tuple[str, int]]:
-    """Yield name and generation of the job's changed network policies; the first generation is 1."""
+    """Yield name and generation of each network policy of the job that was changed: generation above 1."""
     for raw in objects.policies:
         metadata = part(raw, "metadata")
         generation = count(metadata, "generation")
@@ -87,10 +88,10 @@ def _obstacle(raw: Raw, name: str) -> ForeignJob:
 def _pods(
     job: TrainingJob, index: int, objects: Objects, ours: JobView | None
 ) -> tuple[tuple[PodView, ...], tuple[PodView, ...]]:
-    """Return the pods of a replica, oldest first, and other pods with its labels.
+    """Return the pods of a replica, oldest first, and all other pods with the replica's labels.
 
-    Every user who can create pods can give them the operator's labels, but only pods that its Job owns belong
-    to the replica. Of an earlier Job, only the pod that the status names is known.
+    A user who can create pods can give them the operator's labels. So a pod belongs to the replica only if
+    the replica's Job owns the pod, or if the status names it as a pod of an earlier Job.
     """
     known = {
         replica.pod.uid
@@ -113,8 +114,8 @@ def _pods(
 def _former(job: TrainingJob, index: int, objects: Objects) -> Iterator[PodView]:
     """Yield the pods of an earlier TrainingJob of this name that may still write to a replica's claim.
 
-    Claims that the operator created for the earlier job have that job's uid in their names, so only an
-    `existingClaim` is shared.
+    A claim that the operator created for the earlier job has that job's uid in its name. So the two jobs can
+    share only an `existingClaim`.
     """
     shared = job.spec.storage.existing_claim
     if shared is None:
@@ -128,7 +129,7 @@ def _former(job: TrainingJob, index: int, objects: Objects) -> Iterator[PodView]
 
 
 def _last_word(pod: PodView) -> Termination | None:
-    """Return the trainer's termination message; None if the pod wrote another text."""
+    """Return the trainer's termination message; None if the pod wrote no valid message."""
     trainer = pod.trainer
     if trainer is None or trainer.exit is None:
         return None
@@ -147,21 +148,21 @@ def _refused(job: JobView, newest: PodView | None, objects: Objects) -> CreateFa
 
 
 def _unmounted(newest: PodView, objects: Objects) -> str:
-    """Return the reason for a pod's missing volumes; "" if they are mounted, or no event has a reason."""
+    """Return the reason for a pod's missing volumes; "" if all are mounted, or no event has a reason."""
     waits = newest.phase == "Pending" and not newest.mounted
     last = _last_event(objects, newest.uid, UNMOUNTED) if waits else None
     return text(last, "message")
 
 
 def _probe(newest: PodView, objects: Objects) -> str:
-    """Return the probe for which the kubelet ended a pod's trainer; "" if no event reports one."""
+    """Return the failed probe for which the kubelet ended a pod's trainer; "" without such an event."""
     last = _last_event(objects, newest.uid, {KILLING})
     failed = _PROBE.match(text(last, "message")) if last is not None else None
     return failed[1] if failed is not None else ""
 
 
 def last_hindrance(events: Iterable[Raw], uid: str) -> dict[str, Any] | None:
-    """Return the last event that explains an incomplete object, with only the fields read here."""
+    """Return the last event that explains an incomplete object, with only the fields that `observe` reads."""
     found = (raw for raw in events if _is_read(raw))
     last = max(found, key=_when, default=None)
     if last is None:
@@ -172,9 +173,9 @@ def last_hindrance(events: Iterable[Raw], uid: str) -> dict[str, Any] | None:
 
 
 def _is_read(event: Raw) -> bool:
-    """Return whether an event is one of those that this module reads.
+    """Return whether this module reads an event of this reason and message.
 
-    A kubelet also writes events when it ends the other containers, after the trainer.
+    A kubelet also writes `Killing` events about the other containers, which it ends after the trainer.
     """
     reason = text(event, "reason")
     return reason in {"FailedCreate", *UNMOUNTED} or (

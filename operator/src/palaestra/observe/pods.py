@@ -1,4 +1,4 @@
-"""One pod, from the API server's JSON."""
+"""Convert the JSON of a pod into a `PodView`."""
 
 from datetime import UTC, datetime
 from typing import Any
@@ -9,10 +9,11 @@ from palaestra.plan.pod import GRACE_S
 from palaestra_protocol.pod.status import ExitCode
 
 MOST_MESSAGE = 4096  # Kubernetes' limit for a termination message
-BEGINNING = datetime(1970, 1, 1, tzinfo=UTC)  # the value for an unreadable time
+BEGINNING = datetime(1970, 1, 1, tzinfo=UTC)  # the replacement for an unreadable time
 UNSCHEDULABLE = frozenset({"Unschedulable", "SchedulerError"})
 GRACE = "deletionGracePeriodSeconds"
-BY_SIGNAL = frozenset({ExitCode.INTERRUPTED, 128 + 9, 128 + 15})  # exit codes of a trainer after a signal
+# Exit codes of a trainer that a signal ended.
+BY_SIGNAL = frozenset({ExitCode.INTERRUPTED, 128 + 9, 128 + 15})
 
 
 def pod_view(raw: Raw) -> PodView:
@@ -41,7 +42,7 @@ def pod_view(raw: Raw) -> PodView:
 
 
 def dropped(view: PodView) -> tuple[str, ...]:
-    """Return the containers that should be sidecars but are plain init containers."""
+    """Return the names of containers that are init containers but should be sidecars."""
     return tuple(
         container.name
         for container in view.containers
@@ -50,7 +51,7 @@ def dropped(view: PodView) -> tuple[str, ...]:
 
 
 def was_signalled(raw: Raw) -> bool:
-    """Return whether a signal ended the trainer of a pod, and the pod does not show the cause."""
+    """Return whether a signal ended the trainer of a pod, and the pod's status does not contain the cause."""
     view = pod_view(raw)
     ended = view.trainer.exit if view.phase == "Failed" and view.trainer is not None else None
     shown = view.disruption or view.reason or view.gone_by is not None

@@ -1,4 +1,4 @@
-"""The objects to which a job refers by name; each must be open to jobs before it is used."""
+"""The objects to which a job refers by name; a job may use only objects with the label for jobs."""
 
 from collections.abc import Iterator, Mapping
 
@@ -10,12 +10,12 @@ FOR_JOBS = "palaestra.dev/for-jobs"
 
 
 def references(job: TrainingJob) -> tuple[ReferencedObject, ...]:
-    """Return every object of the job's namespace that must be open to jobs for its spec, each once."""
+    """Return all objects to which the job's spec refers and that need the label for jobs, each once."""
     return tuple(dict.fromkeys((*_worlds(job), *_secrets(job), *_pull_secrets(job), *_claims(job))))
 
 
 def open_to_jobs(raw: object) -> bool:
-    """Return whether an object has the label that opens it to jobs."""
+    """Return whether an object has the label that allows jobs to use it."""
     metadata = raw.get("metadata") if isinstance(raw, Mapping) else None
     labels = metadata.get("labels") if isinstance(metadata, Mapping) else None
     return isinstance(labels, Mapping) and labels.get(FOR_JOBS) == "true"

@@ -1,14 +1,14 @@
-"""Bounded memory for facts that no watch reports, by TrainingJob.
+"""Bounded memory, by TrainingJob, for facts that no watch reports.
 
-One policy applies to all of them. Each reconcile replaces the values of the previous one, and the values of a
-deleted or recreated TrainingJob are dropped, so the memory holds only facts about existing objects. If it is
-full, it accepts no new value until another one is dropped. Eviction of the oldest would be worse: with
-thousands of jobs in turn, each would evict another one, and no value would stay.
+Each reconcile of a job replaces the values that the previous reconcile stored. The values of a deleted or
+recreated TrainingJob are dropped, so the memory holds only facts about existing objects. A full memory
+accepts a new value only after another value was dropped. The memory does not evict the oldest value.
+Otherwise, with thousands of jobs, each job would evict the values of another job, and no value would stay.
 
-A `RateLimitedLookup` also requests the facts, about incomplete objects: those that lack a pod, a volume, an
-admission or a cause. The first request about an object is sent after it was incomplete for some seconds, the
-next ones after growing pauses. All objects of one lookup share a few requests a second, so that thousands of
-them in a namespace do not delay others.
+A `RateLimitedLookup` also sends the requests for the facts. The facts are about incomplete objects, which
+lack a pod, a volume, an admission or a cause. The lookup sends the first request about an object some seconds
+after the object was found incomplete. The pauses between the later requests grow. All objects of one lookup
+share a few requests a second, so that thousands of objects in one namespace do not delay other namespaces.
 """
 
 import threading
@@ -19,11 +19,13 @@ from typing import Generic, TypeVar
 
 from palaestra.objects import Key
 
-REMEMBERED = 4000  # objects of all jobs together; each has one message
-PATIENCE_S = 5.0  # before the first request about an object
-RECHECK_S = 15.0  # between the first two requests about an object; each pause is twice the previous one
+REMEMBERED = 4000  # limit of objects of all jobs together; one message is stored for each object
+PATIENCE_S = 5.0  # from the time an object is found incomplete until the first request about it
+# The pause between the first two requests about an object; each later pause is twice the previous one.
+RECHECK_S = 15.0
 LONGEST_PAUSE_S = 300.0
-RATE = 4.0  # requests a second for all objects together; with one saved token, at most 5 in any second
+# Requests a second for all objects together. The bucket holds one token, so at most 5 go out in any second.
+RATE = 4.0
 
 Item = TypeVar("Item", bound=Hashable)
 Value = TypeVar("Value")
@@ -32,7 +34,7 @@ Ask = Callable[[str, Item], Fact | None]
 
 
 class BoundedCache(Generic[Item, Value]):
-    """Values by TrainingJob and item; safe for several threads, if each job is used by one at a time."""
+    """Values by TrainingJob and item; threads may share it if only one thread at a time uses a job."""
 
     def __init__(self) -> None:
         self._lock = threading.RLock()
@@ -49,9 +51,9 @@ class BoundedCache(Generic[Item, Value]):
             return {}
 
     def keep(self, key: Key, uid: str, values: Mapping[Item, Value]) -> Mapping[Item, Value]:
-        """Replace the values of a TrainingJob by `values`; return those for which there is room.
+        """Replace the values of a TrainingJob by `values`; return the values that fit into the memory.
 
-        An existing item keeps its place.
+        If not all values fit, items that were already stored come before new items.
         """
         with self._lock:
             before = self.known(key, uid)
@@ -64,7 +66,7 @@ class BoundedCache(Generic[Item, Value]):
             return kept
 
     def forget(self, key: Key) -> None:
-        """Forget a TrainingJob that is gone."""
+        """Drop the values of a deleted TrainingJob."""
         with self._lock:
             _, values = self._values.pop(key, ("", {}))
             self._size -= len(values)
@@ -75,9 +77,9 @@ class Answers(Generic[Item, Fact]):
     """The facts about incomplete objects.
 
     Attributes:
-        facts: the last fact about each; an object without a fact is absent.
-        unasked: objects for which the memory has no room; the operator sends no request about them.
-        again_s: seconds until the next reconcile must send a request; None: no object is incomplete.
+        facts: the last fact about each object; an object without a fact is absent.
+        unasked: objects that the full memory did not accept; the operator sends no request about them.
+        again_s: seconds until the next reconcile must send a request, or None if no object is incomplete.
     """
 
     facts: Mapping[Item, Fact]
@@ -87,7 +89,7 @@ class Answers(Generic[Item, Fact]):
 
 @dataclass(slots=True)
 class _Lack(Generic[Fact]):
-    """An incomplete object: the time of the next request, and the last fact."""
+    """An incomplete object: the time of the next request about it, and the last fact."""
 
     due: float
     pause_s: float = RECHECK_S
@@ -113,7 +115,7 @@ class RateLimitedLookup(BoundedCache[Item, _Lack[Fact]]):
         """Return the facts about `lacking`, the incomplete objects of a TrainingJob.
 
         Raises:
-            ApiError: a request failed; the next one follows after a pause.
+            ApiError: a request failed; `about` sends the next one after a pause.
         """
         known = self.known(key, uid)
         due = self._clock() + PATIENCE_S
@@ -143,7 +145,7 @@ class RateLimitedLookup(BoundedCache[Item, _Lack[Fact]]):
 
 
 class _Turns:
-    """Limits the rate: one token, and a queue of times for objects that must wait."""
+    """A rate limiter: a bucket of one token, and a queue of future times for objects that must wait."""
 
     def __init__(self, now: float) -> None:
         self._lock = threading.Lock()
@@ -151,7 +153,7 @@ class _Turns:
         self._end = now  # when the last turn in the queue ends
 
     def wait_s(self, now: float, *, queued: bool) -> float:
-        """Return the seconds until a turn; 0: the turn is now."""
+        """Return the seconds to wait before the request; 0: send it now."""
         with self._lock:
             self._tokens = min(self._tokens + (now - self._filled) * RATE, 1.0)
             self._filled = now

@@ -1,7 +1,7 @@
-"""The operator's caches, one for each kind of object, with trimmed objects.
+"""The operator's caches, one for each kind of object; they store trimmed copies of the objects.
 
-They hold TrainingJobs, and objects of other kinds only if they have the label palaestra.dev/job. So the
-operator's memory does not grow with other workloads of the cluster.
+They store all TrainingJobs; of the other kinds, they store only objects with the label palaestra.dev/job. So
+the operator's memory does not grow with the other workloads of the cluster.
 """
 
 import time
@@ -39,7 +39,7 @@ class Caches:
 
     Args:
         api: the cluster.
-        namespaces: the watched ones; empty: all of them.
+        namespaces: the namespaces to watch; empty: all namespaces.
         changed: called with the key of each TrainingJob that changed, or whose child changed.
     """
 
@@ -69,18 +69,18 @@ class Caches:
             reflector.start()
 
     def stop(self, deadline_s: float) -> None:
-        """Stop all watches; one that does not stop within `deadline_s` ends with the process."""
+        """Stop all watches; a watch that does not stop within `deadline_s` ends with the process."""
         for reflector in self._all():
             reflector.stop(0.0)
         self._jobs.stop(deadline_s)
 
     def wait_synced(self, deadline_s: float) -> bool:
-        """Wait at most `deadline_s`, and return whether all objects were read once."""
+        """Wait at most `deadline_s`, and return whether the first list of each kind was read."""
         ends = time.monotonic() + deadline_s
         return all(reflector.wait_synced(max(0.0, ends - time.monotonic())) for reflector in self._all())
 
     def missing(self) -> tuple[str, ...]:
-        """Return the plurals of the kinds that were not read yet."""
+        """Return the plural names of the kinds whose first list was not read yet."""
         return tuple(reflector.plural for reflector in self._all() if not reflector.synced)
 
     def known(self) -> Collection[Key]:
@@ -137,7 +137,7 @@ class Caches:
 
 
 def waits(job: Object) -> tuple[str, ...]:
-    """Return the reason of each replica that waits, or that runs without a step so far, for a metric."""
+    """Return the waiting reason of each replica that is pending, or that runs but has done no step yet."""
     return tuple(
         text(replica, "reason")
         for replica in parts(job, "status", "replicas")

@@ -1,8 +1,8 @@
 """The control loop: compare the cluster with the job, and change it one step toward the job.
 
-Level-triggered: a reconcile gets the key of a job, not the change. It reads everything from the cluster, so
-the operator can be killed between any two writes and restarted. `palaestra.decide`, which is pure, decides on
-actions and status; this module builds no objects.
+The loop is level-triggered: a reconcile gets the key of a job, not the change. A reconcile derives the job's
+state from the cluster alone, so the operator can be killed between any two writes and restarted. The pure
+package `palaestra.decide` chooses the actions and the status. This module builds no objects.
 """
 
 import threading
@@ -42,7 +42,7 @@ log = structlog.get_logger(__name__)
 class ReconcileRecords:
     """The record of each TrainingJob's last reconcile, in memory only; safe to use from several threads.
 
-    A TrainingJob that was deleted and created again is another job.
+    A TrainingJob that was deleted and created again has another uid, and so starts with an empty record.
     """
 
     def __init__(self) -> None:
@@ -56,23 +56,23 @@ class ReconcileRecords:
         return record if known_uid == uid else ReconcileRecord()
 
     def keep(self, key: Key, uid: str, record: ReconcileRecord) -> None:
-        """Keep the record of a reconcile."""
+        """Store the record of a reconcile."""
         with self._lock:
             self._known[key] = (uid, record)
 
     def forget(self, key: Key) -> None:
-        """Forget a job that is gone."""
+        """Drop the record of a job that no longer exists."""
         with self._lock:
             self._known.pop(key, None)
 
     def clear(self) -> None:
-        """Forget all records."""
+        """Drop all records."""
         with self._lock:
             self._known.clear()
 
 
 def now(record: ReconcileRecord) -> Times:
-    """Return the current time by both clocks; `record` is from the last reconcile."""
+    """Return the current time by both clocks; `record` is the record of the last reconcile."""
     return Times(now=datetime.now(UTC), clock_s=time.monotonic(), record=record)
 
 
@@ -85,7 +85,7 @@ class Controller:
         acting: executes actions.
         reporting: writes status and events.
         layout: the layout of this release in this cluster.
-        times: returns the clocks at a reconcile, given the record of the last one.
+        times: returns the clocks of a reconcile; its argument is the record of the last reconcile.
     """
 
     def __init__(
@@ -104,23 +104,25 @@ class Controller:
         self._layout = layout
         self._times = times
         self._records = ReconcileRecords()
-        self._terminating: set[Key] = set()  # jobs whose terminating namespace was logged
+        self._terminating: set[Key] = set()  # jobs for which the log has "namespace terminates"
 
     def begin_anew(self) -> None:
-        """Restart every wait, because another operator may have led in the meantime."""
+        """Drop all records, which restarts all waiting times: another operator may have led meanwhile."""
         self._records.clear()
 
     def reconcile(self, key: Key) -> float | None:
         """Reconcile one TrainingJob: observe, decide, act, report.
 
-        If the status has just accepted the job, it decides and acts once more, and so creates its objects.
+        If this reconcile's status accepts the job, a second decision follows at once and creates the job's
+        objects.
 
         Returns:
             The seconds after which the decision may change by time alone; None: never.
 
         Raises:
-            ApiError: a request failed, so retry later; completed actions stay. It is not raised for a
-                namespace that is being deleted, because each change in it triggers a reconcile anyway.
+            ApiError: a request failed, so retry later; completed actions stay. If the namespace is being
+                deleted, this error is not raised, because each change in the namespace triggers a reconcile
+                anyway.
             Outdated: the cache is behind.
             NotLeading: another operator may lead.
         """
@@ -147,7 +149,7 @@ class Controller:
             return None
 
     def _observe(self, raw: Object) -> tuple[TrainingJob, Seen]:
-        """Return a job and its observation; the whole job is read if it must be planned.
+        """Return a job and its observation; a job that must be planned is read whole from the API server.
 
         Raises:
             JobRefused: the operator cannot run the job as it is.
@@ -162,9 +164,10 @@ class Controller:
     def _carry_out(
         self, raw: Object, decision: Decision, times: Times, *, confirmed: bool = False
     ) -> StatusWrite:
-        """Act and report: execute the actions, then write the status and the events.
+        """Execute the actions, then write the status and the events.
 
-        `confirmed`: the status just written accepts the job, so its objects are created without a read.
+        `confirmed`: this reconcile's status accepts the job, so its objects are created without a confirming
+        read.
         """
         key = (raw["metadata"]["namespace"], raw["metadata"]["name"])
         self._records.keep(key, raw["metadata"]["uid"], decision.record)
@@ -181,7 +184,7 @@ class Controller:
             log.info("namespace terminates", job=key, error=str(error))
 
     def _forget(self, key: Key) -> None:
-        """Forget a job that is gone or that another controller manages."""
+        """Drop all memory of a job that no longer exists or that another controller manages."""
         self._looking.forget(key)
         self._reporting.forget(key)
         self._records.forget(key)
@@ -191,9 +194,9 @@ class Controller:
 def _just_accepted(before: Object, stored: Object) -> bool:
     """Return whether the written status accepts its job, so that all its objects can be created at once.
 
-    A job that was not accepted has never had a pod, so this needs no read to confirm it. With an
-    `existingClaim`, a pod of an earlier job may still write to the claim, so that job needs the reads of the
-    next reconcile.
+    A job that was not accepted has never had a pod, so its creations need no confirming read. A job with an
+    `existingClaim` is different: a pod of an earlier job may still write to the claim. The reads of the next
+    reconcile must exclude that, so the result is False.
     """
     accepted = part(stored, "status").get("release") and not part(before, "status").get("release")
     return bool(accepted) and part(stored, "spec", "storage").get("existingClaim") is None

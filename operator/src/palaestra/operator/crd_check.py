@@ -1,14 +1,15 @@
 """Compare the cluster's CustomResourceDefinition with the fields that this release writes.
 
-With `crds.install: false` an administrator applies the definition, and may forget an update. Then the API
-server drops new fields of a status without an error. No decision depends on them, but people miss them. The
-API server also refuses a status with a condition of a new type. So the operator leaves out such conditions
-until it has read that the definition allows them; existing ones of a status stay.
+With `crds.install: false` an administrator applies the definition, and may forget to update it. Then the API
+server drops new fields of a status without an error. The operator decides without these fields, but people
+see an incomplete status. The API server also refuses a status with a condition of a new type. So the operator
+leaves out such conditions until it has read that the definition allows them. Conditions that the stored
+status already has stay.
 
-Columns and selectable fields are not compared, because no written value is lost without them.
+Printer columns and selectable fields are not compared, because their absence loses no written value.
 
 The operator has no permission to read CustomResourceDefinitions, so it reads the OpenAPI document, which
-every account may read. If that fails, the operator still works.
+every account may read. If that read fails, the operator still works.
 """
 
 import threading
@@ -24,9 +25,10 @@ from palaestra.cluster import Api, ApiError
 from palaestra.observe.json_access import part, parts, text
 
 READ_S = 5.0
-FIRST_PAUSE_S = 10.0  # a definition is published some seconds after it is applied
+FIRST_PAUSE_S = 10.0  # the API server publishes a definition some seconds after it was applied
 MOST_SHOWN = 20
-_NEW = frozenset({ConditionType.RECONCILING.value, ConditionType.STALLED.value})  # a definition may lack them
+# An older definition does not allow these types.
+_NEW = frozenset({ConditionType.RECONCILING.value, ConditionType.STALLED.value})
 
 Schema = Mapping[str, Any]
 
@@ -34,14 +36,14 @@ log = structlog.get_logger(__name__)
 
 
 class CrdCheck:
-    """The CustomResourceDefinition in a cluster, compared with this release's.
+    """The CustomResourceDefinition in a cluster, compared with the definition of this release.
 
     Args:
         api: the cluster.
-        changed: called when the definition accepts more fields of a status than before.
+        changed: called when the cluster's definition starts to allow the new condition types.
 
     Attributes:
-        outdated: whether fields are missing in it; None: it could not be read yet.
+        outdated: whether the cluster's definition lacks fields; None: it was not read yet.
     """
 
     def __init__(self, api: Api, changed: Callable[[], None]) -> None:
@@ -52,7 +54,7 @@ class CrdCheck:
         self.outdated: bool | None = None
 
     def follow(self, stopping: threading.Event, every_s: float) -> None:
-        """Compare at once, then repeatedly in a thread of its own until no field is missing."""
+        """Compare at once; then compare repeatedly in a separate thread until no field is missing."""
         self._try_look()
         threading.Thread(
             target=self._follow, args=(stopping, every_s), name="definition", daemon=True
@@ -81,7 +83,8 @@ class CrdCheck:
     def accepted(self, stored: Any, status: dict[str, Any]) -> dict[str, Any]:
         """Return a status without the conditions whose types the definition does not allow.
 
-        Until the definition was read, only the types in the `stored` status are allowed.
+        Until the definition was read, a new type is allowed only if the `stored` status has a condition of
+        it.
         """
         if self._knows_new:
             return status
@@ -115,10 +118,10 @@ def _condition_types(served: Mapping[str, Any]) -> frozenset[str]:
 
 
 def lacks(served: Schema, ours: Schema, path: str = "") -> Iterator[str]:
-    """Yield "<path>: <fact>" for each field of `ours` that is missing or different in `served`.
+    """Yield "<path>: <difference>" for each field of `ours` that `served` lacks or defines differently.
 
-    Both are structural schemas. The fields below a missing field are not listed. Additional fields of
-    `served` belong to a newer release and are ignored.
+    `ours` and `served` are structural schemas. The fields below a missing field are not listed. Additional
+    fields of `served` belong to a newer release and are ignored.
     """
     kind, wanted = served.get("type"), ours.get("type")
     if kind != wanted:

@@ -1,7 +1,7 @@
 """Execute actions: create missing objects, stop, replace, suspend, resume, delete.
 
-An action can be repeated safely: names are deterministic, so the API server refuses a second object of the
-same name. If an action fails, the actions for other replicas are still executed.
+Each action can be repeated safely. The names of objects are deterministic, so a repeated creation fails with
+"already exists". If an action fails, the actions for other replicas are still executed.
 """
 
 from http import HTTPStatus
@@ -24,10 +24,10 @@ class Executor:
     """Executes actions.
 
     Args:
-        api: for reads that must not come from a cache.
-        writer: for writes.
-        strangers: remembers Jobs of other owners that have names of this operator's Jobs.
-        denials: remembers refused creations.
+        api: the cluster, for reads that must not come from a cache.
+        writer: writes to the cluster while this operator leads.
+        strangers: stores the Jobs of other owners whose names this operator's Jobs need.
+        denials: stores refused creations.
     """
 
     def __init__(
@@ -39,15 +39,17 @@ class Executor:
         self._denials = denials
 
     def carry_out(self, raw: Object, actions: tuple[Action, ...], *, confirmed: bool = False) -> Denied:
-        """Execute `actions` for a TrainingJob, in order, and return the refusals; empty if all succeeded.
+        """Execute `actions` for a TrainingJob, in order; return the errors by replica.
 
-        `confirmed`: they follow from the status just written, so they need no read to confirm them.
+        The result is empty if all actions succeeded.
 
-        After a refusal, no other action for that replica is executed. If the refusal is about the whole job,
-        no other object is created, because no pod may run without its network policy.
+        `confirmed`: the actions follow from the status just written, so no read must confirm them.
+
+        After an error, the later actions for the same replica are skipped. If the error is about the whole
+        job, all later creations are skipped, because no pod may run without its network policy.
 
         Raises:
-            Outdated: the cluster has changed since the decision; some of the actions may be done.
+            Outdated: the cluster has changed since the decision; some of the actions may have been executed.
             NotLeading: another operator may lead.
         """
         if not confirmed:
@@ -111,10 +113,10 @@ class Executor:
         log.info("applied", job=key, kind=kind, name=name)
 
     def _see_owner(self, key: Key, uid: str, obj: Object) -> None:
-        """Check that the TrainingJob owns an existing Job, which the cache has not received yet.
+        """Check that the TrainingJob owns an existing Job that is not in the cache yet.
 
         Raises:
-            AlreadyExists: another object owns it, or it no longer exists.
+            AlreadyExists: another object owns the Job, or the Job no longer exists.
         """
         name = obj["metadata"]["name"]
         found = self._strangers.meet(key, uid, name)
@@ -123,10 +125,10 @@ class Executor:
             raise AlreadyExists(HTTPStatus.CONFLICT, "AlreadyExists", words)
 
     def _see_config_map(self, namespace: str, obj: Object) -> None:
-        """Check that an existing ConfigMap is immutable, as planned, and owned by the TrainingJob.
+        """Check that an existing ConfigMap is immutable and has the planned data and owner.
 
         Raises:
-            AlreadyExists: one of these is false; otherwise pods would train with a wrong content.
+            AlreadyExists: one of these is false, so pods could train with wrong content.
         """
         name = obj["metadata"]["name"]
         found = self._api.get(CONFIG_MAPS, namespace, name)
@@ -136,16 +138,16 @@ class Executor:
             raise AlreadyExists(HTTPStatus.CONFLICT, "AlreadyExists", words)
 
     def _patch(self, key: Key, action: Stop | Replace | SetSuspend) -> None:
-        """Patch a Job, if its uid and version have not changed since the decision."""
+        """Patch a Job if its uid and resourceVersion have not changed since the decision."""
         metadata = {**action.patch.get("metadata", {}), "uid": action.basis.uid}
         patch = {**action.patch, "metadata": metadata}
         self._writer.merge(JOBS, key[0], action.job, patch, action.basis.version)
 
     def _replace(self, key: Key, action: Replace) -> None:
-        """Mark the Job, then evict the pod if it still runs.
+        """Annotate the Job with the replacement, then evict the pod if it still runs.
 
         Raises:
-            ApiError: the mark was not written, or a disruption budget does not allow an eviction now.
+            ApiError: the annotation was not written, or a disruption budget does not allow an eviction now.
         """
         if not action.marked:
             self._patch(key, action)
@@ -155,7 +157,7 @@ class Executor:
 
 
 def _wrong_with(found: Object, planned: Object) -> str:
-    """Return the difference between an existing ConfigMap and the planned one; "" if they agree."""
+    """Return the difference between an existing ConfigMap and the planned ConfigMap; "" if they agree."""
     if found.get("data") != planned["data"]:
         return "with other content"
     if not owners(found) & owners(planned):

@@ -1,6 +1,6 @@
-"""The order of the checks of worlds: one job of a namespace at a time, and the namespaces in turn.
+"""The order in which the worlds of jobs are checked: namespaces take turns, one job each.
 
-So a job waits only for other jobs of its namespace, not for those of other namespaces.
+Each namespace has at most one job under check, so many jobs in one namespace do not delay other namespaces.
 """
 
 import threading
@@ -13,7 +13,7 @@ from palaestra.plan import GivenWorld
 
 @dataclass(slots=True, kw_only=True)
 class Turn:
-    """The turn of a job; `worlds` is None until its reconcile hands them over, as they are not stored."""
+    """The turn of a job; `worlds` is None until the job's next reconcile passes them to `hand_over`."""
 
     key: Key
     worlds: Sequence[GivenWorld] | None = None
@@ -24,18 +24,19 @@ class FairQueue:
 
     def __init__(self) -> None:
         self._changed = threading.Condition()
-        self._lines: dict[str, dict[Key, None]] = {}  # by namespace; the namespace of the next turn is first
+        # Waiting jobs by namespace; the namespace of the next turn is first.
+        self._lines: dict[str, dict[Key, None]] = {}
         self._turns: dict[Key, Turn] = {}
         self._closed = False
 
     def waits(self, key: Key) -> bool:
-        """Return whether the worlds of a job wait or are being checked; False if they must be handed over."""
+        """Return whether a job is queued or under check; if False, its worlds must go to `hand_over`."""
         with self._changed:
             turn = self._turns.get(key)
             return turn.worlds is not None if turn is not None else key in self._lines.get(key[0], ())
 
     def hand_over(self, key: Key, worlds: Sequence[GivenWorld]) -> None:
-        """Pass the unchecked worlds of a job; the job is queued if it is not its turn."""
+        """Pass the unchecked worlds of a job; if the job has no turn now, queue it."""
         with self._changed:
             turn = self._turns.get(key)
             if turn is not None and turn.worlds is None:
@@ -47,7 +48,7 @@ class FairQueue:
             self._changed.notify_all()
 
     def next(self) -> Turn | None:
-        """Wait for the next turn, begin it and return it; None after `close`. Call `end` after the turn."""
+        """Wait for the next turn, begin it and return it; return None after `close`. Call `end` later."""
         with self._changed:
             while not self._closed:
                 busy = {key[0] for key in self._turns}
@@ -58,19 +59,19 @@ class FairQueue:
             return None
 
     def handed(self, turn: Turn, deadline_s: float) -> Sequence[GivenWorld]:
-        """Return the worlds of a turn; empty if they were not handed over in time."""
+        """Return the worlds of a turn; empty if `hand_over` did not pass them within `deadline_s`."""
         with self._changed:
             self._changed.wait_for(lambda: turn.worlds is not None or self._closed, deadline_s)
             return turn.worlds or ()
 
     def end(self, turn: Turn) -> None:
-        """End a turn, so that the next one of its namespace can begin."""
+        """End a turn, so that the next turn of the same namespace can begin."""
         with self._changed:
             self._turns.pop(turn.key, None)
             self._changed.notify_all()
 
     def close(self) -> None:
-        """Begin no more turns."""
+        """Close the queue: no further turn begins, and waiting calls return."""
         with self._changed:
             self._closed = True
             self._changed.notify_all()

@@ -1,7 +1,7 @@
-"""All writes to the cluster; each is refused while another operator leads.
+"""All writes to the cluster; while another operator leads, each write is refused.
 
-A write that was decided in an earlier tenure is refused too: while its thread was delayed between decision
-and write, another operator may have led.
+A write that was decided in an earlier term as leader is refused too. Its thread may have been delayed between
+decision and write, and another operator may have led in that time.
 """
 
 import threading
@@ -25,7 +25,7 @@ class FencedClient:
 
     Args:
         api: the cluster.
-        term: returns the number of the tenure in which this operator leads; None: it does not lead.
+        term: returns the number of this operator's current term as leader; None: it does not lead.
     """
 
     def __init__(self, api: Api, term: Callable[[], int | None]) -> None:
@@ -34,7 +34,7 @@ class FencedClient:
         self._look = threading.local()
 
     def begin(self) -> None:
-        """Begin a reconcile: this thread must base later writes on reads after this call."""
+        """Begin a reconcile: this thread may write only until the current term of the leader ends."""
         self._look.term = self._term()
 
     def create(self, obj: Object) -> Object:
@@ -43,27 +43,27 @@ class FencedClient:
         return self._api.create(resource_of(obj), obj)
 
     def apply(self, obj: Object) -> Object:
-        """Apply an object that only the operator writes, whether it exists or not."""
+        """Apply (create or update) an object that only the operator writes."""
         self._check()
         return self._api.apply(obj)
 
     def merge(self, resource: Resource, namespace: str, name: str, patch: Object, version: str) -> Object:
-        """Change the fields in `patch` of an object, if it still has this version."""
+        """Merge `patch` into an object, if the object still has this resourceVersion."""
         self._check()
         return self._api.merge(resource, namespace, name, patch, resource_version=version)
 
     def delete(self, resource: Resource, namespace: str, name: str, *, uid: str, version: str) -> None:
-        """Delete the object with this uid and version, but not a later object of its name."""
+        """Delete the object with this uid and resourceVersion, but not a later object of the same name."""
         self._check()
         self._api.delete(resource, namespace, name, uid=uid, resource_version=version)
 
     def evict(self, namespace: str, name: str, uid: str) -> None:
-        """Evict the pod with this uid, but not a later pod of its name."""
+        """Evict the pod with this uid, but not a later pod of the same name."""
         self._check()
         self._api.evict(namespace, name, uid=uid)
 
     def status(self, job: Object, patch: Object) -> Object:
-        """Change the status of a TrainingJob, if it still has the version of `job`; return it as stored."""
+        """Merge `patch` into the status if the job has not changed since `job`; return the stored job."""
         self._check()
         metadata = job["metadata"]
         return self._api.merge(

@@ -1,6 +1,7 @@
 """The operator's HTTP server: liveness, readiness and metrics.
 
-Every client that reaches the pod may send requests, so the server is read-only.
+The server has no authentication: any client that reaches the pod may send requests. So the server is
+read-only.
 """
 
 from collections.abc import Callable
@@ -19,8 +20,8 @@ def serving(address: Address, *, healthy: Trouble, ready: Trouble, metrics: Call
 
     Args:
         address: the address to listen on; port 0 selects a free port.
-        healthy: returns a problem that only a restart solves, or None.
-        ready: returns the text about missing lists, or None.
+        healthy: returns a sentence about a problem that only a restart solves, or None.
+        ready: returns a sentence about the lists that were not read yet, or None.
         metrics: returns the text of the metrics.
 
     Raises:

@@ -1,6 +1,7 @@
 """The objects of one kind, watched in some namespaces or in all of them.
 
-If the operator watches only some namespaces, each has its own reflector, because a list cannot span several.
+If the operator watches only some namespaces, each namespace has its own reflector, because one list request
+covers one namespace or all.
 """
 
 import time
@@ -12,15 +13,15 @@ from palaestra.objects import Key, Object
 
 
 class Informer:
-    """The objects of one kind; they may be slightly behind the cluster.
+    """The objects of one kind; the cached copies may be slightly behind the cluster.
 
     Args:
         api: the cluster.
         resource: the kind.
-        namespaces: the watched ones; empty: all of them.
+        namespaces: the namespaces to watch; empty: all namespaces.
         labels: a label selector.
-        keep: returns the part of an object to cache.
-        changed: called with the cached part of each object that changed.
+        keep: returns the reduced copy of an object that is cached.
+        changed: called with the reduced copy of each object that changed.
     """
 
     def __init__(
@@ -41,7 +42,7 @@ class Informer:
 
     @property
     def synced(self) -> bool:
-        """Return whether a whole list of each namespace was read, at least once."""
+        """Return whether each namespace was listed completely at least once."""
         return all(reflector.synced for reflector in self._reflectors)
 
     def start(self) -> None:
@@ -58,21 +59,21 @@ class Informer:
             reflector.stop(max(0.0, ends - time.monotonic()))
 
     def wait_synced(self, deadline_s: float) -> bool:
-        """Wait at most `deadline_s`, and return whether all objects were read once."""
+        """Wait at most `deadline_s`, and return whether each namespace was listed completely once."""
         ends = time.monotonic() + deadline_s
         return all(reflector.wait_synced(max(0.0, ends - time.monotonic())) for reflector in self._reflectors)
 
     def get(self, namespace: str, name: str) -> Object | None:
-        """Return an object; None if it does not exist."""
+        """Return the cached copy of an object; None if the object does not exist."""
         found = (reflector.store.get(namespace, name) for reflector in self._reflectors)
         return next((obj for obj in found if obj is not None), None)
 
     def holds(self, namespace: str, name: str) -> bool:
-        """Return whether an object exists, without decoding it."""
+        """Return whether an object exists, without decoding the cached copy."""
         return any(reflector.store.holds(namespace, name) for reflector in self._reflectors)
 
     def select(self, namespace: str | None, labels: Mapping[str, str]) -> list[Object]:
-        """Return the objects with these labels; namespace None: in all watched namespaces."""
+        """Return the objects with these labels in a namespace; None: in all watched namespaces."""
         return [obj for reflector in self._reflectors for obj in reflector.store.select(namespace, labels)]
 
     def keys(self) -> set[Key]:

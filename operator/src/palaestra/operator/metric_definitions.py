@@ -1,7 +1,7 @@
-"""Every metric of the operator, by name; `palaestra.operator.metrics` has their values.
+"""The definitions of the operator's metrics; `palaestra.operator.metrics` has their values.
 
-Labels are bounded: no label has the name of a job, because its series would outlive the job. The pods of a
-job export the metrics of its training.
+Labels have few values. No label contains the name of a job, because the series would outlive the job. The
+metrics of a training come from the pods of its job.
 """
 
 from palaestra.api.reason_texts import ROWS
@@ -10,10 +10,10 @@ from palaestra.api.status import Phase, Restarts
 from palaestra_protocol.metrics import Family, Label, counter, gauge, histogram
 
 SECONDS = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0)
-# The range is from a node that has all images to a queue that takes a night.
+# The shortest wait is on a node that has all images; the longest is in a queue overnight.
 WAITS = (1.0, 2.0, 5.0, 10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1800.0, 3600.0, 14_400.0)
 RESULTS = ("done", "conflict", "error")
-# A replica may end with these reasons: success, and every reason that is a warning.
+# The reasons with which a replica may end: success, and every reason that is a warning.
 ENDS = tuple(reason for reason in Reason if reason is Reason.SUCCEEDED or ROWS[reason].warning)
 
 VERB = Label(name="verb", values=("get", "list", "watch", "create", "patch", "apply", "delete"))

@@ -25,12 +25,12 @@ from palaestra_protocol.metrics import Family, Values
 
 Counted = TypeVar("Counted", Counter, Histogram)
 
-# Without this, each counter has a second, unused series.
+# By default, the client library exports a second series for each counter: its creation time.
 disable_created_metrics()
 
 
 class Metrics:
-    """The operator's metrics, in a registry of their own."""
+    """The operator's metrics, in a registry that holds no other metrics."""
 
     def __init__(self) -> None:
         self.registry = CollectorRegistry()
@@ -44,7 +44,7 @@ class Metrics:
         ProcessCollector(registry=self.registry)
 
     def request(self, verb: str, resource: str, code: int, seconds: float) -> None:
-        """Count a request; `code` is 0 without a response, `seconds` the time until the response's head."""
+        """Count a request; `code` is 0 without a response, `seconds` ends with the response's head."""
         self._requests.labels(verb, resource, str(code)).inc()
         if verb != "watch":
             self._request_seconds.labels(verb).observe(seconds)
@@ -54,9 +54,9 @@ class Metrics:
         self._queued.observe(seconds)
 
     def written(self, job: Object, status: Object) -> None:
-        """Count the changes between the old status of a TrainingJob and the written one.
+        """Count the changes between the old status of a TrainingJob and the written status.
 
-        The operator that writes a change counts it, so that no change is counted twice.
+        Only the operator that wrote the status counts its changes, so no change is counted twice.
         """
         old = job.get("status") or {}
         if status["phase"] == Phase.RUNNING and not _has_run(old):
@@ -75,7 +75,7 @@ class Metrics:
         waits: Callable[[], Iterable[tuple[str, str]]],
         outdated: Callable[[], bool | None],
     ) -> None:
-        """Export queue, leadership, phases, waiting replicas and the definition, read at each scrape."""
+        """Export the gauges that these functions return; each scrape calls them."""
         self.registry.register(_Now(depth, leads, phases, waits, outdated))
 
     def text(self) -> bytes:
@@ -119,7 +119,7 @@ class _Now(Collector):
         self._outdated = outdated
 
     def collect(self) -> Iterator[Metric]:
-        """Yield each family; only the leader exports the gauges of jobs, so that each job is counted once."""
+        """Yield each metric family; only the leader exports gauges of jobs, so each job counts once."""
         leads = self._leads()
         yield metric_definitions.JOBS.metric(_by_phase(self._phases()) if leads else {})
         yield metric_definitions.REPLICAS_WAITING.metric(dict(Count(self._waits())) if leads else {})
@@ -131,7 +131,7 @@ class _Now(Collector):
 
 
 def _from_zero(made: Counted, family: Family) -> Counted:
-    """Return a metric with all values of its labels set to 0, so that the first event is an increase."""
+    """Return a metric with one series of 0 for each label value, so the first event is an increase."""
     for values in family.combinations() if family.labels else ():
         made.labels(*values)
     return made
@@ -145,7 +145,7 @@ def _by_phase(jobs: Iterable[tuple[str, str]]) -> Values:
 
 
 def _has_run(status: Object) -> bool:
-    """Return whether a job was running before, by its phase and its replicas' attempts."""
+    """Return whether a job has already run, derived from its phase and its replicas' attempts."""
     begun = (replica.get("attempt", 0) > 1 or "target" in replica for replica in status.get("replicas", ()))
     return status.get("phase") == Phase.RUNNING or any(begun)
 

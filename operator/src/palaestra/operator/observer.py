@@ -1,10 +1,10 @@
-"""Observe one TrainingJob, from the caches and by requests.
+"""Observe one TrainingJob, from the caches and by requests to the API server.
 
-Some facts are needed too rarely for a watch. The operator requests them only while a job waits for them:
+Some facts are needed too rarely for a watch. The operator requests these facts only while a job needs them:
 
 - the objects to which the job refers by name, and whether the cluster has Kueue;
-- the reasons for which its pods cannot be created, or Kueue does not admit it;
-- a Job of another owner that has a name of the job's own Jobs.
+- the reasons for which the job's pods cannot be created or Kueue does not admit the job;
+- a Job of another owner whose name one of the TrainingJob's Jobs needs.
 """
 
 import time
@@ -49,7 +49,7 @@ from palaestra.plan import GivenWorld
 
 RECHECK_S = 10.0  # while an object may be missing
 KUEUE = "kueue.x-k8s.io"
-KUEUE_S = 10.0  # for which the result of a request about Kueue is reused
+KUEUE_S = 10.0  # seconds for which the answer whether the cluster has Kueue is reused
 
 _READ = {
     ReferenceKind.CONFIG_MAP: CONFIG_MAPS,
@@ -60,7 +60,7 @@ _READ = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Seen:
-    """The observation of a TrainingJob; `again_s`: seconds until unwatched facts must be read again."""
+    """The observation of a TrainingJob; `again_s`: seconds until unwatched facts must be requested again."""
 
     observed: Observed
     again_s: float | None
@@ -72,7 +72,7 @@ class JobObserver:
     Args:
         api: the cluster.
         caches: the watched objects.
-        strangers: Jobs of other owners that have names of this operator's Jobs.
+        strangers: Jobs of other owners whose names this operator's Jobs need.
         denials: refused creations.
         polled: returns the responses of the trainers, by the pod's uid.
         checking: checks the worlds of jobs.
@@ -102,7 +102,7 @@ class JobObserver:
         """Return the observation of a job.
 
         Raises:
-            ApiError: a request was necessary, and failed.
+            ApiError: a request to the API server failed.
         """
         key, uid = (job.metadata.namespace, job.metadata.name), job.metadata.uid or ""
         jobs, pods = self._caches.children(JOBS, key), self._caches.children(PODS, key)
@@ -131,7 +131,7 @@ class JobObserver:
         )
 
     def ask_for(self, job: TrainingJob, seen: Seen) -> Seen:
-        """Return the observation of a cached job, completed with all objects to which the whole job refers.
+        """Return the observation completed with all objects to which the whole job refers.
 
         Raises:
             ApiError: a request failed.
@@ -140,11 +140,11 @@ class JobObserver:
         return replace(seen, observed=observed, again_s=earliest(seen.again_s, asked_s))
 
     def whole(self, raw: Raw) -> Raw:
-        """Return the whole TrainingJob for a cached copy, from the API server.
+        """Return the whole TrainingJob of a trimmed, cached copy; it is read from the API server.
 
         Raises:
             ApiError: a request failed.
-            Outdated: it has changed since the copy was made.
+            Outdated: the TrainingJob has changed since the copy was made.
         """
         metadata = raw["metadata"]
         try:
@@ -156,13 +156,13 @@ class JobObserver:
         return found
 
     def forget(self, key: Key) -> None:
-        """Forget a TrainingJob that is gone."""
+        """Drop all facts about a deleted TrainingJob."""
         parts = (self._strangers, self._denials, self._hindrances, self._admissions, self._switchers)
         for part in (*parts, self._checking):
             part.forget(key)
 
     def with_verdicts(self, job: TrainingJob, seen: Seen, worlds: Sequence[GivenWorld]) -> Seen:
-        """Return the observation of a job completed with the known verdicts on its worlds."""
+        """Return the observation completed with the known results of the checks of the job's worlds."""
         key = (job.metadata.namespace, job.metadata.name)
         if seen.observed.worlds_wait:
             return seen
@@ -170,7 +170,7 @@ class JobObserver:
         return replace(seen, observed=replace(seen.observed, verdicts=verdicts))
 
     def _with_claims(self, job: TrainingJob, observed: Observed) -> tuple[Observed, float | None]:
-        """Return the observation with the claims of trained replicas that are not in the caches.
+        """Return the observation completed with the claims of trained replicas that are not in the caches.
 
         A claim that a person restored may lack the operator's labels.
         """
@@ -183,7 +183,7 @@ class JobObserver:
         return replace(observed, present=present), RECHECK_S if lacking else None
 
     def _asked(self, job: TrainingJob, observed: Observed) -> tuple[Observed, float | None]:
-        """Return the observation completed by requests, and the seconds until the next ones."""
+        """Return the observation completed by requests, and the seconds until the next requests."""
         if complete(job, observed) and not resuming(job, observed):
             return observed, None
         key = (job.metadata.namespace, job.metadata.name)
@@ -203,7 +203,8 @@ class JobObserver:
         except Forbidden:
             if source.kind is not ReferenceKind.SECRET:
                 raise
-            return {}  # no role for Secrets is bound here: treat it as a Secret without the label
+            # The operator may not read Secrets in this namespace: treat the Secret as one without the label.
+            return {}
 
     def _has_kueue(self) -> bool:
         at, found = self._kueue

@@ -1,9 +1,8 @@
-"""Choose the next trainer to poll, and its time; no clock, no sockets.
+"""Choose the next trainer to poll, and its time. This module uses no clock and no sockets.
 
 Each trainer has its own next time, so no trainer waits for the slowest one. The open requests share a limited
-number of slots (`PLACES`), and two rules keep a pod from taking the slots of other pods. Prompt trainers, new
-trainers and slow trainers have separate slots. Among the trainers that wait for a slot, the namespaces take
-turns.
+number of slots (`PLACES`). Two rules keep a pod from taking the slots of other pods. First, prompt, new and
+slow trainers have separate slots. Second, the namespaces of the trainers that wait for a slot take turns.
 """
 
 import heapq
@@ -14,13 +13,14 @@ from enum import Enum
 
 from palaestra.objects import Key
 
-FIRST_S = 1.0  # a new trainer is polled for the first time within this time
+FIRST_S = 1.0  # seconds within which a new trainer is polled for the first time
 
 
 class PollStatus(Enum):
     """The result of the last request to a trainer."""
 
-    PROMPT = "prompt"  # it ended soon, with any result: a refused connection does not delay others
+    # It ended soon, with or without a response: a refused connection does not delay other requests.
+    PROMPT = "prompt"
     NEW = "new"  # no request was sent yet
     SLOW = "slow"
 
@@ -44,7 +44,7 @@ class PollTarget:
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class PollState:
-    """The state of a target: time and result of its last request, whether a response was refused."""
+    """The state of a target: time and result of its last request, and whether a bad response was logged."""
 
     target: PollTarget
     standing: PollStatus = PollStatus.NEW
@@ -54,7 +54,7 @@ class PollState:
 
 @dataclass(slots=True)
 class _Turns:
-    """Entries that wait for a slot: the namespaces take turns, and in each the longest waiting is first."""
+    """Entries that wait for a slot: namespaces take turns; each namespace is first in, first out."""
 
     waiting: OrderedDict[str, deque[PollState]] = field(default_factory=OrderedDict)
 
@@ -67,7 +67,7 @@ class _Turns:
         namespace, entries = self.waiting.popitem(last=False)
         entry = entries.popleft()
         if entries:
-            self.waiting[namespace] = entries  # after all others
+            self.waiting[namespace] = entries  # behind all other namespaces
         return entry
 
 
@@ -91,7 +91,7 @@ class PollSchedule:
         self._free = dict(PLACES)
 
     def follow(self, targets: Collection[PollTarget], now_s: float) -> list[PollTarget]:
-        """Replace the targets to poll; return the dropped ones."""
+        """Replace the targets to poll; return the targets that are no longer polled."""
         wanted = {target.uid: target for target in targets}
         gone = [entry.target for uid, entry in self._entries.items() if wanted.get(uid) != entry.target]
         for target in gone:
@@ -103,7 +103,7 @@ class PollSchedule:
         return gone
 
     def due(self, now_s: float) -> Iterator[PollState]:
-        """Yield the targets to poll now; each occupies a slot until `done`."""
+        """Yield the targets to poll now; each occupies a slot until `done` is called with it."""
         while self._times and self._times[0][0] <= now_s:
             entry = heapq.heappop(self._times)[-1]
             if self.follows(entry):
@@ -122,7 +122,7 @@ class PollSchedule:
             return False
         first = entry.standing is PollStatus.NEW
         entry.standing = PollStatus.PROMPT if now_s - entry.asked_s < self._prompt_s else PollStatus.SLOW
-        # The first wait varies more, which separates targets that were found together.
+        # The first wait varies more, which spreads targets that were found at the same time.
         least = 0.2 if first else 0.8
         self._at(entry, now_s + self._period_s * (least + (1.0 - least) * self._spread()))
         return True
@@ -132,7 +132,7 @@ class PollSchedule:
         return self._entries.get(entry.target.uid) is entry
 
     def next_s(self) -> float | None:
-        """Return the time at which the next target is due, or None. A slot may become free earlier."""
+        """Return the time at which the next target is due, or None; an earlier free slot is not included."""
         return self._times[0][0] if self._times else None
 
     def _at(self, entry: PollState, due_s: float) -> None:

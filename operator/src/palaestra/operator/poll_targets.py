@@ -1,7 +1,7 @@
-"""The trainers to poll, updated by each event, so that callers need not read all pods.
+"""The trainers to poll; each watch event updates them, so callers need not read all pods.
 
-Labels alone do not make a pod a trainer: its Job must be known, and the same TrainingJob must own the Job.
-Only the address and the owners of a pod are stored.
+Labels alone do not make a pod a trainer. A known Job must own the pod, and the TrainingJob in the label must
+own this Job. Of a pod, only its address and its owners are stored.
 """
 
 import ipaddress
@@ -22,7 +22,7 @@ class _Job:
 
 
 class PollTargets:
-    """The running trainers, from the events of the caches; safe to read from any thread."""
+    """The running trainers, updated by the caches; any thread may read them."""
 
     def __init__(self) -> None:
         self._training_jobs: dict[Key, str] = {}
@@ -30,7 +30,7 @@ class PollTargets:
         self._pods: dict[Key, tuple[PollTarget, frozenset[str]]] = {}
 
     def training_job(self, obj: Object, *, exists: bool) -> None:
-        """Record the newest state of a TrainingJob, or the last one of a deleted TrainingJob."""
+        """Record the newest state of a TrainingJob; if it was deleted (`exists` is False), remove it."""
         name = _name(obj)
         if exists:
             self._training_jobs[name] = text(part(obj, "metadata"), "uid")
@@ -38,7 +38,7 @@ class PollTargets:
             self._training_jobs.pop(name, None)
 
     def job(self, obj: Object, *, exists: bool) -> None:
-        """Record the newest state of a batch/v1 Job, or the last one of a deleted Job."""
+        """Record the newest state of a batch/v1 Job; if it was deleted (`exists` is False), remove it."""
         name, uid = _name(obj), text(part(obj, "metadata"), "uid")
         if exists:
             self._jobs[name] = _Job(key=_key(obj), uid=uid, owners=owners(obj))
@@ -46,7 +46,7 @@ class PollTargets:
             self._jobs.pop(name, None)
 
     def pod(self, obj: Object, *, exists: bool) -> None:
-        """Record the newest state of a pod, or the last one of a deleted pod."""
+        """Record the newest state of a pod; if it was deleted (`exists` is False), remove it."""
         name, host = _name(obj), _address(obj)
         if exists and host is not None and _trains(obj):
             uid = text(part(obj, "metadata"), "uid")

@@ -1,8 +1,8 @@
 """Poll the status of running trainers over the pod network; the responses are untrusted.
 
-A pod runs programs that its author chose. So a whole response has a deadline and a maximum size, and is
-parsed strictly. A missing or wrong response means "unknown", never "stalled". Each response is used as soon
-as it arrives; `poll_schedule` chooses the next trainer. The results are in memory only, so a restarted
+A pod runs programs of the job's author. So each response has a deadline and a maximum size, and is parsed
+strictly. A missing or malformed response means "unknown", never "stalled". The operator uses each response as
+soon as it arrives; `poll_schedule` chooses the next trainer. The results are in memory only, so a restarted
 operator polls all trainers again.
 """
 
@@ -23,9 +23,10 @@ from palaestra_protocol.pod.status import ProtocolError, TrainerStatus, decoded
 
 PERIOD_S = 10.0
 DEADLINE_S = 3.0  # for one whole response
-PROMPT_SHARE = 1 / 3  # a prompt response takes less than this share of the deadline; most take milliseconds
+# A prompt response takes less than this share of the deadline; most responses take milliseconds.
+PROMPT_SHARE = 1 / 3
 FOLLOW_S = 1.0  # between updates of the list of trainers
-MOST_BYTES = 65_536  # for one response, with room for the longest faults of 32 simulators
+MOST_BYTES = 65_536  # for one response: enough for the longest faults of 32 simulators
 MOST_HEAD_BYTES = 8192
 REQUEST = "GET /status HTTP/1.0\r\nHost: {host}\r\nAccept: application/json\r\n\r\n"
 
@@ -39,7 +40,8 @@ class Poller:
         targets: returns the running trainers.
         changed: called with the key of a job whose trainer's response has changed.
         period_s: seconds between two requests to a trainer.
-        deadline_s: seconds that one whole response may take; for the first request a third of it.
+        deadline_s: seconds that one whole response may take; the first response of a pod may take a third of
+            it.
     """
 
     def __init__(
@@ -117,7 +119,7 @@ class Poller:
         except (OSError, TimeoutError, asyncio.IncompleteReadError, asyncio.LimitOverrunError) as error:
             log.debug("unreachable", job=target.key, pod=target.uid, error=type(error).__name__)
         except ProtocolError as error:
-            if not entry.refused:  # once for each pod, so that bad responses do not fill the log
+            if not entry.refused:  # log it once for each pod, so that bad responses do not fill the log
                 log.warning("answer refused", job=target.key, pod=target.uid, error=str(error))
             entry.refused = True
         except Exception:  # the response of one pod must not end the polling of all others
@@ -144,7 +146,7 @@ async def _get_status(target: PollTarget) -> bytes:
             raise ProtocolError("head: the response is not HTTP 200")
         return await _read_all(reader)
     finally:
-        writer.transport.abort()  # no need to wait until the pod closes
+        writer.transport.abort()  # do not wait until the pod closes the connection
 
 
 async def _read_all(reader: asyncio.StreamReader) -> bytes:

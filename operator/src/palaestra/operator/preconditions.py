@@ -1,7 +1,8 @@
-"""Confirm by reads that the cluster has not changed since the decision, because a cache may be behind.
+"""Check by reads that the cluster has not changed since the decision, because a cache may be behind.
 
-If it has changed, the actions are not executed, and the next reconcile decides again. After a change between
-the read and the write, the write fails on its precondition: the uid and the resourceVersion of the object.
+If the cluster has changed, the actions are not executed, and the next reconcile decides again. The cluster
+may also change between the read and the write. Then the write fails, because it carries the uid and the
+resourceVersion of the object as preconditions.
 """
 
 from collections.abc import Mapping, Sequence
@@ -17,14 +18,14 @@ from palaestra.plan.replica import JOB_LABEL, REPLICA_LABEL, UID_LABEL
 
 
 class Outdated(PalaestraError):
-    """The cluster has changed since the decision, so the action was not done; reconcile again."""
+    """The cluster has changed since the decision, so the action was not executed; reconcile again."""
 
 
 def confirm(api: Api, raw: Object, actions: Sequence[Action]) -> None:
     """Check that the TrainingJob is unchanged; before a Job is created or stopped, check its pods too.
 
-    So an ended replica is never trained again, and no replica has two pods. If a replica has started since
-    the decision, it is not stopped and its pod is not replaced, because the cause has passed.
+    These checks prevent a second training of an ended replica, and a second pod for a replica. If a replica
+    has started since the decision, its pod is neither stopped nor replaced: the cause has passed.
 
     Raises:
         Outdated: the TrainingJob or a pod has changed.
@@ -53,9 +54,9 @@ def confirm(api: Api, raw: Object, actions: Sequence[Action]) -> None:
 
 
 def _occupies(pod: Object, jobs: Mapping[str, Object]) -> bool:
-    """Return whether a pod may still write to the volume of one of `jobs`, which has the Jobs by replica.
+    """Return whether a pod may still write to the volume of one of `jobs` (the Jobs by replica).
 
-    A pod of an earlier TrainingJob of the same name can do so only if both mount the same claim.
+    A pod of an earlier TrainingJob of the same name can write to it only if pod and Job mount the same claim.
     """
     labels = pod["metadata"]["labels"]
     job = jobs.get(labels.get(REPLICA_LABEL))
@@ -68,8 +69,8 @@ def _occupies(pod: Object, jobs: Mapping[str, Object]) -> bool:
 def _is_news(pod: Object, stop: Stop | Replace, raw: Object) -> bool:
     """Return whether a pod is new or has changed, and belongs to the replica to be stopped.
 
-    A pod whose labels were edited no longer belongs to the replica, as in `observe`. Otherwise it would
-    prevent the stop of the replica forever.
+    As in `observe`, a pod with edited labels no longer belongs to the replica. If it did, it would prevent
+    the stop of the replica forever.
     """
     uid, known, labels = pod["metadata"]["uid"], dict(stop.basis.pods), pod["metadata"]["labels"]
     if (labels.get(UID_LABEL), labels.get(REPLICA_LABEL)) != (raw["metadata"]["uid"], str(stop.replica)):

@@ -1,7 +1,7 @@
 """Assemble the operator, run it until a signal, and stop it within two seconds.
 
-Only this module knows all parts. Reflectors watch the cluster from the start, so that a new leader can work
-at once. Workers start when the caches are complete and this operator leads.
+This module connects the other modules of the package. Reflectors watch the cluster from the start, so that a
+new leader can work at once. Workers reconcile only while the caches are complete and this operator leads.
 """
 
 import logging
@@ -41,10 +41,10 @@ from palaestra_protocol.signals import set_at_signals
 
 log = structlog.get_logger(__name__)
 
-# Deadlines within the two seconds in which the operator stops: for work in progress, the Lease, the rest.
+# The operator stops within two seconds: these deadlines are for the workers, the Lease, and each other part.
 FINISH_S, RELEASE_S, STOP_S = 0.6, 0.6, 0.1
 SYNC_S = 1.0
-SETTLES_S = 0.1  # after which related changes, such as all objects of one job, are in the caches
+SETTLES_S = 0.1  # delay of a reconcile after a change; meanwhile the caches receive related changes
 FAILED = 1
 _JSON = structlog.processors.JSONRenderer(default=str)
 
@@ -55,7 +55,7 @@ class Operator:
     Args:
         api: the cluster.
         options: the options of the command line.
-        metrics: its metrics.
+        metrics: the operator's metrics.
     """
 
     def __init__(self, api: Api, options: OperatorOptions, metrics: Metrics) -> None:
@@ -161,7 +161,7 @@ class Operator:
         return f"not read yet: {', '.join(missing)}" if missing else None
 
     def _end(self) -> None:
-        """Stop in the safe order: first the writes, then the Lease, then the rest."""
+        """Stop in the safe order: first all writes end, then the Lease is released, then the reads end."""
         self._gate.clear()
         self._checking.stop()
         self._apart.stop()
@@ -173,7 +173,7 @@ class Operator:
 
 
 def run(options: OperatorOptions, metrics: Metrics | None = None) -> int:
-    """Run the operator until SIGTERM or SIGINT and return its exit code; 1: a thread failed.
+    """Run the operator until SIGTERM or SIGINT; return its exit code, which is 1 if a thread failed.
 
     Raises:
         PalaestraError: no API server is configured, or the address of the metrics is in use.
@@ -183,7 +183,7 @@ def run(options: OperatorOptions, metrics: Metrics | None = None) -> int:
     broken: list[str] = []
 
     def break_down(failed: threading.ExceptHookArgs) -> None:
-        """Stop the operator if a thread fails, because a restart is better than an incomplete operator."""
+        """Stop the operator if a thread fails: a restart is better than an operator without the thread."""
         broken.append(failed.thread.name if failed.thread else "")
         log.critical("thread failed", thread=broken[-1], exc_info=failed.exc_value)
         stopping.set()
@@ -213,9 +213,9 @@ def _layout(options: OperatorOptions) -> ClusterLayout:
 
 
 def configure_logs() -> None:
-    """Set up the log: one JSON object a line on standard error, with its level and the time in UTC.
+    """Configure the log: standard error gets one JSON object a line, with its level and the time in UTC.
 
-    Messages are constant, and values are fields.
+    The message of each log call is constant; its values are separate fields.
     """
     structlog.configure(
         wrapper_class=structlog.make_filtering_bound_logger(logging.INFO),
@@ -230,5 +230,5 @@ def configure_logs() -> None:
 
 
 def _render(logger: Any, name: str, fields: structlog.typing.EventDict) -> str:
-    """Return the line, in which the user information of addresses is masked."""
+    """Return the log line as JSON, with user names and passwords in URLs masked."""
     return masked(str(_JSON(logger, name, fields)))

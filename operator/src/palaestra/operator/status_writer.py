@@ -1,7 +1,7 @@
-"""Report the state of a job: one status write if it changed, then events.
+"""Report the state of a job: write the status once if it changed, then write the events.
 
-Events are written after the status, because an event about a change that was not written would be wrong.
-Progress alone is written rarely; conditions and phases are written at once.
+An event about a change that is not in the status would be wrong, so events are written after the status. If
+only the progress changed, the status is written rarely. Changed conditions and phases are written at once.
 """
 
 import threading
@@ -27,7 +27,7 @@ class StatusWrite:
 
     Attributes:
         stored: the TrainingJob that the API server returned; None: no status was written.
-        again_s: seconds until delayed progress must be written; None: no progress was delayed.
+        again_s: seconds until the delayed progress must be written; None: no write was delayed.
     """
 
     stored: Object | None = None
@@ -38,8 +38,8 @@ class StatusWriter:
     """Writes status and events of TrainingJobs; safe to use from several threads.
 
     Args:
-        writer: for the status.
-        recorder: for the events.
+        writer: writes the status.
+        recorder: writes the events.
         written: called after each write with the old TrainingJob and the written status.
         accepted: returns the part of a status that the cluster's definition allows; its first argument is the
             stored status.
@@ -63,7 +63,7 @@ class StatusWriter:
 
         Raises:
             Conflict: the job has changed since the decision.
-            Outdated: the job is gone.
+            Outdated: the job was deleted.
             NamespaceTerminating: the status was written, but events can no longer be written.
             NotLeading: another operator may lead.
         """
@@ -101,15 +101,15 @@ class StatusWriter:
             self._count(raw, status)
         with self._lock:
             self._written[key] = clock_s
-            # A cluster with an older definition prunes new fields, so the same patch would have no effect
-            # again.
+            # An older CustomResourceDefinition prunes new fields. Then this patch has no effect, and a retry
+            # would have no effect either.
             self._futile.pop(key, None)
             if not changed:
                 self._futile[key] = (version, patch)
         return StatusWrite(stored=stored)
 
     def forget(self, key: Key) -> None:
-        """Forget a TrainingJob that is gone."""
+        """Drop the records of a deleted TrainingJob."""
         with self._lock:
             self._written.pop(key, None)
             self._futile.pop(key, None)

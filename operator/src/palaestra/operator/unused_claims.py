@@ -1,8 +1,9 @@
 """Delete the claims of deleted TrainingJobs, if no volume was ever bound to them.
 
-A claim outlives its TrainingJob because it holds the run. A claim that was never bound is empty, but counts
-in quotas forever. It has no owner, so the garbage collector does not delete it. A temporary owner, until the
-claim is bound, was rejected: if no operator removed the owner in time, the run would be deleted with the job.
+A claim outlives its TrainingJob because its volume stores the run. A claim that was never bound stores no
+run, but counts against quotas forever. A claim has no owner, so the garbage collector does not delete it. A
+temporary owner reference, until the claim is bound, was rejected. If the operator did not remove it in time,
+the garbage collector would delete the run together with the job.
 """
 
 import structlog
@@ -22,7 +23,7 @@ class UnusedClaims:
     """Deletes unused claims.
 
     Args:
-        api: for reads that must not come from a cache.
+        api: the cluster, for reads that must not come from a cache.
         caches: the watched objects.
         writer: for deletions.
     """
@@ -36,7 +37,7 @@ class UnusedClaims:
         """Delete the unused claims of earlier TrainingJobs of this name.
 
         Raises:
-            ApiError: a request failed, or a claim has changed in the meantime; reconcile again.
+            ApiError: a request failed, or a claim has changed since it was cached; reconcile again.
             NotLeading: another operator may lead.
         """
         job = self._caches.training_job(key)

@@ -1,7 +1,7 @@
 """Facts that no watch reports, because a watch for them would be expensive and few jobs need them.
 
-Each class has one kind of fact in a bounded memory of its own, so that many objects that lack one kind do
-not displace the others. After a restart the operator requests the facts again.
+Each class stores one type of fact in its own bounded memory, so that many facts of one type do not displace
+facts of another type. After a restart the operator requests the facts again.
 """
 
 import time
@@ -22,20 +22,23 @@ from palaestra.plan.job import QUEUE_LABEL
 RECHECK_S = 10.0  # between two reads of a foreign Job
 JOB_UID_LABEL = "kueue.x-k8s.io/job-uid"  # on Workloads; from Kueue's pkg/controller/constants/constants.go
 
-Denied = Mapping[int | None, ApiError]  # by replica; None: of the whole job
-Lacking = tuple[str, str]  # uid of a Job or pod, and a selector for the events with the reason
+Denied = Mapping[int | None, ApiError]  # errors by replica; None: an object of the whole job
+Lacking = tuple[str, str]  # uid of a Job or pod, and the field selector of its explaining events
 Change = tuple[str, int]  # uid and generation of a Job
 
-_BY_A_WEBHOOK = "webhook"  # a webhook that does not respond; the API server reports it as an internal error
-_BY_A_BUDGET = "disruption budget"  # it keeps the pod; the API server responds with 429, as if busy
+# In the message if a webhook does not respond; the API server's status is then an internal error.
+_BY_A_WEBHOOK = "webhook"
+# In the message if a budget forbids an eviction; the API server's status is then 429, as if it were busy.
+_BY_A_BUDGET = "disruption budget"
 
 
 class ForeignJobs(BoundedCache[str, tuple[float, Object]]):
-    """The time of the last read and the object of each foreign Job, by TrainingJob and name.
+    """Each foreign Job with the time of its last read, by TrainingJob and name.
 
-    A foreign Job has a name that a TrainingJob needs, but belongs to an earlier one or to another owner. It
-    is not cached, because it may lack the label of the operator's objects. The operator finds one if a Job
-    cannot be created because its name is taken, and reads it every few seconds until it is gone.
+    A foreign Job has a name that a TrainingJob needs, but belongs to an earlier TrainingJob or to another
+    owner. The caches may not have it, because it may lack the label of the operator's objects. The operator
+    finds a foreign Job when the creation of its own Job fails with "already exists". The operator then reads
+    the foreign Job every few seconds until that Job is deleted.
 
     Args:
         api: the cluster.
@@ -48,7 +51,7 @@ class ForeignJobs(BoundedCache[str, tuple[float, Object]]):
         self._clock = clock
 
     def meet(self, key: Key, uid: str, name: str) -> Object | None:
-        """Return and remember the Job whose name a TrainingJob needs; None if it is gone."""
+        """Return and store the foreign Job whose name a TrainingJob needs; None if it does not exist."""
         others = {other: met for other, met in self.known(key, uid).items() if other != name}
         try:
             found = trimmed(self._api.get(JOBS, key[0], name))
@@ -59,9 +62,9 @@ class ForeignJobs(BoundedCache[str, tuple[float, Object]]):
         return found
 
     def among(self, key: Key, uid: str, cached: Collection[str]) -> list[Object]:
-        """Return the foreign Jobs whose names a TrainingJob needs, as read at most ten seconds ago.
+        """Return the foreign Jobs whose names a TrainingJob needs; each was read at most ten seconds ago.
 
-        `cached` are the names of the Jobs in the cache, which are not foreign.
+        `cached` has the names of the Jobs in the cache, which are not foreign.
         """
         met = {name: met for name, met in self.known(key, uid).items() if name not in cached}
         self.keep(key, uid, met)
@@ -72,16 +75,17 @@ class ForeignJobs(BoundedCache[str, tuple[float, Object]]):
 
 
 class RejectedCreations(BoundedCache[int | None, str]):
-    """The API server's last refusals, by TrainingJob and replica; None: of an object of the whole job.
+    """The API server's last refusals, by TrainingJob and replica; replica None: an object of the whole job.
 
-    A quota, a webhook or RBAC refuses an object, and no object in the cluster reports that. A refusal is kept
-    until the object is created or no longer needed. After a restart the operator is refused again.
+    A quota, a webhook or RBAC may refuse an object, and no object in the cluster records the refusal. A
+    refusal is stored until the object is created or no longer needed. After a restart the operator tries the
+    creation again, and so gets the refusal again.
     """
 
     def learn(self, key: Key, uid: str, refused: Denied) -> None:
-        """Record the refusals of one reconcile; objects without a refusal were created.
+        """Record the refusals of one reconcile; drop older refusals of objects that are not in `refused`.
 
-        A temporary refusal, such as one from a busy API server, does not change the record.
+        A temporary error, such as a busy API server, does not change the record.
         """
         before = self.known(key, uid)
         words = {
@@ -92,7 +96,7 @@ class RejectedCreations(BoundedCache[int | None, str]):
 
 
 def _lasting(error: ApiError) -> bool:
-    """Return whether a refusal stays until a person acts."""
+    """Return whether a refusal is permanent until a person acts."""
     by_a_webhook = isinstance(error, ServerError) and _BY_A_WEBHOOK in error.message
     by_a_budget = isinstance(error, TooManyRequests) and _BY_A_BUDGET in error.message
     return not error.retryable or by_a_webhook or by_a_budget
@@ -101,8 +105,8 @@ def _lasting(error: ApiError) -> bool:
 class PodEvents(RateLimitedLookup[Lacking, Object]):
     """The last event about each Job without a pod, pod without its volumes, or trainer ended by a signal.
 
-    Only events report a quota that refuses a pod, or a volume that does not come. If a signal ended a
-    trainer, they report the probe that its pod does not show.
+    Only events report that a quota refuses a pod, or that a volume is not mounted. If a signal ended a
+    trainer, only events report that the cause was a failed probe.
 
     Args:
         api: the cluster.
@@ -116,7 +120,7 @@ class PodEvents(RateLimitedLookup[Lacking, Object]):
     def of(
         self, key: Key, uid: str, jobs: Sequence[Object], pods: Sequence[Object]
     ) -> Answers[Lacking, Object]:
-        """Return the events about those of a TrainingJob's `jobs` and `pods` that need an explanation.
+        """Return the events about a TrainingJob's incomplete `jobs` and `pods`.
 
         Raises:
             ApiError: the read of events failed.
@@ -156,7 +160,7 @@ def _lacking(jobs: Sequence[Object], pods: Sequence[Object]) -> Iterator[Lacking
 
 
 def _newest_of(jobs: Sequence[Object], pods: Sequence[Object]) -> Iterator[Object]:
-    """Yield the newest pod of each Job that has not ended; the status already has the end of an older pod."""
+    """Yield the newest pod of each unfinished Job; the status already reports the end of older pods."""
     for job in jobs:
         if holds(job, "Complete") or holds(job, "Failed"):
             continue
@@ -167,7 +171,7 @@ def _newest_of(jobs: Sequence[Object], pods: Sequence[Object]) -> Iterator[Objec
 
 
 def _wants_volumes(pod: Object) -> bool:
-    """Return whether a pod's node has not started a container of it yet, so its volumes may be missing."""
+    """Return whether a pod has a node but no started container, so that its volumes may be missing."""
     waits = (pod.get("status") or {}).get("phase") == "Pending" and not holds(
         pod, "PodReadyToStartContainers"
     )
@@ -182,9 +186,10 @@ def _alive(pod: Object) -> bool:
 class KueueWorkloads(RateLimitedLookup[str, str]):
     """The message of the Workload of each Job that waits in a queue, by the Job's uid.
 
-    A job's author may be unable to read it. A Workload is as large as a pod's template, and Kueue changes it
-    often, so the operator lists the one of each waiting Job. Thousands of Jobs may wait for days, so their
-    requests and their memory are separate from those for Jobs whose pods are refused.
+    A job's author may have no permission to read Workloads. A Workload is as large as a pod's template and
+    changes often, so a watch would be expensive. The operator lists only the Workloads of waiting Jobs.
+    Thousands of Jobs may wait for days, so this lookup has its own rate and memory, separate from
+    `PodEvents`.
 
     Args:
         api: the cluster.
@@ -196,7 +201,7 @@ class KueueWorkloads(RateLimitedLookup[str, str]):
         self._api = api
 
     def of(self, key: Key, uid: str, jobs: Sequence[Object], pods: Sequence[Object]) -> Answers[str, str]:
-        """Return the messages for those of a TrainingJob's `jobs` that wait in a queue.
+        """Return the messages for the Jobs in `jobs` that wait in a queue.
 
         Raises:
             ApiError: the read of a Workload failed.
@@ -206,7 +211,8 @@ class KueueWorkloads(RateLimitedLookup[str, str]):
     def _words(self, namespace: str, uid: str) -> str:
         try:
             return why_not_admitted(self._api.list(WORKLOADS, namespace, labels=f"{JOB_UID_LABEL}={uid}"))
-        except (Forbidden, NotFound):  # a role without Workloads, or a Kueue without this version
+        # The role does not allow Workloads, or this Kueue does not serve this version.
+        except (Forbidden, NotFound):
             return ""
 
 
@@ -217,9 +223,9 @@ def _waits(job: Object) -> bool:
 class SuspendManagers(BoundedCache[Change, str]):
     """The client that suspended or resumed a Job, if it was not the operator, by TrainingJob and change.
 
-    It is the field manager of `spec.suspend`. The caches do not store managedFields, which are half of an
-    object. So the Job is read once for each change of its spec, if its `suspend` differs from the operator's
-    last value.
+    This client is the field manager of `spec.suspend`. The caches do not store managedFields, which are half
+    of an object's size. So if `suspend` differs from the operator's last value, the operator reads the Job
+    once for each change of the Job's spec.
     """
 
     def __init__(self, api: Api) -> None:

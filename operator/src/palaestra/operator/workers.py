@@ -1,7 +1,7 @@
-"""Threads that take keys from the queue and reconcile them, each key in one thread at a time.
+"""Threads that take keys from the queue and reconcile them; only one thread at a time has a key.
 
-One bad object never delays another. After an error the key is logged, counted, and retried at growing pauses,
-while the other keys continue.
+An object that causes errors does not delay other objects. After an error, a worker logs and counts the key
+and retries it with growing pauses. Meanwhile the workers reconcile the other keys.
 """
 
 import threading
@@ -16,10 +16,12 @@ from palaestra.objects import Key
 from palaestra.operator.fenced_client import NotLeading
 from palaestra.operator.preconditions import Outdated
 
-IDLE_S = 1.0  # between two checks of the stop condition
-REPEATS = 4  # consecutive conflicts before the first log line; after that, each power of two is logged
-IN_DOUBT_S = 1.0  # between two tries of a key while a lease is in doubt
-STUCK_S = 300.0  # on one key; every call has a deadline, so no reconcile takes this long
+IDLE_S = 1.0  # seconds between two checks of the stop condition
+REPEATS = 4  # consecutive conflicts of a key before the first log line; then each power of two is logged
+IN_DOUBT_S = 1.0  # seconds until the next try of a key while it is uncertain whether this operator leads
+# Seconds after which a reconcile counts as stuck. Every call has a deadline, so a reconcile is normally
+# shorter.
+STUCK_S = 300.0
 
 log = structlog.get_logger(__name__)
 
@@ -32,7 +34,7 @@ class Workers:
     Args:
         queue: the queue of keys.
         reconcile: reconciles one job; returns the seconds until the next reconcile, or None.
-        gate: no reconcile starts while it is not set.
+        gate: a reconcile starts only while this event is set.
         seconds: the histogram of durations, by `result`.
         count: number of threads.
     """
@@ -69,7 +71,7 @@ class Workers:
                 thread.join(max(0.0, ends - time.monotonic()))
 
     def trouble(self) -> str | None:
-        """Return the problem of a thread that only a restart solves, or None."""
+        """Return a sentence about a stuck thread, or None; only a restart solves this problem."""
         now = time.monotonic()
         for thread in self._threads:
             if now - self._began.get(thread.name, now) > STUCK_S:
@@ -94,10 +96,11 @@ class Workers:
         """Reconcile one key, and return the result."""
         try:
             again_s = self._reconcile(key)
-        except (Conflict, Outdated) as error:  # another client wrote; the cache receives the change soon
+        # Another client changed the object; the cache receives the change soon.
+        except (Conflict, Outdated) as error:
             self._retry_conflict(key, error)
             return "conflict"
-        except NotLeading:  # another leader reconciles all jobs; or this operator only renewed its Lease late
+        except NotLeading:  # another leader reconciles all jobs, or this operator renewed its Lease late
             self._queue.add_after(key, IN_DOUBT_S)
             return "conflict"
         except ApiError as error:
@@ -112,7 +115,7 @@ class Workers:
         return "done"
 
     def _retry_conflict(self, key: Key, error: Exception) -> None:
-        """Retry later; single conflicts are not logged, and repeated ones less and less often."""
+        """Retry later; log no single conflict, and repeated conflicts of a key ever more rarely."""
         again_s = self._retry(key)
         times = self._queue.failures(key)
         if times >= REPEATS and times & (times - 1) == 0:

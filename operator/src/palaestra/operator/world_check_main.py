@@ -1,8 +1,8 @@
-"""The program that checks worlds: a process that limits its own time and memory.
+"""The program that checks worlds; its process limits its own time and memory.
 
-It writes a line when it is ready. A request is a line of JSON and then the bytes of a world; the response is
-the verdict as a line of JSON. It does not write files, and ends with its parent. Only the operator runs it,
-as
+The program writes one line when it is ready. A request is a line of JSON followed by the bytes of a world;
+the response is a line of JSON with the result. The program writes no files, and ends when its parent ends.
+Only the operator runs it, with this command:
 
     python -m palaestra.operator.world_check_main PARENT SECONDS MEBIBYTES
 """
@@ -23,7 +23,7 @@ from palaestra_sim.world import check
 
 MOST_CHARACTERS = 4096  # the longest message of a refusal; a status shows fewer characters
 TOO_MUCH_MEMORY = "memory"
-_NICENESS = 5  # the operator itself has priority
+_NICENESS = 5  # the operator's own process has priority over a check
 _PR_SET_PDEATHSIG = 1  # Source: linux/prctl.h
 _OOM_SCORE = Path("/proc/self/oom_score_adj")
 
@@ -33,7 +33,8 @@ def main() -> None:
     parent, seconds, mebibytes = map(int, sys.argv[1:])
     _end_with(parent)
     _limit(mebibytes)
-    gc.disable()  # a tree of nodes has no cycles, and a collection visits all of it
+    # A world's tree of nodes has no cycles, and each garbage collection would visit the whole tree.
+    gc.disable()
     _write({})
     for field, source in _requests():
         _give_time(seconds)
@@ -64,7 +65,7 @@ def _verdict(field: str, source: bytes) -> dict[str, str]:
 
 
 def _end_with(parent: int) -> None:
-    """Have the kernel kill this process as soon as its parent ends."""
+    """Request from the kernel that it kills this process as soon as the parent ends."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
     if os.getppid() != parent:  # the parent ended before this call
@@ -72,7 +73,7 @@ def _end_with(parent: int) -> None:
 
 
 def _limit(mebibytes: int) -> None:
-    """Limit the memory, forbid files and core dumps, and be the kernel's first choice if memory runs out."""
+    """Limit the memory, forbid files and core dumps, and make this process the OOM killer's first choice."""
     _bound(resource.RLIMIT_AS, mebibytes << 20)
     _bound(resource.RLIMIT_CORE, 0)
     _bound(resource.RLIMIT_FSIZE, 0)
@@ -82,13 +83,13 @@ def _limit(mebibytes: int) -> None:
 
 
 def _give_time(seconds: int) -> None:
-    """Limit the processor time from now on; the kernel ends the process with SIGXCPU."""
+    """Limit the processor time from now on; when it is used up, the kernel ends the process with SIGXCPU."""
     used = resource.getrusage(resource.RUSAGE_SELF)
     _bound(resource.RLIMIT_CPU, int(used.ru_utime + used.ru_stime) + 1 + seconds)
 
 
 def _bound(kind: int, most: int) -> None:
-    """Set a limit of this process, unless the system already has a lower one."""
+    """Set a limit of this process, unless the existing hard limit is lower."""
     _, hard = resource.getrlimit(kind)
     resource.setrlimit(kind, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))
 

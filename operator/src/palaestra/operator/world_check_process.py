@@ -1,7 +1,7 @@
 """Check worlds in a separate process, with a budget for each world.
 
-So an error in a check, for example a time that grows with the square of a world's size, affects only the
-author's job, and not the operator that serves all jobs.
+A check may contain an error, for example a run time that grows with the square of a world's size. The
+separate process limits the effect to the job of the world's author; the operator continues to serve all jobs.
 """
 
 import json
@@ -18,10 +18,10 @@ import structlog
 from palaestra.plan import GivenWorld, WorldVerdict
 
 SECONDS = 20  # processor time for one world; the costliest known world of 900 kB takes 2 s
-# Address space; the costliest known world of 900 kB takes 135, and two fit into the container.
+# Address space; the costliest known world of 900 kB needs 135 MiB. The container has memory for two checks.
 MEBIBYTES = 144
-DEADLINE_S = 300.0  # for all worlds of a job; it passes because of a busy node, not because of a world
-_CRASHES: Final = frozenset(  # 1: an exception, whose traceback is in the operator's log
+DEADLINE_S = 300.0  # for all worlds of a job; only a busy node, not a costly world, exceeds it
+_CRASHES: Final = frozenset(  # exit code 1: an exception, whose traceback is in the operator's log
     (1, -signal.SIGABRT, -signal.SIGBUS, -signal.SIGFPE, -signal.SIGILL, -signal.SIGSEGV)
 )
 _PROGRAM = "palaestra.operator.world_check_main"
@@ -31,12 +31,12 @@ log = structlog.get_logger(__name__)
 
 
 class WorldCheckProcess:
-    """Runs the program that checks worlds, once for each call; calls may come from several threads.
+    """Runs the program that checks worlds, one process for each call; several threads may call it.
 
     Args:
-        seconds: the seconds of processor time for a world.
-        mebibytes: the mebibytes of memory for a world.
-        deadline_s: for a whole call.
+        seconds: the limit of processor time for one world, in seconds.
+        mebibytes: the limit of memory for one world, in MiB.
+        deadline_s: the deadline for a whole call, in seconds.
     """
 
     def __init__(
@@ -50,7 +50,7 @@ class WorldCheckProcess:
         self._stopped = False
 
     def check(self, worlds: Sequence[GivenWorld]) -> Mapping[str, WorldVerdict]:
-        """Return the verdicts on worlds by digest; a world without a verdict can be checked again."""
+        """Return the results of the checks by digest; a world without a result can be checked again."""
         lines, code = self._answers(worlds)
         ready, lines = bool(lines), lines[1:]
         verdicts = {
@@ -63,7 +63,7 @@ class WorldCheckProcess:
         return verdicts
 
     def stop(self) -> None:
-        """End all checks; later checks return no verdicts."""
+        """Kill all running checks; later calls of `check` return no results."""
         with self._lock:
             self._stopped = True
             for process in self._running:
@@ -99,7 +99,7 @@ class WorldCheckProcess:
         return WorldVerdict(problem=answer.get("problem", ""))
 
     def _ended(self, world: GivenWorld, code: int, *, ready: bool) -> WorldVerdict | None:
-        """Return the verdict on the world at which the program ended; None if a retry may succeed."""
+        """Return the result for the world at which the program ended; None if a retry may succeed."""
         if code == -signal.SIGXCPU:
             return self._too_costly(world, f"{self._seconds} s of processor time")
         if ready and code in _CRASHES:
@@ -116,7 +116,7 @@ class WorldCheckProcess:
 
 
 def _written(worlds: Sequence[GivenWorld]) -> bytes:
-    """Return the requests for worlds, as the program reads them."""
+    """Return the requests for worlds in the format of `world_check_main`."""
     requests = ({"field": world.field, "bytes": len(world.source)} for world in worlds)
     return b"".join(
         json.dumps(request).encode() + b"\n" + world.source

@@ -1,8 +1,8 @@
-"""The verdicts on the worlds of jobs. Small worlds are checked here, larger ones in a separate process.
+"""The results (verdicts) of the checks of the jobs' worlds; a separate process checks large worlds.
 
-No worker waits for a check. A reconcile without a verdict reports that the worlds are being checked, and the
-verdict queues the job again. Worlds are not stored in the meantime: at its turn, a job is queued to hand them
-over.
+No worker waits for a check in the separate process. A reconcile without a result reports that the worlds are
+being checked. When the result is known, the checker queues the job again. Queued jobs do not keep their
+worlds in memory: when its turn begins, a job is reconciled again and passes its worlds to the checker.
 """
 
 import threading
@@ -15,11 +15,11 @@ from palaestra.plan import GivenWorld, WorldVerdict
 from palaestra_sim.errors import WorldError
 from palaestra_sim.world import check
 
-MOST_BYTES_HERE = 16_384  # the worker itself checks worlds up to this total, in less than 0.1 s
+MOST_BYTES_HERE = 16_384  # a worker itself checks worlds up to this total size, in less than 0.1 s
 AT_ONCE = 2  # checks of all namespaces together
-REMEMBERED = 4000  # verdicts, each with a message of at most 4 kB if it is a refusal
-HANDED_S = 10.0  # for a job to hand over its worlds at its turn; after that, the next job has its turn
-PAUSE_S = 5.0  # after a check without a verdict: the node is busy, or is out of memory
+REMEMBERED = 4000  # results in memory; that of an invalid world has a message of at most 4 kB
+HANDED_S = 10.0  # seconds that a job has at its turn to pass its worlds; then the turn ends
+PAUSE_S = 5.0  # pause in seconds after a check without a result: the node is busy or out of memory
 
 Apart = Callable[[Sequence[GivenWorld]], Mapping[str, WorldVerdict]]
 
@@ -28,8 +28,8 @@ class WorldChecker:
     """Checks the worlds of jobs.
 
     Args:
-        apart: checks worlds in a separate process; returns the verdicts that it reached.
-        wake: queues a job.
+        apart: checks worlds in a separate process; returns the results of the completed checks.
+        wake: queues a job for a reconcile.
     """
 
     def __init__(self, apart: Apart, wake: Callable[[Key], None]) -> None:
@@ -37,7 +37,7 @@ class WorldChecker:
         self._wake = wake
         self._turns = FairQueue()
         self._lock = threading.Lock()
-        self._known: OrderedDict[str, WorldVerdict] = OrderedDict()  # by digest, the last used at the end
+        self._known: OrderedDict[str, WorldVerdict] = OrderedDict()  # by digest; the last used is at the end
         self._stopped = threading.Event()
         self._threads = [
             threading.Thread(target=self._run, name=f"check {number}", daemon=True)
@@ -45,21 +45,21 @@ class WorldChecker:
         ]
 
     def start(self) -> None:
-        """Start the threads that wait for checks."""
+        """Start the threads that run the checks."""
         for thread in self._threads:
             thread.start()
 
     def stop(self) -> None:
-        """Begin no more checks."""
+        """Stop: no further check begins."""
         self._stopped.set()
         self._turns.close()
 
     def waits(self, key: Key) -> bool:
-        """Return whether the worlds of a job wait for their check, or are being checked."""
+        """Return whether the worlds of a job wait for a check, or are under check."""
         return self._turns.waits(key)
 
     def verdicts(self, key: Key, worlds: Sequence[GivenWorld]) -> Mapping[str, WorldVerdict]:
-        """Return the known verdicts on a job's worlds; the others follow, and queue the job."""
+        """Return the known results for a job's worlds; the other worlds are queued for a check."""
         missing = [world for world in worlds if self._recall(world.digest) is None]
         if missing and sum(len(world.source) for world in missing) <= MOST_BYTES_HERE:
             self._remember({world.digest: _checked(world) for world in missing})
@@ -69,7 +69,7 @@ class WorldChecker:
         return {digest: verdict for digest, verdict in found.items() if verdict is not None}
 
     def forget(self, key: Key) -> None:
-        """Forget a job that is gone or needs no check."""
+        """Remove a job from the queue of checks: it was deleted, or needs no check."""
         self._turns.hand_over(key, ())
 
     def _run(self) -> None:
@@ -99,7 +99,7 @@ class WorldChecker:
 
 
 def _checked(world: GivenWorld) -> WorldVerdict:
-    """Return the verdict on a small world."""
+    """Check a small world and return the result."""
     try:
         check(world.source, world.field)
     except WorldError as error:

@@ -1,7 +1,7 @@
 """Turn a TrainingJob into the objects that it needs.
 
-Pure: the same job and layout give the same objects. It uses no clock, network or randomness, so tests/golden/
-has the plan of every example, for a cluster and for a laptop.
+The plan is pure: the same job and layout give the same objects. `plan` uses no clock, no network and no
+random numbers. So tests/golden/ can store the plan of every example, for a cluster and for a laptop.
 
     plan(job, layout).objects
 """
@@ -60,14 +60,14 @@ class ReplicaPlan:
 
     @property
     def objects(self) -> tuple[Object, ...]:
-        """Return the objects in the order of their creation: a Job's pods need the other two."""
+        """Return the objects in the order of their creation, with the Job last: its pods need the others."""
         found = (self.config_map, self.claim, self.job)
         return tuple(part for part in found if part is not None)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Plan:
-    """The objects of a TrainingJob: one for the whole job, and those of the planned replicas, by index.
+    """The objects of a TrainingJob: the network policy, and the objects of the planned replicas by index.
 
     `network_policy` is None in a layout whose pods do not have their own network.
     """
@@ -91,13 +91,13 @@ def plan(
 ) -> Plan:
     """Return the plan of a job that has a uid.
 
-    `config_maps` holds the worlds of `configMap` sources, by name and key. `replicas` are the indices of the
-    replicas to plan; by default all of them. `verdicts` are the results of the checks of the job's
-    worlds; without them the worlds are checked here.
+    `config_maps` contains the worlds of `configMap` sources, by name and key. `replicas` has the indices of
+    the replicas to plan; by default, all replicas are planned. `verdicts` has the results of the checks of
+    the job's worlds; without verdicts, this function checks the worlds.
 
     Raises:
-        PlanError: the job cannot be planned in this layout, or not yet.
-        WorldError: one of its worlds is wrong.
+        PlanError: the job cannot be planned in this layout, or its worlds are not checked yet.
+        WorldError: a world of the job is invalid.
     """
     sources = source_files(job, config_maps or {}, verdicts)
     chosen = range(job.spec.replicas) if replicas is None else replicas
@@ -108,7 +108,7 @@ def plan(
 
 
 def identified(job: TrainingJob, uid: str) -> TrainingJob:
-    """Return a copy of the job with a uid, for a job that has no uid from a cluster."""
+    """Return a copy of the job with a uid, for a job that was not created in a cluster."""
     metadata = job.metadata.model_copy(update={"uid": uid})
     return job.model_copy(update={"metadata": metadata})
 

@@ -1,6 +1,6 @@
-"""The storage of a replica's run: its own claim, an existing claim, or the pod.
+"""The storage of a replica's run: a claim of its own, an existing claim, or an ephemeral volume.
 
-Also the claim with the initial policy of the run, if the job names one.
+The module also adds the claim with the initial policy of the run, if the job names such a claim.
 """
 
 from hashlib import sha256
@@ -11,7 +11,8 @@ from palaestra.errors import PlanError
 from palaestra.plan.replica import TRAINER, Replica
 
 INITIAL = "initial-policy"
-# Provisioners copy the name of a claim into a label's value or a cloud's tag, which have this limit.
+# Provisioners copy the name of a claim into the value of a label or into a cloud's tag. Labels and tags have
+# this limit.
 LONGEST_NAME = 63
 DIGITS = 12  # hexadecimal digits in a shortened name
 
@@ -19,8 +20,8 @@ DIGITS = 12  # hexadecimal digits in a shortened name
 def claim(replica: Replica) -> dict[str, Any] | None:
     """Return the replica's own PersistentVolumeClaim, or None if the job uses other storage.
 
-    Its name depends on the job's uid: a job that is deleted and created again starts a new run, and the old
-    run stays. With `retain: Keep` it has no owner, so it outlives the job.
+    The claim's name depends on the job's uid. So a job that is deleted and created again starts a new run,
+    and the old run stays. With `retain: Keep` the claim has no owner, so it outlives the job.
     """
     storage = replica.job.spec.storage
     if storage.ephemeral or storage.existing_claim is not None:
@@ -49,9 +50,9 @@ def run_volume(replica: Replica) -> dict[str, Any]:
 
 
 def initial_volume(replica: Replica) -> dict[str, Any] | None:
-    """Return the volume with the initial policy; None without one, or if it is the run's own volume.
+    """Return the volume with the initial policy; None without a claim, or if the run uses the same claim.
 
-    A pod must not have two volumes of one claim: some drivers then never mount it.
+    A pod must not have two volumes of one claim, because some storage drivers then never mount the claim.
     """
     initial = replica.job.spec.trainer.initial_policy
     if initial is None or initial.claim in {None, replica.job.spec.storage.existing_claim}:
@@ -63,7 +64,7 @@ def initial_path(replica: Replica) -> str | None:
     """Return the path of the initial policy for the trainer, or None.
 
     Raises:
-        PlanError: it is on a claim, and this layout has no claims.
+        PlanError: the policy is on a claim, and this layout has no claims.
     """
     initial = replica.job.spec.trainer.initial_policy
     if initial is None:
@@ -80,9 +81,9 @@ def initial_path(replica: Replica) -> str | None:
 
 
 def claim_name(job: str, index: int, uid: str) -> str:
-    """Return the name of the claim of a job's replica: `<job>-<replica>-<uid>`.
+    """Return the name of a replica's claim: `<job>-<replica>-<uid>`.
 
-    If that is too long, the job's name is cut, and a hash of the whole name replaces the uid.
+    If this name is too long, the job's name is cut, and a hash of the whole name replaces the uid.
     """
     whole = f"{job}-{index}-{uid}"
     if len(whole) <= LONGEST_NAME:

@@ -11,7 +11,7 @@ from palaestra.plan.worlds import FOLDER
 
 
 def config_map(replica: Replica, worlds: Mapping[str, bytes]) -> dict[str, Any]:
-    """Return the ConfigMap; its content never changes, and its name ends in a hash of the content."""
+    """Return the immutable ConfigMap, whose name ends in a hash of its content."""
     data = {
         FILE: training_yaml(replica, worlds).decode(),
         **{name: content.decode() for name, content in worlds.items()},

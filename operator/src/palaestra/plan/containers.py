@@ -17,15 +17,16 @@ from palaestra.plan.yaml_text import literal
 Container = dict[str, Any]
 
 SIDECAR = "palaestra-sidecar"
-PERIOD_S = 10  # between two probes; one try of the ROS master's probe waits as long
-BUILT_IN = "palaestra-train"  # the program of a job without a command
+PERIOD_S = 10  # between two probes; also the time that one try of the ROS master's probe waits
+BUILT_IN = "palaestra-train"  # the trainer's program in a job without a custom command
 SECURITY = {
     "allowPrivilegeEscalation": False,
     "capabilities": {"drop": ["ALL"]},
     "readOnlyRootFilesystem": True,
 }
-# One try waits for the port itself: a kubelet's shortest period is a second, and the master takes a
-# quarter of one. The port is on loopback, which a kubelet's own TCP probe cannot reach.
+# A kubelet's shortest period is a second, but the ROS master starts in a quarter of a second. So the command
+# of one try waits for the port itself. A TCP probe of the kubelet cannot reach the port, which is on
+# loopback.
 MASTER_ANSWERS = "until (exec 3<>/dev/tcp/{host}/{port}) 2>/dev/null; do sleep 0.05; done"
 
 
@@ -50,7 +51,7 @@ def ros_master(replica: Replica) -> Container:
 
 
 def sidecar(replica: Replica, simulator: PlannedSimulator, worlds: Mapping[str, bytes]) -> Container:
-    """Return the sidecar of one simulator, which starts the simulator when the trainer requests it."""
+    """Return the sidecar of one simulator; it starts the simulator when the trainer requests the start."""
     group, places = simulator.group, replica.places(simulator.container)
     ports = replica.layout.ports
     quantities = planned.resources(group.resources, _least(replica, group.driver))
@@ -69,8 +70,8 @@ def sidecar(replica: Replica, simulator: PlannedSimulator, worlds: Mapping[str, 
         "command": [program],
         "args": _arguments(replica, simulator, world_path(replica, simulator, worlds)),
         "ports": [_port(f"sim-{simulator.place}", ports.health[simulator.place])],
-        # It has no startup probe: if the first start of a sidecar with one fails, kubelets before 1.34.3
-        # never start the trainer (Kubernetes issue 132826).
+        # The sidecar has no startup probe. If the first start of a sidecar with a startup probe fails,
+        # kubelets before 1.34.3 never start the trainer (Kubernetes issue 132826).
         "livenessProbe": {
             "initialDelaySeconds": min(group.start_deadline_seconds, _start_s(replica)),
             **_alive(ports.health[simulator.place]),
@@ -80,7 +81,7 @@ def sidecar(replica: Replica, simulator: PlannedSimulator, worlds: Mapping[str, 
 
 
 def _arguments(replica: Replica, simulator: PlannedSimulator, world: str) -> list[str]:
-    """Return the options of a sidecar, without references to variables."""
+    """Return the options of a sidecar, in which a kubelet expands no variables."""
     group, layout = simulator.group, replica.layout
     words = [
         f"--driver={group.driver.value}",
@@ -112,14 +113,14 @@ def trainer(replica: Replica) -> Container:
         **_common(replica, TRAINER, planned.resources(spec.resources, least), spec.env),
     }
     if not spec.command:  # a custom program need not serve HTTP
-        # On a busy node the import of PyTorch takes minutes, and the trainer cannot respond before it.
+        # On a busy node the import of PyTorch takes minutes, and the trainer responds only after the import.
         container["startupProbe"] = {**_healthz(port), "failureThreshold": _tries(replica)}
         container["livenessProbe"] = _alive(port)
     return container
 
 
 def install_sidecar(replica: Replica) -> Container | None:
-    """Return the init container that copies the sidecar for users' own images, or None if not needed."""
+    """Return the init container that copies the sidecar for users' own images; None if no group needs it."""
     groups = replica.job.spec.simulators
     if replica.places(SIDECAR).sidecar is None or not any(group.driver is Driver.COMMAND for group in groups):
         return None
@@ -128,8 +129,8 @@ def install_sidecar(replica: Replica) -> Container | None:
         "name": INSTALL_SIDECAR,
         "image": replica.layout.images.stub,
         "imagePullPolicy": replica.job.spec.trainer.image_pull_policy.value,
-        # It copies only the contents of the folder, because cp may not set the times of the volume's own
-        # folder.
+        # The command copies only the content of the folder, because cp has no permission to set the times of
+        # the volume's root folder.
         "command": ["sh", "-c", f"cp -a /opt/palaestra/* {target}/"],
         "terminationMessagePolicy": "FallbackToLogsOnError",
         "securityContext": SECURITY,
@@ -171,7 +172,7 @@ def _environment(replica: Replica, container: str, threads: int) -> dict[str, di
         "PALAESTRA_CONFIG": f"{places.config}/{FILE}",
         "PALAESTRA_RUN": places.run,
         "OMP_NUM_THREADS": str(threads),
-        "PYTHONUNBUFFERED": "1",  # people read the log while it is written
+        "PYTHONUNBUFFERED": "1",  # the log must be readable while the program runs
         **({"HOME": places.home} if places.home is not None else {}),
         **({"PALAESTRA_TERMINATION_LOG": places.termination} if container == TRAINER else {}),
     }
@@ -230,7 +231,7 @@ def _least(replica: Replica, driver: Driver) -> Resources:
 
 
 def _of_ros_master(replica: Replica) -> planned.Planned:
-    """Return the resources of the ROS master, and of the container that copies the sidecar."""
+    """Return the resources of the ROS master, which the container that copies the sidecar has too."""
     own = replica.job.spec.ros_master
     least = planned.by_default(replica.layout.resources.ros_master, planned.ROS_MASTER)
     return planned.resources(own.resources if own is not None else Resources(), least)
@@ -245,7 +246,7 @@ def _port(name: str, number: int) -> dict[str, Any]:
 
 
 def _healthz(port: int) -> dict[str, Any]:
-    """Return a probe that sends a container the request GET /healthz."""
+    """Return a probe that sends the request GET /healthz to the container."""
     return {
         "httpGet": {"path": "/healthz", "port": port},
         "periodSeconds": PERIOD_S,
@@ -254,12 +255,12 @@ def _healthz(port: int) -> dict[str, Any]:
 
 
 def _alive(port: int) -> dict[str, Any]:
-    """Return a liveness probe that tolerates a minute of a busy node."""
+    """Return a liveness probe that fails only after a minute without a response, as on a busy node."""
     return {**_healthz(port), "failureThreshold": 6}
 
 
 def _tries(replica: Replica) -> int:
-    """Return the allowed failures of a startup probe, by the replica's time for its first step."""
+    """Return the allowed failures of a startup probe; together they last as long as the start timeout."""
     return math.ceil(_start_s(replica) / PERIOD_S)
 
 

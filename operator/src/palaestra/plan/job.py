@@ -1,4 +1,4 @@
-"""The batch/v1 Job of a replica, which creates its pods, one at a time."""
+"""The batch/v1 Job of a replica, which creates the replica's pods, one at a time."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -7,16 +7,17 @@ from palaestra.plan.replica import TRAINER, Replica
 from palaestra_protocol.pod.status import ExitCode
 
 QUEUE_LABEL = "kueue.x-k8s.io/queue-name"
-SUSPEND_SET = "palaestra.dev/suspend-set"  # annotation: the `spec.suspend` that the operator last set
+# Annotation: the value of `spec.suspend` that the operator set last.
+SUSPEND_SET = "palaestra.dev/suspend-set"
 GIVEN_UP = (ExitCode.CONFIGURATION, ExitCode.FAULT_BUDGET, ExitCode.DIVERGED)
 
 
 def job(replica: Replica, template: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the Job; the operator enforces the job's deadline, because it does not count suspended time.
+    """Return the Job; the operator, not the Job, enforces the active deadline of the TrainingJob.
 
-    With a queue it is created suspended, and Kueue sets `spec.suspend` from then on. Without a queue an
-    annotation holds the operator's value, so that the operator recognizes another client's change and keeps
-    it.
+    A Job with a queue is created suspended, and Kueue sets `spec.suspend` from then on. On a Job without a
+    queue, an annotation stores the operator's value of `spec.suspend`. So the operator recognizes a change by
+    another client, and does not undo this change.
     """
     queue, suspend = replica.job.spec.scheduling.queue_name, replica.job.spec.suspend
     metadata = replica.metadata(replica.name)
@@ -30,7 +31,7 @@ def job(replica: Replica, template: Mapping[str, Any]) -> dict[str, Any]:
         "metadata": metadata,
         "spec": {
             "backoffLimit": replica.job.spec.backoff_limit,
-            # One writer at a time: the old pod has ended before the next one starts.
+            # Only one pod at a time writes to the volume: the next pod starts after the old pod has ended.
             "podReplacementPolicy": "Failed",
             "podFailurePolicy": {"rules": _failure_rules()},
             "suspend": queue is not None or suspend,
@@ -45,9 +46,9 @@ def suspend_set(*, suspend: bool) -> dict[str, str]:
 
 
 def _failure_rules() -> list[dict[str, Any]]:
-    """Return the rules for failed pods, in order; a failure without a rule is counted and retried.
+    """Return the rules for failed pods, in order; a failure that matches no rule is counted and retried.
 
-    The rules always name the trainer: a rule without a name would match the sidecars' exit codes too.
+    The rules name the trainer: a rule without a container's name would match the sidecars' exit codes too.
     """
     disrupted = {"type": "DisruptionTarget", "status": "True"}
     return [

@@ -1,6 +1,6 @@
-"""The differences between a cluster and a laptop: ports, paths, images and a few settings of pods.
+"""The layout: the settings of a plan that differ between a cluster and a laptop, such as ports and paths.
 
-`plan` receives a layout and only reads it; the planned objects are not edited later.
+`plan` receives a layout as its input; no program edits the planned objects later.
 """
 
 from collections.abc import Mapping, Sequence
@@ -12,13 +12,13 @@ from palaestra.plan.resources import NO_DEFAULTS, Defaults
 
 ROS_MASTER_PORT = 11311  # the port that ROS 1 tools expect
 STATUS_PORT = 9090
-CONTROL_PORTS = range(7100, 7200)  # by the simulator's number in its pod; a pod has at most 32
+CONTROL_PORTS = range(7100, 7200)  # by the simulator's number in its pod; a pod has at most 32 simulators
 HEALTH_PORTS = range(7200, 7300)
-# A signal ends process 1 of a container only if the process has a handler, and rosmaster has none. So
-# another program is process 1; otherwise a pod would stay for its whole grace period.
+# SIGTERM ends process 1 of a container only if the process has a handler, and rosmaster has no handler. So
+# bash is process 1. Otherwise a deleted pod would exist for its whole grace period.
 ROSMASTER = ("bash", "-c", "trap 'kill $!; exit' TERM; rosmaster --core -p {port} & wait $!")
 OWN_ROS_MASTER = ("palaestra-ros-master", "--listen=127.0.0.1:{port}")
-USER = 65532  # uid, gid and fsGroup of everything in a pod, as in the images
+USER = 65532  # uid, gid and fsGroup of all containers in a pod, as in the images
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,7 +33,7 @@ class Ports:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Images:
-    """The release's own images, for jobs that do not name images."""
+    """The release's images, which jobs use that do not name images."""
 
     trainer: str
     stub: str
@@ -55,10 +55,10 @@ class Images:
 class ContainerPaths:
     """The absolute paths in the containers of one replica.
 
-    The claim is mounted at `volume`, and `run` is the run directory on it. `home` is set if the image's own
-    home is read-only, `shared_memory` if the default is too small for a simulator, and `sidecar` if
-    `palaestra-sidecar` must be copied into a user's image. A claim with an initial policy is mounted at
-    `initial`.
+    The claim is mounted at `volume`, and `run` is the run directory on this claim. `home` is set if the
+    image's own home is read-only, and `shared_memory` if the default is too small for a simulator. `sidecar`
+    is set if `palaestra-sidecar` must be copied into a user's image. A claim with an initial policy is
+    mounted at `initial`.
     """
 
     config: str
@@ -74,15 +74,15 @@ class ContainerPaths:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Allowed:
-    """The settings beyond their own pods that an installation allows to the jobs of a cluster.
+    """The settings with effects outside of its own pods that an installation allows a job to have.
 
     Attributes:
         pod_labels: keys of labels that jobs may give their pods, or domains that end in `/`.
-        pod_annotations: the same for annotations.
-        priority_classes: names.
-        runtime_classes: names.
-        tolerations: keys of taints, or domains that end in `/`.
-        affinity_namespaces: names of namespaces to whose pods a job may have an affinity, besides its own.
+        pod_annotations: keys of annotations that jobs may give their pods, or domains that end in `/`.
+        priority_classes: names of allowed priority classes.
+        runtime_classes: names of allowed runtime classes.
+        tolerations: keys of taints that jobs may tolerate, or domains that end in `/`.
+        affinity_namespaces: namespaces, besides the job's own, to whose pods a job may have an affinity.
         anti_affinity_labels: keys of labels by which a required anti-affinity may select pods of other jobs,
             or domains that end in `/`.
     """
@@ -97,7 +97,7 @@ class Allowed:
 
 
 class Layout(Protocol):
-    """The layout of a cluster or of a laptop."""
+    """The interface of the two layouts, `ClusterLayout` and `LocalLayout`."""
 
     @property
     def images(self) -> Images:
@@ -126,7 +126,7 @@ class Layout(Protocol):
 
     @property
     def longest_start_s(self) -> int | None:
-        """The limit for the start of a container in seconds; None: only the job limits it."""
+        """The limit for the start of a container in seconds; None: only the job's own limit applies."""
         ...
 
     @property
@@ -136,7 +136,7 @@ class Layout(Protocol):
 
     @property
     def monitoring_namespace(self) -> str | None:
-        """The namespace that collects metrics; None if pods share a network."""
+        """The namespace whose pods may scrape metrics; None if pods share a network."""
         ...
 
     @property
@@ -151,12 +151,12 @@ class Layout(Protocol):
 
     @property
     def resources(self) -> Defaults:
-        """Requests and limits of containers for which a job does not set any."""
+        """Requests and limits of containers for which a job does not set resources."""
         ...
 
     @property
     def user(self) -> int | None:
-        """The user and group of a pod; None: the cluster chooses them, as OpenShift does."""
+        """The user and group ID of a pod; None: the cluster chooses both, as OpenShift does."""
         ...
 
     def places(self, uid: str, replica: int, container: str) -> ContainerPaths:
@@ -164,7 +164,7 @@ class Layout(Protocol):
         ...
 
     def another_run(self, uid: str, replica: int) -> str:
-        """Return the run directory of a replica of the job with `uid`, on the same volume.
+        """Return the directory of a run on the same volume: that of a replica of the job with `uid`.
 
         Raises:
             PlanError: in this layout, jobs cannot share a volume.
@@ -174,7 +174,7 @@ class Layout(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClusterLayout:
-    """Every pod has its own network and file system, so paths and ports are always the same."""
+    """The layout of a cluster: a pod has its own network and file system, so ports and paths are fixed."""
 
     images: Images
     ports: Ports = Ports()
@@ -191,7 +191,7 @@ class ClusterLayout:
     user: int | None = USER
 
     def places(self, uid: str, replica: int, container: str) -> ContainerPaths:
-        """Return the same paths for every container; the job's uid separates the runs."""
+        """Return the same paths for every container; the job's uid separates the runs on one volume."""
         return ContainerPaths(
             config="/etc/palaestra",
             volume="/var/lib/palaestra",
@@ -205,13 +205,13 @@ class ClusterLayout:
         )
 
     def another_run(self, uid: str, replica: int) -> str:
-        """Return the run's own folder on the volume."""
+        """Return the folder of this run on the volume."""
         return f"/var/lib/palaestra/{uid}/{replica}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LocalLayout:
-    """All containers share this machine: all files are in the run directory, all ports on loopback.
+    """The layout of a laptop: all files are in the run directory, and all ports on loopback.
 
     `job_directory` is the absolute folder of the job's replicas, `<dir>/<job name>`.
     """
@@ -220,9 +220,11 @@ class LocalLayout:
     job_directory: str
     ports: Ports = Ports()
     ros_master: Sequence[str] = OWN_ROS_MASTER
-    ros_hostname: str = "127.0.0.1"  # a bare chroot has no /etc/hosts, which has the name localhost
+    # An address, because a minimal chroot has no /etc/hosts that defines localhost.
+    ros_hostname: str = "127.0.0.1"
     health_host: str = "127.0.0.1"
-    longest_start_s: int = 600  # short: a person waits, and no image is pulled and no volume is mounted
+    # Short, because a person waits, and the start includes no image pull and no mount.
+    longest_start_s: int = 600
     operator_namespace: None = None
     monitoring_namespace: None = None
     node_selector: Mapping[str, str] = field(default_factory=dict)

@@ -1,8 +1,8 @@
-"""The NetworkPolicy of a job's pods: a second protection after loopback, because ROS 1 has no authentication.
+"""The NetworkPolicy of a job's pods. ROS 1 has no authentication, so it adds to the protection by loopback.
 
-Ingress: metrics, the trainer's status and the simulators' states, from the operator's pods and from the
-monitoring namespace. The containers of a pod communicate on loopback, to which policies do not apply; a node
-always reaches its pods, for their probes. Egress is open unless the job closes it.
+Ingress is allowed from the operator's pods and from the monitoring namespace, for metrics, the trainer's
+status and the simulators' states. The containers of a pod communicate on loopback, to which policies do not
+apply. A node always reaches its own pods, for their probes. Egress is open unless the job closes it.
 """
 
 from typing import Any
@@ -13,15 +13,15 @@ from palaestra.plan.layout import HEALTH_PORTS, Layout
 from palaestra.plan.replica import JOB_LABEL, UID_LABEL, owner, uid_of
 
 OPERATOR_LABEL = "palaestra.dev/operator"
-NAMESPACE_LABEL = "kubernetes.io/metadata.name"  # every API server sets this label itself
+NAMESPACE_LABEL = "kubernetes.io/metadata.name"  # the API server sets this label on each namespace
 SHORT_UID = 8
 
 
 def network_policy(job: TrainingJob, layout: Layout) -> dict[str, Any] | None:
-    """Return the NetworkPolicy of all pods of the job; None if pods have no network of their own.
+    """Return the NetworkPolicy of all pods of the job; None if the layout's pods share a network.
 
-    Its name has the start of the job's uid, so that it differs from the policy of an earlier job of this
-    name.
+    The policy's name contains the start of the job's uid, so that it differs from the policy of an earlier
+    job with the same name.
 
     Raises:
         PlanError: the job has no uid.

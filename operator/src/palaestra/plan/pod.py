@@ -1,4 +1,4 @@
-"""The pod template of a replica: containers in order, volumes, and the settings of *restricted* security."""
+"""The pod template of a replica, by the Pod Security Standard *restricted*."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -10,7 +10,7 @@ from palaestra.plan.replica import TRAINER, Replica
 from palaestra.plan.resources import twice
 
 UNPRIVILEGED: Mapping[str, Any] = {"runAsNonRoot": True, "seccompProfile": {"type": "RuntimeDefault"}}
-# For the last checkpoint and the shutdown of the simulators; not longer than the notice of a spot node.
+# The time for the last checkpoint and the shutdown of the simulators. A spot node gives no longer notice.
 GRACE_S = 60
 SCRATCH_SIZE = "1Gi"
 MEMORY_SIZE = "128Mi"
@@ -19,7 +19,7 @@ MEMORY_SIZE = "128Mi"
 def pod_template(
     replica: Replica, config_map: Mapping[str, Any], worlds: Mapping[str, bytes]
 ) -> dict[str, Any]:
-    """Return the template; `config_map` is the replica's, `worlds` are the worlds in it."""
+    """Return the template; `config_map` is the replica's ConfigMap, and `worlds` are the worlds in it."""
     installed = install_sidecar(replica)
     init = [
         *([installed] if installed else []),
@@ -51,7 +51,7 @@ def pod_template(
 
 
 def _security(user: int | None) -> dict[str, Any]:
-    """Return the security settings of a pod; without a user, the cluster chooses user and groups."""
+    """Return the security settings of a pod; if `user` is None, the cluster chooses user and groups."""
     fixed = {} if user is None else {"runAsUser": user, "runAsGroup": user}
     group = {} if user is None else {"fsGroup": user}
     return {
@@ -64,7 +64,7 @@ def _security(user: int | None) -> dict[str, Any]:
 
 
 def _metadata(replica: Replica) -> dict[str, Any]:
-    """Return labels and annotations; the job's own labels never replace the operator's."""
+    """Return labels and annotations of the pod; labels of the job never replace labels of the operator."""
     scheduling = replica.job.spec.scheduling
     metadata: dict[str, Any] = {"labels": {**scheduling.pod_labels, **replica.labels}}
     if scheduling.pod_annotations:
@@ -87,7 +87,7 @@ def _scheduling(replica: Replica) -> dict[str, Any]:
 def _sizes(replica: Replica, main: Mapping[str, Any]) -> dict[str, str]:
     """Return the size of each container's shared memory by the name of its volume.
 
-    The trainer's own memory limit is the limit for the memory that it shares with its workers.
+    For the memory that the trainer shares with its worker processes, the limit is the trainer's memory limit.
     """
     return {
         shared_memory(TRAINER): main["resources"]["limits"]["memory"],
@@ -99,7 +99,7 @@ def _sizes(replica: Replica, main: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _empty_volumes(containers: list[dict[str, Any]], memory: Mapping[str, str]) -> list[dict[str, Any]]:
-    """Return an empty volume for every mount without another volume: each container has its own."""
+    """Return an empty volume for each mount that has no other volume; each container has its own volumes."""
     mounted = {mount["name"] for container in containers for mount in container["volumeMounts"]}
     return [
         {"name": name, "emptyDir": _empty(name, memory)}

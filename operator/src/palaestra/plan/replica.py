@@ -1,7 +1,7 @@
-"""One replica of a job in a layout: the input for all its objects.
+"""One replica of a job in a layout: the input from which its objects are planned.
 
-Names are deterministic. If a second operator, or the same one after a crash, creates the same objects again,
-the API server refuses them.
+Names are deterministic. If a second or a restarted operator creates the same objects again, the API server
+refuses the duplicates.
 """
 
 from dataclasses import dataclass
@@ -13,17 +13,18 @@ from palaestra_sim.world import RunIdentity
 
 JOB_LABEL = "palaestra.dev/job"
 REPLICA_LABEL = "palaestra.dev/replica"
-UID_LABEL = "palaestra.dev/job-uid"  # a job that is created again has the name of the earlier job
-RESTART_LOST_RUNS = "palaestra.dev/restart-lost-runs"  # annotation of a TrainingJob: any new value
+UID_LABEL = "palaestra.dev/job-uid"  # it distinguishes jobs that had the same name one after the other
+# Annotation of a TrainingJob: a new value gives up lost runs.
+RESTART_LOST_RUNS = "palaestra.dev/restart-lost-runs"
 TRAINER = "trainer"
 ROS_MASTER = "ros-master"
 INSTALL_SIDECAR = "install-sidecar"
-SIMULATOR_PREFIX = "sim-"  # the start of a container's name; the simulator's name follows
+SIMULATOR_PREFIX = "sim-"  # the name of a sidecar's container: this prefix and the simulator's name
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlannedSimulator:
-    """One simulator of a replica; `place` is its number among all simulators of the pod, from 0."""
+    """One simulator of a replica; `place` is the simulator's number in the pod, from 0."""
 
     group: SimulatorGroup
     identity: RunIdentity
@@ -31,17 +32,17 @@ class PlannedSimulator:
 
     @property
     def name(self) -> str:
-        """Return `<group>-<index>`."""
+        """Return the simulator's name, `<group>-<index>`."""
         return f"{self.group.name}-{self.identity.index}"
 
     @property
     def container(self) -> str:
-        """Return the name of its sidecar's container."""
+        """Return the name of the sidecar's container."""
         return f"{SIMULATOR_PREFIX}{self.name}"
 
     @property
     def keeps_clock(self) -> bool:
-        """Return whether it publishes /clock: only one simulator of a ROS master may do so."""
+        """Return whether the simulator publishes /clock, which only one simulator of a ROS master may do."""
         return self.place == 0
 
 
@@ -49,7 +50,7 @@ def uid_of(job: TrainingJob) -> str:
     """Return the uid of a job.
 
     Raises:
-        PlanError: it has none.
+        PlanError: the job has no uid.
     """
     if job.metadata.uid is None:
         raise PlanError("metadata.uid: is absent; plan the job as the cluster returned it")
@@ -81,18 +82,18 @@ class Replica:
         """Return the uid of the job.
 
         Raises:
-            PlanError: it has none.
+            PlanError: the job has no uid.
         """
         return uid_of(self.job)
 
     @property
     def name(self) -> str:
-        """Return `<job>-<replica>`, the name of its Job, which is unique in its namespace."""
+        """Return the name of the replica's Job, `<job>-<replica>`, which is unique in its namespace."""
         return f"{self.job.metadata.name}-{self.index}"
 
     @property
     def simulators(self) -> tuple[PlannedSimulator, ...]:
-        """Return its simulators in the order of the job's groups."""
+        """Return the replica's simulators in the order of the job's groups."""
         members = [(group, i) for group in self.job.spec.simulators for i in range(group.count)]
         return tuple(
             PlannedSimulator(group=group, identity=self._identity(group, i), place=place)
@@ -100,11 +101,11 @@ class Replica:
         )
 
     def places(self, container: str) -> ContainerPaths:
-        """Return the paths for one of its containers."""
+        """Return the paths for a container of the replica."""
         return self.layout.places(self.uid, self.index, container)
 
     def metadata(self, name: str, *, owned: bool = True) -> dict[str, object]:
-        """Return the metadata of one of its objects; an owned object is deleted with the TrainingJob."""
+        """Return the metadata of an object; an owned object is deleted with the TrainingJob."""
         metadata: dict[str, object] = {
             "name": name,
             "namespace": self.job.metadata.namespace,
@@ -116,7 +117,7 @@ class Replica:
 
     @property
     def labels(self) -> dict[str, str]:
-        """Return the labels that select its objects."""
+        """Return the labels that select the replica's objects."""
         return {
             "app.kubernetes.io/managed-by": "palaestra",
             JOB_LABEL: self.job.metadata.name,

@@ -1,7 +1,7 @@
-"""CPU and memory of the containers, and the number of threads that follows from them.
+"""CPU and memory of the containers, and the number of threads that follows from the CPU limit.
 
-With the defaults, two replicas of two simulators each, and the operator, fit on two cores: a replica requests
-425m. A second thread does not speed up small networks, so the trainer has one.
+With the defaults, a replica with two simulators requests 425m. So the operator and two such replicas fit on
+two cores. A second thread does not speed up small networks, so the trainer has one thread.
 """
 
 import math
@@ -23,7 +23,7 @@ NONE = Resources()
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Defaults:
-    """An installation's default resources for containers; Palaestra's own defaults fill the rest."""
+    """An installation's default resources of containers; Palaestra's own defaults complete them."""
 
     ros_master: Resources = NONE
     simulator: Resources = NONE
@@ -34,17 +34,17 @@ NO_DEFAULTS = Defaults()
 
 ROS_MASTER = Resources(requests={"cpu": "25m", "memory": "64Mi"}, limits={"memory": "256Mi"})
 SIMULATOR = Resources(requests={"cpu": "75m", "memory": "160Mi"}, limits={"memory": "2Gi"})
-# It uses 100 MB without a camera and 200 MB with one, in addition to the sidecar.
+# MuJoCo uses 100 MB without a camera and 200 MB with a camera, in addition to the sidecar.
 MUJOCO = Resources(requests={"cpu": "75m", "memory": "256Mi"}, limits={"memory": "2Gi"})
 TRAINER = Resources(requests={"cpu": "250m", "memory": "768Mi"}, limits={"cpu": "1", "memory": "2Gi"})
 
 
 def resources(wanted: Resources, default: Resources) -> Planned:
-    """Return the job's resources, with defaults for those that it does not set.
+    """Return the job's resources, with defaults for all resources that the job does not set.
 
-    If a job sets only the request of a resource, the default limit stays, but is raised to the request if
-    that is more. Without a limit, one container could use all memory of its node. If a job sets only a limit,
-    the default request is left out, because an API server then requests the limit.
+    If a job sets only the request of a resource, the default limit stays, but is raised to the request if the
+    request is larger. Without a limit, one container could use all memory of its node. If a job sets only a
+    limit, the default request is left out. Then the API server sets the request to the limit.
     """
     requests = {name: value for name, value in default.requests.items() if name not in wanted.limits}
     limits = {
@@ -56,14 +56,14 @@ def resources(wanted: Resources, default: Resources) -> Planned:
 
 
 def by_default(installation: Resources, release: Resources) -> Resources:
-    """Return the default of a container: the installation's, completed by the release's."""
+    """Return the default resources of a container: the installation's, completed by the release's."""
     return Resources.model_validate(resources(installation, release))
 
 
 def for_two(planned: Planned) -> Planned:
     """Return the resources of a container with a standby simulator: twice the memory.
 
-    One of the two computes at a time, so they share the processor.
+    Only one of the two simulators computes at a time, so the CPU is not doubled.
     """
     return {
         field: {name: twice(value) if name == "memory" else value for name, value in quantities.items()}
@@ -72,7 +72,7 @@ def for_two(planned: Planned) -> Planned:
 
 
 def twice(quantity: str) -> str:
-    """Return a quantity doubled, in its own unit."""
+    """Return the double of a quantity, in the same unit."""
     number, unit = _split(quantity)
     return f"{(2 * Decimal(number)).normalize():f}{unit}"
 
@@ -88,13 +88,13 @@ def threads(planned: Planned) -> int:
 
 
 def asks_for_gpu(wanted: Resources) -> bool:
-    """Return whether requests or limits have a GPU, such as nvidia.com/gpu, in an amount above 0."""
+    """Return whether requests or limits name a GPU, such as nvidia.com/gpu, in an amount above 0."""
     names = (*wanted.requests, *wanted.limits)
     return any(name.endswith("/gpu") and asks_for(name, wanted) for name in names)
 
 
 def asks_for(resource: str, wanted: Resources) -> bool:
-    """Return whether requests or limits have a resource in an amount above 0."""
+    """Return whether requests or limits name a resource in an amount above 0."""
     quantities = (wanted.requests.get(resource, "0"), wanted.limits.get(resource, "0"))
     return any(_amount(quantity) > 0 for quantity in quantities)
 

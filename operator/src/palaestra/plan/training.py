@@ -1,7 +1,13 @@
-"""training.yaml: the job's settings for one replica, as its trainer reads them.
+"""training.yaml: the job's settings for one replica, in the format that the trainer reads.
 
+<<<<<<< HEAD
 The trainer's `palaestra_trainer.job.configuration` declares all fields. On a laptop the command line reads
 only the addresses of a run from the file; `RunAddresses` is next to the code that writes them.
+=======
+The trainer's `palaestra_trainer.configuration` declares all fields. On a laptop, the command line reads only
+the addresses of a run from the file. `RunAddresses` is in this module, next to the code that writes these
+addresses.
+>>>>>>> words-operator
 """
 
 from collections.abc import Mapping
@@ -22,11 +28,12 @@ FILE = "training.yaml"
 LOOPBACK = "127.0.0.1"
 NEVER = Recycle(after_resets=0)
 DO_NOT_AGE = (Driver.STUB, Driver.MUJOCO)
-AFTER_24_RESETS = Recycle(after_resets=24)  # Source: the paper's simulator ended with a bus error there
+# Source: after this number of resets, the paper's simulator ended with a bus error.
+AFTER_24_RESETS = Recycle(after_resets=24)
 
 
 def training_yaml(replica: Replica, files: Mapping[str, bytes]) -> bytes:
-    """Return the text of the replica's training.yaml; `files` are the worlds next to it."""
+    """Return the text of the replica's training.yaml; `files` has the worlds of the same ConfigMap."""
     return as_yaml([_training(replica, files)]).encode()
 
 
@@ -105,10 +112,10 @@ class SimulatorAddress:
 
     @classmethod
     def read(cls, content: object, path: str) -> Self:
-        """Return the address in the part of a training.yaml at `path`.
+        """Return the address in an entry of a training.yaml; `path` is the entry's path.
 
         Raises:
-            ProtocolError: it has no address.
+            ProtocolError: the entry has no address.
         """
         fields = Fields(content, path)
         return cls(
@@ -124,7 +131,7 @@ class RunAddresses:
 
     Attributes:
         status: `host:port` of the trainer's /status.
-        simulators: one address for each, in the order of the file.
+        simulators: the addresses of the simulators, in the order of the file.
     """
 
     status: str
@@ -149,14 +156,14 @@ class RunAddresses:
 
 
 def recycling(group: SimulatorGroup) -> Recycle:
-    """Return the recycle limits of a group's simulators, with the default for a job without them."""
+    """Return the recycle limits of a group's simulators: the job's, or the default of the driver."""
     if group.recycle is not None:
         return group.recycle
     return NEVER if group.driver in DO_NOT_AGE else AFTER_24_RESETS
 
 
 def _limits(recycle: Recycle) -> dict[str, int]:
-    """Return the limits that are set, memory in bytes."""
+    """Return the limits above 0, with memory in bytes."""
     memory = recycle.above_memory
     limits = {
         "afterResets": recycle.after_resets,

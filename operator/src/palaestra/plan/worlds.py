@@ -1,9 +1,9 @@
 """The worlds of a replica's ConfigMap: the source world of each group of simulators, once.
 
-Each source is checked once for all replicas, so that an error in it is found before objects are created. The
-plan checks it, or the operator checks it before the plan and passes the verdicts, by a digest of the world
-and of its field. Only the sidecar writes the ROS names of a simulator into a world. Sources of `file` are in
-the image, and only the sidecar reads them.
+Each source is checked once for all replicas, so that an error in a world is found before objects are created.
+Either the plan checks the sources, or the operator checks them before the plan and passes the results
+(verdicts). The key of a result is a digest of the world and of its field. Only the sidecar writes the ROS
+names of a simulator into a world. A source of `file` is in the image, so only the sidecar reads it.
 """
 
 import hashlib
@@ -15,7 +15,8 @@ from palaestra.errors import PlanError, WorldCheckTooCostly, WorldRefused, World
 from palaestra.plan.replica import PlannedSimulator, Replica
 from palaestra_sim.world import MJCF, WBT, builtin, check, suffix
 
-MOST_BYTES = 900_000  # all worlds together; an object has at most 1 MiB, and training.yaml is in it too
+# Limit for all worlds together; a ConfigMap has at most 1 MiB, and also contains training.yaml.
+MOST_BYTES = 900_000
 FOLDER = "worlds"
 
 _READ_MJCF = (Driver.MUJOCO, Driver.COMMAND)
@@ -30,8 +31,8 @@ class WorldVerdict:
     """The result of the check of one world.
 
     Attributes:
-        problem: the message of the refusal; "": the world is valid.
-        too_costly: whether the check was ended because it exceeded its budget.
+        problem: the error in the world; "": the world is valid.
+        too_costly: whether the check was stopped because it exceeded its budget.
     """
 
     problem: str = ""
@@ -47,17 +48,17 @@ class GivenWorld:
 
     @property
     def digest(self) -> str:
-        """Return the key of its verdict."""
+        """Return the key of the world's result in `Verdicts`."""
         return hashlib.sha256(b"\0".join((self.field.encode(), self.source))).hexdigest()
 
 
 def require_fine(worlds: Mapping[str, GivenWorld], verdicts: Verdicts) -> None:
-    """Check that every world has a verdict and is not refused; `worlds` are by digest.
+    """Check that every world has a result without a problem; the keys of `worlds` are digests.
 
     Raises:
         WorldCheckTooCostly: a check exceeded its budget.
-        WorldRefused: a world is wrong.
-        WorldUnchecked: a world has no verdict yet.
+        WorldRefused: a world is invalid.
+        WorldUnchecked: a world has no result yet.
     """
     for digest in worlds:
         verdict = verdicts.get(digest)
@@ -71,12 +72,12 @@ def require_fine(worlds: Mapping[str, GivenWorld], verdicts: Verdicts) -> None:
 def source_files(job: TrainingJob, config_maps: ConfigMaps, verdicts: Verdicts | None = None) -> Files:
     """Return the checked source worlds for the ConfigMap of every replica.
 
-    Without `verdicts` they are checked here, which takes time in proportion to their size.
+    Without `verdicts` this function checks the worlds, which takes time in proportion to their size.
 
     Raises:
-        PlanError: a ConfigMap is not among `config_maps`, the worlds are too big, or a verdict is missing or
-            a refusal.
-        WorldError: a world is wrong.
+        PlanError: a ConfigMap is not among `config_maps`, the worlds are too big, or a result is missing or
+            has a problem.
+        WorldError: a world is invalid.
     """
     sources = _sources(job, config_maps)
     given = _given(job, sources)
@@ -99,7 +100,7 @@ def given_worlds(job: TrainingJob, config_maps: ConfigMaps) -> tuple[GivenWorld,
 
 
 def _given(job: TrainingJob, sources: Mapping[int, bytes]) -> tuple[GivenWorld, ...]:
-    """Return the worlds that the author of a job wrote, each once; built-in worlds are known to be valid."""
+    """Return the worlds that the author of a job wrote, each once; built-in worlds need no check."""
     worlds: dict[bytes, GivenWorld] = {}
     for place, source in sources.items():
         world = job.spec.simulators[place].world
@@ -109,7 +110,7 @@ def _given(job: TrainingJob, sources: Mapping[int, bytes]) -> tuple[GivenWorld, 
 
 
 def _sources(job: TrainingJob, config_maps: ConfigMaps) -> Mapping[int, bytes]:
-    """Return the source worlds by the number of their group, without those in an image.
+    """Return the source worlds by the number of their group, without worlds in an image.
 
     Raises:
         PlanError: a ConfigMap is not among `config_maps`, or the worlds are too big.
@@ -125,7 +126,7 @@ def _sources(job: TrainingJob, config_maps: ConfigMaps) -> Mapping[int, bytes]:
     )
     if size > MOST_BYTES:
         raise PlanError(
-            f"spec.simulators: their worlds take {size} bytes and {MOST_BYTES} fit in a "
+            f"spec.simulators: the worlds take {size} bytes, but only {MOST_BYTES} fit into a "
             "ConfigMap; put the worlds into the images and name them with world.file"
         )
     return sources
@@ -161,7 +162,7 @@ def _require_reader(group: SimulatorGroup, source: bytes | None, place: int) -> 
 
 
 def _source(group: SimulatorGroup, field: str, config_maps: ConfigMaps) -> bytes | None:
-    """Return the content of a group's world; None if it is in the image."""
+    """Return the content of a group's world; None if the world is in the image."""
     match group.world:
         case WorldSource(inline=str(text)):
             return text.encode()
@@ -180,6 +181,6 @@ def _source(group: SimulatorGroup, field: str, config_maps: ConfigMaps) -> bytes
 
 
 def _kind(world: WorldSource) -> str:
-    """Return the name of the field that has a world."""
+    """Return the name of the field that contains a world."""
     given = {"inline": world.inline, "configMap": world.config_map, "builtin": world.builtin}
     return next((name for name, value in given.items() if value is not None), "file")

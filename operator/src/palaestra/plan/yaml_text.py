@@ -1,6 +1,6 @@
-"""Objects as YAML for people: fields in their own order, long texts as blocks, no anchors.
+"""Write objects as YAML for people: fields keep their order, long texts are blocks, and no anchors occur.
 
-Also text that the kubelet passes to a container unchanged.
+`literal` escapes text so that the kubelet passes it to a container unchanged.
 """
 
 import re
@@ -9,17 +9,18 @@ from typing import Any
 
 import yaml
 
-# YAML treats these as line ends and would read back other characters; in double quotes they are escaped.
+# YAML treats these characters as line ends and would read back other characters. In double quotes they are
+# escaped.
 _BREAKS = frozenset("\x85\u2028\u2029")
-# PyYAML reads such values, for example 5e-4, as text, but kubectl reads them as numbers.
+# PyYAML reads a value such as 5e-4 as text, but kubectl reads it as a number. So such texts are quoted.
 _NUMBER = re.compile(r"[-+]?[0-9.][0-9._]*([eE][-+]?[0-9]+)?")
 
 
 class _Dumper(yaml.CSafeDumper):
-    """PyYAML's safe dumper for people."""
+    """PyYAML's safe dumper, but without anchors."""
 
-    def ignore_aliases(self, data: Any) -> bool:  # noqa: ARG002 - equal parts are written in full
-        """Return True, so that no anchors are written."""
+    def ignore_aliases(self, data: Any) -> bool:  # noqa: ARG002 - repeated values are written in full
+        """Return True, so that PyYAML writes no anchors."""
         return True
 
 
@@ -42,7 +43,7 @@ def as_yaml(documents: Iterable[Mapping[str, Any]]) -> str:
 
 
 def literal(text: str) -> str:
-    """Return the escaped form from which a kubelet makes `text`, for commands, arguments and variables.
+    """Return `text` escaped for a kubelet, for use in commands, arguments and variables.
 
     A kubelet replaces `$(NAME)` by the variable, and `$$` by `$`.
     """

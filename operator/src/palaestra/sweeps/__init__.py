@@ -2,8 +2,8 @@
 
 - `model`: the Sweep that a person writes, and its parser.
 - `grid`: trials from a Sweep; pure.
-- `trial`: one trial, and the figures of its runs.
-- `search`: the choice of the next trial: all trials of a list, in order.
+- `trial`: one trial, and the results (figures) of its runs.
+- `search`: the interface for the choice of the next trial, and the choice in the order of a list.
 - `optuna_search`: the choice of the next trial by Optuna, which also prunes; imported only if a Sweep uses
   it.
 - `trial_log`: the trials that have ended, in a file of the sweep's folder.

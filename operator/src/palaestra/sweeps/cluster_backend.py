@@ -1,7 +1,7 @@
 """Trials in a cluster: TrainingJobs with a common label, which the operator and a queue run.
 
-They continue if the command ends. The command creates them, reads their status, and deletes those of pruned
-trials.
+The command creates these jobs, reads their status, and deletes the jobs of pruned trials. The jobs continue
+if the command ends.
 """
 
 import time
@@ -18,10 +18,10 @@ from palaestra.errors import PalaestraError
 from palaestra.sweeps.model import LABEL
 from palaestra.sweeps.trial import Point, RunFigures, Trial, TrialFigures, TrialProgress
 
-LOOK_S = 5.0  # the operator writes progress at most every 30 s
+LOOK_S = 5.0  # seconds between two requests; the operator writes progress at most every 30 s
 DELETED_S = 300.0
 AWAY = (Gone, ServerError, TooManyRequests, Unreachable)
-QUIET_LOOKS = 6  # failed requests before a line reports them: at least half a minute
+QUIET_LOOKS = 6  # failed requests in a row before a line reports them: at least half a minute
 
 Answer = TypeVar("Answer")
 
@@ -34,11 +34,11 @@ class ClusterBackend:
     """The TrainingJobs of a sweep in a namespace.
 
     Args:
-        client: client for the cluster and namespace.
+        client: the client for the cluster and namespace.
         sweep: the name of the sweep.
-        at_once: number of trials at the same time; None: all, and the queue decides.
-        report: called with a line when the API server has not responded for a while, and when it responds
-            again.
+        at_once: number of trials at the same time; None: all trials, and the job's queue decides.
+        report: called with a line when the API server has not responded for half a minute, and when it
+            responds again.
         look_s: seconds between two requests.
     """
 
@@ -78,17 +78,18 @@ class ClusterBackend:
         return self._at_once is None or len(self._begun) < self._at_once
 
     def begin(self, trial: Trial) -> None:
-        """Create the job of a trial, unless it exists.
+        """Create the job of a trial if the job does not exist.
 
         Raises:
             NotOfThisSweep: a job of this name does not belong to the sweep.
-            ApiError: the API server refuses it, or does not respond to the first request of this command.
+            ApiError: the API server refuses the job, or does not respond to the first request of this
+                command.
         """
         self._answer_of(lambda: self._create(trial))
         self._begun.add(trial.number)
 
     def wait(self) -> None:
-        """Wait some seconds, then read the newest status of every job; retry if the API server is busy."""
+        """Wait some seconds, then read the status of each job; retry while the server does not respond."""
         time.sleep(self._look_s)
         jobs = self._answer_of(lambda: self._client.list(self._selector))
         self._jobs = {job.metadata.name: job for job in jobs}
@@ -107,7 +108,7 @@ class ClusterBackend:
         return TrialFigures(state=TrialProgress.COMPLETE if done else TrialProgress.FAILED, runs=runs)
 
     def prune(self, trial: Trial) -> None:
-        """Delete the job of a trial, if it exists, and wait until its pods are gone."""
+        """Delete the job of a trial, if it exists, and wait until its pods have ended."""
         self._begun.discard(trial.number)
         self._answer_of(lambda: self._delete(trial))
 
@@ -126,9 +127,9 @@ class ClusterBackend:
             self._client.delete(trial.name, deadline_s=DELETED_S)
 
     def _answer_of(self, ask: Callable[[], Answer]) -> Answer:
-        """Return the response of the API server; after its first response, retry while it does not respond.
+        """Return the response of the API server; retry while it does not respond.
 
-        A server that has never responded may be the wrong one, so its first error is raised.
+        A server that has never responded may be the wrong server, so then the first error is raised.
         """
         looks = 0
         while True:
@@ -151,7 +152,7 @@ class ClusterBackend:
         return answer
 
     def _figures(self, trial: Trial, status: ReplicaStatus) -> RunFigures:
-        """Return the figures of a replica; each change of them is a point of its curve."""
+        """Return the figures of a replica; each change of a figure adds a point to the replica's curve."""
         key = (trial.number, status.index)
         curve = self._curves.get(key, ())
         rate, mean = status.success_rate, status.mean_return

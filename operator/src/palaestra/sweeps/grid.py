@@ -1,7 +1,7 @@
-"""Trials from a Sweep. Pure: the same Sweep gives the same trials in the same order.
+"""Compute the trials of a Sweep. The same Sweep always gives the same trials in the same order.
 
-A random value is a function of the sweep's seed, the number of the trial and the field. So a new trial or
-field does not change other values, and neither does the version of Python.
+A random value is a function of the sweep's seed, the number of the trial and the field. So a new trial, a new
+field or another version of Python does not change other values.
 """
 
 import hashlib
@@ -16,14 +16,14 @@ from palaestra.job_input import changed
 from palaestra.sweeps.model import LABEL, Distribution, Sweep
 from palaestra.sweeps.trial import Trial
 
-_BITS = 53  # a float has this precision
+_BITS = 53  # the precision of a float
 
 
 def trials(sweep: Sweep) -> tuple[Trial, ...]:
-    """Return every trial, in order; for a search, trials that together have every bound and choice.
+    """Return all trials, in order; for a search by Optuna, return the trials with the values of `probes`.
 
     Raises:
-        SpecErrors: jobs are wrong; the error lists every problem once, with its first trial.
+        SpecErrors: jobs are invalid; the error lists each problem once, with the first trial that has it.
     """
     points = list(settings(sweep) if sweep.spec.optuna is None else probes(sweep))
     found: list[Trial] = []
@@ -40,7 +40,7 @@ def trials(sweep: Sweep) -> tuple[Trial, ...]:
 
 
 def settings(sweep: Sweep) -> Iterator[Mapping[str, Any]]:
-    """Yield the values of the fields that differ, trial by trial; the last field of a matrix varies first."""
+    """Yield the changed values of each trial; in a matrix, the last field varies fastest."""
     spec = sweep.spec
     if spec.random:
         for number in range(spec.trials or 0):
@@ -54,10 +54,10 @@ def settings(sweep: Sweep) -> Iterator[Mapping[str, Any]]:
 
 
 def trial(sweep: Sweep, number: int, changes: Mapping[str, Any]) -> Trial:
-    """Return a trial with its job, which has the sweep's label and a replica for each seed.
+    """Return a trial; its job has the sweep's label and a replica for each seed.
 
     Raises:
-        SpecErrors: the job is wrong; the error lists every problem.
+        SpecErrors: the job is invalid; the error lists every problem.
     """
     job = sweep.spec.job
     own = {
@@ -70,7 +70,7 @@ def trial(sweep: Sweep, number: int, changes: Mapping[str, Any]) -> Trial:
 
 
 def probes(sweep: Sweep) -> Iterator[Mapping[str, Any]]:
-    """Yield values that together hold every bound and choice of `random`, to check jobs before a search."""
+    """Yield values that together contain each bound and choice of `random`, to check jobs before a search."""
     columns = [_ends(values) for values in sweep.spec.random.values()]
     first = [column[0] for column in columns]
     for row in zip_longest(*columns):
@@ -79,7 +79,7 @@ def probes(sweep: Sweep) -> Iterator[Mapping[str, Any]]:
 
 
 def drawn(values: Distribution, share: float) -> Any:
-    """Return the value of a distribution at a share of its range, 0 to 1 (excluded)."""
+    """Return the value of a distribution at the share `share` of its range; 0 <= `share` < 1."""
     if values.choice is not None:
         return values.choice[int(share * len(values.choice))]
     low, high = float(values.low or 0), float(values.high or 0)
@@ -90,13 +90,13 @@ def drawn(values: Distribution, share: float) -> Any:
 
 
 def chance(seed: int, number: int, field: str) -> float:
-    """Return a uniformly distributed number from 0 to 1 (excluded) that depends only on the arguments."""
+    """Return a uniformly distributed number in [0, 1) that depends only on the arguments."""
     digest = hashlib.sha256(f"{seed}/{number}/{field}".encode()).digest()
     return (int.from_bytes(digest[:8]) >> (64 - _BITS)) / (1 << _BITS)
 
 
 def short(fields: Iterable[str]) -> Mapping[str, str]:
-    """Return the shortest ends that distinguish the paths, for headings."""
+    """Return for each path its shortest end that no other path has, for headings."""
     paths = list(fields)
     return {path: next(end for end in _endings(path) if end == path or _is_one(end, paths)) for path in paths}
 

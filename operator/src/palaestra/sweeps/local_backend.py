@@ -1,7 +1,7 @@
-"""Trials on this machine: runs in the background, as many at the same time as the processors allow.
+"""Trials on this machine: as many runs in the background as the processors allow.
 
-The trainer and its collecting simulators work in turns, and evaluating simulators wait in the meantime. So a
-run keeps as many processors busy as it has collecting simulators.
+The trainer and its collecting simulators take turns, and evaluating simulators are idle meanwhile. So a run
+keeps as many processors busy as it has collecting simulators.
 """
 
 import json
@@ -32,7 +32,7 @@ class LocalBackend:
         at_once: number of runs at the same time; None: as many as the processors allow.
 
     Attributes:
-        stopped: whether all runs have ended by themselves or after a checkpoint.
+        stopped: whether `stop` has completed, so that all runs have ended.
     """
 
     def __init__(self, folder: Path, at_once: int | None) -> None:
@@ -47,26 +47,26 @@ class LocalBackend:
         """Run all checks of a trial that do not write files.
 
         Raises:
-            LocalError: it cannot be run here.
-            PlanError: it cannot be run on one machine.
+            LocalError: the job cannot be run here.
+            PlanError: the job cannot be run on one machine.
         """
         directory = job_directory(self._folder, job.metadata.name)
         options = RunOptions(runs=self._folder, version=version("palaestra"))
         check(identified(job, uid_of(directory)), directory, range(job.spec.replicas), options)
 
     def has_room(self) -> bool:
-        """Return whether a processor is free and no run waits for one."""
+        """Return whether a processor is free and no run waits for a processor."""
         return not self._waiting and self._fits(1)
 
     def begin(self, trial: Trial) -> None:
-        """Queue the runs of a trial, and start those that fit; complete runs are not repeated."""
+        """Queue the incomplete runs of a trial, and start as many as the processors allow."""
         for replica in range(trial.job.spec.replicas):
             if not self._complete(trial, replica):
                 self._waiting.append((trial, replica))
         self._fill()
 
     def wait(self) -> None:
-        """Wait until a run has ended, at most a second."""
+        """Wait at most a second until a run has ended."""
         select.select([*self._running.values()], [], [], LOOK_S if self._running else 0.0)
         for key, started in tuple(self._running.items()):
             if started.ended:
@@ -74,20 +74,20 @@ class LocalBackend:
         self._fill()
 
     def look(self, trial: Trial) -> TrialFigures:
-        """Return the figures of a trial from its run directories, even if it was not begun."""
+        """Return the figures of a trial from its run directories, even if this command did not begin it."""
         return TrialFigures.of(
             tuple(self._figures(trial, replica) for replica in range(trial.job.spec.replicas))
         )
 
     def prune(self, trial: Trial) -> None:
-        """End the runs of a trial; they keep their checkpoints."""
+        """End the runs of a trial after a checkpoint."""
         self._waiting = deque(unit for unit in self._waiting if unit[0].number != trial.number)
         for (number, _), started in self._running.items():
             if number == trial.number:
                 started.interrupt()
 
     def stop(self) -> None:
-        """End all runs, each with a checkpoint; a KeyboardInterrupt during that kills them."""
+        """End all runs, each with a checkpoint; a KeyboardInterrupt meanwhile kills the runs."""
         self._waiting.clear()
         runs = tuple(self._running.values())
         try:
@@ -139,12 +139,12 @@ def busy(job: TrainingJob) -> int:
 
 
 def evaluations(directory: Path) -> tuple[Point, ...]:
-    """Return the evaluations of a run so far, in order."""
+    """Return the evaluations that a run has written so far, in order."""
     try:
         lines = (directory / "evaluations.jsonl").read_text().split("\n")
     except OSError:  # the file does not exist yet
         return ()
-    return tuple(_point(json.loads(line)) for line in lines[:-1])  # the last is empty or incomplete
+    return tuple(_point(json.loads(line)) for line in lines[:-1])  # the last line is empty or incomplete
 
 
 def _point(line: dict[str, Any]) -> Point:

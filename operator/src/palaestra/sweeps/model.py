@@ -1,6 +1,6 @@
 """The Sweep: a job, the fields that differ between its trials, and their values.
 
-Only the command line reads a Sweep. A cluster does not store it, but gets TrainingJobs for it.
+Only the command line reads a Sweep. A cluster stores only the TrainingJobs of its trials.
 """
 
 from collections.abc import Mapping
@@ -151,9 +151,9 @@ def load(file: Path) -> Sweep:
     """Return the Sweep in a file, with its job as plain data.
 
     Raises:
-        SpecErrors: the file is wrong; the error lists every problem.
-        OSError: the file or that of its job cannot be read.
-        TooLarge: one of them is too large.
+        SpecErrors: the Sweep is invalid; the error lists every problem.
+        OSError: the file, or the file of its job, cannot be read.
+        TooLarge: one of the two files is too large.
     """
     try:
         data = read(read_bounded(file, MOST_JOB_BYTES).decode(), str(file))

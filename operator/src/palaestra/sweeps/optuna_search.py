@@ -1,7 +1,7 @@
-"""A search by Optuna: it suggests trials based on earlier results, and prunes trials.
+"""A search by Optuna, which suggests trials based on earlier results, and prunes trials.
 
-The search is stored in a journal file, so the same command continues it. A trial that was running when the
-search was interrupted is suggested again, with its old number, and its runs resume.
+The search is stored in a journal file, so the same command continues the search. A trial that was running
+when the search was interrupted is suggested again with its old number, and its runs resume.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,7 +19,7 @@ from palaestra.sweeps.model import Distribution, Optuna, Sweep
 from palaestra.sweeps.trial import Trial, TrialFigures, TrialProgress
 
 JOURNAL = "optuna.journal"
-NUMBER = "trial"  # attribute of Optuna's trial: the number in the sweep, which a resumed trial keeps
+NUMBER = "trial"  # attribute of an Optuna trial: its number in the sweep, which a resumed trial keeps
 
 
 class OptunaSearch:
@@ -45,12 +45,12 @@ class OptunaSearch:
 
     @property
     def left(self) -> int:
-        """Return the number of trials to suggest, including those to suggest again."""
+        """Return the number of trials that the search must still suggest, including interrupted trials."""
         waits = self._study.get_trials(deepcopy=False, states=(TrialState.WAITING,))
         return len(waits) + max((self._sweep.spec.trials or 0) - len(self._known), 0)
 
     def next(self) -> Trial | None:
-        """Return the next trial; None if the sweep has all its trials."""
+        """Return the next trial; None if all trials of the sweep were suggested."""
         if not self.left:
             return None
         asked = self._study.ask(self._space)
@@ -65,8 +65,8 @@ class OptunaSearch:
         return self._asked[trial.number].should_prune()
 
     def learn(self, trial: Trial, figures: TrialFigures) -> None:
-        """Report the median result; a trial without one has failed."""
-        self._report(trial, figures)  # a short trial may have ended before its figures were read
+        """Report the median result to Optuna; a trial without a result counts as failed."""
+        self._report(trial, figures)  # a short trial may end before its figures were reported
         asked, value = self._asked.pop(trial.number), figures.median(self._sweep.spec.objective)
         if figures.state is TrialProgress.PRUNED:
             self._study.tell(asked, state=TrialState.PRUNED)
@@ -76,17 +76,18 @@ class OptunaSearch:
             self._study.tell(asked, state=TrialState.FAIL)
 
     def _suggest_again(self) -> None:
-        """Enqueue each trial that was running; a trial without a number was never begun, and is dropped."""
+        """Enqueue each trial that was running; drop trials without a number, which were never begun."""
         waits = self._study.get_trials(states=(TrialState.WAITING,))
         enqueued = {old.user_attrs.get(NUMBER) for old in waits}
         for running in self._study.get_trials(states=(TrialState.RUNNING,)):
-            # In this order, a kill between the two writes leaves both trials, and the next start ends one.
+            # If the process is killed between the two writes, both trials exist, and the next start ends the
+            # old one.
             if running.user_attrs.get(NUMBER) not in {None, *enqueued}:
                 self._study.enqueue_trial(_values(running), user_attrs=running.user_attrs)
             self._study.tell(running.number, state=TrialState.FAIL)
 
     def _report(self, trial: Trial, figures: TrialFigures) -> None:
-        """Report the new medians over the seeds."""
+        """Report the new medians over the seeds to Optuna."""
         asked, reported = self._asked[trial.number], self._reported.setdefault(trial.number, set())
         for step, value in figures.common(self._sweep.spec.objective).items():
             if step not in reported:
@@ -94,7 +95,7 @@ class OptunaSearch:
                 reported.add(step)
 
     def _know(self, number: int | None, values: Mapping[str, Any]) -> Trial | None:
-        """Store and return the trial of a number; None if it was interrupted before it had a number."""
+        """Store and return the trial with a number; None if it was interrupted before it got a number."""
         if number is None:
             return None
         self._known[number] = grid.trial(self._sweep, number, dict(values))
@@ -116,14 +117,14 @@ def _study(sweep: Sweep, folder: Path) -> optuna.Study:
         pruner=pruner,
         load_if_exists=True,
     )
-    # A sampler with the same seed would suggest its first trials again.
+    # A resumed search needs another seed: a sampler with the same seed would suggest its first trials again.
     seed = sweep.spec.seed + len(study.get_trials(deepcopy=False))
     study.sampler = optuna.samplers.TPESampler(seed=seed, n_startup_trials=wanted.startup_trials)
     return study
 
 
 def _values(trial: optuna.trial.FrozenTrial) -> dict[str, Any]:
-    """Return the values of a trial, including those that Optuna will use for an enqueued trial."""
+    """Return the values of a trial, including the fixed values of an enqueued trial."""
     return {**trial.system_attrs.get("fixed_params", {}), **trial.params}
 
 

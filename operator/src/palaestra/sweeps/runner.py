@@ -1,4 +1,4 @@
-"""The loop of a sweep: begin trials while the backend has room, read their figures, record their ends."""
+"""The loop of a sweep: begin trials while the backend accepts them, read their figures, record their ends."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -14,7 +14,7 @@ from palaestra.sweeps.trial import Trial, TrialFigures, TrialProgress
 
 
 class TrialBackend(Protocol):
-    """The backend that runs trials."""
+    """The interface of a backend that runs trials."""
 
     def has_room(self) -> bool:
         """Return whether another trial can begin."""
@@ -25,7 +25,7 @@ class TrialBackend(Protocol):
         ...
 
     def wait(self) -> None:
-        """Wait until a trial may have changed."""
+        """Wait until the figures of a trial may have changed."""
         ...
 
     def look(self, trial: Trial) -> TrialFigures:
@@ -44,17 +44,17 @@ class NoSuccess(PalaestraError):
 def carry_out(
     search: Search, place: TrialBackend, folder: Path, objective: Objective, report: Callable[[str], object]
 ) -> None:
-    """Run trials until the search has no more.
+    """Run trials until the search has no further trial.
 
     Args:
         search: chooses the trials.
-        place: runs them.
+        place: the backend that runs the trials.
         folder: the folder of the sweep; each trial that ends is recorded there.
-        objective: the figure that is compared.
+        objective: the figure by which trials are compared.
         report: called with a line for each trial that begins or ends.
 
     Raises:
-        NoSuccess: a trial was evaluated, but has no success rate to compare.
+        NoSuccess: the objective is the success rate, but an evaluated trial has no success rate.
     """
     active: dict[int, Trial] = {}
     for figures in trial_log.ended(folder).values():
@@ -64,7 +64,7 @@ def carry_out(
             active[trial.number] = trial
             report(f"{trial.name}: {_shown(trial)}")
             place.begin(trial)
-        if not active and place.has_room():  # while there is no room, a pruned trial has not ended yet
+        if not active and place.has_room():  # while the backend has no room, a pruned trial has not ended yet
             return
         place.wait()
         for trial in tuple(active.values()):
@@ -81,7 +81,7 @@ def carry_out(
 
 
 def _refuse_without_success(figures: TrialFigures, objective: Objective) -> None:
-    """Return if the figures can be compared, or do not exist yet."""
+    """Check that the figures can be compared, or do not exist yet; raise NoSuccess otherwise."""
     if objective is Objective.SUCCESS_RATE and figures.lacks(objective):
         raise NoSuccess(
             "spec.objective: SuccessRate is compared, and the environment reports no success; write "
@@ -90,7 +90,7 @@ def _refuse_without_success(figures: TrialFigures, objective: Objective) -> None
 
 
 def _ending(trial: Trial, figures: TrialFigures, objective: Objective, left: int) -> Iterator[str]:
-    """Yield the state of a trial, the reason or the result, and the number of remaining trials."""
+    """Yield state, reasons of failed runs, and result of a trial, and the number of remaining trials."""
     yield f"{trial.name}: {figures.state}"
     yield from figures.reasons()
     if (value := figures.median(objective)) is not None:

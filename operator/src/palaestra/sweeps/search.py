@@ -1,4 +1,4 @@
-"""The order of trials: the choice of the next one, and the decision to prune."""
+"""The order of trials: the choice of the next trial, and the decision to prune a trial."""
 
 from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
@@ -8,7 +8,7 @@ from palaestra.sweeps.trial import Trial, TrialFigures, TrialProgress
 
 
 class Search(Protocol):
-    """Chooses trials, and learns from those that have ended."""
+    """Chooses trials, also by the results of trials that have ended."""
 
     @property
     def known(self) -> Sequence[Trial]:
@@ -21,7 +21,7 @@ class Search(Protocol):
         ...
 
     def next(self) -> Trial | None:
-        """Return the next trial; None if no trial is left, or another must end first."""
+        """Return the next trial; None if no trial is left, or if a running trial must end first."""
         ...
 
     def hopeless(self, trial: Trial, figures: TrialFigures) -> bool:
@@ -34,7 +34,7 @@ class Search(Protocol):
 
 
 class InTurn:
-    """Every trial of a list, in order, without complete trials."""
+    """A search that returns the trials of a list in order, without the trials that were completed before."""
 
     def __init__(self, trials: Iterable[Trial], ended: Mapping[int, TrialFigures]) -> None:
         self.known: Sequence[Trial] = tuple(trials)
@@ -54,9 +54,9 @@ class InTurn:
         return self._left.popleft() if self._left else None
 
     def hopeless(self, trial: Trial, figures: TrialFigures) -> bool:
-        """Return False: each trial counts."""
+        """Return False, because every trial is run to its end."""
         del trial, figures
         return False
 
     def learn(self, trial: Trial, figures: TrialFigures) -> None:
-        """Return at once, because the list does not change."""
+        """Do nothing, because results do not change the list."""

@@ -1,4 +1,4 @@
-"""The result of a sweep as text: a line for each trial, and the best one. Pure."""
+"""The result of a sweep as text: a line for each trial, and a line about the best trial."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -36,7 +36,7 @@ def lines(rows: Sequence[TrialRow], objective: Objective) -> Iterator[str]:
 
 
 def best(rows: Iterable[TrialRow], objective: Objective) -> TrialRow | None:
-    """Return the complete trial with the highest median; the first one if several are equal."""
+    """Return the complete trial with the highest median (of equal trials, the first), or None."""
     complete = [
         row for row in rows if row.figures.state is TrialProgress.COMPLETE and row.figures.values(objective)
     ]
@@ -44,7 +44,7 @@ def best(rows: Iterable[TrialRow], objective: Objective) -> TrialRow | None:
 
 
 def quartiles(values: Sequence[float]) -> tuple[float, float]:
-    """Return the first and the third quartile of at least one value."""
+    """Return the first and the third quartile of `values`, which has at least one value."""
     if len(values) == 1:
         return values[0], values[0]
     low, _, high = quantiles(values, n=4, method="inclusive")

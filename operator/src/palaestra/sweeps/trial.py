@@ -12,7 +12,7 @@ from palaestra.sweeps.model import Objective
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trial:
-    """The values of the fields that differ, and the job with these values; it has a replica for each seed."""
+    """The changed fields with their values, and the job with these values and a replica for each seed."""
 
     number: int
     changes: Mapping[str, Any]
@@ -26,7 +26,7 @@ class Trial:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Point:
-    """The figures of one evaluation; None: not reported."""
+    """The figures of one evaluation; a figure is None if it was not reported."""
 
     step: int
     success_rate: float | None
@@ -39,9 +39,9 @@ class Point:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunFigures:
-    """One run of a trial: its evaluations in order, and its result; None: not known yet.
+    """One run of a trial: its evaluations in order, and its result; `success_rate` may be unknown (None).
 
-    `reason` is the reason for its end; empty: it has not ended, or the reason is unknown.
+    `reason` is the reason for the run's end; empty: the run has not ended, or the reason is unknown.
     """
 
     curve: tuple[Point, ...] = ()
@@ -51,14 +51,14 @@ class RunFigures:
     reason: str = ""
 
     def at(self, step: int, objective: Objective) -> float | None:
-        """Return the newest figure at a step; None if the curve ends or has no figure before that step."""
+        """Return the newest figure up to `step`; None if the curve ends before it or begins after it."""
         if not self.curve or self.curve[-1].step < step:
             return None
         newest = next((point for point in reversed(self.curve) if point.step <= step), None)
         return None if newest is None else newest.value(objective)
 
     def value(self, objective: Objective) -> float | None:
-        """Return the policy's result if it was measured at the end, else that of the last evaluation."""
+        """Return the final policy's figure if it was measured, else the figure of the last evaluation."""
         if objective is Objective.SUCCESS_RATE and self.success_rate is not None:
             return self.success_rate
         return self.curve[-1].value(objective) if self.curve else None
@@ -76,14 +76,14 @@ class TrialProgress(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrialFigures:
-    """The runs of a trial, by seed, and its state."""
+    """The runs of a trial in the order of their seeds, and the state of the trial."""
 
     state: TrialProgress
     runs: tuple[RunFigures, ...] = ()
 
     @classmethod
     def of(cls, runs: tuple[RunFigures, ...]) -> Self:
-        """Return the figures of runs that were not pruned."""
+        """Return the figures of a trial from its runs, for a trial that was not pruned."""
         if not all(run.ended for run in runs):
             return cls(state=TrialProgress.RUNNING, runs=runs)
         done = all(run.succeeded for run in runs)
@@ -95,11 +95,11 @@ class TrialFigures:
         return tuple(dict.fromkeys(run.reason for run in failed if run.reason))
 
     def lacks(self, objective: Objective) -> bool:
-        """Return whether every run was evaluated, but none has the figure of the objective."""
+        """Return whether all runs were evaluated, but without a figure for the objective."""
         return all(run.curve for run in self.runs) and bool(self.runs) and not self.values(objective)
 
     def values(self, objective: Objective) -> tuple[float, ...]:
-        """Return the known results, one for each seed."""
+        """Return the known results of the runs."""
         return tuple(value for run in self.runs if (value := run.value(objective)) is not None)
 
     def median(self, objective: Objective) -> float | None:
@@ -108,12 +108,12 @@ class TrialFigures:
         return median(values) if values else None
 
     def common(self, objective: Objective) -> Mapping[int, float]:
-        """Return the median over all seeds by step, for the steps that every run has reached."""
+        """Return the median over all seeds by step, for all steps that every run has reached."""
         steps = {point.step for run in self.runs for point in run.curve}
         values = {step: self.at(step, objective) for step in sorted(steps)}
         return {step: median(found) for step, found in values.items() if len(found) == len(self.runs)}
 
     def at(self, step: int, objective: Objective) -> tuple[float, ...]:
-        """Return the newest figure of each run at a step, for the runs that have reached it."""
+        """Return the newest figure up to a step for each run that has reached the step."""
         values = (run.at(step, objective) for run in self.runs)
         return tuple(value for value in values if value is not None)

@@ -1,4 +1,4 @@
-"""The folder of a sweep: the Sweep at its beginning, and the trials that have ended.
+"""The folder of a sweep, with a copy of the Sweep and the trials that have ended.
 
 <dir>/<sweep>/sweep.yaml        the Sweep, with its job
 <dir>/<sweep>/trials.jsonl      a line for each trial that has ended
@@ -23,19 +23,22 @@ from palaestra.sweeps.trial import Point, RunFigures, TrialFigures, TrialProgres
 RECORD = "sweep.yaml"
 TRIALS = "trials.jsonl"
 MUTABLE = {"trials"}
-_COMPARING = {"objective"}  # trials.jsonl has both figures, but a search by Optuna has used only one of them
+# This field may change without Optuna. trials.jsonl has both figures, but a search by Optuna used only one
+# figure.
+_COMPARING = {"objective"}
 
 
 def begin(folder: Path, sweep: Sweep) -> None:
-    """Write the Sweep into its folder; an existing Sweep must be the same.
+    """Write the Sweep into its folder; a Sweep that is already there must be equal.
 
-    `trials` may differ, and `objective` too, except in a search by Optuna.
+    Only `trials` may differ, and without Optuna also `objective`.
 
-    An incomplete last line of `trials.jsonl`, after a crash, is removed, so that the next one begins a line.
+    A crash may leave an incomplete last line in `trials.jsonl`. This line is removed, so that the next record
+    begins a new line.
 
     Raises:
         RunRefused: the folder belongs to another sweep.
-        StorageFailed: it cannot be written.
+        StorageFailed: a file cannot be written.
     """
     record = sweep.model_dump(mode="json", by_alias=True, exclude_none=True)
     path = folder / RECORD
@@ -53,7 +56,7 @@ def begin(folder: Path, sweep: Sweep) -> None:
 
 
 def ended(folder: Path) -> Mapping[int, TrialFigures]:
-    """Return the ended trials by number; the last line about a trial counts."""
+    """Return the ended trials by number; if a trial has several lines, the last line counts."""
     path = folder / TRIALS
     if not path.exists():
         return {}
@@ -62,10 +65,10 @@ def ended(folder: Path) -> Mapping[int, TrialFigures]:
 
 
 def note(folder: Path, number: int, figures: TrialFigures) -> None:
-    """Append the end of a trial.
+    """Append a line about the end of a trial.
 
     Raises:
-        StorageFailed: it cannot be written.
+        StorageFailed: the file cannot be written.
     """
     line = {"trial": number, **asdict(figures)}
     with storage(folder / TRIALS), (folder / TRIALS).open("a") as file:

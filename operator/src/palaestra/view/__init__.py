@@ -1,7 +1,7 @@
-"""TrainingJobs as text. Pure: the clock is passed in.
+"""TrainingJobs as text. This package is pure: the clock is an argument.
 
-`tables` and `sparkline` draw, `durations` formats durations, `describe` prints one job in full, `history`
-stores past figures of a job, and `live` shows its progress.
+`tables` and `sparkline` draw tables and charts, and `durations` formats durations. `describe` prints one job
+in full. `history` stores past figures of a job, and `live` shows the job's progress.
 """
 
 from palaestra.view.describe import describe, happened, progress

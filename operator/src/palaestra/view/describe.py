@@ -15,7 +15,7 @@ Row = tuple[str, str]
 
 
 def describe(job: TrainingJob, created: datetime, now: datetime) -> list[str]:
-    """Return the lines about a job, without unknown values."""
+    """Return the lines about a job; unknown values are left out."""
     lines = lines_of([(f"{name}:", value) for name, value in _facts(job, created, now) if value])
     if job.status.left_out:
         lines += ["", "Left out of the worlds:", *_indented(job.status.left_out)]

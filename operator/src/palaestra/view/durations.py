@@ -7,7 +7,7 @@ UNITS = (("d", DAY), ("h", HOUR), ("m", MINUTE), ("s", 1))
 
 
 def short(seconds: float) -> str:
-    """Return a duration for people; `0s` for less than a second and for a negative duration."""
+    """Return a duration as text for people; `0s` for less than a second and for a negative duration."""
     left = max(int(seconds), 0)
     parts: list[tuple[int, str]] = []
     for unit, size in UNITS:

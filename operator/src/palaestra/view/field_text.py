@@ -1,4 +1,4 @@
-"""A field of the TrainingJob as text for a terminal, in the manner of `kubectl explain`."""
+"""A field of the TrainingJob as text for a terminal, in the format of `kubectl explain`."""
 
 from collections.abc import Iterator
 from textwrap import wrap
@@ -9,12 +9,12 @@ _INDENT = "  "
 
 
 def field_text(field: FieldDoc, width: int, *, recursive: bool = False) -> str:
-    """Return what the field is: type, default, description, rules, and the fields of its value.
+    """Return the text about a field: type, default, description, rules, and the fields of its value.
 
     Args:
         field: the field.
-        width: of a line, in characters; a long name or type may exceed it.
-        recursive: list the names and types of all fields below it, without their descriptions.
+        width: the width of a line in characters; a long name or type may exceed it.
+        recursive: whether to list the names and types of all fields below, without their descriptions.
     """
     lines = [f"{field.shown_path}: {_facts(field)}" if field.path else field.name, ""]
     for paragraph in field.paragraphs:
@@ -27,7 +27,7 @@ def field_text(field: FieldDoc, width: int, *, recursive: bool = False) -> str:
 
 
 def _facts(field: FieldDoc) -> str:
-    """Return the type, and the default, `required` or `optional`, on one line."""
+    """Return one line with the type, and with the default, `required` or `optional`."""
     default = default_of(field.schema)
     otherwise = f"default: {default}" if default else "optional"
     return f"{kind_of(field.schema)}; {'required' if field.required else otherwise}"

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from palaestra.api import Status
 from palaestra.api.status import ReplicaStatus
 
-MOST = 40  # The number of values of each figure that fit into one line.
+MOST = 40  # The number of values of a figure that fit into one line.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReplicaFigures:
-    """The figures of a replica at one step; None: unknown at that step."""
+    """The figures of a replica at one step; an unknown figure is None."""
 
     step: int
     steps_per_second: float | None
@@ -20,7 +20,7 @@ class ReplicaFigures:
 
     @classmethod
     def of(cls, replica: ReplicaStatus) -> "ReplicaFigures | None":
-        """Return the figures of a replica, None before its first step."""
+        """Return the figures of a replica; None before the replica's first step."""
         if replica.step is None:
             return None
         return cls(

@@ -26,7 +26,7 @@ BAR = 60
 
 
 def live(job: TrainingJob, history: History, now: datetime) -> Group:
-    """Return the drawing of a job; figures are as old as its status, and ages are relative to `now`."""
+    """Return the drawing of a job; its figures are as old as the status, and ages are relative to `now`."""
     status = job.status
     phase = str(status.phase or "not reconciled by an operator yet")
     heading = Text.assemble((job.metadata.name, "bold"), "  ", (phase, _color(status.phase)))

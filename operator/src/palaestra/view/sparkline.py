@@ -1,4 +1,4 @@
-"""A bar chart in one line of text, one character per value."""
+"""A bar chart in one line of text, with one character for each value."""
 
 from collections.abc import Sequence
 
@@ -9,12 +9,12 @@ UNKNOWN = " "
 def sparkline(
     values: Sequence[float | None], *, lowest: float | None = None, highest: float | None = None
 ) -> str:
-    """Return one bar character per value, higher for larger values; a space for an unknown value.
+    """Return one bar character for each value, higher for larger values, or a space for an unknown value.
 
     Args:
-        values: oldest first.
-        lowest: value of the lowest bar; None: the smallest value.
-        highest: value of the highest bar; None: the largest value.
+        values: the values, oldest first.
+        lowest: the value of the lowest bar; None: the smallest value in `values`.
+        highest: the value of the highest bar; None: the largest value in `values`.
     """
     known = [value for value in values if value is not None]
     if not known:
@@ -27,7 +27,7 @@ def sparkline(
 def _bar(value: float | None, floor: float, ceiling: float) -> str:
     if value is None:
         return UNKNOWN
-    if ceiling <= floor:  # all values are equal: neither low nor high
+    if ceiling <= floor:  # all values are equal, so the bar has half the height
         return BARS[len(BARS) // 2]
     share = (value - floor) / (ceiling - floor)
     return BARS[min(max(round(share * (len(BARS) - 1)), 0), len(BARS) - 1)]

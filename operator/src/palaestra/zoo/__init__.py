@@ -1,11 +1,12 @@
 """TrainingJobs from the hyperparameter files of RL-Baselines3-Zoo.
 
-Pure: text in, text out. Each setting that a TrainingJob cannot represent exactly becomes a note.
+The conversion is pure: it converts text to text. Each setting that a TrainingJob cannot represent exactly
+becomes a note.
 
 - `conversion`: one entry of a file as a TrainingJob with its notes
-- `draft`: the job and the notes, which the keys of an entry fill
-- `expressions`: Python expressions in a file, read as data and never evaluated
-- `hyperparameter_file`: a file, its entries and its algorithm
+- `draft`: the job and the notes during the conversion of an entry
+- `expressions`: Python expressions in a file, which are read as data and never evaluated
+- `hyperparameter_file`: the entries and the algorithm of a file
 - `mapping`: the field of a TrainingJob for each key of an entry
 """
 

@@ -1,4 +1,4 @@
-"""One entry of a file of RL-Baselines3-Zoo as a TrainingJob."""
+"""Convert one entry of a file of RL-Baselines3-Zoo to a TrainingJob."""
 
 import re
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from palaestra.zoo.hyperparameter_file import ZooError, algorithm_of, entry_of, 
 from palaestra.zoo.mapping import note_together, put
 
 _LONGEST_NAME = 48
-_OWN_DEFAULTS = "MoveToTargetEnv-v0"  # the trainer has its own default hyperparameters for it
+_OWN_DEFAULTS = "MoveToTargetEnv-v0"  # the trainer has its own default hyperparameters for this environment
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,9 +34,9 @@ def convert(text: str, name: str, *, env: str | None = None, algorithm: str | No
 
     Args:
         text: the content of the file.
-        name: the path of the file; its last part names the algorithm.
-        env: id of the environment; None: the only one in the file.
-        algorithm: name of the algorithm; None: the file's.
+        name: the path of the file; the file's name is the name of the algorithm.
+        env: id of the environment; None: the only environment in the file.
+        algorithm: name of the algorithm; None: the algorithm of the file.
 
     Raises:
         ZooError: the file does not have the entry, or its algorithm cannot be used here.

@@ -1,4 +1,4 @@
-"""The TrainingJob during the conversion, and the notes about settings that it cannot represent exactly."""
+"""The TrainingJob during the conversion, and notes about settings that a job cannot represent exactly."""
 
 import re
 from collections.abc import Mapping
@@ -14,9 +14,9 @@ class Draft:
     """A TrainingJob that the keys of an entry fill.
 
     Attributes:
-        entry: the whole entry, because some keys change the meaning of others.
+        entry: the whole entry, because some keys change the meaning of other keys.
         environment: id of the environment.
-        algorithm: fields of `trainer.algorithm`, without its hyperparameters.
+        algorithm: fields of `trainer.algorithm`, without `hyperparameters`.
         hyperparameters: the keyword arguments of the algorithm's class.
         options: the keyword arguments of the environment.
         wrappers: the wrappers of the environment.
@@ -45,7 +45,7 @@ class Draft:
         return str(self.algorithm["name"])
 
     def note(self, word: str, fact: str) -> None:
-        """Store a note about a key of the entry, as one line of printable characters."""
+        """Add a note about a key of the entry, as one line of printable ASCII characters."""
         self.notes.append(" ".join(re.sub(r"[^ -~]+", " ", f"{word}: {fact}").split()))
 
     def spec(self) -> dict[str, Any]:

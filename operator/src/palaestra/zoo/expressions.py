@@ -1,14 +1,15 @@
 """Python expressions in a file of RL-Baselines3-Zoo, such as `dict(net_arch=[64], activation_fn=nn.ReLU)`.
 
-Zoo evaluates them. Here they are parsed, and only literals, `dict(...)` and names of classes are read, so an
-untrusted file cannot run code. A class becomes text for a TrainingJob: `ReLU` or `module:Class`.
+Zoo evaluates such expressions. This module only parses the expressions. It reads only literals, `dict(...)`
+and names of classes, so an untrusted file cannot run code. A class becomes text for a TrainingJob: `ReLU` or
+`module:Class`.
 """
 
 import ast
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-# A TrainingJob uses PyTorch's names for these classes; a test compares them with the trainer's.
+# A TrainingJob uses PyTorch's short names for these classes. A test compares this table with the trainer's.
 SHORT: Mapping[str, frozenset[str]] = {
     "torch.nn": frozenset(
         {"ELU", "GELU", "LeakyReLU", "Mish", "ReLU", "SELU", "SiLU", "Softplus", "Tanh"},
@@ -29,13 +30,13 @@ _IMPORTED: Mapping[str, str] = {
 
 
 class NotPlain(ValueError):
-    """An expression that is neither a literal nor a class; the message is its fact."""
+    """An expression is neither a literal nor a class; the message is a fact about the expression."""
 
 
 def entries(text: str) -> Iterator[tuple[str, Any]]:
     """Yield the name and the value of each entry of the mapping in `text`.
 
-    For an unreadable value, a `NotPlain` with the reason is yielded.
+    If a value cannot be read, yield a `NotPlain` with the reason in its place.
 
     Raises:
         NotPlain: the text is not a mapping with text as its keys.

@@ -26,7 +26,8 @@ OF_FILES: Mapping[str, str] = {
     "trpo": "TRPO",
 }
 _SHARED = ("default", "atari")  # entries that apply to other environments
-CHOOSES_ALGORITHM = "model_class"  # a key of her.yml, which is older than HER as a replay buffer
+# A key of Zoo's her.yml, from the time when HER was an algorithm and not a replay buffer.
+CHOOSES_ALGORITHM = "model_class"
 _LONGEST_LIST = 12
 _OF_AN_ENTRY = "n_timesteps"  # every entry has this key
 
@@ -39,7 +40,7 @@ def read_file(text: str, name: str) -> Mapping[str, Any]:
     """Return the document of a file.
 
     Raises:
-        ZooError: it is not YAML, or has no entries.
+        ZooError: the file is not YAML, or has no entries.
     """
     if "python/object" in text:
         raise ZooError(
@@ -63,7 +64,7 @@ def entry_of(data: Mapping[str, Any], name: str, env: str | None) -> tuple[str, 
     As in Zoo, an environment without an entry gets the entry `default`.
 
     Raises:
-        ZooError: the file does not have the entry, or has several and `env` is None.
+        ZooError: the file does not have the entry, or has several entries and `env` is None.
     """
     if _OF_AN_ENTRY in data:
         if env is None:
@@ -88,10 +89,10 @@ def entry_of(data: Mapping[str, Any], name: str, env: str | None) -> tuple[str, 
 
 
 def algorithm_of(given: str | None, name: str, entry: Mapping[str, Any]) -> str:
-    """Return the algorithm: the given one, else that of the entry, else that of the file.
+    """Return the algorithm: `given`, or else the algorithm of the entry, or else of the file.
 
     Raises:
-        ZooError: it is unknown, or cannot be used here.
+        ZooError: the algorithm is unknown, or Palaestra cannot use it.
     """
     word = str(given or entry.get(CHOOSES_ALGORITHM) or PurePath(name).stem)
     here = {**{known.lower(): known for known in ALGORITHMS}, **OF_FILES}

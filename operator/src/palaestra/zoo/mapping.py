@@ -1,7 +1,7 @@
 """The field of a TrainingJob for each key of an entry of RL-Baselines3-Zoo.
 
-A key without a table is a keyword argument of the algorithm's class, as in Zoo. The trainer checks these
-arguments against the class before it starts a simulator.
+As in Zoo, a key that is not in the tables of this module is a keyword argument of the algorithm's class. The
+trainer compares these arguments with the class before it starts a simulator.
 """
 
 import math
@@ -21,7 +21,7 @@ _OFF_POLICY = frozenset({"DQN", "SAC", "TD3", "DDPG", "QRDQN", "TQC", "CrossQ"})
 _LINEAR = re.compile(r"lin_\d+(\.\d*)?(e-?\d+)?")
 _HINDSIGHT = "HerReplayBuffer"
 _GOALS = ("n_sampled_goal", "goal_selection_strategy")
-# Options of replay buffers with a fixed value in a run, and that value.
+# The options of replay buffers that have a fixed value in a run, with this value.
 _BUFFER_OPTIONS: Mapping[str, object] = {
     "copy_info_dict": False,
     "handle_timeout_termination": True,
@@ -34,7 +34,7 @@ _NORMALIZE = {
     "clip_reward": "clipRewards",
 }
 _LENGTH = "max_episode_length"  # a hyperparameter in her.yml
-# Callbacks that a run replaces, and the remedy for each.
+# The callbacks that a run replaces, with the remedy for each.
 _CALLBACKS: Mapping[str, str] = {
     "CheckpointCallback": "a run saves checkpoints; set trainer.checkpoint.everySteps",
     "EvalCallback": "a run evaluates; set trainer.evaluation",
@@ -53,7 +53,7 @@ def note_together(draft: Draft) -> None:
 
 
 def put(draft: Draft, word: str, value: Any) -> None:
-    """Convert one key of an entry, or add a note with the reason that it is left out."""
+    """Convert one key of an entry, or add a note with the reason for which the key is left out."""
     if word == CHOOSES_ALGORITHM:
         return
     if word in _PLACES:
@@ -79,7 +79,7 @@ def _environments(draft: Draft, value: Any) -> None:
         draft.note(
             "n_envs",
             f"{value} became {MOST_COLLECTING}, because a pod has at most 32 simulators and one evaluates; "
-            "a rollout of n_steps is shorter by as much",
+            "a rollout of n_steps is shorter in the same proportion",
         )
 
 
@@ -98,7 +98,7 @@ def _normalize(draft: Draft, value: Any) -> None:
     for name, option in _options(draft, "normalize", {} if value is True else value):
         if name in _NORMALIZE:
             chosen[_NORMALIZE[name]] = option
-        elif name != "gamma" or "gamma" not in draft.entry:  # then Zoo uses the algorithm's gamma
+        elif name != "gamma" or "gamma" not in draft.entry:  # if the entry has gamma, Zoo uses that value
             draft.note(f"normalize.{name}", "left out; algorithm.normalize has no such field")
     if not chosen["observations"]:
         chosen.pop("clipObservations", None)
@@ -112,7 +112,7 @@ def _policy_arguments(draft: Draft, value: Any) -> None:
     arguments = dict(_options(draft, "policy_kwargs", value))
     layers = arguments.get("net_arch")
     if isinstance(layers, list) and any(isinstance(layer, dict) for layer in layers):
-        if len(layers) == 1:  # the format of Stable-Baselines3 before 1.8, with the same networks
+        if len(layers) == 1:  # the format of Stable-Baselines3 before 1.8, which gives the same networks
             arguments["net_arch"] = layers[0]
         else:
             del arguments["net_arch"]
@@ -126,7 +126,7 @@ def _policy_arguments(draft: Draft, value: Any) -> None:
 
 
 def _buffer_class(kind: str) -> Callable[[Draft, Any], None]:
-    """Return the converter for the class of a buffer: `kind` is replay or rollout."""
+    """Return the converter for the class of a buffer; `kind` is `replay` or `rollout`."""
 
     def place(draft: Draft, value: Any) -> None:
         if value is not None:
@@ -137,7 +137,7 @@ def _buffer_class(kind: str) -> Callable[[Draft, Any], None]:
 
 
 def _buffer_arguments(kind: str) -> Callable[[Draft, Any], None]:
-    """Return the converter for a buffer's options; a run itself sets those of Stable-Baselines3's classes."""
+    """Return the converter for a buffer's options; a run sets the options of built-in buffers itself."""
 
     def place(draft: Draft, value: Any) -> None:
         chosen = draft.entry.get(f"{kind}_buffer_class")
@@ -151,7 +151,7 @@ def _buffer_arguments(kind: str) -> Callable[[Draft, Any], None]:
 
 
 def _takes(buffer: Any, option: str) -> bool:
-    """Return whether a buffer of an entry accepts an option; an author's own buffer may accept any."""
+    """Return whether the buffer of an entry accepts an option; a custom buffer may accept any option."""
     if buffer is None:
         return False
     return option in _GOALS if _is_hindsight(buffer) else option not in _BUFFER_OPTIONS
@@ -172,7 +172,7 @@ def _buffer_option(draft: Draft, word: str, option: Any) -> None:
 
 
 def _old_hindsight(word: str) -> Callable[[Draft, Any], None]:
-    """Return the converter for a key of Zoo's her.yml, which is older than HER as a replay buffer."""
+    """Return the converter for a key of Zoo's her.yml, in which HER is not a replay buffer yet."""
 
     def place(draft: Draft, value: Any) -> None:
         draft.hyperparameters["replay_buffer_class"] = _HINDSIGHT
@@ -247,7 +247,7 @@ def _vector_wrappers(draft: Draft, value: Any) -> None:
 
 def _frames(draft: Draft, value: Any) -> None:
     number = None if value is None else _whole(draft, "frame_stack", value)
-    if number is None or number == 1:  # one frame is the observation itself
+    if number is None or number == 1:  # a stack of one frame is the observation itself
         return
     draft.frame_stack = number
 
@@ -257,7 +257,7 @@ def _environment_arguments(draft: Draft, value: Any) -> None:
 
 
 def _options(draft: Draft, word: str, value: Any) -> Iterator[tuple[str, Any]]:
-    """Yield the entries of a mapping in YAML or in a Python expression; note other values."""
+    """Yield the entries of a mapping in YAML or in a Python expression; add notes about other values."""
     if value is None:
         return
     try:
@@ -289,20 +289,20 @@ def _classes(draft: Draft, word: str, value: Any) -> Iterator[tuple[str, dict[st
 
 
 def _schedule(draft: Draft, word: str, value: str) -> Any:
-    """Return a schedule in the form of a job. In Zoo, a value after any word and `_` falls linearly to 0."""
+    """Return a schedule in the format of a job; in Zoo, each `<word>_<value>` falls linearly to 0."""
     if _LINEAR.fullmatch(value):
         return value
     kind, _, rest = value.partition("_")
     number = _number(rest)
     if number is None:
-        return value  # the trainer refuses it and lists the accepted forms
+        return value  # the trainer refuses the value and lists the accepted forms
     if kind not in {"lin", "linear"}:
-        draft.note(word, f"{value} falls linearly to 0, as in Zoo, which reads every schedule so")
+        draft.note(word, f"{value} falls linearly to 0, as in Zoo, which treats every schedule as linear")
     return [[0, number], [1, 0.0]]
 
 
 def _whole(draft: Draft, word: str, value: Any) -> int | None:
-    """Return a number without its fraction, as Zoo does; add a note if it is not a number."""
+    """Return a number without its fraction, as Zoo does; add a note if the value is not a number."""
     number = _number(value)
     if number is None:
         draft.note(word, f"left out; {value!r} is not a number; write one")
@@ -318,7 +318,7 @@ def _number(value: Any) -> float | None:
 
 
 def _as_class(name: str) -> str:
-    """Return `module:Class` for a dotted name, and a name without dots as it is."""
+    """Return `module:Class` for a dotted name; return a name without dots unchanged."""
     module, _, last = name.rpartition(".")
     written = f"{module}:{last}"
     return written if module and re.fullmatch(CLASS, written) else name
