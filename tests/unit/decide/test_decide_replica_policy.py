@@ -7,7 +7,7 @@ from tools.judging import page
 def test_the_page_has_a_row_for_each_check_in_its_order():
     """A row has the number, the class, the name and the first line of the docstring of a check.
 
-    Test_golden.py compares the table with the page.
+    `test_golden.py` compares the table with the page.
     """
     rows = page.table().splitlines()[2:]
 

@@ -1,13 +1,8 @@
 """training.yaml: the job's settings for one replica, in the format that the trainer reads.
 
-<<<<<<< HEAD
-The trainer's `palaestra_trainer.job.configuration` declares all fields. On a laptop the command line reads
-only the addresses of a run from the file; `RunAddresses` is next to the code that writes them.
-=======
-The trainer's `palaestra_trainer.configuration` declares all fields. On a laptop, the command line reads only
+The trainer's `palaestra_trainer.job.configuration` declares all fields. On a laptop, the command line reads only
 the addresses of a run from the file. `RunAddresses` is in this module, next to the code that writes these
 addresses.
->>>>>>> words-operator
 """
 
 from collections.abc import Mapping
