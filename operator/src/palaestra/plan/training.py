@@ -1,8 +1,8 @@
 """training.yaml: the job's settings for one replica, in the format that the trainer reads.
 
-The trainer's `palaestra_trainer.job.configuration` declares all fields. On a laptop, the command line reads only
-the addresses of a run from the file. `RunAddresses` is in this module, next to the code that writes these
-addresses.
+The trainer's `palaestra_trainer.job.configuration` declares all fields. On a laptop, the command line reads
+only the addresses of a run from the file. `RunAddresses` is in this module, next to the code that writes
+these addresses.
 """
 
 from collections.abc import Mapping
