@@ -17,6 +17,7 @@ def event(kind, name, uid=None):
         ("TrainingJob", "job", "0d1f"),
         ("Job", "job-0", None),
         ("Pod", "job-12-x7k2p", None),
+        ("ConfigMap", "job-1-0123456789", None),
         ("PersistentVolumeClaim", "job-0-0d1f", None),
     ],
 )
