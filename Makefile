@@ -1,4 +1,4 @@
-# Everything a person types here. `make help` lists it.
+# The commands for people who work in this repository. `make help` lists them.
 SHELL := /bin/bash
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := help
@@ -11,17 +11,18 @@ SIM := stub
 JOB := manifests/examples/move-to-target$(addprefix -,$(SIM:stub=)).yaml
 COMPILE := $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header
 
-# Bytecode is kept, whatever the environment says; otherwise every process compiles PyTorch and all else again, for seconds.
+# Python must write bytecode even if the environment forbids it; otherwise every process compiles PyTorch and all other
+# modules again, which takes seconds.
 unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: help setup test-packages run test check e2e images cluster cluster-down format bench soak golden lock
 
-help: ## list the verbs
+help: ## list the commands
 	@grep -E '^[a-z0-9-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z0-9-]+):.*## (.*)/\1\t\2/' | expand -t 15
 
 setup: .venv/ready ## install what is needed into .venv; needs no root and no package of ROS
 
-# An index other than that of the last time replaces PyTorch.
+# If the index has changed since the last setup, PyTorch is installed again from the new index.
 export TORCH_INDEX
 ifneq ($(TORCH_INDEX),)
 ifneq ($(TORCH_INDEX),$(shell cat .venv/torch-index 2>/dev/null))
@@ -40,11 +41,11 @@ test-packages: .venv/test-packages ## install what only tests need from the dist
 run: setup ## train move-to-target on this machine, from a TrainingJob to a policy; SIM=mujoco: in MuJoCo
 	@$(BIN)/palaestra run $(JOB)
 
-# Four at once, also on two processors: many tests wait for processes, leases and deadlines most of their time.
-test: setup test-packages ## run every test; also that generated files are current
+# Four workers run at the same time, also on two processors, because many tests mostly wait for processes, leases and deadlines.
+test: setup test-packages ## run all tests, and check that generated files are current
 	@$(BIN)/pytest -n 4 --dist loadfile --no-loadscope-reorder --durations=10
 
-# Side by side, what takes longest first; each prints as a whole, and all are told that fail.
+# The checks run in parallel, the longest first. Make prints the output of each check in one piece, and reports all checks that fail.
 CHECKS := check-mypy check-pyright check-lint check-format check-imports
 .PHONY: $(CHECKS)
 
@@ -66,27 +67,27 @@ check-format:
 check-imports:
 	@$(BIN)/lint-imports
 
-e2e: setup ## test the operator on a real cluster, which is made for it and taken away again
+e2e: setup ## start a cluster, run the end-to-end tests on it, and delete it
 	@tests/cluster/e2e.sh
 
 images: setup ## build the container images, with docker or with buildah
 	@tools/images.sh
 
-cluster: setup ## make a cluster on this machine, with the images in it
+cluster: setup ## start a cluster on this machine, and load the images into it
 	@tests/cluster/up.sh >/dev/null
 	@archives=$$(tools/images.sh --archives) && tests/cluster/load.sh $$(cut -d= -f2 <<<"$$archives")
 
-cluster-down: ## take that cluster away
+cluster-down: ## delete that cluster
 	@tests/cluster/down.sh
 
 format: setup ## rewrite the sources in the common format
 	@$(BIN)/ruff check --fix --quiet || true
 	@$(BIN)/ruff format
 
-bench: setup test-packages ## measure what the project promises; prints JSON
+bench: setup test-packages ## measure speed and memory against the project's limits; prints JSON
 	@$(BIN)/python -m tests.bench
 
-soak: setup test-packages ## prove that nothing ends a training run which nobody attends to; prints JSON, takes hours
+soak: setup test-packages ## inject faults for hours, and check that unattended training continues; prints JSON
 	@$(BIN)/python -m tests.soak
 
 golden: setup ## record the plans of the examples and other generated files again

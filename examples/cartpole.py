@@ -1,4 +1,4 @@
-"""A robot and a task of your own: a model of MuJoCo in `world.inline`.
+"""An example of your own robot and task, with a model of MuJoCo in `world.inline`.
 
     palaestra run manifests/examples/cartpole-mjcf.yaml
 
@@ -15,7 +15,7 @@ from palaestra_trainer.robots import Joints
 from palaestra_trainer.robots.joints import JointRobot
 
 FARTHEST_M, STEEPEST_RAD = 1.5, 0.3
-LONGEST = 250  # most steps of an episode; a step is 40 ms
+LONGEST = 250  # maximum steps of an episode; a step is 40 ms
 
 
 class CartPole(JointRobot):

@@ -5,8 +5,7 @@
 `level` grows from 0 to 1 in the first half of training. A higher level puts more cylinders on the floor, and
 moves them farther from their positions in the world file. It also increases the noise of the distance
 sensors, the slip of the wheels, and the share of commands that take effect one period late. Evaluations are
-always at level 1. All random values follow from the episode's seed, so an interrupted run resumes as if it
-had not been interrupted.
+always at level 1. The episode's seed determines all random values, so an interrupted run resumes exactly.
 """
 
 from typing import Any
@@ -19,20 +18,20 @@ from palaestra_trainer.environments.options import MoveToTargetOptions, parse
 from palaestra_trainer.robots import Pose, RobotinoAbc, Scene, SceneWrapper
 
 HARDEST_AT = 0.5  # share of training
-# These are the values at level 1: most, standard deviation, most, probability.
+# Values at level 1: maximum displacement, standard deviation, maximum slip, probability of a late command.
 MOVED_M, NOISE_M, SLIP, LATE = 0.3, 0.01, 0.2, 0.3
 UNDER_THE_FLOOR_M = -1.0
 
 
 class DisturbedRobot(RobotinoAbc):
-    """A robot with noise, slip and late commands; `begin` sets their size."""
+    """A robot with noise, slip and late commands; `begin` sets their strength."""
 
     def __init__(self, robot: RobotinoAbc) -> None:
         self.robot = robot
         self.begin(np.random.default_rng(0), 0.0)
 
     def begin(self, random: np.random.Generator, level: float) -> None:
-        """Draw the values that stay constant in an episode; `random` draws the others during the episode."""
+        """Draw the values that are constant in an episode; keep `random` to draw the others during it."""
         self.random, self.level = random, level
         self.grip = 1.0 - level * random.uniform(0.0, SLIP)
         self.command, self.noise = (0.0, 0.0, 0.0), 0.0
@@ -47,7 +46,7 @@ class DisturbedRobot(RobotinoAbc):
         return np.clip(self.robot.distances() + self.noise, *self.distance_range_m, dtype=np.float32)
 
     def bumped(self) -> bool:
-        """Return whether the bumper touches something."""
+        """Return whether the bumper touches an object."""
         return self.robot.bumped()
 
     def pose(self) -> Pose:
@@ -61,7 +60,7 @@ class DisturbedRobot(RobotinoAbc):
         self.robot.drive(*(before if late else self.command))
 
     def advance(self) -> int:
-        """Let a period pass, and draw the noise of its readings."""
+        """Let a period pass, and draw the noise of this period's readings."""
         extra = self.robot.advance()
         self.noise = self.random.normal(0.0, NOISE_M * self.level, len(self.robot.distances()))
         return extra
@@ -75,7 +74,7 @@ class HarderScene(SceneWrapper):
         self.robot, self.level = robot, 1.0
 
     def begin(self, seed: int) -> None:
-        """Begin an episode; the scene follows from the seed and the level."""
+        """Begin an episode; the seed and the level determine the scene."""
         self.scene.begin(seed)  # puts all objects back to their positions in the world file
         random = np.random.default_rng(seed)
         cylinders = [it for it in self.layout().obstacles if it.name.startswith("CYLINDER")]
@@ -88,14 +87,14 @@ class HarderScene(SceneWrapper):
 
 
 class CurriculumEnv(MoveToTargetEnv):
-    """MoveToTargetEnv at a level that follows from the progress of training."""
+    """MoveToTargetEnv at a level that depends on the progress of training."""
 
     def __init__(self, robot: DisturbedRobot, scene: HarderScene, options: MoveToTargetOptions) -> None:
         super().__init__(robot, scene, options)
         self.harder = scene
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, Any]:
-        """Begin an episode; outside of a run its level is 1."""
+        """Begin an episode at the level of the training progress; outside of a run, the level is 1."""
         progress = (options or {}).get("training_progress", 1.0)
         self.harder.level = min(1.0, progress / HARDEST_AT)
         return super().reset(seed=seed, options=options)

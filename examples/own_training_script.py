@@ -1,9 +1,9 @@
-"""A training loop of your own: `trainer: {command: [python, own_training_script.py]}`.
+"""An example of your own training loop: `trainer: {command: [python, own_training_script.py]}`.
 
-It replaces the built-in loop and uses the simulators of the TrainingJob. A simulator that breaks is
-restarted, and its episode counts as truncated. The script saves its model at the interval in the job. It
+The script replaces the built-in loop and uses the simulators of the TrainingJob. A simulator that breaks is
+restarted, and its episode counts as truncated. The script saves its model at the interval in the job, and
 reports its steps, so that the operator sees its progress. After a SIGTERM it ends the current step, saves the
-model, and exits with a code that requests a restart. After the restart it resumes from that model.
+model, and exits with a code that requests a restart. After the restart it resumes from the saved model.
 """
 
 import os
@@ -34,7 +34,7 @@ def save(model: PPO) -> None:
 
 
 class Progress(BaseCallback):
-    """Reports before each rollout, when no update is running, and saves the model when a save is due."""
+    """Reports the steps and saves the model before a rollout, when no update is running."""
 
     def _on_training_start(self) -> None:
         self.next_save = self.num_timesteps + job.checkpoint.every_steps

@@ -1,6 +1,6 @@
 """The two listings of the paper's training session, in their order; Stable-Baselines3 replaces tf-agents.
 
-A simulator that breaks in `webots.run` or `with webots` is restarted at once, and its episode is truncated.
+If a simulator breaks in `webots.run` or `with webots`, it is restarted at once, and its episode is truncated.
 """
 
 import rospy

@@ -1,6 +1,6 @@
 """PPO in one file, to be read and changed: `trainer: {command: [python, ppo_in_one_file.py]}`.
 
-In a job it trains in all simulators with role Collect, for the steps of the job. To run it by hand:
+In a job, the program trains in all simulators with role Collect, for the steps of the job. To run it by hand:
 
     python examples/ppo_in_one_file.py --environment MoveToTargetEnv-v0 --simulators 2 --steps 4096
 
@@ -38,7 +38,7 @@ total = settings.steps or load().steps
 
 
 class Agent(nn.Module):
-    """A policy and a value function, for discrete actions and observations that are a row of numbers."""
+    """A policy and a value function, for discrete actions and one-dimensional observations."""
 
     def __init__(self, numbers: int, actions: int) -> None:
         super().__init__()
@@ -79,7 +79,7 @@ while steps < total:
         following, reward, terminated, truncated, infos = envs.step(action.numpy())
         ended = terminated | truncated
         rewards[step], ends[step] = torch.as_tensor(reward), torch.as_tensor(ended)
-        # A time limit or a fault truncates an episode that would have continued: add the value of the rest.
+        # A time limit or a fault truncates an episode that would have continued: add its remaining value.
         for index in np.flatnonzero(truncated & ~terminated):
             last = torch.as_tensor(infos["final_obs"][index])
             with torch.no_grad():

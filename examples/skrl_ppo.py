@@ -1,7 +1,7 @@
 """PPO of skrl in the simulators of a job, or in stubs: `trainer: {command: [python, skrl_ppo.py]}`.
 
-skrl is not part of the trainer's image; add it with `FROM palaestra-trainer` and `pip install skrl`. To run
-it by hand: `python examples/skrl_ppo.py --environment MoveToTargetEnv-v0 --simulators 2 --steps 4096`.
+skrl is not in the trainer's image; add it with `FROM palaestra-trainer` and `pip install skrl`. To run this
+program by hand: `python examples/skrl_ppo.py --environment MoveToTargetEnv-v0 --simulators 2 --steps 4096`.
 """
 
 import argparse
@@ -85,8 +85,8 @@ agent = Reporting(
         "discount_factor": 0.97,
         "learning_rate": 3e-4,
         "entropy_loss_scale": 0.01,
-        # `time_limit_bootstrap` stays off: with it, skrl would use the next episode's first observation
-        # as the last one of a truncated episode.
+        # `time_limit_bootstrap` stays off: with it, skrl would use the first observation of the next episode
+        # instead of the last observation of a truncated episode.
         "experiment": {
             "directory": os.environ.get("PALAESTRA_RUN", "runs"),
             "write_interval": 0,

@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
 # Install what Palaestra needs into .venv, on a machine with Python 3.11 or newer; needs no root.
-# With TORCH_INDEX, PyTorch comes from that package index, such as the one with builds for the processor alone.
-# Safe to repeat; a failed run leaves no .venv/ready behind, so the next one starts over.
+# With TORCH_INDEX, PyTorch comes from that package index, for example from the index with builds for the processor alone.
+# You can repeat this script safely: a failed run leaves no .venv/ready behind, so the next run starts over.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-# The environment is made from the system's interpreter and sees its packages: Debian's rospy, where it is
-# installed, is in /usr/lib/python3.
+# The environment uses the system's interpreter and can import its packages: if Debian's rospy is installed, it is
+# in /usr/lib/python3.
 PYTHON=/usr/bin/python3
 uv_pin=$(grep -oE '^uv==[0-9.]+' requirements.lock)
 rm -f .venv/ready
@@ -32,7 +32,7 @@ uv=.venv/bin/uv
 # Print the lock without PyTorch, and without the packages that only its build for CUDA needs.
 without_torch() { awk '/^[^ #]/ { dropped = /^(torch|triton|nvidia-[a-z0-9-]+)==/ } !dropped' requirements.lock; }
 
-# The choice is kept, so that a later `make setup` without it does not bring the large build back.
+# The chosen index is stored, so that a later `make setup` without TORCH_INDEX does not install the large build again.
 index=${TORCH_INDEX:-$(cat .venv/torch-index 2>/dev/null || true)}
 if [[ -z $index ]]; then
   echo "setup: installing the locked packages (PyTorch with CUDA is 3 GB to download, 5 GB on the disk;" \
@@ -42,7 +42,7 @@ else
   torch=$(grep -oE '^torch==[0-9.]+' requirements.lock)
   echo "setup: installing the locked packages, and $torch from $index (a build for the processor alone is 0.2 GB)"
   without_torch >.venv/without-torch.lock
-  # The lock names every dependency; a resolver would miss PyTorch in it.
+  # The lock names every dependency, so --no-deps suffices; a resolver would fail, because this copy lacks PyTorch.
   $uv pip install --quiet --require-hashes --no-deps -r .venv/without-torch.lock
   mapfile -t cuda < <($uv pip freeze | grep -oE '^(triton|nvidia-[a-z0-9-]+)==' | tr -d '=')
   if ((${#cuda[@]})); then
@@ -52,7 +52,7 @@ else
   echo "$index" >.venv/torch-index
 fi
 $uv pip install --quiet --no-deps --no-build-isolation -e operator -e trainer -e sim_image
-# For programs with rospy and ROS's own tools, where ROS is installed.
+# If ROS is installed, programs with rospy and ROS's own tools need the package webots_ros.
 if .venv/bin/python -c "import genmsg, genpy" 2>/dev/null; then
   .venv/bin/palaestra-webots-ros --importable .venv/share
 fi

@@ -1,16 +1,16 @@
 #!/usr/bin/env bash
 # Install what only the tests and measurements need, on a Debian 12 or 13 machine: ROS, a compiler and OpenGL
-# from the distribution. Safe to repeat; a failed run leaves no .venv/test-packages behind.
+# from the distribution. You can repeat this script safely: a failed run leaves no .venv/test-packages behind.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-# rospy's own service proxies import netifaces, on which its package forgets to depend.
+# rospy's service proxies import netifaces, but Debian's package of rospy does not depend on it.
 packages=(python3-rospy python3-rosmaster python3-netifaces)
-# ROS's command line, and the messages that those of webots_ros hold, as Python modules and as definitions.
+# ROS's command line, and the message types that webots_ros uses, as Python modules and as definitions.
 packages+=(python3-rosmsg python3-rosservice python3-rostopic python3-sensor-msgs ros-sensor-msgs)
 # A compiler and the headers of roscpp: a test builds a client in C++.
 packages+=(g++ libroscpp-dev libsensor-msgs-dev python3-gencpp)
-# OpenGL on the processor: MuJoCo's cameras draw with it.
+# MuJoCo's cameras draw with OpenGL on the processor.
 packages+=(libegl1 libgl1-mesa-dri libopengl0)
 
 all_installed() {

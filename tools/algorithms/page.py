@@ -1,6 +1,6 @@
-"""Which algorithm works with which observations and actions, in docs/reference/algorithms.md.
+"""The table of algorithms, observations and actions in docs/reference/algorithms.md.
 
-The reasons are the messages that a person gets who tries a refused combination.
+The reasons in the table are the messages that a trainer prints for a refused combination.
 tests/unit/trainer/algorithms/test_algorithms_grid.py trains in every cell that works.
 """
 
@@ -35,7 +35,7 @@ def refusal(name: str, seen: str, acted: str) -> str:
 
 
 def table() -> str:
-    """Return a row for each algorithm and observation, a column for each kind of actions, and reasons."""
+    """Return the table, with rows for algorithm and observation and columns for actions, and its reasons."""
     reasons: dict[str, int] = {}
     rows = []
     for name in ALGORITHMS:

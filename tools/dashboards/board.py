@@ -1,4 +1,4 @@
-"""What all dashboards share: their variables, the links between them, the grid and the panels' numbers."""
+"""The parts that all dashboards share: variables, links to each other, the grid and the panels' numbers."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ EVERYTHING = ".+"  # what "All" stands for in a matcher: short, and right for na
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Variable:
-    """A choice at the top of a dashboard: the values that a label of a metric has."""
+    """A choice at the top of a dashboard: the values of a metric's label."""
 
     name: str
     metric: str
@@ -67,9 +67,9 @@ class Board:
     """One dashboard.
 
     Attributes:
-        name: its file, its title, and its address in Grafana: /d/palaestra-<name>.
+        name: the name of its file, its title, and a part of its address in Grafana: /d/palaestra-<name>.
         says: the questions that it answers, and its readers.
-        since: the time that it shows at first, as Grafana has it: now-1h.
+        since: the start of the time that it shows at first, in Grafana's format: now-1h.
     """
 
     name: str

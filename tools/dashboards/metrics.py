@@ -1,4 +1,4 @@
-"""Selecting metrics: which labels a choice at the top of a dashboard narrows.
+"""Metrics with matchers for their labels, which the choices at the top of a dashboard set.
 
 `training_job`, `replica` and `simulator` are labels of the target: the PodMonitor takes them from the pod.
 """
@@ -54,12 +54,12 @@ def of_jobs(metric: str, *matchers: str) -> str:
 
 
 def rate(counter: str, over: str = RATE) -> str:
-    """Return how much a counter grows in a second."""
+    """Return a query for the growth of a counter per second."""
     return f"rate({counter}[{over}])"
 
 
 def grown(counter: str, over: str = RATE) -> str:
-    """Return by how much a counter has grown."""
+    """Return a query for the growth of a counter in the time `over`."""
     return f"increase({counter}[{over}])"
 
 

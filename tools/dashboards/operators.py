@@ -1,4 +1,4 @@
-"""Operator: does it keep up, is it refused anything, who leads."""
+"""The dashboard Operator: does an operator keep up, are its requests refused, and which operator leads."""
 
 from grafana_foundation_sdk.models import units
 

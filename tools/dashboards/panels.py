@@ -1,7 +1,7 @@
-"""A panel: a question, the queries that answer it, and how the answer looks.
+"""A panel: a question, the queries that answer the question, and the look of the answer.
 
-Each title is a question; the description says how to read the answer and what to do about it. Four looks
-are enough: lines, shares that are stacked, figures, and a spread of values over time.
+Each title is a question; the description explains how to read the answer and what to do. The four looks are
+lines, stacked shares, single figures, and the distribution of values over time.
 """
 
 from collections.abc import Callable, Mapping
@@ -39,7 +39,7 @@ HEIGHT: Final = 8
 
 
 class Look(Enum):
-    """How the answer to a question looks."""
+    """The look of the answer to a question."""
 
     LINES = auto()
     SHARES = auto()
@@ -66,9 +66,9 @@ class Panel:
         question: its title.
         says: how to read the answer, and what to do.
         unit: of all values, one of `grafana_foundation_sdk.models.units`.
-        least, most: the ends of the axis; None: as the values are.
-        alarm: values from this one on are drawn red.
-        width: in columns; a row has 24.
+        least, most: the ends of the axis; None: the least or largest value.
+        alarm: the least value that is drawn red.
+        width: number of columns; a row has 24.
     """
 
     question: str

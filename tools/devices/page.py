@@ -38,7 +38,7 @@ def _row(kind: DeviceType[Any]) -> str:
 
 
 def _device(kind: DeviceType[Any]) -> object:
-    """Return a device of that type, from a world that has nothing else."""
+    """Return a device of a type, from a world that has only this device."""
     node = f"{kind.node} {{ }}"
     part = f"HingeJoint {{ device {node} }}" if kind.on_joint else node
     world = f"#VRML_SIM R2023b utf8\nRobot {{ children [ {part} ] }}\n"

@@ -18,7 +18,7 @@ EPILOG = "Archives are kept in $PALAESTRA_CACHE/images (default: ~/.cache/palaes
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Build the images that were named; return 0, 1 when one could not be built, or 130 after Ctrl-C."""
+    """Build the named images; return 0, or 1 if an image could not be built, or 130 after Ctrl-C."""
     parser = _parser()
     options = parser.parse_args(arguments)
     known = recipes(options.torch)

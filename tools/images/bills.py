@@ -1,6 +1,6 @@
-"""Bills of materials, in the format CycloneDX that scanners read: one for each image and each wheel of ours.
+"""Bills of materials of our images and wheels, in the format CycloneDX, which vulnerability scanners read.
 
-The bill of an image lists what is in its archive. A wheel contains no package of others, so its bill lists
+The bill of an image lists the packages in its archive. A wheel contains no other packages, so its bill lists
 the packages that it was tested with: its part of the lock, with hashes.
 """
 
@@ -22,7 +22,7 @@ from tools.images.recipes import Recipe, project
 
 VERSION = SchemaVersion.V1_6
 ENDING = ".cdx.json"
-# Our packages, each with those of ours that it needs.
+# Our packages, each with all of our packages that it contains or needs.
 WHEELS = {
     "sim_image": ("sim_image",),
     "trainer": ("sim_image", "trainer"),
@@ -31,9 +31,9 @@ WHEELS = {
 
 
 def of_image(built: Built) -> Path:
-    """Write the bill of an image next to its archive, unless it is there, and return its path.
+    """Write the bill of an image next to its archive, unless the bill exists, and return the bill's path.
 
-    Bills whose archives are gone are removed.
+    This also removes the bills of archives that do not exist any more.
 
     Raises:
         ImagesError: the archive cannot be read.
@@ -53,7 +53,7 @@ def of_wheels(root: Path, folder: Path, machine: str) -> tuple[Path, ...]:
     """Write the bills of our wheels into a folder, and return their paths.
 
     Raises:
-        ImagesError: the lock is not as `make lock` writes it.
+        ImagesError: the lock does not have the format that `make lock` writes.
     """
     return tuple(_of_wheel(root, folder, package, machine) for package in WHEELS)
 
@@ -94,7 +94,7 @@ def _component(url: PackageURL) -> Component:
 
 
 def _text(whole: Component, parts: Iterable[Component], content: str) -> str:
-    """Return a bill as JSON; the same content gives the same bytes, so it has no time."""
+    """Return a bill as JSON, without a time, so that the same content gives the same bytes."""
     bill = Bom(components=parts, serial_number=uuid.uuid5(uuid.NAMESPACE_URL, f"{whole.bom_ref}#{content}"))
     bill.metadata.component = whole
     bill.register_dependency(whole, bill.components)

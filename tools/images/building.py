@@ -14,7 +14,7 @@ from tools.images.engines import Base, Engine, Order
 from tools.images.errors import ImagesError
 from tools.images.recipes import Recipe, digest, project
 
-_KEPT = 3  # archives of an image: the newest, one that a test may be using, and one of another tag
+_KEPT = 3  # archives of an image: the newest, an archive that a test may use, and an archive of another tag
 _KEPT_WHEELS = 6
 _GIT_DEADLINE_S = 20
 
@@ -40,7 +40,7 @@ class Wanted:
     machine: str
 
     def key(self) -> str:
-        """Return the digest of all of this, which is part of the archive's name."""
+        """Return the digest of all inputs, which is part of the archive's name."""
         return digest(
             (
                 self.reference,
@@ -57,7 +57,7 @@ class Wanted:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Workshop:
-    """The place where images are built: the checkout, the engine, and the folder of the archives."""
+    """The builder of images, with its checkout, its engine and its folder of archives."""
 
     root: Path
     engine: Engine
@@ -65,10 +65,10 @@ class Workshop:
     machine: str = platform.machine()
 
     def build(self, recipe: Recipe, tag: str | None = None) -> Built:
-        """Return an image, built if no image has this content; `tag` is the version by default.
+        """Return an image, and build it if no archive has this content; the default of `tag` is the version.
 
         Raises:
-            ImagesError: it cannot be built.
+            ImagesError: the image cannot be built.
         """
         wanted = self._wanted(recipe, tag)
         archive = self.folder / f"{recipe.name}-{wanted.key()}.tar"
@@ -135,7 +135,7 @@ def say(text: str) -> None:
 
 
 def _revision(root: Path) -> str:
-    """Return the commit that is checked out, with + when files differ from it; "unknown" outside of git."""
+    """Return the checked-out commit, with + if files differ from the commit; "unknown" outside of git."""
     commit = programs.answer(["git", "-C", str(root), "rev-parse", "HEAD"], deadline_s=_GIT_DEADLINE_S)
     if commit is None:
         return "unknown"

@@ -23,12 +23,12 @@ def folder(environment: Mapping[str, str] = os.environ) -> Path:
 
 @contextmanager
 def locked(file: Path, deadline_s: int) -> Iterator[None]:
-    """Hold a lock, so that two calls never make the same file; the system releases it when this process ends.
+    """Hold a lock, so that two calls never make the same file; the system releases it at this process's end.
 
-    Only the main thread may call it, because SIGALRM ends the wait for the other call.
+    Only the main thread may call this function, because SIGALRM ends the wait for the other call.
 
     Raises:
-        ImagesError: another call has held it for `deadline_s`, or the file system has no locks.
+        ImagesError: another call has held the lock for `deadline_s`, or the file system has no locks.
     """
     file.parent.mkdir(parents=True, exist_ok=True)
     with file.open("w") as handle:
@@ -45,12 +45,12 @@ def locked(file: Path, deadline_s: int) -> Iterator[None]:
 
 
 def use(path: Path) -> None:
-    """Note that a file or folder is in use. Its modification time stays, because others compare it."""
+    """Set the access time of a file or folder, but not the modification time, which other code compares."""
     os.utime(path, ns=(time.time_ns(), path.stat().st_mtime_ns))
 
 
 def prune(paths: Iterable[Path], kept: int) -> None:
-    """Remove all of these files and folders but those that were used last."""
+    """Remove these files and folders, except the `kept` most recently used."""
     for path in sorted(paths, key=lambda path: path.stat().st_atime_ns, reverse=True)[kept:]:
         if path.is_dir():
             shutil.rmtree(path)

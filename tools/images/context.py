@@ -1,7 +1,7 @@
-"""The folder that an image is built from: what goes into the image, and nothing else.
+"""The folder that an image is built from, with exactly the files that the image needs.
 
-Wheels are fetched and made here, where pip has the index, its proxy and its certificates; the
-build itself asks no index. They stay in the cache, so that only a changed lock fetches again.
+Wheels are fetched and built outside of the image's build, because pip on this machine has the index, its
+proxy and its certificates; the build itself uses no index. The cache keeps the wheels until the lock changes.
 """
 
 import os
@@ -27,7 +27,7 @@ _OLDEST_GLIBC, _NEWEST_GLIBC = 5, 41  # 2.41 is Debian trixie's
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Locked:
-    """Packages of others, as a requirements file with hashes, and the digest of that file."""
+    """Packages from the index, as a requirements file with hashes, and the digest of that file."""
 
     text: str
     digest: str
@@ -46,7 +46,7 @@ def contents(root: Path, recipe: Recipe, machine: str) -> Contents:
     """Return the content of an image for a `machine` (x86_64).
 
     Raises:
-        ImagesError: the lock is not as `make lock` writes it.
+        ImagesError: the lock does not have the format that `make lock` writes.
     """
     projects = [project(root, package) for package in recipe.packages]
     pins = _pins(root / "requirements.lock")
@@ -63,7 +63,7 @@ def contents(root: Path, recipe: Recipe, machine: str) -> Contents:
 
 
 def fill(folder: Path, root: Path, recipe: Recipe, inside: Contents, *, wheels: Path, machine: str) -> None:
-    """Make `folder` the context of an image; wheels of others are kept in the folder `wheels`.
+    """Make `folder` the context of an image; wheels from the index are cached in the folder `wheels`.
 
     Raises:
         ImagesError: a wheel cannot be fetched or made.
@@ -90,7 +90,7 @@ def _pins(file: Path) -> Sequence[lock.Pin]:
 
 
 def _extra(file: Path, share: str, machine: str) -> Locked:
-    """Return a whole lock, without the packages that are already in the part of the other lock."""
+    """Return an additional lock without the packages of `share`, the image's part of the main lock."""
     pins = _pins(file)
     there = [pin.name for pin in lock.parse(share)]
     return _locked(lock.share(pins, [pin.name for pin in pins], machine, there), machine)
@@ -101,7 +101,7 @@ def _locked(requirements: str, machine: str) -> Locked:
 
 
 def _fetched(kept: Path, locked: Locked, machine: str) -> Path:
-    """Return the folder of the locked wheels, fetched whole or not at all."""
+    """Return the folder of the locked wheels; if one wheel cannot be fetched, the folder is not created."""
     if kept.exists():
         cache.use(kept)
         return kept

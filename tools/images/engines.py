@@ -1,6 +1,6 @@
-"""The engine that builds an image: Docker if its engine answers and has the base image, otherwise buildah.
+"""The engine that builds an image: Docker if its engine responds and has the base image, otherwise buildah.
 
-Both build the same Dockerfiles, and leave a docker archive, which `kind load image-archive` takes.
+Both build the same Dockerfiles and write a docker archive, which `kind load image-archive` accepts.
 """
 
 import hashlib
@@ -15,7 +15,7 @@ from tools.images import programs
 from tools.images.errors import ImagesError
 
 DEBIAN = "docker.io/library/debian:trixie-slim"
-# Neither the mounts nor the processes of a build outlive it, also when it is killed.
+# With these options, the mounts and the processes of a build end with it, also if it is killed.
 _ISOLATED = ("unshare", "--mount", "--pid", "--fork", "--kill-child", "--mount-proc", "--")
 _ASK_DEADLINE_S = 20
 _PULL_DEADLINE_S = 180
@@ -55,7 +55,7 @@ class Engine(Protocol):
         ...
 
     def build(self, order: Order) -> None:
-        """Build an image and write its archive, whole or not at all.
+        """Build an image and write its archive; if a step fails, no archive is left.
 
         Raises:
             ImagesError: a step failed.
@@ -66,7 +66,7 @@ class Engine(Protocol):
         """Load the image of an archive under its name, so that another image can be built FROM it.
 
         Raises:
-            ImagesError: it cannot be read.
+            ImagesError: the archive cannot be read.
         """
         ...
 
@@ -79,7 +79,7 @@ class Docker:
 
     @classmethod
     def here(cls, image: str = DEBIAN) -> Self | None:
-        """Return Docker if its engine answers, can build, and has the base image or can pull it."""
+        """Return Docker if its engine responds, can build, and has or can pull the base image; else None."""
         for question in (["docker", "version"], ["docker", "buildx", "version"]):
             if programs.answer(question, deadline_s=_ASK_DEADLINE_S) is None:
                 return None
@@ -109,24 +109,24 @@ class Docker:
 
 
 class Buildah:
-    """buildah with a store of its own in the cache; its base image is a tree made by debootstrap.
+    """buildah with its own store in the cache; its base image is a tree made by debootstrap.
 
-    Steps run in a chroot, as builds inside a container must, and use this machine's network.
+    Steps run in a chroot, because builds inside a container need that, and use this machine's network.
     """
 
     def __init__(self, folder: Path, tree: Path) -> None:
         self._tree = tree
         self._logs = folder / "logs"
         self._base = Base(name=f"localhost/{tree.stem}", digest=tree.stem)
-        # A restart of the machine clears this folder, as it clears the mounts.
+        # The folder must be in /run: a restart of the machine removes the mounts, and clears /run too.
         mounted = Path("/run") / f"palaestra-{hashlib.sha256(os.fsencode(folder)).hexdigest()[:12]}"
         self._store = (f"--root={folder / 'store'}", f"--runroot={mounted}", "--storage-driver=overlay")
 
     @classmethod
     def here(cls, folder: Path, root: Path) -> Self:
-        """Return buildah, installed if it is missing, with the tree that tests/cluster/base.sh makes.
+        """Return buildah with the tree that tests/cluster/base.sh makes; install buildah if it is missing.
 
-        The caller holds the lock of `folder`: containers that a killed build left in it are removed.
+        The caller must hold the lock of `folder`, because this method removes containers of killed builds.
 
         Raises:
             ImagesError: the user is not root, or a part cannot be installed.
@@ -158,7 +158,7 @@ class Buildah:
         build = ("build", "--layers", "--pull-never", "--isolation=chroot")
         self._run([*build, *_what(order)], log=order.log, deadline_s=_BUILD_DEADLINE_S)
         part = order.archive.with_suffix(".part")
-        part.unlink(missing_ok=True)  # buildah would add to it
+        part.unlink(missing_ok=True)  # buildah would append to an existing file
         push = ("push", "--quiet", order.reference, f"docker-archive:{part}:{order.reference}")
         self._run(push, log=_beside(order.log, "archive"), deadline_s=_STEP_DEADLINE_S)
         part.rename(order.archive)
@@ -183,7 +183,7 @@ class Buildah:
 
 
 def _what(order: Order) -> list[str]:
-    """Return the arguments that describe the build; docker and buildah take the same ones."""
+    """Return the arguments that describe the build; docker and buildah take the same arguments."""
     return [
         f"--tag={order.reference}",
         f"--file={order.dockerfile}",

@@ -2,4 +2,4 @@
 
 
 class ImagesError(Exception):
-    """An image cannot be built here; the message says the thing, the fact and the remedy."""
+    """An image cannot be built on this machine; the message has the object, the problem and the remedy."""

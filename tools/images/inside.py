@@ -1,7 +1,7 @@
 """The packages of Debian and of Python in an image, read from its archive.
 
-The lock has the requested packages; the archive has those that a node runs. A package that a later layer
-removes is not in the image.
+The lock lists the requested packages, but only the archive shows the packages of the finished image. If a
+later layer removes a package, the package is not in the image.
 """
 
 import json
@@ -15,7 +15,7 @@ from pathlib import Path
 from tools.images.errors import ImagesError
 
 _DPKG = re.compile(r"var/lib/dpkg/status(\.d/[^/]+)?")
-# Without Debian's own modules for Python, which are packages of Debian.
+# Debian's own modules for Python are excluded, because they are in the list of Debian's packages.
 _METADATA = re.compile(r"(?!usr/lib/python3/dist-packages/).*\.dist-info/METADATA")
 _REMOVED, _EMPTIED = ".wh.", ".wh..wh..opq"  # a layer's marks; source: the OCI image specification
 
@@ -34,7 +34,7 @@ def packages(archive: Path) -> tuple[Package, ...]:
     """Return the packages in the image of a docker archive, sorted.
 
     Raises:
-        ImagesError: it is not such an archive.
+        ImagesError: the file is not a docker archive.
     """
     files: dict[str, bytes] = {}
     try:
@@ -53,7 +53,7 @@ def _content(archive: tarfile.TarFile, name: str) -> bytes:
 
 
 def _apply(layer: tarfile.TarFile, files: dict[str, bytes]) -> None:
-    """Apply a layer to the files that lists of packages are read from."""
+    """Apply a layer's changes to `files`, which holds only the files with lists of packages."""
     for member in layer:
         path = member.name.removeprefix("./").removeprefix("/")
         folder, _, name = path.rpartition("/")

@@ -1,8 +1,8 @@
 """Choose the packages that one image needs from `requirements.lock`. Pure: text in, text out.
 
-The lock names for every package those that require it (`# via`), so the part for an image is found without
-an index. Markers are evaluated for the image's Python, which is another one than that of the building
-machine.
+For every package, the lock names the packages that require it (`# via`). So the part for an image can be
+found without an index. Markers are evaluated for the image's Python version, which differs from the version
+of the building machine.
 """
 
 import re
@@ -20,7 +20,7 @@ _WANTED_BY = re.compile(r"^    # (?:via|  ) *([a-z0-9-]+)?")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pin:
-    """One locked version; `wanted_by` names packages, ours among them."""
+    """One locked version; `wanted_by` names the packages that require it, including our own packages."""
 
     name: str
     version: str
@@ -62,7 +62,7 @@ def share(pins: Iterable[Pin], packages: Collection[str], machine: str, without:
 
 
 def unwanted(pins: Iterable[Pin], package: str, names: Collection[str]) -> tuple[Pin, ...]:
-    """Return the pins as they would be if `package` did not want those called `names`."""
+    """Return the pins without the requirements of `package` for the packages in `names`."""
     return tuple(
         replace(pin, wanted_by=pin.wanted_by - {package}) if pin.name in names else pin for pin in pins
     )

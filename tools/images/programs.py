@@ -1,4 +1,4 @@
-"""Running other programs: each has a deadline and dies with us; its output goes to a file or comes back."""
+"""Running other programs, each with a deadline; a program is killed if this process dies."""
 
 import subprocess
 from collections.abc import Sequence
@@ -14,7 +14,8 @@ def run(command: Sequence[str], *, log: Path, deadline_s: float) -> None:
     """Run a program with its output in `log`.
 
     Raises:
-        ImagesError: it failed, or took longer than `deadline_s`; the message ends with its last lines.
+        ImagesError: the program failed, or took longer than `deadline_s`; the message ends with the last
+            lines of its output.
     """
     log.parent.mkdir(parents=True, exist_ok=True)
     said = _tried(command, log, deadline_s)

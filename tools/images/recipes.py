@@ -10,17 +10,17 @@ from typing import Any
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
-REGISTRY = "docker.io/library"  # what a cluster adds to a name without a host
+REGISTRY = "docker.io/library"  # the prefix that a cluster adds to a name without a host
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Recipe:
     """One image.
 
-    `packages` are folders of ours, of which the image has the optional dependencies that `extras` names, and
-    `files` are other files that the Dockerfile runs or copies. `without` names locked packages that the
-    image leaves out. `extra` is an additional lock, which the image has whole. `arguments` are those of the
-    Dockerfile.
+    `packages` are the folders of our packages in the image, and `extras` names the optional dependencies of
+    these packages. `files` are other files that the Dockerfile runs or copies. `without` names locked
+    packages that the image leaves out. `extra` is an additional lock, whose packages the image has too.
+    `arguments` are the arguments of the Dockerfile.
     """
 
     name: str
@@ -38,7 +38,7 @@ class Recipe:
 
 
 def recipes(torch: str) -> Mapping[str, Recipe]:
-    """Return all images by name, trainer and notebook with PyTorch of `debian` or with `cuda`."""
+    """Return all images by name; `torch` is `debian` or `cuda`, the PyTorch of trainer and notebook."""
     stood_in_for = ("torch",) if torch == "debian" else ()  # the distribution's PyTorch replaces it
     return {
         "stub": Recipe(
@@ -75,7 +75,7 @@ def recipes(torch: str) -> Mapping[str, Recipe]:
             without=(
                 *stood_in_for,
                 "kubernetes",
-            ),  # kubernetes is in the notebook's lock, so that the trainer's part is the same in both images
+            ),  # kubernetes is in the notebook's lock instead, so that trainer and notebook share layers
             extra="images/notebook/requirements.lock",
             arguments={"TORCH": torch},
         ),
@@ -83,7 +83,7 @@ def recipes(torch: str) -> Mapping[str, Recipe]:
             name="operator",
             dockerfile="operator/Dockerfile",
             packages=("sim_image", "operator"),
-            # Only the client's asynchronous half needs them, and the image leaves it out.
+            # Only the client's asynchronous half needs these packages, and the image leaves that half out.
             without=("aiohttp", "aiohttp-retry"),
         ),
     }
@@ -96,7 +96,7 @@ def project(root: Path, package: str) -> Mapping[str, Any]:
 
 
 def left_out(project: Mapping[str, Any], extras: Collection[str]) -> frozenset[str]:
-    """Return the names of packages that a project needs only for extras other than these."""
+    """Return the names of packages that a project needs only for other extras than `extras`."""
     optional: Mapping[str, Sequence[str]] = project.get("optional-dependencies", {})
     wanted = [*project["dependencies"], *(each for extra in extras for each in optional.get(extra, ()))]
     return _names(each for listed in optional.values() for each in listed) - _names(wanted)
@@ -115,7 +115,7 @@ def sources(root: Path, package: str) -> Iterator[Path]:
 
 
 def digest(parts: Iterable[bytes | str]) -> str:
-    """Return 12 hexadecimal digits of a digest of these parts, which depends on their order and borders."""
+    """Return 12 hexadecimal digits of a digest of the parts, which depends on their order and borders."""
     total = hashlib.sha256()
     for part in parts:
         data = part.encode() if isinstance(part, str) else part

@@ -1,4 +1,4 @@
-"""A world whose supervisor has every device, and the services and topics that each simulator offers there."""
+"""A world whose supervisor has every device, and the services and topics of each simulator in this world."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _SETTINGS = {
 _MASS = "physics Physics { density -1 mass 1 }"  # without it no force moves a joint
 
 PHYSICS: Mapping[str, Callable[[], Physics]] = {"stub": StubPhysics, "mujoco": MujocoPhysics}
-# A service that a simulator cannot perform fails, so that no client trains with a success that did nothing.
+# Services that fail because a simulator cannot perform them. A success without effect would mislead a client.
 _STUB = frozenset(  # pictures and forces
     (
         "camera/enable",
@@ -69,12 +69,12 @@ FAILING: Mapping[str, frozenset[str]] = {"stub": _EVERYWHERE | _STUB, "mujoco": 
 
 
 def device_name(type_name: str) -> str:
-    """Return the name in the world of the device of a type: "DistanceSensor" is "distance_sensor"."""
+    """Return the name that a type's device has in the world: "distance_sensor" for "DistanceSensor"."""
     return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", type_name).lower()
 
 
 def world() -> str:
-    """Return the world."""
+    """Return the text of the world file."""
     parts = "\n".join(_part(kind) for kind in DEVICES.values())
     return f"""#VRML_SIM R2023b utf8
 WorldInfo {{ basicTimeStep 32 info [ "everything" ] }}

@@ -38,7 +38,7 @@ def page(text: str) -> str:
 
 
 def tables() -> str:
-    """Return a table for the robot, the supervisor, each type of device, and the services of ours."""
+    """Return a table for the robot, the supervisor, each type of device, and our additional services."""
     surveys = [offered(simulator) for simulator in FAILING]
     services = groups({path: it for survey in surveys for path, it in survey.services.items()})
     topics = groups({path: it for survey in surveys for path, it in survey.topics.items()})
@@ -63,7 +63,7 @@ def _row(group: str, path: str, type_name: str, md5: str) -> str:
 
 
 def _state(simulator: str, path: str) -> str:
-    """Return whether a simulator of ours has a path: `yes`, `fails` or `no`."""
+    """Return `yes`, `fails` or `no` for a path in one of our simulators."""
     survey = offered(simulator)
     if path not in survey.services and path not in survey.topics:
         return "no"

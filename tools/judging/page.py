@@ -1,4 +1,4 @@
-"""The checks on a replica, in docs/explain/judging.md: a row for each check of the operator's own lists."""
+"""The table of checks on a replica in docs/explain/judging.md, with a row for each check of the operator."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def page(text: str) -> str:
 
 
 def table() -> str:
-    """Return a row for each check in its order: class, name, and the first line of its docstring."""
+    """Return a row for each check, in the order of the lists: class, name, first line of the docstring."""
     rows = (
         f"| {number} | {kind} | `{check.__name__}` | {(check.__doc__ or '').strip().splitlines()[0]} |"
         for number, (kind, check) in enumerate(CHECKS, 1)

@@ -1,8 +1,8 @@
 """`llms.txt`, the list of all pages for language models, made from docs/README.md and the pages it links to.
 
 The form is that of https://llmstxt.org: a title, a summary, and sections of links with a note each.
-The first sections are the paths in reading order. The other pages follow by kind, each with its own first
-line, which says for whom it is.
+The first sections list the pages of each reading path, in order. The other pages follow by kind. Their notes
+are the first lines of the pages, which name the readers.
 """
 
 from __future__ import annotations

@@ -1,1 +1,1 @@
-"""docs/reference/metrics.md: the part of it that is made from the code."""
+"""docs/reference/metrics.md: the tables, which are made from the code."""

@@ -1,6 +1,6 @@
 """The tables of docs/reference/metrics.md, made from the families that the programs declare.
 
-This module belongs to no program, because operator and trainer do not import each other.
+This module is in tools/, because operator and trainer do not import each other.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,8 +14,8 @@ from palaestra_trainer.run.telemetry import metric_definitions as trainer
 
 PAGE = "docs/reference/metrics.md"
 SERIES = "<!-- generated: how many series -->"
-PROCESS = 6  # process_*, which prometheus_client exports in each program
-MOST_NAMED = 10  # values of a label that are written out
+PROCESS = 6  # series of process_*, which prometheus_client exports in each program
+MOST_NAMED = 10  # the table lists the values of a label up to this number, and only counts more values
 
 JOBS, REPLICAS, SIMULATORS, NAMESPACES = 1000, 2, 3, 50
 SIZES: Mapping[str, int] = {
@@ -43,7 +43,7 @@ class Program:
 
     @property
     def series(self) -> int:
-        """The maximum number of series of one instance, with those of its process."""
+        """The maximum number of series of one instance, including its series process_*."""
         return sum(family.series(SIZES) for family in self.families) + PROCESS
 
 

@@ -1,1 +1,1 @@
-"""The count of other people's models of MuJoCo that start as they are."""
+"""The count of other projects' models of MuJoCo that start without changes."""

@@ -1,7 +1,7 @@
-"""`python -m tools.models DIR...`: count the models of MuJoCo below folders that start as they are.
+"""`python -m tools.models DIR...`: count the models of MuJoCo below folders that start without changes.
 
-dm_control, gymnasium, gymnasium-robotics, metaworld and robosuite bring 140 with an actuator. Their wheels
-are enough, without their dependencies:
+dm_control, gymnasium, gymnasium-robotics, metaworld and robosuite have 140 models with an actuator. You need
+only the wheels of these packages, without their dependencies:
 
     uv pip install --no-deps --target DIR dm_control gymnasium gymnasium-robotics metaworld robosuite
 """
@@ -18,7 +18,8 @@ from pathlib import Path
 from typing import Final
 
 DEADLINE_S: Final = 180.0
-# A file without an actuator moves nothing; a file that MuJoCo refuses is a part of another file.
+# Files without an actuator do not count as models. Files that MuJoCo refuses do not count either, because
+# they are parts of other files.
 IS_MODEL: Final = "import mujoco, sys; sys.exit(mujoco.MjModel.from_xml_path(sys.argv[1]).nu == 0)"
 
 
@@ -45,7 +46,7 @@ def files(folders: Sequence[Path]) -> Iterator[Path]:
 
 
 def refusal(file: Path) -> str | None:
-    """Return the refusal of a model, "" if it starts, None if MuJoCo loads no model with an actuator."""
+    """Return the refusal of a model; "" if it starts; None if the file is not a model with an actuator."""
     if run(sys.executable, "-c", IS_MODEL, file).returncode:
         return None
     check = run(Path(sys.executable).with_name("palaestra-mujoco"), "--check", file)

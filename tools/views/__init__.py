@@ -1,1 +1,1 @@
-"""Pictures of the shipped arena for the documentation, as MuJoCo draws them."""
+"""Pictures of the shipped arena for the documentation, drawn with MuJoCo."""

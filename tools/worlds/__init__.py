@@ -1,1 +1,1 @@
-"""The count of other people's worlds of Webots that start as they are."""
+"""The count of other projects' worlds of Webots that start without changes."""

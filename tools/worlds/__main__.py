@@ -1,8 +1,8 @@
 """`python -m tools.worlds DIR...`: count the worlds of Webots below folders that simulators start.
 
-Give it checkouts of projects. The controllers of each world's robots are set to `ros`, in a copy next to the
-world, because a world belongs to the files around it. Equal worlds count once. A world that starts only with
-`--leave-out all` is printed with the sentences that refuse it.
+The folders are checkouts of projects. The program sets the controllers of each world's robots to `ros`, in a
+copy next to the world, because a world refers to the files around it. Equal worlds count once. If a world
+starts only with `--leave-out all`, the program prints it with the messages that refuse it.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from typing import Final
 
 SIMULATORS: Final = ("palaestra-stub", "palaestra-mujoco")
 DEADLINE_S: Final = 180.0
-# No controller drives a robot that has one of these values.
+# Matches a robot's controller, except `<none>` and `void`: robots with these two values have no controller.
 CONTROLLER: Final = re.compile(rb'(\bcontroller\s+)"(?!<none>|void")[^"\n]*"')
 MARK: Final = ".counted.wbt"
 HEADER: Final = b"#VRML_SIM "  # files with another header are parts of worlds
@@ -38,10 +38,10 @@ class Answer:
     """The result of one simulator for one world.
 
     Attributes:
-        starts: whether the world starts as it is.
+        starts: whether the world starts without `--leave-out`.
         with_left_out: whether it starts with `--leave-out all`.
-        keeps: whether a robot then has a motor and a sensor.
-        refusals: the refusals that keep the world from starting as it is.
+        keeps: whether, with `--leave-out all`, a robot has a motor and a sensor.
+        refusals: the messages that refuse the world without `--leave-out`.
     """
 
     starts: bool
@@ -68,7 +68,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def distinct(folders: Sequence[Path]) -> Iterator[Path]:
-    """Yield the worlds below the folders; of equal ones, the first."""
+    """Yield the worlds below the folders; if several worlds are equal, yield only the first of them."""
     seen: set[bytes] = set()
     for file in sorted(file for folder in folders for file in folder.rglob("*.wbt")):
         content = file.read_bytes()
@@ -103,7 +103,7 @@ def for_ros(world: Path, simulator: str) -> Iterator[Path]:
 
 
 def is_complete(line: str) -> bool:
-    """Return whether a line of `--check` describes a robot of ROS with a motor and a sensor."""
+    """Return whether a line of `--check` describes a robot with controller `ros`, a motor and a sensor."""
     if not line.startswith('robot "') or 'controller "ros"' not in line:
         return False
     types = set(re.findall(r"\b\d+ ([A-Z]\w+)", line))
@@ -113,7 +113,7 @@ def is_complete(line: str) -> bool:
 def report(
     simulator: str, worlds: Sequence[Path], answers: Sequence[Answer], write: Callable[[str], object]
 ) -> None:
-    """Write the refused worlds, the kinds of refusals with the number of their worlds, and the counts."""
+    """Write the refused worlds, the number of worlds for each refusal, and the totals."""
     kinds: Counter[str] = Counter()
     for world, answer in zip(worlds, answers, strict=True):
         facts = {re.sub(r"^\S+:\d+:\d+: ", "", line) for line in answer.refusals}

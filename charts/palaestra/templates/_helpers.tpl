@@ -1,5 +1,5 @@
-{{/* The name of everything that belongs to the operator. It is fixed, and so is its Lease's: a second release in the
-     namespace, or a second one for the whole cluster, is refused by Helm instead of working on the same jobs. */}}
+{{/* The name of the operator's objects. This name and the name of its Lease are fixed. So Helm refuses a second release in
+     the namespace, or a second release for the whole cluster; otherwise two operators would reconcile the same jobs. */}}
 {{- define "palaestra.name" -}}
 palaestra-operator
 {{- end }}
@@ -10,7 +10,7 @@ palaestra-operator
 app.kubernetes.io/version: {{ .root.Chart.AppVersion | quote }}
 {{- end }}
 
-{{/* Labels by which pods are found: never changed, as a Deployment's selector cannot be. */}}
+{{/* Labels that select pods. They must never change, because a Deployment's selector is immutable. */}}
 {{- define "palaestra.selector" -}}
 app.kubernetes.io/name: palaestra
 app.kubernetes.io/component: {{ .component }}
@@ -24,7 +24,7 @@ app.kubernetes.io/component: {{ .component }}
 {{- if $image.digest }}@{{ $image.digest }}{{ else }}:{{ $image.tag | default .root.Chart.AppVersion }}{{ end -}}
 {{- end }}
 
-{{/* The image of a job's part, or nothing where the operator's own default is the same. Takes the root and the name. */}}
+{{/* The image of a container of jobs, or nothing if it equals the operator's own default. Takes the root and the name. */}}
 {{- define "palaestra.jobImage" -}}
 {{- $image := include "palaestra.image" . -}}
 {{- if ne $image (printf "palaestra-%s:%s" .name .root.Chart.AppVersion) }}{{ $image }}{{ end -}}
