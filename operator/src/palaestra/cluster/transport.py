@@ -191,8 +191,7 @@ class Transport:
         response = self._send(call, Timeout(connect=min(self.limits.connect_s, left_s), read=left_s))
         try:
             return self._answer(response, call, deadline)
-        # Ctrl-C is included: otherwise the next request would read the remaining bytes of this response.
-        except BaseException:
+        except BaseException:  # also Ctrl-C: the next request would read the remaining bytes of this response
             response.close()
             raise
         finally:
