@@ -1,4 +1,4 @@
-"""Settings with which a run learns little or takes more steps than set; they are logged, not refused."""
+"""Settings that make a run learn little or exceed its steps; the trainer logs them, but accepts the job."""
 
 from __future__ import annotations
 
@@ -39,6 +39,6 @@ def futile(model: BaseAlgorithm, steps: int) -> Iterator[str]:
 
 
 def _steps_of_rollout(model: OffPolicyAlgorithm) -> int:
-    """Return the steps of all members before an update; 0 if it waits for whole episodes."""
+    """Return the steps of all members before an update; 0 if an update waits for whole episodes."""
     frequency = cast("TrainFreq", model.train_freq)
     return frequency.frequency * model.n_envs if frequency.unit is TrainFrequencyUnit.STEP else 0

@@ -1,4 +1,4 @@
-"""Algorithms that choose only among actions that a mask of the environment allows."""
+"""Functions for algorithms that choose only actions that a mask of the environment allows."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def is_masked(algorithm: Algorithm) -> bool:
 
 
 def takes_masks(policy: object) -> bool:
-    """Return whether a model, or the policy of one, chooses only among allowed actions."""
+    """Return whether a model or a policy chooses only actions that a mask allows."""
     return isinstance(policy.model if isinstance(policy, Normalized) else policy, MaskablePPO)
 
 
@@ -29,7 +29,7 @@ def refuse_without_masks(algorithm: Algorithm, env: gymnasium.Env[Any, Any], nam
 
     Args:
         algorithm: the algorithm of the job.
-        env: the environment; its simulator need not be up.
+        env: the environment; its simulator need not have started.
         name: id of the environment.
 
     Raises:

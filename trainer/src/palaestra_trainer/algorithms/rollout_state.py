@@ -1,9 +1,10 @@
-"""The state of each algorithm besides its saved tensors: a rollout changes it, and a resume needs it.
+"""The state of each algorithm that a rollout changes and a resume needs, besides the saved tensors.
 
 Every algorithm counts steps, and keeps its last observation and statistics of episodes. `checkpoint.state`
-saves these, and the action noise. This table has the rest, by class: networks that a rollout changes, the
-state of an LSTM, counts. A user's class has the entry of its nearest ancestor in the table. Without such an
-ancestor, the whole policy is copied at each boundary, because a rollout may change any part.
+saves these values and the action noise. The table of this module lists the rest for each class: networks that
+a rollout changes, the state of an LSTM, and counts. A user's class has the entry of its nearest ancestor in
+the table. Without such an ancestor, the whole policy is copied at each boundary between rollouts, because a
+rollout may change any network.
 """
 
 from __future__ import annotations
@@ -21,12 +22,12 @@ from palaestra_trainer.algorithms.reinforce import REINFORCE
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RolloutState:
-    """The attributes of an algorithm that change in a rollout, besides those that every algorithm has.
+    """The attributes that a rollout of an algorithm changes, besides those that every algorithm has.
 
     Attributes:
         networks: networks with tensors that a rollout changes; an update may change them too.
         memories: states of recurrent networks, nested tuples of tensors of shape (layers, members, units).
-        numbers: its counts, and numbers derived from them.
+        numbers: counts of the algorithm, and numbers that it derives from its counts.
     """
 
     networks: tuple[str, ...] = ()
@@ -61,6 +62,6 @@ BESIDE: Mapping[type[BaseAlgorithm], RolloutState] = MappingProxyType(
 
 
 def beside(model: BaseAlgorithm) -> RolloutState:
-    """Return the entry of the model's class, or of its nearest ancestor that has one."""
+    """Return the entry of the model's class, or of the nearest ancestor in the table."""
     known = (BESIDE[cls] for cls in type(model).__mro__ if cls in BESIDE)
     return next(known, _UNKNOWN)

@@ -1,6 +1,6 @@
-"""Check that an algorithm fits an environment, and choose its policy.
+"""Check that an algorithm supports the spaces of an environment, and choose its policy.
 
-The checks need only the spaces, so they refuse a mismatch before a simulator starts.
+The checks need only the spaces, so a mismatch is refused before a simulator starts.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.user_code import imports
 
 KINDS = (spaces.Box, spaces.Discrete, spaces.MultiDiscrete, spaces.MultiBinary)
-# The convolutions of each network need at least this number of pixels per side.
+# The convolutions of each network need images with at least this number of pixels per side.
 SMALLEST: Mapping[Cnn | None, int] = {None: 36, "small": 20}
 
 
@@ -30,7 +30,8 @@ def policy_of_spaces(
     """Return the policy of an algorithm for these observations and actions.
 
     Raises:
-        ConfigurationError: the algorithm does not fit the environment; one line for each reason.
+        ConfigurationError: the algorithm does not support the spaces; the message has one line for each
+            reason.
     """
     refuse_spaces(algorithm, seen, acted)
     if lines := [*_about_images(algorithm, seen), *_about_normalization(algorithm, seen)]:
@@ -39,7 +40,7 @@ def policy_of_spaces(
 
 
 def refuse_spaces(algorithm: Algorithm, seen: spaces.Space[Any], acted: spaces.Space[Any]) -> None:
-    """Refuse observations and actions that the algorithm would misread, or does not support.
+    """Refuse spaces that the algorithm would misinterpret or does not support.
 
     Raises:
         ConfigurationError: one line for each reason.
@@ -49,7 +50,7 @@ def refuse_spaces(algorithm: Algorithm, seen: spaces.Space[Any], acted: spaces.S
 
 
 def named_policy(algorithm: Algorithm, entry: RegisteredAlgorithm) -> str | type[BasePolicy] | None:
-    """Return the policy that the job names: an alias of the algorithm or a class; None if it names no policy.
+    """Return the policy that the job names, as an alias or a class; None if the job names no policy.
 
     Raises:
         ConfigurationError: the name is neither an alias nor a class.
@@ -72,13 +73,13 @@ def aliases(cls: type[BaseAlgorithm]) -> Mapping[str, type[BasePolicy]]:
 
 
 def images_in(space: spaces.Space[Any]) -> list[spaces.Box]:
-    """Return the images of an observation: the observation itself, or parts of a Dict."""
+    """Return the spaces of images in an observation: the observation itself, or parts of a Dict."""
     parts = space.spaces.values() if isinstance(space, spaces.Dict) else [space]
     return [part for part in parts if isinstance(part, spaces.Box) and is_image_space(part)]
 
 
 def scalable(space: spaces.Space[Any]) -> list[str] | bool:
-    """Return the keys of a Dict whose parts may be normalized; for another space, whether it may be.
+    """Return the keys of a Dict that can be normalized; for another space, return whether it can.
 
     Networks scale images themselves, and the numbers of a Discrete are labels without a scale.
     """
@@ -88,7 +89,7 @@ def scalable(space: spaces.Space[Any]) -> list[str] | bool:
 
 
 def refuse_flaws(seen: spaces.Space[Any], acted: spaces.Space[Any]) -> None:
-    """Refuse spaces that every algorithm of Stable-Baselines3 would misread, or does not support.
+    """Refuse spaces that every algorithm of Stable-Baselines3 would misinterpret or does not support.
 
     Raises:
         ConfigurationError: one line for each reason.
@@ -140,7 +141,7 @@ def _flaw(part: spaces.Space[Any]) -> str:
 
 
 def _flaw_of_bounds(acted: spaces.Space[Any]) -> str:
-    """Return the reason why a Box cannot be an action space, and the remedy; "" if it can."""
+    """Return the reason why a Box cannot be an action space, and the remedy; "" without a reason."""
     if not isinstance(acted, spaces.Box):
         return ""
     if not np.issubdtype(acted.dtype, np.floating):
