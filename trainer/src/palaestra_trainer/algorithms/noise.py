@@ -28,7 +28,7 @@ NAMES = ("noise_type", "noise_std")
 
 
 def mistakes(given: Mapping[str, Any], field: str) -> Iterator[str]:
-    """Yield a message with field, fact and remedy for each of the two hyperparameters that is wrong."""
+    """Yield a message with field, fact and remedy for each wrong value of `noise_type` or `noise_std`."""
     kind, deviation = given.get("noise_type"), given.get("noise_std")
     if kind is not None and kind not in KINDS:
         yield f"{field}.noise_type: {kind!r} is not known; {nearest(str(kind), dict(KINDS))}"

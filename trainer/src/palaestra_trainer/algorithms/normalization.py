@@ -55,7 +55,7 @@ class Moments:
         """Return the moments from the result of `to_json`.
 
         Raises:
-            KeyError, TypeError, ValueError: the content is not such a result, or of another shape.
+            KeyError, TypeError, ValueError: `content` is not a result of `to_json`, or has another shape.
         """
         mean, variance = (np.array(content[name], dtype=np.float64) for name in ("mean", "variance"))
         if mean.shape != shape or variance.shape != shape:
@@ -152,7 +152,7 @@ class ValidNormalize(VecNormalize):
         """Load some of the statistics that `to_json` wrote; the clip values of this run do not change.
 
         Raises:
-            KeyError, TypeError, ValueError: the content is not such a result, or of another shape.
+            KeyError, TypeError, ValueError: `content` is not a result of `to_json`, or has another shape.
         """
         running = self._running()
         found = {name: Moments.from_json(content[name], np.shape(running[name].mean)) for name in content}
@@ -200,7 +200,7 @@ class Normalized:
         deterministic: bool = False,  # noqa: FBT001, FBT002 - as in Stable-Baselines3
         **masks: Any,
     ) -> tuple[Any, Any]:
-        """Return an action for one observation, and the policy's next state; MaskablePPO takes masks."""
+        """Return an action for a raw observation, and the policy's next state; MaskablePPO takes `masks`."""
         seen = self._normalizer.normalize_obs(observation)
         return self.model.predict(seen, state, episode_start, deterministic, **masks)
 

@@ -50,7 +50,7 @@ class ReplaySize:
         return self.memory_bytes + keep * min(every_steps, self.rows) * self.row_bytes
 
     def most_rows(self, memory_bytes: int, disk_bytes: int, every_steps: int, keep: int) -> int:
-        """Return the most rows with which a buffer fits into memory, and its checkpoints on the disk."""
+        """Return the largest number of rows for which memory and the disk for checkpoints suffice."""
         in_memory = memory_bytes // self.row_bytes
         on_disk = disk_bytes // self.row_bytes
         # With at most `every_steps` rows, checkpoints may share no rows. With more rows, each checkpoint has
@@ -62,7 +62,7 @@ class ReplaySize:
 def replay_size(
     algorithm: Algorithm, observation: spaces.Space[Any], action: spaces.Space[Any], steps: int
 ) -> ReplaySize | None:
-    """Return the size of an algorithm's replay buffer; None: it has no buffer, or no policy takes the space.
+    """Return the size of an algorithm's replay buffer; None: it has no buffer, or no policy for the space.
 
     Args:
         algorithm: the algorithm with all its hyperparameters.

@@ -129,7 +129,7 @@ def _flaws_of_action(acted: spaces.Space[Any]) -> Iterator[str]:
 
 
 def _flaw(part: spaces.Space[Any]) -> str:
-    """Return the reason why Stable-Baselines3 would misread a space, and the remedy; "" if it would not."""
+    """Return the reason why Stable-Baselines3 would misinterpret a space, and the remedy; else ""."""
     if isinstance(part, spaces.Discrete | spaces.MultiDiscrete) and np.any(part.start):
         start = np.asarray(part.start).tolist()
         return f"counts from {start}, and networks count from 0; count from 0, and add {start} inside"

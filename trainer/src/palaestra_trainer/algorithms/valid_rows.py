@@ -127,7 +127,7 @@ class OnPolicyRows(ValidRowsCounted, OnPolicyAlgorithm):
         )
 
     def _refuse_masks(self, buffer: RolloutBuffer) -> None:
-        """Refuse a buffer with masks in an algorithm without masks, and one without masks in MaskablePPO."""
+        """Refuse a buffer with masks for an algorithm without masks, or without masks for MaskablePPO."""
         takes_masks = isinstance(self, MaskablePPO)
         if isinstance(buffer, _WITH_MASKS) == takes_masks:
             return

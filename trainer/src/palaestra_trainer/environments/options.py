@@ -1,4 +1,4 @@
-"""The options of the tasks; they vary a task without changes to its code."""
+"""The options of the tasks; a job sets them to vary a task without changes to its code."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from palaestra_trainer.robots.geometry import Movement
 
 ACTIONS = ("discrete", "continuous")
 TIME_UP = ("terminated", "truncated")
-# `Sparse` has a reward for time-up, so time-up terminates its episodes. `Dense` has no such reward, so its
-# episodes are truncated: see docs/explain/tasks.md.
+# `Sparse` has a reward for the end of time, so the end of time terminates its episodes. `Dense` has no such
+# reward, so the end of time truncates its episodes. docs/explain/tasks.md gives the reasons.
 TIME_UP_OF = {"Dense": "truncated", "Sparse": "terminated"}
 
 
@@ -41,7 +41,7 @@ class Episodes(Protocol):
 
     @property
     def time_up(self) -> str | None:
-        """The end of an episode when time is up, see `TIME_UP`; None: `TIME_UP_OF` the reward."""
+        """How an episode ends when time is up, a value of `TIME_UP`; None: `TIME_UP_OF` the reward."""
         ...
 
 
@@ -64,7 +64,8 @@ class MoveToTargetOptions:
         movements: the choices of a discrete action, in this order.
         actions: `discrete` (one of `movements`) or `continuous` (a twist).
         max_steps: steps until time is up.
-        time_up: the end of an episode then, `terminated` or `truncated`; None: `TIME_UP_OF` the reward.
+        time_up: how an episode ends when time is up, `terminated` or `truncated`; None: `TIME_UP_OF` the
+            reward.
 
     Raises:
         ConfigurationError: one line for every mistake.
@@ -86,8 +87,8 @@ class GoalOptions(MoveToTargetOptions):
     """The options of `MoveToTargetGoalEnv`, checked: those of `MoveToTargetOptions` with other defaults.
 
     Args:
-        observe: the parts of `observation`; `target` is refused, because the goal has keys of its own.
-        time_up: see `MoveToTargetOptions`; `truncated`, because time-up has no reward.
+        observe: the parts of `observation`; `target` is refused, because the goal has its own keys.
+        time_up: see `MoveToTargetOptions`; by default `truncated`, because the end of time has no reward.
 
     Raises:
         ConfigurationError: one line for every mistake.
@@ -174,7 +175,7 @@ class NavigateOptions:
 
 
 def time_up_terminates(options: Episodes) -> bool:
-    """Return whether time-up terminates an episode, so that a learner estimates no value after it."""
+    """Return whether the end of time terminates an episode; a learner then estimates no value after it."""
     return (options.time_up or TIME_UP_OF[options.reward]) == "terminated"
 
 
@@ -191,7 +192,7 @@ _Chosen = TypeVar("_Chosen", bound=MoveToTargetOptions | SeeOptions | NavigateOp
 
 
 def parse_as(kind: type[_Chosen], given: Mapping[str, Any]) -> _Chosen:
-    """Return options from the values in a job file, where movements and parts are names.
+    """Return options from the values in a job file, in which movements and parts are written as names.
 
     Raises:
         ConfigurationError: one line for every mistake.
