@@ -1,4 +1,4 @@
-"""`palaestra-export`: the best policy of a run as one file for other programs."""
+"""`palaestra-export` writes the best policy of a run as one file for other programs."""
 
 from __future__ import annotations
 
@@ -58,5 +58,5 @@ def export(arguments: Sequence[str] | None = None) -> int:
 
 
 def export_and_leave() -> int:
-    """Run `palaestra-export` as a program that ends soon, even if a thread of the job's code still runs."""
+    """Run `palaestra-export`, and end the process soon even if a thread of the job's code still runs."""
     return leaving(export())
