@@ -1,4 +1,4 @@
-"""Create the members of fault-tolerant environments: in a facade, in a job, or in new simulators."""
+"""Create the members of fault-tolerant environments from a facade, from a job, or from new simulators."""
 
 from __future__ import annotations
 
@@ -39,15 +39,17 @@ from palaestra_trainer.telemetry.progress_sources import follow
 
 
 def make_players(wanted: Environment | None, number: int | None, role: Role) -> EnvGroup:
-    """Return a group of environments of one class, each in its own simulator, which is up.
+    """Return a group of environments of one class, each in its own running simulator.
 
-    The simulator is that of the newest `Webots` facade of this process that no environment uses. Without such
-    a facade, or for more than one simulator, those of PALAESTRA_CONFIG are used. If that is not set, new ones
-    are started: stubs, or MuJoCo for `SeeTarget-v0`.
+    If this process has a `Webots` facade that no environment uses, the environment takes the simulator of the
+    newest such facade. Without such a facade, or for more than one simulator, the simulators of
+    PALAESTRA_CONFIG are used. If that variable is not set, new simulators are started: stubs, or MuJoCo for
+    `SeeTarget-v0`.
 
     Args:
-        wanted: the environment; None: that of PALAESTRA_CONFIG.
-        number: number of simulators; None: that of the facade, else all of the role, else a new one.
+        wanted: the environment; None: the environment of PALAESTRA_CONFIG.
+        number: number of simulators; None: the simulator of the facade, or all simulators of the role, or one
+            new simulator.
         role: the role of the simulators in PALAESTRA_CONFIG.
 
     Raises:
@@ -120,7 +122,8 @@ def _in_own(environment: Environment, number: int, world: str, driver: str) -> E
     with ExitStack() as stack:
         members = []
         for entry in entries:
-            # A stub ignores six such digits when it seeds its faults, so that the faults are repeatable.
+            # A stub derives the seed of its faults from its name without these six digits, so its faults are
+            # repeatable.
             launcher = ProcessLauncher(world, driver, suffix=f"_{entry.index}_{uuid4().hex[:6]}")
             stack.callback(launcher.close)
             members.append(simulator_at(launcher, configuration, entry))
@@ -130,7 +133,7 @@ def _in_own(environment: Environment, number: int, world: str, driver: str) -> E
 def _allocated(
     stack: ExitStack, configuration: Configuration, number: int | None, role: Role
 ) -> tuple[SimulatorConfiguration, ...]:
-    """Return simulators that are reserved until `stack` closes; no simulator may be given up."""
+    """Reserve simulators until `stack` closes; return them with a minimum that allows none to be given up."""
     every = max(1, len(configuration.with_role(role)))
     entries = []
     for _ in range(number or every):
@@ -143,7 +146,7 @@ def _allocated(
 def _started(
     stack: ExitStack, configuration: Configuration, members: Sequence[Member], watcher: Watcher
 ) -> list[Restarter]:
-    """Start the members and return their restarters; closing `stack` stops the members."""
+    """Start the members and return their restarters; when `stack` closes, it stops the members."""
     fleet = Fleet(configuration, members, watcher)
     stack.callback(fleet.stop)
     fleet.start()

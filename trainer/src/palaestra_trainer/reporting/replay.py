@@ -1,6 +1,6 @@
-"""A recorded episode from above, as SVG: floor, obstacles, target, and the way of the robot.
+"""Draw a recorded episode from above as SVG: floor, obstacles, target, and the path of the robot.
 
-The picture is complete without a script. The script of the page moves the robot along the way.
+The picture is complete without a script. The script of the page moves the robot along its path.
 """
 
 from __future__ import annotations
@@ -139,7 +139,7 @@ def _controls(replay: Replay) -> Markup:
 
 
 def _for_script(replay: Replay) -> dict[str, object]:
-    """Return the poses as whole millimeters and degrees, which are short."""
+    """Return the data for the page's script; whole millimeters and degrees keep it short."""
     return {
         "s": replay.frame_s,
         "poses": [
