@@ -82,6 +82,6 @@ class FloorLayout:
     obstacles: tuple[Obstacle, ...] = ()
 
     def gap(self, x_m: float, y_m: float) -> float:
-        """Return meters from a point to the nearest obstacle or floor edge; negative inside or beyond it."""
+        """Return meters to the nearest obstacle or floor edge; negative in an obstacle or off the floor."""
         edge = min(x_m - self.low[0], self.high[0] - x_m, y_m - self.low[1], self.high[1] - y_m)
         return min(edge, *(thing.gap(x_m, y_m) for thing in self.obstacles if thing.standing), math.inf)
