@@ -1,4 +1,4 @@
-"""The package that runs in the trainer's container and in notebooks."""
+"""The package for programs in the trainer's container and in notebooks."""
 
 from __future__ import annotations
 
@@ -45,10 +45,10 @@ def make_env(environment: str | None = None, *, role: str = "Collect", **options
     Args:
         environment: id of the environment; by default the environment of PALAESTRA_CONFIG.
         role: the role of the simulator in PALAESTRA_CONFIG, `Collect` or `Evaluate`.
-        options: options of the environment.
+        options: keyword arguments of the environment.
 
     Raises:
-        ConfigurationError: the environment is missing or wrong, or no simulator with the role is free.
+        ConfigurationError: the environment is missing or wrong, or all simulators with the role are in use.
         FaultBudgetSpent: the simulator does not start.
     """
     from palaestra_trainer.fault_tolerant.env import FaultTolerantEnv

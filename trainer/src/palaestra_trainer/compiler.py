@@ -18,9 +18,9 @@ from types import ModuleType
 from typing import Any
 
 NAME = "torch._dynamo"
-_ANSWER = "__dynamo_disable"  # the attribute of a function in which PyTorch keeps the result of `disable`
+_ANSWER = "__dynamo_disable"  # attribute of a function in which PyTorch stores the result of `disable`
 
-# Each function of the stand-in, and the module of PyTorch that calls it.
+# # The functions of the stand-in, each with the module of PyTorch that calls it.
 _OF_PYTORCH = {"disable": "torch._compile", "graph_break": "torch.optim.optimizer"}
 
 
@@ -36,7 +36,7 @@ class _StandIn(ModuleType):
         self._asked_about: list[Callable[..., Any]] = []
 
     def _graph_break(self) -> None:
-        pass  # without a compiler there is no graph
+        pass  # without a compiler, a program has no graph to break
 
     def _disable(self, fn: Callable[..., Any], *_: Any, **_options: Any) -> Callable[..., Any]:
         self._asked_about.append(fn)
@@ -91,7 +91,7 @@ class _LoaderOfStandIn(SourceFileLoader):
 
 
 class _Imported(Loader):
-    """Loads a module that was imported while its spec was searched for."""
+    """A loader for a module that was imported while Python searched for its spec."""
 
     def create_module(self, spec: ModuleSpec) -> ModuleType:
         return sys.modules[spec.name]

@@ -60,7 +60,7 @@ class Wrapper(_Section):
     """A wrapper around the environment, see `environments.wrappers`.
 
     Attributes:
-        name: its class, as `module:Class`.
+        name: class of the wrapper, as `module:Class`.
         options: keyword arguments of the class.
     """
 
@@ -73,10 +73,11 @@ class Environment(_Section):
 
     Attributes:
         id: name under which the environment is registered with gymnasium.
-        reward: Dense gives a reward at each step, Sparse only at the end of an episode.
+        reward: with Dense the environment gives a reward at each step, with Sparse only at the end of an
+            episode.
         options: keyword arguments of the environment.
         wrappers: wrappers around the environment, the innermost first; None: no wrappers.
-        frame_stack: number of newest observations that are stacked into one; None: no stacking.
+        frame_stack: number of newest observations that are stacked into one observation; None: no stacking.
     """
 
     id: str
@@ -106,7 +107,7 @@ class Callback(_Section):
     """A callback of the job's author, see `run.callbacks`.
 
     Attributes:
-        name: its class, as `module:Class`.
+        name: class of the callback, as `module:Class`.
         options: keyword arguments of the class.
     """
 
@@ -115,7 +116,7 @@ class Callback(_Section):
 
 
 class Algorithm(_Section):
-    """The learning algorithm.
+    """The learning algorithm of the run.
 
     Attributes:
         name: a name in the table of algorithms, or `module:Class`.
@@ -190,13 +191,13 @@ class SimulatorConfiguration(_Section):
 
     Attributes:
         name: `<group>-<index>`, unique in the file.
-        role: Collect gathers experience, Evaluate measures the policy.
+        role: Collect for collecting experience, Evaluate for evaluating the policy.
         min_simulators: number of simulators of its group that must work for the run to continue; None: all.
-        control: address of its sidecar's control port.
+        control: address of the control port of the simulator's sidecar.
         driver: the simulator program: stub, mujoco, webots or command.
-        options: its command-line options.
-        world: path of its generated world.
-        standby: whether its sidecar runs a second simulator as a standby for this one.
+        options: command-line options of the simulator program.
+        world: path of the generated world that the simulator loads.
+        standby: whether the sidecar also runs a standby for this simulator.
         start_deadline_seconds: seconds within which the simulator must respond after its start.
     """
 
@@ -216,7 +217,7 @@ class SimulatorConfiguration(_Section):
 
 
 class Configuration(_Section):
-    """The complete configuration of one replica: the resolved TrainingJob for it.
+    """The complete configuration of one replica, which the operator derives from the TrainingJob.
 
     Attributes:
         seed: the job's seed plus the replica's index; all other seeds are derived from this seed.
@@ -224,7 +225,7 @@ class Configuration(_Section):
         steps: number of valid environment steps of the whole run, of all simulators together.
         resume_from: the run directory of another job; a run that has not saved a checkpoint yet resumes from
             the newest checkpoint in that directory.
-        initial_policy: a model.zip whose policy a new run begins with; None: random weights.
+        initial_policy: a model.zip with whose policy a new run begins; None: random weights.
         stall_deadline_seconds: the run fails after this time without an environment step.
         robot: class of the robot, `module:Class` or a name of `robots.registry`; None: `DEFAULT_ROBOT`.
         command: the user's own program that replaces the built-in training loop; the trainer does not read
@@ -300,7 +301,7 @@ def load_run(folder: Path) -> Configuration:
 
 
 def parse(content: object, *, source: str = "training.yaml") -> Configuration:
-    """Return the configuration that `content`, a YAML document as Python data, describes.
+    """Return the configuration that `content` describes, which is the Python data of a YAML document.
 
     Raises:
         ConfigurationError: the message has one line for each mistake, with field, fact and remedy.
@@ -321,7 +322,7 @@ def parse(content: object, *, source: str = "training.yaml") -> Configuration:
 def dump(configuration: Configuration) -> str:
     """Return YAML text from which `load` reads an equal configuration."""
     content = configuration.model_dump(mode="json", by_alias=True, exclude_none=True)
-    # The text is ASCII, because YAML reads some other characters as line ends.
+    # The text is pure ASCII, because YAML reads some other characters as line ends.
     return yaml.safe_dump(content, sort_keys=False)
 
 

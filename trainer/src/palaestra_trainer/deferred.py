@@ -1,10 +1,10 @@
 """Import Stable-Baselines3 without libraries that most programs never use; this saves a third of their start.
 
 The modules of Stable-Baselines3 import pandas, Matplotlib and rich for functions that no training calls. They
-import TensorBoard's writer even if nothing is written. While Python executes these modules, a stand-in module
-replaces each library. A stand-in imports its library at the first use, so every function of the library still
-works. When other modules import a library, they get the library itself. A library that is already imported is
-not replaced.
+import TensorBoard's writer even if the program does not write event files. While Python executes these
+modules, a stand-in module replaces each library. A stand-in imports its library at the first use, so every
+function of the library still works. When other modules import a library, they get the library itself. A
+library that is already imported is not replaced.
 """
 
 from __future__ import annotations

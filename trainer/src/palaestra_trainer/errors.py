@@ -43,7 +43,7 @@ _LIBRARIES = {
 
 
 def fact_of(error: BaseException) -> str:
-    """Return class, text, file and line of an error that the code of a job's author raised."""
+    """Return class, text, file and line of an error in the code of a job's author."""
     fact = f"{type(error).__name__}: {error}"
     frames = (
         (frame.f_globals.get("__name__", "").partition(".")[0], frame.f_code.co_filename, line)
@@ -85,7 +85,7 @@ class Diverged(TrainerError, ArithmeticError):
 
 
 class ExportError(TrainerError, RuntimeError):
-    """The exported policy acts differently from the policy in model.zip; nothing was written."""
+    """The exported policy acts differently from the policy in model.zip; the file was not written."""
 
 
 class NoSuchSensor(TrainerError, NotImplementedError):
@@ -108,7 +108,7 @@ class Paused(TrainerError, RuntimeError):
 
 
 class SimulatorFault(TrainerError):
-    """One simulator failed; restart only that one.
+    """One simulator failed; restart only that simulator.
 
     Attributes:
         simulator: the ROS name or group name of the simulator.

@@ -71,7 +71,8 @@ def install(folder: Path, target: Path) -> None:
             shutil.copytree(source, staged)
         _check_names(folder, staged, target)
         _check_requirements(staged)
-        # Byte code is compiled now, because the root file system of a pod is read-only.
+        # # The byte code is compiled while the image is built, because the root file system of a pod is
+        # read-only.
         compileall.compile_dir(staged, quiet=1, stripdir=str(staged), prependdir=str(target))
         _replace(staged, target)
 
@@ -116,7 +117,7 @@ def _copy(folder: Path, source: Path) -> None:
 
 
 def _install_project(source: Path, staged: Path) -> None:
-    """Build the project and install it into `staged` with everything that the image lacks.
+    """Build the project and install it into `staged`, with the dependencies that the image lacks.
 
     uv skips the packages of the image, even if the project requires another version of one.
     `_check_requirements` finds such a conflict later.
@@ -196,7 +197,7 @@ def _unmet(requirements: Iterable[Requirement], there: Sequence[Distribution]) -
 
 
 def _requirements(distribution: Distribution, extra: str = "") -> Iterator[Requirement]:
-    """Yield the requirements of a distribution on this platform; with an extra, only those of the extra."""
+    """Yield the requirements of a distribution, or only those of an extra, on this platform."""
     for requirement in map(Requirement, distribution.requires or ()):
         marker = requirement.marker
         always = marker is None or marker.evaluate({"extra": ""})

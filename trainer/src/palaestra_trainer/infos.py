@@ -1,14 +1,14 @@
-"""The info of a step, and the keys in it that Palaestra sets.
+"""The keys that Palaestra sets in the info of a step.
 
 Stable-Baselines3 reads the keys `episode`, `terminal_observation` and `TimeLimit.truncated`. Palaestra puts
 its other facts about a step into a separate dict, `info["palaestra"]`. So the keys of an environment and
 those of Palaestra cannot be confused:
 
 - `valid`: False in a row that the algorithm must not learn from
-- `sim_fault`: in the row that a fault truncated: kind, simulator, fact, episode and step
+- `sim_fault`: only in the row of a fault: its kind, simulator, fact, episode and step
 - `recovering`: in the rows after the fault, until the simulator is up again; False after the simulator was
   given up
-- `extra_steps`: simulation steps that a late message made necessary
+- `extra_steps`: simulation steps in addition to the usual one, because a message was late
 - `hidden`: the environment's own values for keys that Stable-Baselines3 or Palaestra uses
 """
 

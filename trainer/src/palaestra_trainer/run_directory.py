@@ -77,7 +77,7 @@ class RunDirectory:
 
     @property
     def model(self) -> Path:
-        """The best model by evaluation, a Stable-Baselines3 zip."""
+        """The model with the best evaluation, as a zip of Stable-Baselines3."""
         return self.path / "model.zip"
 
     @property
@@ -92,7 +92,7 @@ class RunDirectory:
 
     @property
     def summary(self) -> Path:
-        """The result of the run; the file exists once the run is finished."""
+        """The result of the run; the file exists only after the run has finished."""
         return self.path / "summary.json"
 
     @property
@@ -102,7 +102,7 @@ class RunDirectory:
 
     @property
     def trackers(self) -> Path:
-        """The id of this run in each experiment tracker that the job uses."""
+        """The ids of this run in the experiment trackers of the job."""
         return self.path / "trackers.json"
 
     def begin_attempt(self, pod_uid: str, reason: str, versions: Mapping[str, str] | None = None) -> int:
@@ -146,7 +146,7 @@ def drop_lines(path: Path, unwanted: Callable[[dict[str, Any]], bool]) -> None:
 
 
 def replace_file(path: Path, write: Callable[[Path], object]) -> None:
-    """Replace `path` by the file that `write` writes to a temporary name.
+    """Replace the file at `path` by the file that `write` writes to a temporary name.
 
     Raises:
         OSError: the file could not be written; the old file is unchanged.

@@ -49,13 +49,13 @@ NAMES = (*REPLAY.names, *ROLLOUT.names)
 
 
 def mistakes(given: Mapping[str, Any]) -> Iterator[str]:
-    """Yield a message with field, fact and remedy for each of these hyperparameters that is wrong."""
+    """Yield a message with field, fact and remedy for each wrong hyperparameter of a buffer."""
     for kind in KINDS:
         yield from _mistakes(kind, given.get(kind.chooser), given.get(kind.options))
 
 
 def arguments(given: Mapping[str, Any], observation: spaces.Space[Any]) -> dict[str, Any]:
-    """Return the keyword arguments of the algorithm's class for these hyperparameters.
+    """Return the keyword arguments that these hyperparameters set for the algorithm's class.
 
     Raises:
         ConfigurationError: the buffer does not accept the environment's observation.

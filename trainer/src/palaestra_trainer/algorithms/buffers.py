@@ -52,7 +52,7 @@ class Positions(NamedTuple):
 
     @classmethod
     def from_json(cls, content: Sequence[Any]) -> Positions:
-        """Return the positions that were written as JSON."""
+        """Return the positions from their JSON data."""
         row, full, newest, columns = content
         return cls(row, full, tuple(newest), tuple((at, filled) for at, filled in columns))
 
@@ -65,7 +65,7 @@ class ValidReplayBuffer(ReplayBuffer):
 
     Attributes:
         chunk_rows: number of rows of one chunk; the last chunk may have fewer.
-        changed: numbers of the chunks that have changed; clear it after saving them.
+        changed: numbers of the chunks that have changed; clear this set after saving the chunks.
     """
 
     def __init__(
@@ -84,7 +84,7 @@ class ValidReplayBuffer(ReplayBuffer):
 
     @property
     def positions(self) -> Positions:
-        """The write positions of the buffer; set it to restore them."""
+        """The write positions of the buffer; set this property to restore them."""
         return Positions(self.pos, self.full, tuple(self._newest))
 
     @positions.setter
@@ -109,7 +109,7 @@ class ValidReplayBuffer(ReplayBuffer):
         for row, info in enumerate(infos):
             if is_valid(info):
                 one = slice(row, row + 1)
-                # In a full buffer this row may have been the newest one of another member.
+                # In a full buffer, this row may overwrite the newest row of another member.
                 self._newest = [None if newest == self.pos else newest for newest in self._newest]
                 self._newest[row] = self.pos
                 self.changed.add(self.pos // self.chunk_rows)
@@ -184,7 +184,7 @@ class ValidRolloutBuffer(RolloutBuffer):
     def get(self, batch_size: int | None = None) -> Generator[Any, None, None]:
         """Yield minibatches of valid rows in random order."""
         if not self.generator_ready:
-            next(super().get(1))  # flattens the rows of all members into one column
+            next(super().get(1))  # this call flattens the rows of all members into one column
         rows = np.random.permutation(np.flatnonzero(self.swap_and_flatten(self.valid)))
         for batch in self._parts(rows, batch_size or max(len(rows), 1)):
             yield self._get_samples(batch)
@@ -199,7 +199,7 @@ class ValidDictRolloutBuffer(ValidRolloutBuffer, DictRolloutBuffer):
 
 
 def batches(rows: np.ndarray, size: int) -> Iterator[np.ndarray]:
-    """Yield `rows` in parts of `size`; a single last row joins the part before it.
+    """Yield `rows` in parts of `size`; add a single last row to the part before it.
 
     A part with a single row would have one advantage, whose standard deviation is NaN.
     """

@@ -1,4 +1,4 @@
-"""The device of a model's networks: the CPU, unless a job requests a GPU and PyTorch finds one.
+"""Choose the device of a model: the CPU, unless a job requests a GPU and PyTorch finds a GPU.
 
 The CPU is the default even if the node has a GPU, because networks of some hundred units learn faster on the
 CPU. A resumed run ends with exactly the same numbers only on the CPU.

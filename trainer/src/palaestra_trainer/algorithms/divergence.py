@@ -1,4 +1,4 @@
-"""Detect NaN and infinite numbers in a learner, at the update that produced them.
+"""Detect NaN and infinite numbers in a model right after the update that produced them.
 
 After each update, the losses and every learned tensor are checked. One call computes the norms of all
 tensors. The check takes 0.05 to 0.2 ms, which is 0.6 % of an update of DQN and 0.04 % of an update of PPO.

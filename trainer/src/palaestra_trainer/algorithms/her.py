@@ -1,4 +1,4 @@
-"""Hindsight experience replay: learning from goals that an episode reached by accident.
+"""Hindsight experience replay, which learns from goals that an episode reached by accident.
 
 A job chooses this method by two hyperparameters of Stable-Baselines3 and rl-baselines3-zoo:
 `replay_buffer_class` and `replay_buffer_kwargs`. New goals are drawn from whole episodes. So each member has
@@ -74,7 +74,8 @@ def refuse_other_observations(observation: spaces.Space[Any]) -> None:
 class ValidHerReplayBuffer(ValidDictReplayBuffer, HerReplayBuffer):
     """A buffer for hindsight experience replay that stores valid rows, with a column for each member.
 
-    Only rows of closed episodes are sampled. An episode that is longer than its column keeps its last rows.
+    Only rows of closed episodes are sampled. Of an episode that is longer than its column, only the last rows
+    are kept.
     """
 
     def __init__(
@@ -122,7 +123,7 @@ class ValidHerReplayBuffer(ValidDictReplayBuffer, HerReplayBuffer):
             rows = 0 if start is None else (self._next[column] - start) % self.buffer_size
             self._under_way[column] = self.buffer_size if start == self._next[column] else rows
             open_rows = self._rows_under_way(column)
-            if self.ep_length[open_rows, column].any():  # the episode was closed in a dropped rollout
+            if self.ep_length[open_rows, column].any():  # a dropped rollout had closed the episode
                 self._set_episode(open_rows, column, self._start(column), 0)
 
     def size(self) -> int:
@@ -146,7 +147,7 @@ class ValidHerReplayBuffer(ValidDictReplayBuffer, HerReplayBuffer):
         done: np.ndarray,
         infos: list[dict[str, Any]],
     ) -> None:
-        """Append each valid row to its member's column; an invalid row closes the episode before it."""
+        """Append each valid row to its member's column; if a row is invalid, close the member's episode."""
         actions = action.reshape((self.n_envs, self.action_dim))
         for column, info in enumerate(infos):
             if not is_valid(info):
@@ -166,7 +167,7 @@ class ValidHerReplayBuffer(ValidDictReplayBuffer, HerReplayBuffer):
                 self._close(column)
 
     def keep(self, kept: np.ndarray) -> None:
-        """Drop every episode with a row that is not `kept`."""
+        """Drop every episode that has a row outside of `kept`."""
         for column in range(self.n_envs):
             lost = np.flatnonzero(~kept[: self._used(column)])
             for start in set(self.ep_start[lost, column].tolist()):

@@ -37,7 +37,7 @@ CLASSES: Mapping[str, Mapping[str, type[Any]]] = {
         for it in (optim.Adam, optim.AdamW, optim.NAdam, optim.RAdam, optim.RMSprop, optim.SGD)
     },
 }
-# For these arguments of a policy, the given class must be a subclass of the class here.
+# For each of these arguments of a policy, the job must name a subclass of the class on the right.
 BASES: Mapping[str, type[Any]] = {
     "activation_fn": nn.Module,
     "optimizer_class": optim.Optimizer,
@@ -65,7 +65,7 @@ def mistakes(
 
 
 def arguments(cls: type[BaseAlgorithm], hyperparameters: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the keyword arguments of the class for these hyperparameters.
+    """Return the keyword arguments that these hyperparameters set for the class.
 
     Raises:
         ConfigurationError: a class that a hyperparameter names cannot be imported.
@@ -134,7 +134,7 @@ def _mistakes_of_schedule(field: str, name: str) -> Iterator[str]:
 
 
 def _class(argument: str, name: Any) -> type[Any] | None:
-    """Return the class for a policy's argument: `module:Class`, or a PyTorch name in upper or lower case.
+    """Return the class that a policy's argument names: `module:Class`, or a PyTorch name in any case.
 
     A PyTorch name may include its module, as in `torch.nn.Tanh`, `th.nn.Tanh` or `nn.Tanh`.
     """
@@ -184,7 +184,7 @@ def _kinds(annotation: Any) -> set[Any]:
 
 
 def _words(annotation: Any) -> str:
-    """Return the accepted values of an annotation, as text for a person who writes YAML."""
+    """Return the values that an annotation accepts, in the words of YAML."""
     origin, parts = get_origin(annotation), get_args(annotation)
     if annotation in _WORDS:
         return _WORDS[annotation]

@@ -15,7 +15,7 @@ from palaestra_trainer.algorithms.reinforce import REINFORCE
 
 
 def futile(model: BaseAlgorithm, steps: int) -> Iterator[str]:
-    """Yield a line for each setting of a new model that does not fit the steps of its run."""
+    """Yield a warning for each setting of a new model that is unsuitable for the steps of its run."""
     if isinstance(model, OffPolicyAlgorithm) and model.learning_starts >= steps:
         yield (
             f"{FIELD}.learning_starts: {model.learning_starts} is not less than steps ({steps}), so nothing "

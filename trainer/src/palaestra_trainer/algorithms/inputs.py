@@ -18,7 +18,7 @@ _LIBRARIES = {"palaestra_trainer", "sb3_contrib", "stable_baselines3", "torch"}
 
 
 def give_copies(model: BaseAlgorithm) -> None:
-    """Make each network of the job's author in the policy of `model` get copies of its inputs."""
+    """Pass copies of the inputs to each network of the job's author in the policy of `model`."""
     _hook(model.policy, set())
 
 

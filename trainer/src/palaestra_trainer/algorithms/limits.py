@@ -19,9 +19,9 @@ class Range:
     """The range of values that a hyperparameter may have.
 
     Attributes:
-        least: the smallest number.
-        most: the greatest number; None: no upper limit.
-        open: whether `least` itself is refused.
+        least: the smallest allowed number.
+        most: the greatest allowed number; None: no upper limit.
+        open: whether `least` itself is not allowed.
     """
 
     least: float
@@ -29,7 +29,7 @@ class Range:
     open: bool = False
 
     def __contains__(self, value: float) -> bool:
-        """Return whether a number is in the range; NaN is not."""
+        """Return whether a number is in the range; NaN is never in a range."""
         enough = value > self.least if self.open else value >= self.least
         return enough and (self.most is None or value <= self.most)
 

@@ -83,7 +83,7 @@ def _refuse_members(chosen: Mapping[str, Any], members: int) -> None:
 
 
 def resolve(algorithm: Algorithm, environment: str) -> Algorithm:
-    """Return the algorithm with all its hyperparameters: those of the job, and defaults for the rest.
+    """Return the algorithm with all its hyperparameters, from the job or else from the defaults.
 
     Args:
         algorithm: the algorithm of the job.
@@ -106,7 +106,8 @@ def make_model(algorithm: Algorithm, env: VecEnv, seed: int, device: Device = "c
     `normalization`.
 
     Raises:
-        ConfigurationError: the algorithm does not fit the environment, or a hyperparameter has a wrong value.
+        ConfigurationError: the algorithm does not support the environment's spaces, or a hyperparameter has a
+            wrong value.
     """
     entry = entry_of(algorithm.name)
     given = with_defaults(algorithm, {}).hyperparameters

@@ -15,10 +15,10 @@ from palaestra_trainer.algorithms.buffers import ValidRolloutBuffer, batches
 
 
 class _Masked(ValidRolloutBuffer):
-    """A rollout buffer of rows with masks."""
+    """A rollout buffer whose rows have masks."""
 
     def _parts(self, rows: np.ndarray, size: int) -> Iterator[np.ndarray]:
-        """Yield `rows` in parts of `size`; a single last row joins the part before it.
+        """Yield `rows` in parts of `size`; add a single last row to the part before it.
 
         Unlike PPO, MaskablePPO normalizes the advantage even of a single row, whose standard deviation is
         NaN.

@@ -15,7 +15,7 @@ from palaestra_trainer.errors import ConfigurationError
 
 
 def is_masked(algorithm: Algorithm) -> bool:
-    """Return whether an algorithm needs masks of the allowed actions from the environment."""
+    """Return whether an algorithm needs masks of allowed actions from its environment."""
     return issubclass(entry_of(algorithm.name).original, MaskablePPO)
 
 
@@ -48,8 +48,8 @@ def predict_allowed(policy: Any, masks: Any, *seen: Any, deterministic: bool = T
     Args:
         policy: a policy for which `takes_masks` is True.
         masks: masks as `action_masks` returns them.
-        seen: observation, state, and whether an episode begins.
-        deterministic: whether the most probable action is chosen.
+        seen: observation, state, and whether an episode begins, as for `predict` of the policy.
+        deterministic: whether to choose the most probable action.
     """
     action, state = policy.predict(*seen, deterministic=deterministic, action_masks=masks)
     return action, state

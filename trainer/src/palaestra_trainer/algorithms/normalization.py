@@ -27,7 +27,7 @@ from palaestra_trainer.configuration import Normalize
 
 @dataclass(frozen=True, slots=True)
 class Moments:
-    """Mean, variance and number of the samples so far; the arrays are never changed."""
+    """Mean, variance and number of the samples so far, in arrays that never change."""
 
     mean: np.ndarray
     variance: np.ndarray
@@ -97,7 +97,7 @@ class ValidNormalize(VecNormalize):
             scales[name].put_back(running)
 
     def reset(self) -> Any:
-        """Return the first observations of new episodes, normalized."""
+        """Return the normalized first observations of new episodes."""
         observations = cast("Observations", self.venv.reset())
         self.old_obs = observations
         self.returns = np.zeros(self.num_envs)
@@ -122,7 +122,7 @@ class ValidNormalize(VecNormalize):
     def go_on(self, observations: Observations, returns: np.ndarray) -> Any:
         """Set the last observations and returns of a resumed run; return the normalized observations.
 
-        `returns` are the discounted rewards of the running episodes, one per member.
+        `returns` holds for each member the discounted reward of its running episode.
         """
         self.old_obs, self.returns = observations, returns
         return self.normalize_obs(observations)

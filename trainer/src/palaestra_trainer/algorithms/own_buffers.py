@@ -43,7 +43,7 @@ VALID_ROLLOUTS: Mapping[type[Any], type[Any]] = {
     DictRolloutBuffer: ValidDictRolloutBuffer,
     RolloutBuffer: ValidRolloutBuffer,
 }
-# An author's class may extend one of these.
+# # An author's class may extend a class on the left; its subclass for valid rows is on the right.
 _VALID: Mapping[type[Any], type[Any]] = {
     DictReplayBuffer: ValidDictReplayBuffer,
     ReplayBuffer: ValidReplayBuffer,
@@ -193,7 +193,7 @@ def _can_be_written(value: Any) -> bool:
     """Return whether a checkpoint can write a value and read an equal value."""
     if isinstance(value, np.ndarray):
         return not value.dtype.hasobject
-    if isinstance(value, torch.Tensor | float):  # NaN is not equal to itself
+    if isinstance(value, torch.Tensor | float):  # no comparison, because NaN is not equal to itself
         return True
     try:
         return bool(json.loads(json.dumps(value)) == value)

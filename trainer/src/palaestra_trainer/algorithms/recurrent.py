@@ -22,7 +22,7 @@ class _Sequences(ValidRolloutBuffer):
     def get(self, batch_size: int | None = None) -> Generator[Any, None, None]:
         """Yield minibatches of valid rows, from a random row on, as RecurrentPPO's own buffer does."""
         if not self.generator_ready:
-            next(super(ValidRolloutBuffer, self).get(1))  # flattens the rows of all members into one column
+            next(super(ValidRolloutBuffer, self).get(1))  # this call flattens the rows of all members
         rows = np.flatnonzero(self.swap_and_flatten(self.valid))
         first_of_member = np.zeros((self.buffer_size, self.n_envs))
         first_of_member[0] = 1.0

@@ -1,4 +1,4 @@
-"""The algorithms by name, with their defaults.
+"""The table of algorithms, with their defaults.
 
 The defaults are those of the algorithm's class in Stable-Baselines3, in sb3-contrib, or in this package for
 REINFORCE. Only the environments of the arena have other defaults, which were found by experiments. A job may
@@ -42,12 +42,12 @@ OURS = frozenset(
 )  # fmt: skip
 ARENA_ENVIRONMENTS = frozenset({"MoveToTargetEnv-v0"})
 _ANY_ACTIONS = (spaces.Box, spaces.Discrete, spaces.MultiDiscrete, spaces.MultiBinary)
-_LOG_INTERVAL = {True: 10, False: 1}  # off policy: episodes; on policy: rollouts
+_LOG_INTERVAL = {True: 10, False: 1}  # episodes off policy, rollouts on policy
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RegisteredAlgorithm:
-    """One algorithm.
+    """The entry of an algorithm.
 
     Attributes:
         original: the algorithm's class in its package; this class loads a model.zip.
@@ -214,7 +214,7 @@ def entry_of(name: str) -> RegisteredAlgorithm:
         raise ConfigurationError(f"algorithm.name: {name} cannot be used: {why}")
     if imports.names_class(name):
         entry = _entry(imports.class_named(name, "algorithm.name", BaseAlgorithm))
-        with_valid_rows(entry.original)  # raises if invalid rows would reach its losses
+        with_valid_rows(entry.original)  # raises an error if invalid rows would reach the losses
         return entry
     raise ConfigurationError(
         f"algorithm.name: {name} is not an algorithm; {nearest(name, dict(ALGORITHMS))} "

@@ -31,7 +31,7 @@ from palaestra_trainer.waiting.episode_end import EpisodeEnd
 
 
 class REINFORCE(BaseAlgorithm):
-    """Monte-Carlo policy gradient.
+    """The Monte-Carlo policy gradient algorithm REINFORCE.
 
     One update learns from `episodes_per_update` whole episodes of each environment. The number is the same
     for each environment: an update that took the episodes that end first would prefer short episodes. If an
@@ -43,11 +43,11 @@ class REINFORCE(BaseAlgorithm):
     Args:
         policy: "MlpPolicy", "CnnPolicy", "MultiInputPolicy" or an actor-critic class; its value network is
             trained only for the baseline "value".
-        env: environment or VecEnv to learn in.
+        env: environment or VecEnv in which the policy learns.
         learning_rate: learning rate of Adam, or a function of the remaining progress (1 to 0).
-        episodes_per_update: whole episodes of each environment in one update.
-        gamma: discount per step, 0 to 1.
-        baseline: "value" subtracts a learned V(s), "none" subtracts nothing.
+        episodes_per_update: number of whole episodes of each environment in one update.
+        gamma: discount factor per step, 0 to 1.
+        baseline: "value" subtracts a learned V(s) from the return; "none" does not subtract a baseline.
         normalize_advantage: scale G - b to mean 0 and deviation 1 within an update; without a baseline, G is
             only divided by its root mean square.
         ent_coef: weight of the policy's entropy in the loss; more entropy keeps the policy exploring.
@@ -137,7 +137,7 @@ class REINFORCE(BaseAlgorithm):
         reset_num_timesteps: bool = True,  # noqa: FBT001, FBT002 - as in Stable-Baselines3
         progress_bar: bool = False,  # noqa: FBT001, FBT002 - as in Stable-Baselines3
     ) -> Self:
-        """Return this model, trained until the first episode end at or after `total_timesteps`.
+        """Train until the first episode that ends at or after `total_timesteps`; return this model.
 
         `log_interval` counts updates; the other arguments are Stable-Baselines3's.
         """
@@ -205,7 +205,7 @@ class REINFORCE(BaseAlgorithm):
         self.logger.record("train/loss", loss.item())
 
     def dump_logs(self) -> None:
-        """Write the means over the last episodes, the speed, and the values that `train` recorded."""
+        """Write means over the last episodes, the speed, and the values that `train` recorded."""
         seconds = max((time.time_ns() - self.start_time) / 1e9, sys.float_info.epsilon)
         fps = int((self.num_timesteps - self._num_timesteps_at_start) / seconds)
         self.logger.record("time/episodes", self._episode_num, exclude="tensorboard")
@@ -237,7 +237,7 @@ class REINFORCE(BaseAlgorithm):
         return loss
 
     def _advantages(self, returns: torch.Tensor, values: torch.Tensor) -> torch.Tensor:
-        """Return G - b of each step, normalized if `normalize_advantage`."""
+        """Return G - b of each step, normalized if `normalize_advantage` is set."""
         if self.baseline == "none":
             return returns / (returns.square().mean().sqrt() + 1e-8) if self.normalize_advantage else returns
         advantages = returns - values

@@ -1,4 +1,4 @@
-"""The size of a replay buffer, computed from the spaces before the buffer exists.
+"""Compute the size of a replay buffer from the spaces, before the buffer exists.
 
 The memory of a NumPy array is allocated page by page when rows are first written. So a buffer with more rows
 than the run has steps needs memory only for the rows of these steps.
@@ -38,7 +38,7 @@ class ReplaySize:
 
     @property
     def memory_bytes(self) -> int:
-        """Memory of all rows."""
+        """The memory that all rows need."""
         return self.rows * self.row_bytes
 
     def disk_bytes(self, every_steps: int, keep: int) -> int:

@@ -25,7 +25,8 @@ class RolloutState:
     """The attributes that a rollout of an algorithm changes, besides those that every algorithm has.
 
     Attributes:
-        networks: networks with tensors that a rollout changes; an update may change them too.
+        networks: names of networks with tensors that a rollout changes; an update may change these tensors
+            too.
         memories: states of recurrent networks, nested tuples of tensors of shape (layers, members, units).
         numbers: counts of the algorithm, and numbers that it derives from its counts.
     """
@@ -48,7 +49,7 @@ BESIDE: Mapping[type[BaseAlgorithm], RolloutState] = MappingProxyType(
                 sb3.PPO,
                 sb3.A2C,
                 sb3.SAC,
-                sb3.TD3,  # includes DDPG, which is a subclass
+                sb3.TD3,  # also for DDPG, which is a subclass
                 sb3_contrib.TQC,
                 sb3_contrib.TRPO,
                 sb3_contrib.CrossQ,

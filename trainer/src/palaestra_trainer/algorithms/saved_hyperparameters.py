@@ -20,7 +20,7 @@ def begin_with(
 
     Args:
         configuration: the configuration of the run.
-        directory: the directory of the run, which may not have begun.
+        directory: the directory of the run; the run may not have begun yet.
         before: the run, this or another, from whose checkpoint the attempt resumes; None: it does not resume.
 
     Raises:

@@ -1,4 +1,4 @@
-"""Schedules that a job writes as text or as a list of points.
+"""Convert a schedule that a job writes as text or as a list of points.
 
 `lin_0.001` falls from 0.001 at the start of the training to 0 at its end, as in rl-baselines3-zoo. A list has
 points [share of the steps, value], such as `[[0, 0.001], [0.5, 0.0002]]`. Between two points the value

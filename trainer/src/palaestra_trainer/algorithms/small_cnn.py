@@ -1,4 +1,4 @@
-"""A small convolutional network for images, as a features extractor of Stable-Baselines3.
+"""A small convolutional network for images, which Stable-Baselines3 uses as a features extractor.
 
 This network has layers of 16 and 32 channels and 128 units; NatureCNN has 32, 64 and 64 channels and 512
 units.
@@ -22,7 +22,7 @@ class SmallCnn(BaseFeaturesExtractor):
 
     Args:
         observation_space: images with channels first.
-        features_dim: units of the last layer.
+        features_dim: number of units of the last layer.
     """
 
     def __init__(self, observation_space: spaces.Box, features_dim: int = 128) -> None:

@@ -43,7 +43,7 @@ def refuse_spaces(algorithm: Algorithm, seen: spaces.Space[Any], acted: spaces.S
     """Refuse spaces that the algorithm would misinterpret or does not support.
 
     Raises:
-        ConfigurationError: one line for each reason.
+        ConfigurationError: a space is refused; the message has one line for each reason.
     """
     if lines := [*_about_observations(seen), *_about_actions(algorithm.name, acted)]:
         raise ConfigurationError("\n".join(lines))
@@ -81,7 +81,8 @@ def images_in(space: spaces.Space[Any]) -> list[spaces.Box]:
 def scalable(space: spaces.Space[Any]) -> list[str] | bool:
     """Return the keys of a Dict that can be normalized; for another space, return whether it can.
 
-    Networks scale images themselves, and the numbers of a Discrete are labels without a scale.
+    Images are excluded because networks scale images themselves. Discrete is excluded because its numbers are
+    labels without a scale.
     """
     if isinstance(space, spaces.Dict):
         return [key for key, part in space.spaces.items() if scalable(part)]
@@ -92,7 +93,7 @@ def refuse_flaws(seen: spaces.Space[Any], acted: spaces.Space[Any]) -> None:
     """Refuse spaces that every algorithm of Stable-Baselines3 would misinterpret or does not support.
 
     Raises:
-        ConfigurationError: one line for each reason.
+        ConfigurationError: a space is refused; the message has one line for each reason.
     """
     if lines := [*_about_observations(seen), *_flaws_of_action(acted)]:
         raise ConfigurationError("\n".join(lines))

@@ -1,4 +1,4 @@
-"""The remedy for a name that is not a hyperparameter of the algorithm.
+"""Find the remedy for a name that is not a hyperparameter of the algorithm.
 
 The remedy for a misspelled name is the most similar hyperparameter. Some names are similar to a
 hyperparameter, but have another meaning: `n_timesteps` is not `n_steps`. For such a name, the remedy is the
@@ -46,10 +46,10 @@ def mistakes(
 
     Args:
         algorithm: name of the algorithm in the job.
-        entry: its entry.
-        of_policy: the arguments of its policy.
+        entry: entry of the algorithm.
+        of_policy: the arguments of the algorithm's policy.
         given: the names that the job sets.
-        field: the field of the job with these names.
+        field: the field of the job that holds these names.
     """
     known = entry.known
     unknown = [word for word in given if word not in known]

@@ -94,7 +94,7 @@ class OffPolicyRows(ValidRowsCounted, OffPolicyAlgorithm):
 
 
 class OnPolicyRows(ValidRowsCounted, OnPolicyAlgorithm):
-    """An on-policy algorithm whose rollouts mask invalid rows.
+    """An on-policy algorithm whose rollout buffer never samples invalid rows.
 
     Raises:
         ConfigurationError: the algorithm creates its own rollout buffer, which would sample invalid rows.
@@ -144,7 +144,8 @@ class OnPolicyRows(ValidRowsCounted, OnPolicyAlgorithm):
     def train(self) -> None:
         """Learn from the rollout, unless too few of its rows are valid.
 
-        The deviation of a single advantage is NaN.
+        With `normalize_advantage`, a single valid row is too few, because the deviation of a single advantage
+        is NaN.
         """
         rollout = self._masked()
         if rollout.valid.sum() < (2 if getattr(self, "normalize_advantage", False) else 1):

@@ -33,7 +33,7 @@ def begin_from(path: Path, model: BaseAlgorithm) -> None:
     """Load the policy of a zip into a new model; load its statistics too if both models normalize.
 
     Raises:
-        ConfigurationError: the file cannot be read, or a tensor or statistic does not fit this model.
+        ConfigurationError: the file cannot be read, or a tensor or statistic does not match this model.
     """
     own = model.policy.state_dict()
     tensors, known = _read(path, model.device, _most_bytes(own))
@@ -59,7 +59,7 @@ def _read(path: Path, device: torch.device, most: int) -> tuple[Any, dict[str, A
             _refuse_larger(path, map(archive.getinfo, [POLICY, *statistics]), most)
             content = io.BytesIO(archive.read(POLICY))
             known = json.loads(archive.read(NORMALIZE)) if statistics else {}
-        if zipfile.is_zipfile(content):  # the format of PyTorch is a zip too, whose members may be compressed
+        if zipfile.is_zipfile(content):  # PyTorch's format is a zip too, and its members may be compressed
             with zipfile.ZipFile(content) as inner:
                 _refuse_larger(path, inner.infolist(), most)
         content.seek(0)
@@ -76,7 +76,7 @@ def _read(path: Path, device: torch.device, most: int) -> tuple[Any, dict[str, A
 
 
 def _refuse_larger(path: Path, members: Iterable[zipfile.ZipInfo], most: int) -> None:
-    """Refuse members of a zip that would unpack to more bytes than the policy of this run can need."""
+    """Refuse members of a zip that would unpack to more bytes than this run's policy can need."""
     unpacked = sum(each.file_size for each in members)
     if unpacked > most:
         raise _refused(

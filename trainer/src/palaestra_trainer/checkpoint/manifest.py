@@ -65,7 +65,7 @@ class SavedCheckpoint:
 
 
 def describe(configuration: Configuration, step: int, counters: Mapping[str, Any]) -> Manifest:
-    """Return the manifest of a checkpoint of this run, without its files.
+    """Return the manifest of a checkpoint of this run, still without its list of files.
 
     Fields that are None are omitted. So an older release finds an unknown field only if the job sets that
     field.
@@ -101,7 +101,7 @@ def digest_of(path: Path) -> str:
 
 
 def refuse_another_run(checkpoint: SavedCheckpoint, configuration: Configuration) -> None:
-    """Check that the checkpoint is of a run of this configuration.
+    """Check that the checkpoint's run has the algorithm and environment of this configuration.
 
     Raises:
         ConfigurationError: the checkpoint's run has another algorithm or environment.

@@ -38,7 +38,7 @@ def write(model: BaseAlgorithm, folder: Path) -> None:
 
 
 def read(model: BaseAlgorithm, folder: Path) -> None:
-    """Load the file that `write` wrote into the buffer of an equal model.
+    """Read the file that `write` wrote, and load its state into the buffer of an equal model.
 
     Raises:
         OSError, ValueError, KeyError: the file is damaged.

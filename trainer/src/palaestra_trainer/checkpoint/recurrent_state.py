@@ -1,4 +1,4 @@
-"""The tensors that an algorithm changes in a rollout, as `algorithms.rollout_state` declares them."""
+"""Read and set the tensors that a rollout changes, which `algorithms.rollout_state` declares."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The states of the random generators that training draws from, as plain data."""
+"""Save and restore the states of the random generators that training uses."""
 
 from __future__ import annotations
 

@@ -45,7 +45,7 @@ class TrainingState:
         observation: the last observation of each member, one per row, as the environments returned it.
         episode_starts: whether each row of `observation` is the first observation of an episode.
         episodes: statistics of the last episodes, as Stable-Baselines3 keeps them.
-        successes: whether the last episodes succeeded.
+        successes: for each of the last episodes, whether it succeeded.
         positions: write positions of the replay buffer; None without a replay buffer.
         members: state of each collecting simulator's episode.
         rollout: other counts of running episodes, as JSON data; the training callback defines them.

@@ -44,13 +44,13 @@ class Tensors:
         return cls(deepcopy(model.get_parameters()), variables)
 
     def put_back(self, model: BaseAlgorithm) -> None:
-        """Set the model's tensors to the copied ones."""
+        """Set the model's tensors to the values of this copy."""
         model.set_parameters(self.parameters, exact_match=True, device=model.device)
         _set_variables(model, self.variables)
 
 
 def save_tensors(path: Path, model: BaseAlgorithm) -> None:
-    """Write the zip of a model, with the statistics that its policy needs.
+    """Write the zip of a model; include the statistics that its policy needs.
 
     Raises:
         OSError: the file could not be written.

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from palaestra_protocol.imports import import_without, without_collections
 
-# With rich, structlog would format tracebacks, but the log has them as plain text.
+# If structlog finds rich, it formats tracebacks with rich, but the log must have plain text.
 import_without("rich", "structlog")
 
 from palaestra_protocol.pod.status import ExitCode

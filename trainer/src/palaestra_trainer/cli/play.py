@@ -1,8 +1,8 @@
 """`python -P -m palaestra_trainer.cli.play RUN` plays episodes with a run's policy until SIGTERM.
 
 A TrainingJob can name this program as its `trainer.command`. The program plays in the simulators of that job,
-and does not learn. It prints a line for each episode. A simulator that fails is restarted, and the next
-episode begins.
+and does not learn. The program prints a line for each episode. A simulator that fails is restarted, and the
+next episode begins.
 """
 
 from __future__ import annotations

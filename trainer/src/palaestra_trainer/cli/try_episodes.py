@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from palaestra_protocol.imports import import_without, without_collections
 
-# With rich, structlog would format tracebacks, but the log has them as plain text.
+# If structlog finds rich, it formats tracebacks with rich, but the log must have plain text.
 import_without("rich", "structlog")
 
 from palaestra_protocol.linux import require_linux
@@ -159,4 +159,4 @@ def _short(space: object) -> str:
 
 
 def _drop(line: str) -> None:
-    """Show nothing."""
+    """Ignore a line, because the output is JSON."""

@@ -1,4 +1,4 @@
-"""Gymnasium environments; importing this package registers them.
+"""Gymnasium environments, which the import of this package registers.
 
 A program can run `import palaestra_trainer.environments` and then `gymnasium.make("MoveToTargetEnv-v0",
 ...)`. It can also do both in one call, `gymnasium.make("palaestra_trainer.environments:MoveToTargetEnv-v0",

@@ -23,7 +23,7 @@ def action_space(options: Driving) -> spaces.Space[Any]:
 
 
 def twist(action: Any, options: Driving) -> Twist:
-    """Return the velocity of an action of `action_space(options)`, see `Omnidrive.drive`."""
+    """Return the velocity for an action of `action_space(options)`, as `Omnidrive.drive` takes it."""
     if options.actions == "continuous":
         return _scaled(action)
     return options.movements[int(action)].twist

@@ -37,7 +37,7 @@ def broken_by_step(space: spaces.Space[Any], result: Any) -> str:
 
 
 def kind_of(result: Any) -> str:
-    """Return the class of a value as text; for a tuple, the classes of its parts too."""
+    """Return the class of a value as text; for a tuple, also the classes of its parts."""
     if isinstance(result, tuple):
         return f"a tuple of {len(result)}: ({', '.join(type(part).__name__ for part in result)})"
     return f"a {type(result).__name__}"

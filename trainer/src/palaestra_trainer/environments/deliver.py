@@ -1,4 +1,4 @@
-"""The task: drive to three targets in turn, and stand on each.
+"""The task to drive to three targets in turn, and to stand on each.
 
 World, robot, observations and rewards are those of `MoveToTargetEnv`. So the same world has tasks of
 different difficulty.
@@ -18,7 +18,7 @@ from palaestra_trainer.robots.geometry import Point
 class DeliverEnv(MoveToTargetEnv):
     """Drive to three targets in turn and stand on each: within 0.20 m, slower than 0.05 m/s.
 
-    It differs from `MoveToTargetEnv` in these points:
+    The task differs from `MoveToTargetEnv` in these points:
 
     - The mark shows one target. When the robot stands on this target, the mark moves to the next target, at
       least 1 m away, and the episode continues. `options.targets` is the number of targets.
@@ -32,9 +32,9 @@ class DeliverEnv(MoveToTargetEnv):
 
     Args:
         robot: the robot to drive.
-        scene: arranges episodes.
+        scene: the scene, which places robot and mark for each episode.
         options: observation, actions and rewards.
-        on_close: called by `close`.
+        on_close: a function that `close` calls.
 
     Raises:
         MissingCapability: the robot is not a Robotino.

@@ -41,7 +41,7 @@ def held(env: gymnasium.Env[Any, Any], name: str) -> gymnasium.Env[Any, Any]:
     unpack the result of a step.
 
     Raises:
-        ConfigurationError: its spaces, or the signatures of its methods, are wrong.
+        ConfigurationError: the environment's spaces or the signatures of its methods are wrong.
     """
     layer, lowest = env, None
     while isinstance(layer, gymnasium.Wrapper):
@@ -72,10 +72,10 @@ class Checked(gymnasium.Wrapper[Any, Any, Any, Any]):
 
     Args:
         env: the environment.
-        name: its name in messages.
+        name: name of the environment in messages.
 
     Raises:
-        ConfigurationError: its spaces, or the signatures of its methods, are wrong.
+        ConfigurationError: the environment's spaces or the signatures of its methods are wrong.
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any], name: str) -> None:

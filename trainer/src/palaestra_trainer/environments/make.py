@@ -33,7 +33,7 @@ def make_environment(wanted: Environment, robot: RobotAbc, scene: Scene) -> gymn
     """Return the environment of a job with `robot` and `scene`, in a wrapper that checks its results.
 
     Raises:
-        ConfigurationError: it is not registered, or its signature does not fit the job.
+        ConfigurationError: the environment is not registered, or its signature does not fit the job.
         MissingCapability: the robot lacks a capability in the environment's `needs`.
     """
     arguments = _checked(wanted, {"robot": robot, "scene": scene})
@@ -55,7 +55,7 @@ def keywords(wanted: Environment) -> dict[str, Any]:
     """Return the keyword arguments that a job passes to its environment, without robot and scene.
 
     Raises:
-        ConfigurationError: it is not registered, or its signature does not fit the job.
+        ConfigurationError: the environment is not registered, or its signature does not fit the job.
     """
     given = _checked(wanted, dict.fromkeys(("robot", "scene")))
     return {name: value for name, value in given.items() if name not in {"robot", "scene"}}

@@ -27,7 +27,7 @@ def choices_of(space: spaces.Space[Any]) -> list[int]:
     """Return for each number of an action how many choices it has.
 
     Raises:
-        TypeError: actions of this kind have no masks.
+        TypeError: actions of this type of space have no masks.
     """
     match space:
         case spaces.Discrete():
@@ -49,12 +49,12 @@ def masks_in(given: Any, space: spaces.Space[Any], *, count: int | None = None) 
     """Return masks of actions as truth values; shape (masks, choices).
 
     Args:
-        given: one mask or several, of any shape.
+        given: one mask or several masks, of any shape.
         space: the space of the actions.
         count: the number of masks; None: any number.
 
     Raises:
-        ValueError: a value is not a mask of this space, or one of the masks allows nothing.
+        ValueError: a value is not a mask of this space, or a mask does not allow any action.
     """
     choices = choices_of(space)
     expected = f"expected {sum(choices)} truth values, one for each choice of {space}; got"
@@ -76,7 +76,7 @@ def masks_in(given: Any, space: spaces.Space[Any], *, count: int | None = None) 
 
 
 def mask_of(env: gymnasium.Env[Any, Any]) -> np.ndarray:
-    """Return a copy of the mask that the environment returns now; shape (choices,), bool.
+    """Return a copy of the environment's current mask; shape (choices,), bool.
 
     Raises:
         ConfigurationError: the value is not a mask of the environment's actions, or allows no action.

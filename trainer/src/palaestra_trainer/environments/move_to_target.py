@@ -1,4 +1,4 @@
-"""The task: drive to the target and stand there.
+"""The task to drive to the target and stand there.
 
 The environment consists of a robot and a scene, and depends on neither ROS nor Webots. It defines the
 observations, the rewards and the end of an episode. It does not catch a `SimulatorFault` of the robot. The
@@ -125,9 +125,9 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
 
     Args:
         robot: the robot to drive.
-        scene: arranges episodes.
+        scene: the scene, which places robot and mark for each episode.
         options: observation, actions and rewards.
-        on_close: called by `close`.
+        on_close: a function that `close` calls.
 
     Raises:
         MissingCapability: the robot is not a Robotino.
@@ -168,7 +168,7 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, Info]:
-        """Begin an episode; return its first observation, and an info with its start and target.
+        """Begin an episode; return its first observation, and an info that holds start and target.
 
         Args:
             seed: decides the episode; None: the random generator continues from the last seed.
@@ -176,7 +176,7 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
 
         Raises:
             ConfigurationError: an option is unknown, or names a position in an obstacle.
-            SimulatorFault: as the robot raised it.
+            SimulatorFault: the simulator of the robot failed.
         """
         super().reset(seed=seed)
         self._scene.begin(int(self.np_random.integers(2**31)))
@@ -190,11 +190,11 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
         return self._numbers_of(seen), {"start": task.start, "target": task.target}
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, Info]:
-        """Drive according to `action` for one control period; return the result.
+        """Drive with the velocity of `action` for one control period; return the result of the step.
 
         Raises:
             ResetNeeded: no episode has begun.
-            SimulatorFault: as the robot raised it.
+            SimulatorFault: the simulator of the robot failed.
         """
         before = self.situation
         self._robot.drive(*twist(action, self.options))

@@ -28,7 +28,7 @@ Numbers = NDArray[np.float32]
 Observation = dict[str, Numbers]
 Info = dict[str, Any]
 
-FARTHEST_M = 2.0 * math.sqrt(2.0) * UNIT_M  # the distance from corner to corner
+FARTHEST_M = 2.0 * math.sqrt(2.0) * UNIT_M  # the distance between opposite corners of the floor
 
 
 class MoveToTargetGoalEnv(gymnasium.Env[Observation, Any]):
@@ -50,7 +50,7 @@ class MoveToTargetGoalEnv(gymnasium.Env[Observation, Any]):
     ## Reward
 
     `compute_reward(achieved_goal, desired_goal, info)` returns the reward of one pair of goals or of many
-    pairs. It does not use `info`. In `info["reward_terms"]`, the reward is the term `reached`.
+    pairs. It does not use `info`. The term `reached` in `info["reward_terms"]` holds the reward.
 
     | reward | min | max | is                                                            |
     |--------|-----|-----|---------------------------------------------------------------|
@@ -78,9 +78,9 @@ class MoveToTargetGoalEnv(gymnasium.Env[Observation, Any]):
 
     Args:
         robot: the robot to drive.
-        scene: arranges episodes.
+        scene: the scene, which places robot and mark for each episode.
         options: observation, actions and rewards.
-        on_close: called by `close`.
+        on_close: a function that `close` calls.
     """
 
     needs: ClassVar[tuple[type, ...]] = MoveToTargetEnv.needs
@@ -115,11 +115,11 @@ class MoveToTargetGoalEnv(gymnasium.Env[Observation, Any]):
         return self._seen(numbers), info
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, Info]:
-        """Drive according to `action` for one control period; return the result.
+        """Drive with the velocity of `action` for one control period; return the result of the step.
 
         Raises:
             ResetNeeded: no episode has begun.
-            SimulatorFault: as the robot raised it.
+            SimulatorFault: the simulator of the robot failed.
         """
         numbers, _, _, _, driven = self._drive.step(action)
         self._steps += 1
@@ -137,7 +137,7 @@ class MoveToTargetGoalEnv(gymnasium.Env[Observation, Any]):
         return seen, reward, terminated, self.compute_truncated(achieved, desired, info), info
 
     def compute_reward(self, achieved_goal: Numbers, desired_goal: Numbers, info: Any) -> Numbers:
-        """Return the reward of each pair of goals; shape (...), for goals of shape (..., 2)."""
+        """Return the reward of each pair of goals, with shape (...) for goals of shape (..., 2)."""
         del info
         distance_m = _distance_m(achieved_goal, desired_goal)
         if self.options.reward == "Sparse":

@@ -1,4 +1,4 @@
-"""The task: drive to the target between obstacles that a laser scanner detects.
+"""The task to drive to the target between obstacles that a laser scanner detects.
 
 The environment consists of a scene and any robot that can steer, scan and report its pose. It depends on
 neither ROS nor Webots. It does not catch a `SimulatorFault` of the robot.
@@ -28,7 +28,7 @@ from palaestra_trainer.robots.geometry import Point, Pose
 REACHED_M = 0.15
 BUMPED_M = 0.05  # distance from the robot's outline; a scanner may not detect a nearer object
 SECTORS = 24
-SEEN_M = 0.8  # a sector whose nearest object is beyond this distance counts as empty
+SEEN_M = 0.8  # a sector counts as empty if its nearest object is farther than this
 TARGET_M = 2.0  # the unit of the distance to the target
 # The movements as shares of the robot's greatest speeds: forward, counter-clockwise.
 MOVES = ((0.9, 0.0), (0.55, 0.33), (0.55, -0.33), (0.0, 0.55), (0.0, -0.55))
@@ -104,9 +104,9 @@ class NavigateEnv(gymnasium.Env[Observation, Any]):
 
     Args:
         robot: the robot to drive, with the capabilities in `needs`.
-        scene: arranges episodes.
+        scene: the scene, which places robot and mark for each episode.
         options: actions and rewards.
-        on_close: called by `close`.
+        on_close: a function that `close` calls.
 
     Raises:
         MissingCapability: the robot lacks a capability.
@@ -149,8 +149,8 @@ class NavigateEnv(gymnasium.Env[Observation, Any]):
         """Begin the episode that `seed` decides; return its first observation and info.
 
         Raises:
-            ConfigurationError: `options` names an impossible start or target.
-            SimulatorFault: as the robot raised it.
+            ConfigurationError: `options` sets an impossible start or target.
+            SimulatorFault: the simulator of the robot failed.
         """
         super().reset(seed=seed)
         self._scene.begin(int(self.np_random.integers(2**31)))
@@ -162,11 +162,11 @@ class NavigateEnv(gymnasium.Env[Observation, Any]):
         return self._observe(self._place.pose(), 0.0, 0.0), info
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, Info]:
-        """Drive according to `action` for one control period; return the result.
+        """Drive with the velocity of `action` for one control period; return the result of the step.
 
         Raises:
             ResetNeeded: no episode has begun.
-            SimulatorFault: as the robot raised it.
+            SimulatorFault: the simulator of the robot failed.
         """
         before = self._place.pose()
         before_m = math.hypot(*self._ahead(before))

@@ -60,7 +60,7 @@ class StepState:
 
 @dataclass(frozen=True, slots=True)
 class ObservationPart:
-    """A part of an observation: the function that measures its numbers, and their bounds."""
+    """A part of an observation: the function that computes its numbers, and the bounds of the numbers."""
 
     measure: Callable[[StepState], Sequence[float]]
     low: tuple[float, ...]

@@ -22,7 +22,7 @@ FRAMES = (1, 3)
 
 
 class Episodes(Protocol):
-    """The options of every task that ends at a target; see `MoveToTargetOptions`."""
+    """The options of all tasks that end at a target; see `MoveToTargetOptions`."""
 
     @property
     def reward(self) -> str:
@@ -46,7 +46,7 @@ class Episodes(Protocol):
 
 
 class Driving(Episodes, Protocol):
-    """The options of every task of a robot that drives in all directions; see `MoveToTargetOptions`."""
+    """The options of all tasks for a robot that drives in all directions; see `MoveToTargetOptions`."""
 
     @property
     def movements(self) -> Sequence[Movement]:
@@ -62,13 +62,13 @@ class MoveToTargetOptions:
         reward: `Dense` gives a reward at each step, `Sparse` only at the end of an episode.
         observe: the parts of the observation, in this order.
         movements: the choices of a discrete action, in this order.
-        actions: `discrete` (one of `movements`) or `continuous` (a twist).
+        actions: `discrete`, one of `movements`, or `continuous`, a twist.
         max_steps: steps until time is up.
         time_up: how an episode ends when time is up, `terminated` or `truncated`; None: `TIME_UP_OF` the
             reward.
 
     Raises:
-        ConfigurationError: one line for every mistake.
+        ConfigurationError: an option is wrong; the message has one line for every mistake.
     """
 
     reward: str = "Dense"
@@ -84,14 +84,14 @@ class MoveToTargetOptions:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GoalOptions(MoveToTargetOptions):
-    """The options of `MoveToTargetGoalEnv`, checked: those of `MoveToTargetOptions` with other defaults.
+    """The checked options of `MoveToTargetGoalEnv`, which are `MoveToTargetOptions` with other defaults.
 
     Args:
         observe: the parts of `observation`; `target` is refused, because the goal has its own keys.
         time_up: see `MoveToTargetOptions`; by default `truncated`, because the end of time has no reward.
 
     Raises:
-        ConfigurationError: one line for every mistake.
+        ConfigurationError: an option is wrong; the message has one line for every mistake.
     """
 
     observe: Sequence[str] = ("sensors", "velocity", "position", "time_left")
@@ -104,13 +104,13 @@ class GoalOptions(MoveToTargetOptions):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DeliverOptions(MoveToTargetOptions):
-    """The options of `DeliverEnv`, checked: those of `MoveToTargetOptions`, with defaults for more targets.
+    """The checked options of `DeliverEnv`: `MoveToTargetOptions` with defaults for several targets.
 
     Args:
         targets: number of targets in an episode.
 
     Raises:
-        ConfigurationError: one line for every mistake.
+        ConfigurationError: an option is wrong; the message has one line for every mistake.
     """
 
     observe: Sequence[str] = ("sensors", "velocity", "target", "time_left", "to_reach")
@@ -136,7 +136,7 @@ class SeeOptions:
         cylinders: whether the arena's four cylinders stand on the floor.
 
     Raises:
-        ConfigurationError: one line for every mistake.
+        ConfigurationError: an option is wrong; the message has one line for every mistake.
     """
 
     reward: str = "Dense"
@@ -162,7 +162,7 @@ class NavigateOptions:
         time_up: see `MoveToTargetOptions`.
 
     Raises:
-        ConfigurationError: one line for every mistake.
+        ConfigurationError: an option is wrong; the message has one line for every mistake.
     """
 
     reward: str = "Dense"
@@ -183,7 +183,7 @@ def parse(given: Mapping[str, Any]) -> MoveToTargetOptions:
     """Return the options of `MoveToTargetEnv` from the values in a job file.
 
     Raises:
-        ConfigurationError: one line for every mistake.
+        ConfigurationError: an option is wrong; the message has one line for every mistake.
     """
     return parse_as(MoveToTargetOptions, given)
 
@@ -195,7 +195,7 @@ def parse_as(kind: type[_Chosen], given: Mapping[str, Any]) -> _Chosen:
     """Return options from the values in a job file, in which movements and parts are written as names.
 
     Raises:
-        ConfigurationError: one line for every mistake.
+        ConfigurationError: an option is wrong; the message has one line for every mistake.
     """
     known = [field.name for field in fields(kind)]
     if unknown := [name for name in given if name not in known]:

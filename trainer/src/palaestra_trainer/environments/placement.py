@@ -18,7 +18,7 @@ from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.robots.geometry import Point, Pose
 from palaestra_trainer.robots.layout import FloorLayout
 
-CLEARANCE_M = 0.10  # between the robot's outline and any obstacle, at the start and on the target
+CLEARANCE_M = 0.10  # least distance between the robot's outline and obstacles, at the start and on the target
 OF_THE_RUN = ("training_progress", "episode")  # options of every reset in a run; not used here
 APART_M = 1.0  # smallest distance from start to target
 MOST_DRAWS = 10_000  # after this many random points without a free one, the layout counts as full
@@ -97,7 +97,9 @@ class FreePlaces:
         raise self._full()
 
     def chosen_task(self, random: np.random.Generator, chosen: Mapping[str, Any]) -> EpisodeTask:
-        """Return a task; `chosen` may set `start` (x, y, heading; or a Pose) and `target` (x, y).
+        """Return a random task, with the values that `chosen` sets.
+
+        `chosen` may have `start`, which is x, y, heading or a Pose, and `target`, which is x, y.
 
         Raises:
             ConfigurationError: a name in `chosen` is unknown, the number of values is wrong, the target is in
@@ -139,7 +141,7 @@ class FreePlaces:
 
 
 def _numbers(name: str, given: Any, wanted: tuple[str, ...]) -> list[float]:
-    """Return the wanted numbers from any value that numpy accepts as a row of numbers."""
+    """Return the numbers of a value that NumPy can convert to a one-dimensional array."""
     with suppress(TypeError, ValueError):
         row = np.asarray(given, dtype=float)
         if row.shape == (len(wanted),):

@@ -33,7 +33,7 @@ class EpisodeOutcome(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Transition:
-    """The facts of one step that rewards use.
+    """The values of one step from which rewards are computed.
 
     Attributes:
         before_m: meters to the target before the step.
@@ -101,5 +101,5 @@ WEIGHTS: dict[str, dict[str, float]] = {
 
 
 def reward_terms(reward: str, step: Transition) -> dict[str, float]:
-    """Return every term of a reward (`Dense` or `Sparse`) by name, weighted; their sum is the reward."""
+    """Return the weighted terms of `Dense` or `Sparse` by name; the sum of the terms is the reward."""
     return {name: weight * TERMS[name](step) for name, weight in WEIGHTS[reward].items()}

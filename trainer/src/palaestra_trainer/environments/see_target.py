@@ -1,4 +1,4 @@
-"""The task: find the red pole in the camera's image and drive to it.
+"""The task to find the red pole in the camera's image and drive to it.
 
 The environment consists of a scene and a robot with a color camera, and depends on neither ROS nor Webots. It
 defines the observations, the rewards and the end of an episode. It does not catch a `SimulatorFault` of the
@@ -37,12 +37,11 @@ Info = dict[str, Any]
 class SeeTargetEnv(gymnasium.Env[Observation, Any]):
     """Find the red pole with the camera, and drive to within 0.45 m of its middle.
 
-    A Robotino with a camera of 64 x 48 pixels drives on a walled floor of 4 x 4 m with a red
-    pole, 0.5 m high, that is visible but cannot be touched. Start, heading and position of the
-    pole differ in every episode, so the pole is often out of sight at the start. The pole
-    counts as reached at 0.45 m, where its top and its foot leave the image. A step is one
-    control period of the robot (0.192 s in simulation): at 0.5 m/s it drives 0.1 m, at 1 rad/s
-    it turns 11 degrees.
+    A Robotino with a camera of 64 x 48 pixels drives on a walled floor of 4 x 4 m with a red pole, 0.5 m
+    high. The pole is visible, but the robot cannot collide with it. Start, heading and position of the pole
+    differ in every episode, so the pole is often out of sight at the start. The pole counts as reached at
+    0.45 m, where its top and its foot leave the image. A step is one control period of the robot (0.192 s in
+    simulation). In a step the robot drives 0.1 m at 0.5 m/s, and turns 11 degrees at 1 rad/s.
 
     ## Actions
 
@@ -95,9 +94,9 @@ class SeeTargetEnv(gymnasium.Env[Observation, Any]):
 
     Args:
         robot: the robot to drive, a `RobotinoAbc` with `Cameras`; its color camera has 64 x 48 pixels.
-        scene: arranges episodes.
+        scene: the scene, which places robot and pole for each episode.
         options: images, actions and rewards.
-        on_close: called by `close`.
+        on_close: a function that `close` calls.
 
     Raises:
         MissingCapability: the robot is not a Robotino with cameras.
@@ -145,8 +144,8 @@ class SeeTargetEnv(gymnasium.Env[Observation, Any]):
         """Begin the episode that `seed` decides; return its first observation and info.
 
         Raises:
-            ConfigurationError: `options` names an impossible start or target, or the image has another size.
-            SimulatorFault: as the robot raised it.
+            ConfigurationError: `options` sets an impossible start or target, or the image has another size.
+            SimulatorFault: the simulator of the robot failed.
         """
         super().reset(seed=seed)
         self._scene.begin(int(self.np_random.integers(2**31)))
@@ -160,11 +159,11 @@ class SeeTargetEnv(gymnasium.Env[Observation, Any]):
         return self._seen(), {"start": task.start, "target": task.target}
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, Info]:
-        """Drive according to `action` for one control period; return the result.
+        """Drive with the velocity of `action` for one control period; return the result of the step.
 
         Raises:
             ResetNeeded: no episode has begun.
-            SimulatorFault: as the robot raised it.
+            SimulatorFault: the simulator of the robot failed.
         """
         before_m = self.target_m
         self._robot.drive(*twist(action, self.options))

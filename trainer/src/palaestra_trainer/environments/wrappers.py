@@ -24,7 +24,7 @@ _BRIGHTEST = 255
 
 
 def mistakes(wanted: Environment) -> Iterator[str]:
-    """Yield field, fact and remedy of each wrapper that cannot be used."""
+    """Yield a message with field, fact and remedy for each wrapper that cannot be used."""
     for index, wrapper in enumerate(wanted.wrappers or ()):
         field = f"{FIELD}[{index}]"
         try:

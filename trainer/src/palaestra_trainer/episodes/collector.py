@@ -62,7 +62,7 @@ class Collector:
         run_seed: the replica's seed.
         index: the member's index among the collecting members.
         episode: number of the next episode.
-        training_progress: share of training, 0 to 1, that is complete when the next episode begins.
+        training_progress: share of the training that is complete when the next episode begins, 0 to 1.
         reset_info: the environment's info of the last reset; if the reset failed, `valid` is False in it.
     """
 
@@ -82,7 +82,7 @@ class Collector:
         self._news: dict[str, Any] = {}
         self._found_broken: SimulatorFault | None = None
         self._hidden: set[str] = set()
-        self._newest: dict[str, Any] = {}  # info of the last step
+        self._newest: dict[str, Any] = {}  # the info of the last step
 
     @property
     def env(self) -> Environment:
@@ -119,7 +119,7 @@ class Collector:
         return episode_seed(self.run_seed, COLLECT, self.index, self.episode)
 
     def begin(self, options: dict[str, Any] | None = None) -> Any:
-        """Return the first observation of the next episode; while the member restarts, the last observation.
+        """Begin the next episode if the member is up; return the current observation.
 
         Raises:
             FaultBudgetSpent: the member's restart budget is used up.
@@ -135,7 +135,7 @@ class Collector:
         return self._observation
 
     def action_mask(self) -> np.ndarray:
-        """Return a mask of the actions that are allowed in the next step.
+        """Return the mask of allowed actions for the next step.
 
         While the member restarts, the mask allows all actions, because the member does not execute them. If
         the request for the mask fails, the next step reports the fault.

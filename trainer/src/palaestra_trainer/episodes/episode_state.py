@@ -15,7 +15,7 @@ class EpisodeState:
     Attributes:
         episode: number of the current episode, or of the next episode if `actions` is None.
         actions: the actions of the episode so far, shape (steps, *action), read-only; None: no episode runs.
-        training_progress: the share of training, 0 to 1, that was complete when the episode began.
+        training_progress: share of the training that was complete when the episode began, 0 to 1.
     """
 
     episode: int
@@ -38,7 +38,7 @@ class ActionLog:
         self._length += 1
 
     def taken(self) -> np.ndarray:
-        """Return the actions so far, shape (steps, *action), a view."""
+        """Return a view of the actions so far, shape (steps, *action)."""
         return self._rows[: self._length]
 
     def _grow(self, action: np.ndarray) -> None:

@@ -1,4 +1,4 @@
-"""Evaluate a policy: play whole episodes with given seeds and return their results.
+"""Evaluate a policy in whole episodes with given seeds.
 
 If a fault truncates an episode, a free simulator plays this episode again with the same seed. So an
 evaluation always has all of its episodes, and two policies are compared on the same episodes.
@@ -100,7 +100,7 @@ class EvaluationResult:
         return wilson(sum(map(bool, successes)), len(successes)) if successes else None
 
     def _successes(self) -> list[bool | None]:
-        """Return the success of each episode, or [] if no episode reported it.
+        """Return the success of each episode; [] if no episode reported its success.
 
         An environment may report only successes, so None counts as failure if another episode reports a
         success.
@@ -135,7 +135,7 @@ class EvaluationResult:
         }
 
     def record(self) -> dict[str, Any]:
-        """Return the means, the interval and each episode, as in a line of evaluations.jsonl."""
+        """Return the content of a line of evaluations.jsonl: the means, the interval and each episode."""
         interval = self.success_interval
         return {
             **self.summary(),
@@ -150,7 +150,7 @@ def evaluate(
     """Evaluate the deterministic actions of `policy` in one episode for each of `seeds`.
 
     Args:
-        policy: chooses the actions.
+        policy: the policy, which chooses the actions.
         member: the member that plays the episodes, or its restarter.
         seeds: the seeds of the episodes, at least one; an episode that a fault truncated is played again.
         check: called before each step and during waits for a simulator; it raises to cancel the evaluation.

@@ -20,10 +20,10 @@ class Film:
     """One recorded episode.
 
     Attributes:
-        poses: x, y and heading of each frame, one after the other; the first frame is after the reset.
+        poses: x, y and heading of all frames in one array; the first frame shows the state after the reset.
         targets: pairs of a frame's number and the position of the target from that frame on.
         frame_s: seconds of simulated time between two frames.
-        first: the sight after the reset, with the floor and the size of the robot.
+        first: the state after the reset, with the floor and the size of the robot.
     """
 
     poses: array[float]

@@ -39,7 +39,7 @@ class Difference(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pairs:
-    """Counts of episodes that two policies, A and B, have both played.
+    """Counts of the episodes that both policies, A and B, have played.
 
     Attributes:
         both: episodes in which both policies succeeded.
@@ -55,7 +55,7 @@ class Pairs:
 
     @classmethod
     def of(cls, results: Iterable[tuple[bool, bool]]) -> Pairs:
-        """Return the counts of the results of A and B in each episode."""
+        """Count the pairs of results of A and B in each episode."""
         seen = list(results)
         return cls(
             both=seen.count((True, True)),

@@ -1,4 +1,4 @@
-"""The seed of every episode: a pure function of the episode's stream and number.
+"""Compute the seed of every episode, as a pure function of the episode's stream and number.
 
 A run that was killed and resumed plays the same episodes as an uninterrupted run, because seeds do not depend
 on the process. Each stream has its own sequence of seeds: collecting, evaluating, confirming, and any name of

@@ -92,7 +92,7 @@ class SimulatorsVecEnv(MembersVecEnv):
         return self._stack(observations)
 
     def set_training_progress(self, training_progress: float) -> None:
-        """Set the share of training, 0 to 1, that is complete when the next episodes begin."""
+        """Set the share of the training that is complete when the next episodes begin, 0 to 1."""
         for collector in self._collectors:
             collector.training_progress = training_progress
 
@@ -143,7 +143,7 @@ class SimulatorsVecEnv(MembersVecEnv):
         )
 
     def close(self) -> None:
-        """End background work and close the environments; the caller stops the simulators.
+        """End restarts in the background and close the environments; the caller stops the simulators.
 
         If an environment raises an error, the error is logged, and the other environments are closed too.
         """

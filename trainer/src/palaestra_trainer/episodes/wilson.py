@@ -1,4 +1,4 @@
-"""The confidence interval of a success rate that was measured on a few episodes."""
+"""Compute the confidence interval of a success rate from a few episodes."""
 
 from __future__ import annotations
 

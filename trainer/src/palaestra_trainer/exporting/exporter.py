@@ -52,7 +52,7 @@ def export(run: Path, to: str, file: Path | None = None) -> Exported:
 
     Raises:
         ConfigurationError: the model or a library of the extra `export` is missing.
-        ExportError: the file would act differently; nothing was written.
+        ExportError: the file would act differently from the policy, so it was not written.
         OSError: the file could not be written.
     """
     known = _format(to)

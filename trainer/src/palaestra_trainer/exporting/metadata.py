@@ -1,7 +1,7 @@
 """Create the data sheet in an exported file: inputs, actions, and the run that trained the policy.
 
-Meanings and units are copied from the tables in the environment's docstring, under the headings for actions
-and observations. If the docstring has no tables, the sheet has only the spaces.
+Meanings and units come from the tables under the headings for actions and observations in the environment's
+docstring. If the docstring has no tables, the sheet has only the spaces.
 """
 
 from __future__ import annotations

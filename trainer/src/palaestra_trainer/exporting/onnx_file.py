@@ -30,7 +30,7 @@ _BATCH = 3  # larger than 1, because the exporter could treat a size of 1 as a c
 def content(acting: PolicyModule, sheet: Mapping[str, Any]) -> bytes:
     """Return the bytes of the file, with the data sheet in its metadata; batches may have any size.
 
-    PyTorch omits inputs that do not affect an output. The sheet names them as `unused`.
+    PyTorch omits inputs that do not affect an output. The data sheet lists these inputs as `unused`.
 
     Raises:
         ExportError: PyTorch's exporter cannot convert the policy.

@@ -32,7 +32,7 @@ class Normalizer(nn.Module):
         mean: mean of each number.
         variance: variance of each number.
         clip: largest absolute value of a result.
-        epsilon: added to the variance.
+        epsilon: number that is added to the variance.
     """
 
     mean: torch.Tensor
@@ -51,7 +51,7 @@ class Normalizer(nn.Module):
 
 
 class PolicyModule(nn.Module):
-    """The deterministic policy, with its normalizer.
+    """A deterministic policy with its normalizers, as a PyTorch module.
 
     Args:
         loaded: the policy, on the CPU; the module sets it to evaluation mode.
@@ -62,7 +62,7 @@ class PolicyModule(nn.Module):
     Attributes:
         spaces: the space of each input, in the layout of the environment.
         action_space: the space of an action.
-        choices: the number of choices of each number of an action; empty: the policy takes no masks.
+        choices: for each number of an action how many choices it has; empty: the policy does not take masks.
         state_shape: layers and units of the state; None: the policy has no state.
         normalizers: the normalizer of each input, in the order of `spaces`; `Identity` for an input that is
             not normalized.
@@ -127,7 +127,7 @@ class PolicyModule(nn.Module):
         if self.state_shape is None:
             return ()
         hidden, cell = inputs[len(self.spaces) :]
-        # The flags are 0, because a state of zeros already begins an episode.
+        # The flags are always 0, because an episode begins with a state of zeros.
         return (hidden, cell), torch.zeros_like(hidden[0, :, 0])
 
     def _channels_first(self, name: str, part: torch.Tensor) -> torch.Tensor:
@@ -155,7 +155,7 @@ class Scoring(PolicyModule):
 
     @property
     def outputs(self) -> list[str]:
-        """The name of the scores."""
+        """The name of the output with the scores."""
         return ["action"]
 
     def forward(self, *inputs: torch.Tensor) -> tuple[torch.Tensor, ...]:

@@ -40,7 +40,7 @@ def drawn(acting: PolicyModule, count: int) -> dict[str, np.ndarray]:
 
 
 def drawn_masks(acting: PolicyModule, count: int) -> np.ndarray:
-    """Return masks that allow about half of the choices, at least one per number; shape (count, choices)."""
+    """Return random masks that allow about half of the choices; shape (count, choices)."""
     generator = np.random.default_rng(0)
     parts = []
     for choices in acting.choices:
@@ -77,7 +77,7 @@ def _images(shape: tuple[int, ...], count: int, seed: int) -> np.ndarray:
 
 
 def _numbers(box: spaces.Box, normalize: Any, count: int, seed: int) -> np.ndarray:
-    """Return numbers of a Box, shape (count, *box.shape)."""
+    """Return random numbers of a Box, shape (count, *box.shape)."""
     low, high = (bound.astype(np.float64) for bound in (box.low, box.high))
     middle, farthest = _middle(low, high, normalize)
     far = np.random.default_rng(seed).uniform(-1.0, 1.0, (count, *box.shape)) * _scales(farthest, count)

@@ -15,13 +15,13 @@ from palaestra_trainer.exporting.sample_observations import EPISODE, drawn, draw
 from palaestra_trainer.run.policies import TrainedPolicy
 
 OBSERVATIONS = 1_000
-TOLERANCE = 1e-5  # allowed difference of a continuous action, as a share of its range
+TOLERANCE = 1e-5  # largest allowed difference of a continuous action, as a share of its range
 # # A comparison is meaningful only if at least this number of actions are between the bounds, or if scores
 # differ by this number of tolerances.
 _TELLING = 10
 
 Arrays = tuple[np.ndarray, ...]
-Run = Callable[..., Arrays]  # takes the inputs of a batch and returns its outputs
+Run = Callable[..., Arrays]  # a function from the inputs of a batch to its outputs
 Convert = Callable[[PolicyModule], Run]
 
 
@@ -140,7 +140,7 @@ def _scores_show(convert: Convert, scoring: Scoring, observations: dict[str, np.
 def _span_and_tolerance(
     acting: PolicyModule, expected: np.ndarray, magnitude: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the range of each number of an action, and its allowed difference.
+    """Return the range of each number of an action, and the largest allowed difference.
 
     If actions are only clipped, they may use a small part of the space's range. Then the range of the actual
     values counts, but at least 1, because the network may compute with numbers around 1.

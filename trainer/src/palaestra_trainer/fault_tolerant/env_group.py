@@ -22,7 +22,7 @@ def _nothing(rows: Sequence[StepResult]) -> None:
 
 
 class EnvGroup:
-    """One `EpisodeRunner` for each member.
+    """A group that has an `EpisodeRunner` for each member.
 
     `close` releases the simulators. Without a call of `close`, they are released at the end of the process.
 
@@ -32,7 +32,7 @@ class EnvGroup:
         deadline_s: the longest time to wait for a simulator that restarts.
         mend_at_once: whether the step with the fault waits until the restart is complete; if not, the next
             reset waits.
-        played: called with the rows of each step.
+        played: a function that gets the rows of each step.
 
     Attributes:
         all: the runners, in the order of `restarters`.

@@ -116,7 +116,7 @@ class EpisodeRunner:
         """
         if not self.playing:
             raise ResetNeeded(f"{self.restarter.name}: no episode is under way; call reset() first")
-        self.playing = False  # stays False if an interrupt ends the step
+        self.playing = False  # remains False if an interrupt ends the step
         try:
             step = self.restarter.step(action)
         except SimulatorFault as fault:

@@ -17,8 +17,8 @@ from palaestra_trainer.infos import TRUNCATED
 class FaultTolerantVecEnv(MembersVecEnv):
     """A VecEnv whose members all step at the same time, as in `FaultTolerantVectorEnv`.
 
-    The info of an episode's last step has `terminal_observation`, `TimeLimit.truncated` and the `episode`
-    that Stable-Baselines3's Monitor would add. If a fault truncated the episode, the info has `sim_fault`
+    The info of an episode's last step has `terminal_observation`, `TimeLimit.truncated`, and `episode` as
+    Stable-Baselines3's Monitor sets it. If a fault truncated the episode, the info has `sim_fault`
     (`palaestra_trainer.infos`) but not `episode`. So `rollout/ep_rew_mean` does not count that episode.
 
     Args:

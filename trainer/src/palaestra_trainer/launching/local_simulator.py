@@ -25,17 +25,17 @@ _ADDRESSES = re.compile(r"control=(\S+)")
 
 
 class ProcessLauncher(Sidecar):
-    """Starts a new sidecar, and a ROS master if none responds at ROS_MASTER_URI.
+    """Starts a new sidecar; if no ROS master responds at ROS_MASTER_URI, also starts a master.
 
     Args:
         world: path of the world, or the name of a world that Palaestra ships.
-        driver: stub, mujoco or webots.
+        driver: the simulator program: stub, mujoco or webots.
         options: command-line options for the simulator.
         names: sidecar options that set the ROS names of the robots.
         suffix: text that is appended to the ROS names in the world.
 
     Raises:
-        ConfigurationError: the sidecar refused the world or the driver; its output is in the message.
+        ConfigurationError: the sidecar refused the world or the driver; the message has its output.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""A client of a sidecar's control port; the Webots facade uses it as its launcher."""
+"""A client of a sidecar's control port, which the Webots facade uses as its launcher."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ class Sidecar:
         self._ask("POST", "/start", {})
 
     def confirm_ready(self) -> None:
-        """Report to the sidecar that the simulator has responded to a real request."""
+        """Report to the sidecar that the simulator has responded to a request."""
         self.left_out = self._ask("POST", "/ready", {}).left_out
 
     def ready(self) -> bool:

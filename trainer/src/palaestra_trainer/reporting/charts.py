@@ -125,7 +125,7 @@ def _scales(series: Sequence[Series], *, share: bool) -> tuple[_Scale, _Scale]:
 
 def _padded(low: float, high: float) -> tuple[float, float]:
     """Return bounds around values; the bounds differ by enough for distinct ticks."""
-    least = max(abs(low), abs(high), 1e-9) * (0.1 if low == high else 1e-3)  # ticks show four digits
+    least = max(abs(low), abs(high), 1e-9) * (0.1 if low == high else 1e-3)  # ticks show only four digits
     pad = max(0.06 * (high - low), least)
     return low - pad, high + pad
 

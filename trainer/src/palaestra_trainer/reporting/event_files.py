@@ -91,7 +91,7 @@ def _fields(message: bytes) -> Iterator[tuple[int, int | float | bytes]]:
 
 
 def _varint(message: bytes, at: int) -> tuple[int, int]:
-    """Return an integer and the position after it."""
+    """Return the integer at a position, and the position after the integer."""
     value = shift = 0
     while True:
         byte = message[at]

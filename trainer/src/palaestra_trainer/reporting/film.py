@@ -87,7 +87,7 @@ def pictures(replay: Replay, size_px: int, every: int = 1) -> Iterator[Image.Ima
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Canvas:
-    """A picture whose coordinates are meters on the floor, with y up.
+    """A picture that is drawn in meters on the floor, with the y axis upward.
 
     Attributes:
         image: the picture, larger than the final picture by the factor `_SMOOTH`.

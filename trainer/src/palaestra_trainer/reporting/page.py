@@ -39,7 +39,7 @@ DETAILS: tuple[Detail | None, ...] = (
 
 
 def page(runs: Sequence[RunData], most_bytes: int = MOST_BYTES) -> str:
-    """Return the report of runs with as many details as fit into `most_bytes` of UTF-8.
+    """Return the report of runs, with the most details for which the page has at most `most_bytes`.
 
     Only the first `MOST_RUNS` runs are shown.
 

@@ -46,7 +46,7 @@ def replay_figure(replay: Replay) -> Markup:
 
 
 def view_of(replay: Replay) -> tuple[float, float, float, float]:
-    """Return the smallest x and y of the picture, its width and its height, in meters."""
+    """Return the smallest x, the smallest y, the width and the height of the picture, in meters."""
     xs = [pose[0] for pose in replay.poses] + [x for _, x, _ in replay.targets]
     ys = [pose[1] for pose in replay.poses] + [y for _, _, y in replay.targets]
     for corner in (replay.low, replay.high):

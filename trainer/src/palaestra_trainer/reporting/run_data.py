@@ -38,7 +38,7 @@ class ReportedFault:
         time: time at which the trainer detected the fault.
         step: step of the run at that time.
         simulator: name of the simulator.
-        kind: dead, hung or wrong_data.
+        kind: kind of the fault: dead, hung or wrong_data.
         fact: message of the fault.
         steps_lost: steps of the episode that the fault truncated.
         seconds: seconds from the fault until the simulator was up again; None: the simulator did not come up
@@ -83,10 +83,10 @@ class Replay:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunData:
-    """One run.
+    """The data of one run.
 
     Attributes:
-        name: job and replica.
+        name: name of the job and number of the replica.
         ended: good, interrupted, failed, or open if the end is not known.
         end: the end of the run in words.
         figures: name and value of the main results, in order.
@@ -97,13 +97,13 @@ class RunData:
         curves: curves of the training by name.
         faults: the faults in the order of time.
         fault_count: number of all faults of the run; `faults` may have fewer.
-        goodput: seconds by cause.
+        goodput: seconds of the run by cause.
         checkpoints: step, size and time of each checkpoint, as texts.
         attempts: start and reason of each attempt, as texts.
         replays: recorded episodes.
         replayed: the evaluation that recorded the episodes, in words.
-        repeat: commands that repeat the run.
-        files: the name and text of files to show.
+        repeat: sentences and commands to repeat the run.
+        files: name and text of the files in the report.
     """
 
     name: str

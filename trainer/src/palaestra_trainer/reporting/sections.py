@@ -15,7 +15,7 @@ from palaestra_trainer.reporting.run_data import Evaluated, ReportedFault, RunDa
 
 NUMBER = re.compile(r"-?[0-9][0-9,]*(\.[0-9]+)?%?")
 DEVIATIONS = 1.96  # half width of a 95 % interval, in standard deviations of a mean
-MOST_TEXT = 400  # characters of one message
+MOST_TEXT = 400  # most characters of one message
 NEVER = "\u2013"  # the simulator did not come up in that attempt
 ENDED = {"good": "complete", "interrupted": "interrupted", "failed": "failed", "open": "not ended"}
 

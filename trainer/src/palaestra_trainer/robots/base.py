@@ -1,4 +1,4 @@
-"""The interfaces of all robots, of the Robotino, and of the scene around a simulated robot.
+"""The interfaces of robots, of the Robotino, and of the scene around a simulated robot.
 
 An environment uses only `RobotAbc` and the capabilities that its task needs. Only a simulation can move
 objects to the positions that an episode needs. So `Scene` is a separate interface, which a real robot does
@@ -17,7 +17,7 @@ from palaestra_trainer.robots.layout import FloorLayout
 
 RADIUS_M = 0.2266  # radius of the body's cylinder, as in Webots' model of the Robotino 3
 OUTLINE_M = 0.2286  # radius of the body with its bumper
-SENSORS = 9  # infrared sensors, one every 40 degrees
+SENSORS = 9  # number of infrared sensors, one every 40 degrees
 # For a distance outside this range, the sensor returns the nearer bound. Source: lookup table of the GP2Y0A41
 # in that model.
 SENSOR_RANGE_M = (0.03, 0.40)
@@ -38,7 +38,7 @@ class RobotAbc(ABC):
 
     @abstractmethod
     def advance(self) -> int:
-        """Let one control period pass; return the number of extra periods, normally 0."""
+        """Advance the robot by one control period; return the number of extra periods, normally 0."""
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         """Return the robot itself, because a copy would drive the same robot.
@@ -66,7 +66,7 @@ class RobotinoAbc(RobotAbc, Omnidrive, Localization, Distances, Bumper):
 class Scene(ABC):
     """Places the robot and other objects for episodes, which is possible only in a simulation.
 
-    An episode begins in three steps: `begin` restores the initial positions of all objects, `layout` returns
+    An episode begins in three steps. `begin` restores the initial positions of all objects, `layout` returns
     these positions, and `place` puts the robot on a free position.
     """
 

@@ -76,7 +76,7 @@ class Distances(ABC):
 
     @abstractmethod
     def distances(self) -> NDArray[np.float32]:
-        """Return meters to the nearest obstacle, one number for each of `bearings_rad`."""
+        """Return the meters to the nearest obstacle in each direction of `bearings_rad`."""
 
 
 class Bumper(ABC):
@@ -112,7 +112,7 @@ class Cameras(ABC):
 
     @abstractmethod
     def depth_image(self) -> NDArray[np.float32]:
-        """Return meters for each pixel, shape (height, width); valid until the next `advance`.
+        """Return the distance of each pixel in meters, shape (height, width); valid until the next `advance`.
 
         Distances are measured parallel to the optical axis. Pixels without an object in range are infinite.
 
@@ -169,7 +169,7 @@ class Joints(ABC):
 
     @abstractmethod
     def joints(self) -> NDArray[np.float64]:
-        """Return the readings of `sensors`, shape (sensors,): radians, meters, and their rates."""
+        """Return the readings of `sensors`, shape (sensors,), in radians, meters, or their rates."""
 
     @abstractmethod
     def command(self, values: Iterable[float]) -> None:
@@ -189,7 +189,7 @@ class Gripper(ABC):
 
     @abstractmethod
     def grip(self, opening: float) -> None:
-        """Open the gripper to a share of its width, from 0 (closed) to 1, from the next period on."""
+        """Open the gripper in the next period to a share of its width, from 0 (closed) to 1."""
 
 
 class Forklift(ABC):
@@ -211,7 +211,7 @@ class Forklift(ABC):
 
     @abstractmethod
     def lift(self, height_m: float) -> None:
-        """Move the fork to a height in `lift_range_m`, from the next period on."""
+        """Move the fork in the next period to a height in `lift_range_m`."""
 
 
 CAPABILITIES: tuple[type, ...] = (
@@ -229,7 +229,7 @@ CAPABILITIES: tuple[type, ...] = (
 
 
 def require(robot: object, needs: Iterable[type], by: str) -> None:
-    """Check that a robot has every capability in `needs`; `by` is the name of the task in the error.
+    """Check that a robot has every capability in `needs`; `by` names the task in the error.
 
     Raises:
         MissingCapability: the robot lacks a capability.

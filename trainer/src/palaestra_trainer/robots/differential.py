@@ -60,7 +60,7 @@ class TurtleBot3Burger(DifferentialDrive, Scanner):
     wheel_radius_m = 0.033
     axle_m = 0.16
     wheel_rad_s = 6.67
-    radius_m = 0.111  # distance from the center between the wheels to the corners at the rear
+    radius_m = 0.111  # from the middle of the axle to the corners at the rear
     speed_m_s = 0.22
     turn_rad_s = 2.75
     laser: ClassVar[str] = "LDS-01"

@@ -74,7 +74,7 @@ class FloorLayout:
     Attributes:
         low: smallest x and y of the floor in meters; its sides are parallel to x and y.
         high: greatest x and y of the floor in meters.
-        obstacles: all objects except the floor, robots and marks; includes objects stored under the floor.
+        obstacles: all objects except the floor, robots and marks; objects under the floor are included.
     """
 
     low: Point

@@ -136,7 +136,7 @@ class Robotino(MobileRobot, RobotinoAbc, Cameras, Scanner, Gripper, Forklift):
         self._use(*self._fingers)
 
     def grip(self, opening: float) -> None:
-        """Open the gripper to a share of its width, from 0 (closed) to 1, from the next period on."""
+        """Open the gripper in the next period to a share of its width, from 0 (closed) to 1."""
         for finger in self._fingers:
             self._require_use(finger, "gripper", "use_gripper()")
             finger.set(self.grip_m * min(max(opening, 0.0), 1.0))
@@ -146,14 +146,14 @@ class Robotino(MobileRobot, RobotinoAbc, Cameras, Scanner, Gripper, Forklift):
         self._use(self._fork)
 
     def lift(self, height_m: float) -> None:
-        """Move the fork to a height in `lift_range_m`, from the next period on."""
+        """Move the fork in the next period to a height in `lift_range_m`."""
         self._require_use(self._fork, "fork", "use_forklift()")
         least, most = self.lift_range_m
         self._fork.set(min(max(height_m, least), most))
 
 
 def wheel_speeds(vx: float, vy: float, omega: float) -> Sequence[float]:
-    """Return the speeds in rad/s of rear, front-right and front-left wheel for a twist in m/s and rad/s."""
+    """Return the speeds (rad/s) of rear, front-right and front-left wheel for a twist in m/s and rad/s."""
     turn = omega * _WHEEL_DISTANCE_M
     return (
         (vy - turn) / _WHEEL_RADIUS_M,

@@ -1,4 +1,4 @@
-"""A robot in Webots, or in any simulator with the same ROS interface, and the scene around it.
+"""A robot and its scene in Webots, or in any simulator with the same ROS interface.
 
 The names of a robot's devices and nodes are attributes of its class. So a robot with other names needs only a
 short subclass, which `trainer.robot` of a job names.

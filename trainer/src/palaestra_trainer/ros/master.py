@@ -42,7 +42,7 @@ class Master:
             raise MasterLost(f"no ROS master at {self.uri}: {error}; is another program there?") from error
 
     def service_address(self, service: str) -> tuple[str, int] | None:
-        """Return host and port of the node that serves `service`; None if no node does."""
+        """Return host and port of the node that serves `service`; None if no node serves it."""
         answer = self._answer("lookupService", service)
         if answer.code != OK:
             return None

@@ -54,7 +54,7 @@ class RosService:
         data = self._type.request.frame(fields)
         try:
             (self._wire or self._connect()).send(data)
-        except BaseException:  # also Ctrl-C: the next call would read the response to this request
+        except BaseException:  # after Ctrl-C too, the next call would read the response to this request
             self.close()
             raise
 
@@ -67,12 +67,12 @@ class RosService:
         wire = self._asked()
         try:
             return self._read_answer(wire)
-        except BaseException:  # also Ctrl-C: the next call would read the response to this request
+        except BaseException:  # after Ctrl-C too, the next call would read the response to this request
             self.close()
             raise
 
     def fileno(self) -> int:
-        """Return the descriptor that is readable once the response arrives or the connection breaks.
+        """Return the descriptor, which becomes readable when the response arrives or the connection is lost.
 
         Raises:
             SimulatorDead: `begin` has not sent a request.
@@ -150,7 +150,7 @@ def call_together(
         if meanwhile is not None and sent:
             meanwhile(sent[-1])
         return [service.finish() for service in sent]
-    except BaseException:  # also Ctrl-C: the next calls would read the responses to these requests
+    except BaseException:  # after Ctrl-C too, the next calls would read the responses to these requests
         for service in sent:
             service.close()
         raise

@@ -41,7 +41,7 @@ class Parameters:
         """Return the value of a parameter, or the tree of a namespace.
 
         Raises:
-            KeyError: it is not set.
+            KeyError: the name is not set.
         """
         value: Any = self._root
         for part in parts(name):
@@ -85,7 +85,8 @@ class Parameters:
     def search(self, key: str, node: str) -> str | None:
         """Return the global name of the parameter nearest to a node; None if no parameter matches.
 
-        The search goes from the node's own name up to the root, until it finds the first part of `key`.
+        The search goes from the node's own name up to the root, until a namespace has the first part of
+        `key`.
 
         Args:
             key: a relative name; a global name is only looked up.
@@ -157,7 +158,7 @@ def _names(namespace: str, tree: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _values(namespace: str, tree: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    """Yield each name inside a namespace, with a slash at its end, and its value."""
+    """Yield the name, with a slash at its end, and the value of each entry inside a namespace."""
     for part, value in tree.items():
         name = f"{below(namespace, part)}{SEPARATOR}"
         yield name, value

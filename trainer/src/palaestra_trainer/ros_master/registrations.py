@@ -1,4 +1,4 @@
-"""The registrations of nodes: their topics, services and addresses.
+"""Keep the registrations of nodes: their topics, services and addresses.
 
 This module is pure: it uses no thread, socket or clock. A node is known from its first registration until its
 last registration ends. If a node registers with another address, it is a new node of the same name, and all
@@ -49,8 +49,8 @@ class Registrations:
         Args:
             kind: any kind except SERVICE; use `register_service` for services.
             name: the name of the topic or parameter.
-            node: its full name.
-            uri: at which the node answers.
+            node: full name of the node.
+            uri: URI at which the node responds.
         """
         replaced = self._entered(kind, name, node, uri)
         self._members[kind].setdefault(name, {})[node] = uri
@@ -69,8 +69,8 @@ class Registrations:
         Args:
             kind: not SERVICE.
             name: the name of the topic or parameter.
-            node: its full name.
-            uri: at which the node answers; a registration with another URI stays.
+            node: full name of the node.
+            uri: URI at which the node responds; a registration with another URI stays.
         """
         members = self._members[kind].get(name, {})
         if members.get(node) != uri:

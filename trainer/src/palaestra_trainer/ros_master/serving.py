@@ -16,7 +16,7 @@ class MasterServer:
     """A ROS master that responds from `start` until `close`.
 
     Args:
-        host: the address on which it listens.
+        host: the address on which the master listens.
         port: the port; 0 takes a free port.
         name: the host name by which nodes reach the master; by default `host`.
 
@@ -62,7 +62,7 @@ class MasterServer:
         with self._lock:
             response, updates = self._api.call(method, arguments)
             if updates:
-                self._updates.add(updates)  # now, because the updates of the next call must come after these
+                self._updates.add(updates)  # in the lock, to keep the order of updates
         return tuple(response)  # XML-RPC has no named tuples
 
     def _stop_updates(self, update: Update) -> None:

@@ -58,7 +58,7 @@ class Updates:
             self._turns.append(update.uri)
         queue, about = self._queues[update.uri], (update.method, update.subject)
         queue.pop(about, None)
-        queue[about] = update  # behind all others: a change inside another one must not be undone by it
+        queue[about] = update  # at the end, so that no older update follows and undoes a newer change
 
     def _work(self) -> None:
         while True:

@@ -1,4 +1,4 @@
-"""One attempt of a run, from a configuration to an exit code.
+"""Run one attempt, from a configuration to an exit code.
 
 The attempt reports every error that it can find without a simulator before a simulator starts.
 """
@@ -134,7 +134,7 @@ def _logged(error: BaseException) -> End:
 
 
 class Learning(NamedTuple):
-    """A model and its environment."""
+    """A model and the environment in which it learns."""
 
     env: SimulatorsVecEnv
     model: BaseAlgorithm
@@ -291,7 +291,7 @@ class Attempt:
         return self._algorithm.name not in algorithms.ALGORITHMS or conductor.updates_so_far() > 0
 
     def _tell_if_it_took_longer(self) -> None:
-        """Log a warning if the run took many more steps, because an update waited for whole episodes."""
+        """Log a warning if the run took many more steps than set, because an update waited for episodes."""
         wanted, taken = self._configuration.steps, self._progress.step
         if taken > _FAR_BEYOND * wanted:
             log.warning("the run took more steps, because an update is due later", wanted=wanted, taken=taken)

@@ -46,7 +46,7 @@ class Best:
     """The evaluation of the policy in model.zip.
 
     Attributes:
-        step: valid environment steps that the policy had learned from.
+        step: number of valid environment steps from which the policy had learned.
         success_rate: share of successful episodes, 0 to 1; None: the environment does not report success.
         mean_return: mean return of the evaluation's episodes.
     """
@@ -221,7 +221,7 @@ class Selection:
 
 
 def best_of(directory: RunDirectory) -> Best | None:
-    """Return the evaluation of the policy in model.zip; None: model.zip is missing, or was not evaluated."""
+    """Return the evaluation of model.zip; None if model.zip is missing or was not evaluated."""
     if not directory.model.exists():
         return None
     with zipfile.ZipFile(directory.model) as archive:
@@ -237,7 +237,7 @@ def confirmation_of(directory: RunDirectory, step: int) -> dict[str, Any] | None
 def last_evaluated(directory: RunDirectory, step: int) -> int:
     """Return the step of the last evaluation up to `step`; 0 if there is no evaluation.
 
-    An evaluation that was interrupted is not in the file, so a resumed attempt repeats it.
+    The file does not have an interrupted evaluation, so a resumed attempt repeats that evaluation.
     """
     steps = (int(line["step"]) for line in read_lines(directory.evaluations))
     return max((each for each in steps if each <= step), default=0)

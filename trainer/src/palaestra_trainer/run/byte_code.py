@@ -19,7 +19,7 @@ from pathlib import Path
 from palaestra_trainer.errors import ConfigurationError
 
 _SERIALIZED = ":serialized:"
-_PICKLER = "cloudpickle"  # a pickle refers to cloudpickle only if it creates functions or classes
+_PICKLER = "cloudpickle"  # a pickle names cloudpickle only if it creates functions or classes
 
 
 def refuse_another_python(model: Path) -> None:

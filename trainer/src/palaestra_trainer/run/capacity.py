@@ -1,4 +1,4 @@
-"""The memory and disk space that a run may use, and a check that its replay buffer fits.
+"""Measure the available memory and disk space, and check that a run's replay buffer fits.
 
 The trainer reads the memory limit of its container from the control group, so the job need not pass
 `limits.memory` to the trainer. Without a limit, the machine's available memory counts. The file system
@@ -33,7 +33,8 @@ class Capacity:
         memory_bytes: memory that this process may still allocate; None: unknown.
         memory_limit: whether `memory_bytes` follows from a limit of the container or of another control
             group.
-        disk_bytes: space for checkpoints on the volume of the run directory, including existing ones.
+        disk_bytes: space for checkpoints on the volume of the run directory, including the space of existing
+            checkpoints.
     """
 
     memory_bytes: int | None
@@ -102,7 +103,7 @@ def _available(meminfo: Path) -> int | None:
 def _left_in_groups(groups: Path, own: Path) -> Iterator[int]:
     """Yield the memory that is left below the limit of each control group of this process.
 
-    The file cache does not count as used, because the kernel frees it first.
+    Memory of the file cache counts as free, because the kernel can free it.
     """
     for line in _lines(own):
         _, controllers, path = line.split(":", 2)

@@ -101,7 +101,7 @@ def reported(configuration: Configuration) -> ProgramReport:
 
 @cache
 def _served() -> ProgramReport:
-    """Return the progress of this process; the first call starts the status server."""
+    """Return the progress of this process; the first call also starts the status server."""
     configuration = load()
     progress = ProgramReport(configuration.steps, [])
     status_server(configuration.status_address, progress, constants(configuration)).start()

@@ -46,7 +46,7 @@ def make_judge(wanted: Configuration) -> gymnasium.Env[Any, Any]:
 
 
 def _refuse_other_rewards(env: gymnasium.Env[Any, Any]) -> None:
-    """Refuse wrappers that change the reward of a step, because `compute_reward` does not use them."""
+    """Refuse wrappers that change rewards, because `compute_reward` would not apply them."""
     while isinstance(env, gymnasium.Wrapper):
         if isinstance(env, gymnasium.RewardWrapper):
             raise ConfigurationError(

@@ -25,7 +25,7 @@ from palaestra_trainer.run_directory import RunDirectory
 
 
 class Scale(NamedTuple):
-    """The numbers by which a part of an observation is normalized."""
+    """The statistics and limits that normalize a part of an observation."""
 
     mean: np.ndarray
     variance: np.ndarray
@@ -55,10 +55,10 @@ class TrainedPolicy:
     def make_env(self, robot: RobotAbc, scene: Scene) -> gymnasium.Env[Any, Any]:
         """Return the environment in which the policy learned, with its wrappers, for a robot and its scene.
 
-        The environment gets robot and scene if its signature accepts them, as in a run.
+        As in a run, the environment gets robot and scene only if its signature accepts them.
 
         Raises:
-            ConfigurationError: it is not registered, or its signature does not fit.
+            ConfigurationError: the environment is not registered, or its signature does not fit.
             MissingCapability: the robot lacks a capability in the environment's `needs`.
         """
         return make_environment(self.environment, robot, scene)
@@ -71,7 +71,7 @@ class TrainedPolicy:
         deterministic: bool = True,  # noqa: FBT001, FBT002 - as in Stable-Baselines3
         action_masks: Any = None,
     ) -> tuple[Any, Any]:
-        """Return an action for an observation as the environment returned it, and the policy's next state.
+        """Return an action for a raw observation of the environment, and the policy's next state.
 
         A policy of MaskablePPO needs the masks that the environment's `action_masks` returns. Other policies
         do not take masks.

@@ -13,7 +13,7 @@ from palaestra_trainer.run_directory import RunDirectory, replace_file
 
 
 def keep_replays(directory: RunDirectory, evaluation: EvaluationResult, name: str) -> dict[str, Any]:
-    """Write replays.json with the chosen episodes of an evaluation, and return its content.
+    """Choose episodes of an evaluation, write them to replays.json, and return its content.
 
     If the evaluation has no recordings, the file is not written, and the content is empty.
 

@@ -49,7 +49,7 @@ def rejoin(env: SimulatorsVecEnv, saved: TrainingState, *, masked: bool = False)
 
 
 def _tell(begun: np.ndarray, same: np.ndarray) -> None:
-    """Log a warning if simulators replayed their episode and reached another observation."""
+    """Log a warning if simulators replayed their episode but reached another observation."""
     different = sum(not new and not equal for new, equal in zip(begun, same, strict=False))
     if different:
         log.warning(

@@ -18,9 +18,9 @@ _NEEDED = frozenset({"target", "steps", "success_rate", "success_interval"})  # 
 
 
 def summarise(directory: RunDirectory, progress: Progress) -> dict[str, Any]:
-    """Return the summary of a run that has ended.
+    """Return the summary of a run that has completed its training.
 
-    `success_rate`, its `success_interval` and `mean_return` belong to the policy in model.zip, which learned
+    `success_rate`, `success_interval` and `mean_return` are results of the policy in model.zip, which learned
     for `best_step` steps. The values come from the confirmation of that policy, or else from its evaluation;
     without an evaluation they are null. Faults and restarts are those of all attempts. `duration_s` and the
     speed count all attempts too, and so does `goodput`, the seconds by cause. `trained_share` is the share of

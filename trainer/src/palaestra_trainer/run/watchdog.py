@@ -28,7 +28,7 @@ class Watchdog:
     Args:
         idle_s: a function that returns the seconds since the last progress.
         deadline_s: the longest time without progress.
-        last_word: called before the process ends, to write the termination message.
+        last_word: a function that writes the termination message, called before the process ends.
         leave: a function that ends the process with an exit code.
     """
 
@@ -47,7 +47,7 @@ class Watchdog:
         self._thread = threading.Thread(target=self._watch, name="watchdog", daemon=True)
 
     def __enter__(self) -> Self:
-        """Begin to watch."""
+        """Start the thread of the watchdog."""
         self._thread.start()
         return self
 
@@ -57,7 +57,7 @@ class Watchdog:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Stop watching."""
+        """Stop the thread of the watchdog."""
         self._over.set()
 
     def _watch(self) -> None:

@@ -36,7 +36,7 @@ def allocate(configuration: Configuration, role: Role) -> Allocation:
 
 
 def _path(configuration: Configuration, simulator: SimulatorConfiguration) -> Path:
-    """Return the path of the lock file; ROS_LOG_DIR is the scratch folder in every container of the plan.
+    """Return the path of the lock file, in the scratch folder ROS_LOG_DIR of the containers.
 
     The file name also contains the address of the sidecar, because outside a container several jobs and users
     may share the folder.

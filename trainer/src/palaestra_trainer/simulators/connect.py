@@ -121,7 +121,7 @@ class OwnSimulator:
         self.scene = SimulatedScene(self.webots, self.robot)
         with ExitStack() as undo:
             undo.callback(self.close)
-            self.webots.start()  # connects the robot too
+            self.webots.start()  # this also connects the robot
             self.webots.supervisor.set_mode(Mode.FAST)
             undo.pop_all()
 

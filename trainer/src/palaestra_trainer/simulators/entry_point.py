@@ -41,7 +41,7 @@ class EntryPoint(Generic[_Made]):
     Args:
         environment: the id of the environment.
         kind: the class of the environment.
-        options: the class of its options.
+        options: the class of the environment's options.
 
     Attributes:
         environment_class: the class of the environment, whose docstring describes the task.
@@ -60,7 +60,7 @@ class EntryPoint(Generic[_Made]):
         role: str = Role.COLLECT,
         **options: Any,
     ) -> _Made:
-        """Return an environment.
+        """Create and return an environment.
 
         Args:
             robot: the robot to drive, with the capabilities that the environment needs; give it together with

@@ -28,7 +28,7 @@ class Member(Protocol):
 
     @property
     def env(self) -> Environment:
-        """The environment; its `step` and `reset` may raise `SimulatorFault`."""
+        """The environment, whose `step` and `reset` may raise `SimulatorFault`."""
         ...
 
     def due(self, episodes: int = 1) -> str | None:
@@ -83,7 +83,7 @@ class ReportsLeftOut(Protocol):
 
 @runtime_checkable
 class Located(Protocol):
-    """A member whose robot can be recorded from above."""
+    """A member whose robot and target can be recorded from above."""
 
     def sight(self) -> Sight | None:
         """Return the positions of robot and target after the last step, without a request to the simulator.

@@ -101,10 +101,10 @@ class NotebookMember:
         """Do nothing, because a start has its own deadline."""
 
     def pause(self) -> None:
-        """Leave it to the program."""
+        """Do nothing, because the program pauses its simulator itself."""
 
     def unpause(self) -> None:
-        """Leave it to the program."""
+        """Do nothing, because the program pauses its simulator itself."""
 
 
 class _OneLife(gymnasium.Wrapper[Any, Any, Any, Any]):

@@ -151,7 +151,7 @@ class Restarter:
         later. `check` is called every tenth of a second during a recycling; it raises to end the wait.
 
         Raises:
-            SimulatorFault: it broke; call `begin_mending`.
+            SimulatorFault: the member failed; call `begin_mending`.
             Diverged: the observation is not finite.
         """
         self._recycle_when_due(check)
@@ -168,7 +168,7 @@ class Restarter:
         Observation and info are copies, and the environment gets a copy of the action.
 
         Raises:
-            SimulatorFault: it broke; call `begin_mending`.
+            SimulatorFault: the member failed; call `begin_mending`.
             Diverged: observation or reward is not finite.
         """
         began = time.perf_counter() - away_s()
@@ -184,7 +184,7 @@ class Restarter:
         """Return the mask of allowed actions for the next step; shape (choices,), bool.
 
         Raises:
-            SimulatorFault: it broke; call `begin_mending`.
+            SimulatorFault: the member failed; call `begin_mending`.
             ConfigurationError: the environment returned a value that is not a mask of its actions.
         """
         return mask_of(self.member.env)
@@ -192,7 +192,7 @@ class Restarter:
     def set_attribute(self, name: str, value: Any) -> None:
         """Set an attribute of the member's environment and of each later environment of the member.
 
-        While the restarter is busy, the attribute is set when the next episode begins.
+        If the restarter is busy, the attribute is set when the next episode begins.
         """
         self._attributes.set(name, value, None if self.busy else self.member.env)
 
@@ -263,7 +263,7 @@ class Restarter:
         return True
 
     def _judge(self, fault: SimulatorFault) -> None:
-        """Raise ConfigurationError if two processes in a row show the same mistake before any step."""
+        """Raise ConfigurationError if two processes in a row show the same mistake before the first step."""
         before, self._refusal = self._refusal, self._refusal_of(fault)
         if before and before == self._refusal:
             raise ConfigurationError(f"{self.name}: {fault}") from fault
@@ -312,7 +312,7 @@ class Restarter:
                 await_one([self], check)
 
     def _log_recycling(self, reason: str) -> None:
-        """Log the first recycling, then at most one line a minute with the number of all recyclings."""
+        """Log the first recycling, and then at most one line per minute with the number of recyclings."""
         self._recycled += 1
         if self._clock() >= self._log_next:
             log.info("simulator recycled", simulator=self.name, times=self._recycled, reason=reason)

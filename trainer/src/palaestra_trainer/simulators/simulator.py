@@ -109,7 +109,7 @@ class Simulator:
         Raises:
             SimulatorDead, SimulatorHung, WrongData: the simulator does not start in time.
         """
-        self.webots.start()  # connects the robot too
+        self.webots.start()  # this also connects the robot
         self.unpause()
         self.scene.resets = 0
         self.wear.begin()

@@ -70,7 +70,7 @@ class Standby:
 
     @property
     def simulated_s(self) -> float:
-        """Seconds of simulated time of both simulators since they were created, over all restarts."""
+        """The sum of both simulators' simulated seconds since their creation, over all restarts."""
         return sum(each.simulated_s for each in self._both)
 
     def spare(self) -> StandbyState | None:

@@ -64,7 +64,7 @@ class GoodputLedger:
         self._in_vain |= threading.get_ident() == self._owner
 
     def seconds(self) -> dict[str, float]:
-        """Return the seconds counted under each cause so far; callable from any thread.
+        """Return the seconds under each cause so far; any thread may call this method.
 
         The seconds add up to the wall-clock time without the current step. A step can be divided among the
         causes only at its end, and the seconds of a cause must never decrease.

@@ -65,7 +65,7 @@ class MetricValues:
         self.evaluations += 1
 
     def saved(self, seconds: float, size_bytes: int) -> None:
-        """Count a checkpoint with its size and the time it took to write."""
+        """Record the time that a checkpoint took to write, and its size."""
         self.saves.observe(seconds)
         self.saved_at, self.saved_bytes = time.time(), size_bytes
 

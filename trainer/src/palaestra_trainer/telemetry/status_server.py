@@ -1,4 +1,4 @@
-"""The HTTP server of a trainer for /status, /metrics, /healthz and /watch."""
+"""Create a trainer's HTTP server for /status, /metrics, /healthz and /watch."""
 
 from __future__ import annotations
 

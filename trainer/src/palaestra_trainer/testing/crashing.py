@@ -8,7 +8,7 @@ from palaestra_trainer.errors import SimulatorDead
 
 
 class Crashing:
-    """A fake that crashes at some of its steps, and works again after `restart`.
+    """A fake that crashes at given steps, and works again after `restart`.
 
     Args:
         deaths: numbers of the steps at which the fake crashes, counted from 1; a restart does not reset the

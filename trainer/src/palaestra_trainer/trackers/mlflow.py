@@ -70,7 +70,7 @@ class MLflow(Tracker):
             self._lost += len(metrics)
 
     def end(self) -> None:
-        """Mark the run as finished; the next attempt marks it as running again."""
+        """Mark the run as finished; a next attempt marks the run as running again."""
         if self._lost:
             log.warning("points are missing in MLflow", points=self._lost)
         try:

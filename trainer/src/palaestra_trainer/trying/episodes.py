@@ -64,8 +64,8 @@ def play(
         restarter: the restarter of a simulator that is up.
         agent: chooses the actions.
         seeds: the seeds of the episodes, at least one.
-        check: called before each step and during waits; it raises to cancel the try.
-        report: called with the number of each complete episode, from 1, and the episode.
+        check: called before each step and during waits; it raises to cancel the remaining episodes.
+        report: called after each complete episode, with its number from 1 and its result.
 
     Raises:
         FaultBudgetSpent: the simulator failed more often than its restart budget allows.

@@ -18,7 +18,7 @@ log = structlog.get_logger(__name__)
 
 
 def nothing() -> None:
-    """Do nothing."""
+    """Do nothing, as the default of `before`."""
 
 
 def leave_after(

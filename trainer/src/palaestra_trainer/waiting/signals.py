@@ -34,12 +34,12 @@ def go_on() -> None:
 
 
 class Interrupted(TrainerError):
-    """A signal interrupted the run; it can be resumed later."""
+    """A signal interrupted the run, which can be resumed later."""
 
 
 @contextmanager
 def leaving_when_asked() -> Iterator[None]:
-    """Let a signal end the process at once as interrupted, except while an `Interruption` listens.
+    """Let a signal end the process at once as interrupted, unless an `Interruption` listens.
 
     The context covers the seconds of imports, before the run has progress to save. Without the context, a
     signal would kill the process, or have no effect if the process is the first of a container. While Python

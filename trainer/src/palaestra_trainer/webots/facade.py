@@ -49,7 +49,7 @@ class Launcher(Protocol):
         ...
 
     def expect_stop(self, deadline_s: float) -> None:
-        """Announce that the simulator will end; it is killed after `deadline_s` seconds."""
+        """Announce that the simulator will end; after `deadline_s` seconds, kill it."""
         ...
 
     def failure(self) -> str | None:
@@ -119,7 +119,7 @@ class Webots:
         self.observer = Observer(supervisor_node_name)
         self.supervisor = Supervisor(supervisor_node_name, self.observer)
         self._launcher = launcher
-        # The probe has its own connection with a shorter deadline, because it must report a hang early.
+        # The probe has its own connection with a shorter deadline, because it must detect a hang early.
         self._probe = RosService(f"/{supervisor_node_name}/robot/get_time", "webots_ros/get_float", _PROBE_S)
         self._start_deadline_s = start_deadline_s
         self._at_start: dict[str, Callable[[], None]] = {}

@@ -1,7 +1,7 @@
 """Decode only the reading in a sensor's message.
 
-Every topic of a sensor begins with a std_msgs/Header. Only its `frame_id` varies in length, and one device
-always sends the same `frame_id`.
+Every topic of a sensor begins with a std_msgs/Header. Only the `frame_id` in the header varies in length, and
+a device always sends the same `frame_id`.
 """
 
 from __future__ import annotations

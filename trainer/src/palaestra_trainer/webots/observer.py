@@ -73,7 +73,7 @@ class Observer:
         return bool(self._services.get("supervisor/get_from_def", "supervisor_get_from_def")(name=name).node)
 
     def pose(self, name: str) -> tuple[float, float, float]:
-        """Return x and y in meters and the heading in radians of the node with DEF `name`."""
+        """Return the pose of the node with DEF `name`: x and y in meters, and the heading in radians."""
         self.begin_pose(name)
         return self.finish_pose(name)
 

@@ -121,7 +121,7 @@ class Stepper:
         self._motors.append(motor)
 
     def track(self, name: str) -> None:
-        """Read the pose of the node with DEF `name` at each step, for `pose`."""
+        """Make each step read the pose of the node with DEF `name`, which `pose` then returns."""
         self._tracked[name] = None
 
     def pose(self, name: str) -> tuple[float, float, float]:

@@ -112,7 +112,7 @@ class Supervisor:
         return kind.from_wire(service(field=self._observer.field(name, field), index=index).value)
 
     def set_field(self, name: str, field: str, value: Value, index: int = 0) -> None:
-        """Write a field of the node with DEF `name`; `value` has the form that `get_field` returns.
+        """Write `value`, in the form that `get_field` returns, to a field of the node with DEF `name`.
 
         Raises:
             ConfigurationError: the field holds nodes, or values of another type.
