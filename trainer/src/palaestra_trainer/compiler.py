@@ -20,7 +20,7 @@ from typing import Any
 NAME = "torch._dynamo"
 _ANSWER = "__dynamo_disable"  # attribute of a function in which PyTorch stores the result of `disable`
 
-# # The functions of the stand-in, each with the module of PyTorch that calls it.
+# The functions of the stand-in, each with the module of PyTorch that calls it.
 _OF_PYTORCH = {"disable": "torch._compile", "graph_break": "torch.optim.optimizer"}
 
 

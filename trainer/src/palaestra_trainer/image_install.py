@@ -71,7 +71,7 @@ def install(folder: Path, target: Path) -> None:
             shutil.copytree(source, staged)
         _check_names(folder, staged, target)
         _check_requirements(staged)
-        # # The byte code is compiled while the image is built, because the root file system of a pod is
+        # The byte code is compiled while the image is built, because the root file system of a pod is
         # read-only.
         compileall.compile_dir(staged, quiet=1, stripdir=str(staged), prependdir=str(target))
         _replace(staged, target)
@@ -93,7 +93,7 @@ def _target() -> Path:
     first, *_ = os.environ.get("PYTHONPATH", "").split(os.pathsep)
     if not first:
         raise ConfigurationError(
-            "PYTHONPATH: is not set, and its first folder is where a project goes; "
+            "PYTHONPATH: is not set, but a project is installed into its first folder; "
             "run this in a Dockerfile FROM palaestra-trainer"
         )
     return Path(first)

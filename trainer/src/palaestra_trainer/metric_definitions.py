@@ -9,7 +9,7 @@ from __future__ import annotations
 from palaestra_protocol.metrics import Family, Label, counter, gauge, histogram
 from palaestra_protocol.pod.status import Cause, FaultKind, Role
 
-# # The scale of returns is not known in advance, and returns are often negative. So the buckets are symmetric
+# The scale of returns is not known in advance, and returns are often negative. So the buckets are symmetric
 # around 0, and each bound is at most two and a half times the previous bound.
 DECADES = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
 RETURNS = (*(-decade for decade in reversed(DECADES)), 0.0, *DECADES)
@@ -20,7 +20,7 @@ CHECKPOINT_S = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
 QUANTILES = (0.0, 0.1, 0.5, 0.9, 1.0)
 RECYCLED = "recycled"
 GIVEN_UP = "given_up"
-# # The names of losses in the logs of Stable-Baselines3, without the part before the slash.
+# The names of losses in the logs of Stable-Baselines3, without the part before the slash.
 LOSSES = (
     "loss",
     "policy_loss",

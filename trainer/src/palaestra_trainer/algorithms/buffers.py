@@ -1,4 +1,4 @@
-"""Buffers that keep invalid rows out of every loss.
+"""Buffers of which algorithms sample only valid rows, so a fault does not affect a loss.
 
 A row is invalid if its simulator failed during the step. The episode is truncated before an invalid row. The
 learner bootstraps the value after the last valid row, so the policy is not punished for the fault.
@@ -29,7 +29,7 @@ def valid_rows(infos: Sequence[dict[str, Any]]) -> np.ndarray:
 
 
 COLUMNS = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
-# # With chunks of this size, a million rows need only some dozens of files, and a few new rows are cheap to
+# With chunks of this size, a million rows need only some dozens of files, and a few new rows are cheap to
 # save.
 CHUNK_BYTES = 4 << 20
 

@@ -43,7 +43,7 @@ VALID_ROLLOUTS: Mapping[type[Any], type[Any]] = {
     DictRolloutBuffer: ValidDictRolloutBuffer,
     RolloutBuffer: ValidRolloutBuffer,
 }
-# # An author's class may extend a class on the left; its subclass for valid rows is on the right.
+# An author's class may extend a class on the left; its subclass for valid rows is on the right.
 _VALID: Mapping[type[Any], type[Any]] = {
     DictReplayBuffer: ValidDictReplayBuffer,
     ReplayBuffer: ValidReplayBuffer,
@@ -151,7 +151,7 @@ def with_valid_rows(named: type[BaseBuffer]) -> type[BaseBuffer]:
     base = next((base for base in _VALID if issubclass(named, base)), None)
     if base is None or getattr(named, "get", None) is not getattr(base, "get", None):
         raise ConfigurationError(
-            f"{field_of(named)}: {named.__name__} draws batches of its own (get), in which may be rows "
+            f"{field_of(named)}: {named.__name__} draws batches of its own (get), which may have rows "
             "that a fault spoiled; override compute_returns_and_advantage, add or _get_samples instead"
         )
     content = {"__doc__": named.__doc__, "__module__": named.__module__, "_rows_only": _VALID[base]}

@@ -1,6 +1,6 @@
-"""Schedules of a job's author: functions `module:function` of the remaining share of the steps.
+"""Import schedules of a job's author, which are functions of the remaining share of the steps.
 
-The model.zip contains only the name of such a function.
+A job names such a function as `module:function`, and the model.zip contains only this name.
 """
 
 from __future__ import annotations

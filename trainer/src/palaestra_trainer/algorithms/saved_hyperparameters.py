@@ -1,4 +1,4 @@
-"""The hyperparameters with which a run began; the run keeps them even if the defaults change later.
+"""Save the hyperparameters with which a run begins, so later changes of defaults do not affect it.
 
 A file in the run directory holds all of them.
 """

@@ -133,7 +133,10 @@ def _flaw(part: spaces.Space[Any]) -> str:
     """Return the reason why Stable-Baselines3 would misinterpret a space, and the remedy; else ""."""
     if isinstance(part, spaces.Discrete | spaces.MultiDiscrete) and np.any(part.start):
         start = np.asarray(part.start).tolist()
-        return f"counts from {start}, and networks count from 0; count from 0, and add {start} inside"
+        return (
+            f"counts from {start}, and networks count from 0; count from 0 in the space, and add {start} in "
+            "the environment"
+        )
     if isinstance(part, spaces.MultiBinary) and len(part.shape) > 1:
         return f"is a MultiBinary of shape {part.shape}; flatten it"
     if isinstance(part, spaces.Box) and not part.shape:

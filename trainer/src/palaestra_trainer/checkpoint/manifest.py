@@ -138,8 +138,8 @@ def _read_manifest(folder: Path) -> Manifest:
     number = content.get("format")
     if whole and number != FORMAT:
         raise ConfigurationError(
-            f"{folder}: is of format {number}, of another release than this one, which reads {FORMAT}; "
-            "continue with the release that wrote it, or use another run directory"
+            f"{folder}: is of format {number}, unknown to this release, which reads {FORMAT}; "
+            "continue with the release that wrote the checkpoint, or use another run directory"
         )
     if not whole:
         raise ValueError(f"{MANIFEST} does not match its digest")

@@ -1,4 +1,4 @@
-"""The folder of a run's checkpoints: find the newest checkpoint, and add a new one."""
+"""Find the newest checkpoint of a run, and write a new checkpoint."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from palaestra_trainer.run_directory import sync
 log = structlog.get_logger(__name__)
 
 MODEL = "model.zip"
-# # File systems over object stores, for example, raise these errors when a folder is renamed.
+# File systems over object stores, for example, raise these errors when a folder is renamed.
 _NO_RENAME = frozenset({errno.EPERM, errno.ENOTSUP, errno.ENOSYS, errno.EXDEV})
 _NUMBER = re.compile(r"[0-9]{1,18}")
 

@@ -58,7 +58,7 @@ def compare(arguments: Sequence[str] | None = None) -> int:
     try:
         with Interruption() as interruption:
             return _compare(chosen, interruption)
-    # # The environment's code may raise SystemExit.
+    # The environment's code may raise SystemExit.
     except (KeyboardInterrupt, TrainerError, OSError, SystemExit) as error:
         return refuse_without_run(error)
 

@@ -70,7 +70,7 @@ def evaluate(arguments: Sequence[str] | None = None) -> int:
     configure_logs()
     try:
         _evaluate(chosen)
-    # # The environment's code may raise SystemExit.
+    # The environment's code may raise SystemExit.
     except (KeyboardInterrupt, TrainerError, OSError, SystemExit) as error:
         return refuse_without_run(error)
     return ExitCode.DONE

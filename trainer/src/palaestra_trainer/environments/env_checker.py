@@ -62,7 +62,7 @@ def refuse_statistics(env: gymnasium.Env[Any, Any], name: str) -> None:
         if isinstance(env, NormalizeObservation | NormalizeReward):
             raise ConfigurationError(
                 f"environment.id: {name}: {type(env).__name__} has statistics that the policy's file lacks, "
-                "other ones in each simulator; remove it, and set algorithm.normalize"
+                "and each simulator has different ones; remove the wrapper, and set algorithm.normalize"
             )
         env = env.env
 

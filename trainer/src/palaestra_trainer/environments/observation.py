@@ -133,7 +133,7 @@ def space(parts: Sequence[str]) -> spaces.Box:
 def observe(seen: StepState, parts: Sequence[str], within: spaces.Box) -> NDArray[np.float32]:
     """Return the numbers of these parts, clipped to the bounds of `within`."""
     numbers = [number for name in parts for number in PARTS[name].measure(seen)]
-    # # This computes the same as np.clip in half the time.
+    # This computes the same as np.clip in half the time.
     wanted = np.array(numbers, np.float32)
     cut_off: NDArray[np.float32] = np.minimum(np.maximum(wanted, within.low), within.high)
     return cut_off

@@ -1,4 +1,4 @@
-"""The wrappers that a job sets for its environment, and the stacking of the newest observations.
+"""Apply the wrappers of a job to its environment, and stack the newest observations.
 
 The environment of every simulator has these wrappers, so they are the same in training, in evaluations, after
 a resume and in programs of users. `env_checker` refuses wrappers with statistics.

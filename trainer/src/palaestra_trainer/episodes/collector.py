@@ -75,7 +75,7 @@ class Collector:
         self.reset_info: dict[str, Any] = {}
         self._check = check
         self._started = time.monotonic()
-        # # `begin` returns this observation while the member has not started.
+        # `begin` returns this observation while the member has not started.
         self._observation: Any = blank(self.env.observation_space)
         self._return, self._length = 0.0, 0
         self._actions: ActionLog | None = None
@@ -150,9 +150,9 @@ class Collector:
     def resume(self, state: EpisodeState, *, masked: bool = False) -> Any:
         """Take the actions of `state` again without counting them; return the observation afterwards.
 
-        If the member fails meanwhile, it begins the next episode. It also begins the next episode if its
-        environment is not deterministic: the episode ends earlier than before, or, if `masked` is set, the
-        mask forbids an action.
+        If the member fails meanwhile, the next episode begins. The next episode also begins if the
+        environment is not deterministic: the repeated episode ends earlier, or, if `masked` is set, the mask
+        forbids a repeated action.
 
         Raises:
             FaultBudgetSpent: the member's restart budget is used up.

@@ -37,7 +37,7 @@ class Exported:
 
     Attributes:
         path: the file that was written.
-        observations: number of observations on which the file was compared with the policy.
+        observations: number of observations in the comparison of the file with the policy.
         largest_difference: the largest difference of an action's number in that comparison; for continuous
             actions, as a share of the range.
     """

@@ -16,7 +16,7 @@ from palaestra_trainer.run.policies import TrainedPolicy
 
 OBSERVATIONS = 1_000
 TOLERANCE = 1e-5  # largest allowed difference of a continuous action, as a share of its range
-# # A comparison is meaningful only if at least this number of actions are between the bounds, or if scores
+# A comparison is meaningful only if at least this number of actions are between the bounds, or if scores
 # differ by this number of tolerances.
 _TELLING = 10
 

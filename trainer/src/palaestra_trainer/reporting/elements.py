@@ -7,7 +7,7 @@ import json
 import re
 from typing import Any
 
-# # These control characters and surrogates are not allowed in HTML or in UTF-8.
+# These control characters and surrogates are not allowed in HTML or in UTF-8.
 _REFUSED = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufdd0-\ufdef\ufffe\uffff]")
 _VOID = frozenset({"input", "meta"})
 

@@ -21,7 +21,7 @@ LAST_MS = 1500
 _COLORS = 32
 _SMOOTH = 2  # pictures are drawn larger by this factor and then reduced, to smooth edges
 
-# # The colors that page.css has for a bright page.
+# The colors that page.css has for a bright page.
 _PAGE, _FLOOR, _OBSTACLE = (246, 247, 249), (238, 241, 245), (135, 148, 166)
 _ROBOT, _WAY, _TARGET, _START = (31, 95, 191), (116, 156, 214), (23, 121, 74), (91, 102, 117)
 

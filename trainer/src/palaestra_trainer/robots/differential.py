@@ -122,6 +122,6 @@ class EPuck(DifferentialDrive, Distances):
         return np.array(np.interp(counts, _COUNTS, _METERS), np.float32)
 
 
-# # The lookup table of the e-puck's distance sensors. Source: E-puckDistanceSensor of Webots R2022a.
+# The lookup table of the e-puck's distance sensors. Source: E-puckDistanceSensor of Webots R2022a.
 _METERS = (0.07, 0.06, 0.05, 0.04, 0.03, 0.02, 0.015, 0.01, 0.005, 0.0)
 _COUNTS = (67.19, 104.09, 120.0, 158.03, 234.93, 383.84, 601.46, 1465.73, 2133.33, 4095.0)

@@ -77,7 +77,7 @@ class Master:
         return answer.code == OK and self._is_node(str(answer.value))
 
     def _is_node(self, uri: str) -> bool:
-        """Return whether a node of this master has that address; the port may be another program's now."""
+        """Return whether a node of this master has that address; another program may have its port."""
         try:
             answer = client.call(uri, _NODE_TIMEOUT_S, "getMasterUri", self._caller)
         except TimeoutError:

@@ -38,7 +38,8 @@ class Registrations:
 
     def __init__(self) -> None:
         self._nodes: dict[str, _Node] = {}
-        # Maps the kind, then the name of a topic, service or parameter, then the name of a node to its URI.
+        # URIs of nodes, by the kind of registration, the name of the topic, service or parameter, and the
+        # node's name.
         self._members: dict[Kind, dict[str, dict[str, str]]] = {kind: {} for kind in Kind}
         self._service_uris: dict[str, tuple[str, str]] = {}  # the node and address of each service
         self._types: dict[str, str] = {}

@@ -66,7 +66,7 @@ NOTHING_LEARNED = End(
 )
 _FAR_BEYOND = 1.5  # factor for the job's steps; the last rollout usually exceeds the steps a little
 STOPPED_S = 60.0  # longest time for closing environments and stopping simulators
-# # Code of the job's author may try to end the program, for example by sys.exit.
+# Code of the job's author may try to end the program, for example by sys.exit.
 ENDING = (Exception, SystemExit, KeyboardInterrupt, GeneratorExit)
 
 

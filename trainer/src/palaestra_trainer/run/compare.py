@@ -119,7 +119,7 @@ def notes(a: Path, b: Path) -> Iterator[str]:
         yield f"no simulator of A has role Evaluate: both play in the world of {evaluating(first)[0].name}"
     worlds = [Path(evaluating(each)[0].world).name for each in (first, second)]
     if worlds[0] != worlds[1]:
-        yield f"B was evaluated in the world {worlds[1]}; both play in A's, {worlds[0]}"
+        yield f"B was evaluated in the world {worlds[1]}; both play in A's world, {worlds[0]}"
 
 
 def compare(

@@ -150,6 +150,7 @@ def _warned(configuration: Configuration) -> tuple[SimulatorConfiguration, ...]:
     found = evaluating(configuration)
     if not configuration.with_role(Role.EVALUATE):
         log.warning(
-            "no simulator has role Evaluate: the world is that of a collecting one", name=found[0].name
+            "no simulator has role Evaluate: a collecting simulator evaluates in its world",
+            name=found[0].name,
         )
     return found

@@ -21,7 +21,7 @@ from palaestra_trainer.robots.simulated import SimulatedScene
 from palaestra_trainer.webots import Attached, Webots
 from palaestra_trainer.webots.facade import open_facades
 
-# # No simulator has this name. If `compute_reward` reads a sensor, the sensor raises SimulatorDead with this
+# No simulator has this name. If `compute_reward` reads a sensor, the sensor raises SimulatorDead with this
 # name.
 _NAME = "judge"
 
@@ -51,6 +51,7 @@ def _refuse_other_rewards(env: gymnasium.Env[Any, Any]) -> None:
         if isinstance(env, gymnasium.RewardWrapper):
             raise ConfigurationError(
                 f"environment.wrappers: {type(env).__name__} changes rewards, and HerReplayBuffer computes "
-                f"those of other goals by {COMPUTE_REWARD}, without it; remove it, or replay_buffer_class"
+                f"the rewards of other goals by {COMPUTE_REWARD} without this wrapper; remove the wrapper, "
+                "or replay_buffer_class"
             )
         env = env.env

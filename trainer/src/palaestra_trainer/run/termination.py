@@ -48,7 +48,7 @@ class End:
     message: str
 
 
-# # The first row whose class matches the error decides.
+# The first row whose class matches the error decides.
 ENDS: tuple[tuple[type[BaseException], int, str], ...] = (
     (Interrupted, ExitCode.INTERRUPTED, "Interrupted"),
     (MasterLost, ExitCode.INTERRUPTED, "MasterLost"),

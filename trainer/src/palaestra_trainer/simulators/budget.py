@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 from palaestra_trainer.errors import FaultBudgetSpent, FaultKind, SimulatorFault
 
-# # This number of restarts within the window suggests a permanent fault.
+# This number of restarts within the window suggests a permanent fault.
 FLAPPING = 3
 
 

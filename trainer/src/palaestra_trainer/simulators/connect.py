@@ -76,7 +76,7 @@ def connect_here(configuration: Configuration, run: Path) -> list[Simulator]:
     ]
 
 
-# # For each shipped world: the ROS name of its supervisor, and its robot as `trainer.robot` names it.
+# For each shipped world: the ROS name of its supervisor, and its robot as `trainer.robot` names it.
 _WORLDS: dict[str, tuple[str, str]] = {
     "arena": ("robotino", DEFAULT_ROBOT),
     "seeing": ("robotino", DEFAULT_ROBOT),

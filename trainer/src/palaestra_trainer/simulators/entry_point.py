@@ -70,9 +70,9 @@ class EntryPoint(Generic[_Made]):
                 environment of `make_vec`. `palaestra_trainer.testing.fake_arena`, `fake_court` and
                 `fake_seeing` need no simulator.
             role: role of the simulator in PALAESTRA_CONFIG. Without `robot` and `simulator`, the environment
-                takes the newest free `Webots` facade of this process. If there is none, it takes the first
-                simulator of PALAESTRA_CONFIG with this role that no environment of any process uses. Without
-                PALAESTRA_CONFIG, it starts a simulator with the world of `own_world`, which ends with
+                takes the newest free `Webots` facade of this process. Without such a facade, it takes the
+                first simulator of PALAESTRA_CONFIG with this role that no environment of any process uses.
+                Without PALAESTRA_CONFIG, it starts a simulator with the world of `own_world`, which ends with
                 `close()` or with this process.
             options: fields of the class of options; movements and observation parts are given as text.
 

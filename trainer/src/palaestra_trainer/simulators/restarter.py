@@ -42,7 +42,7 @@ from palaestra_trainer.waiting.signals import Check, go_on
 log = structlog.get_logger(__name__)
 
 LOOK_EVERY_S = 0.1
-# # A canceled start ends at once, except if it waits for a program that does not respond.
+# A canceled start ends at once, except if it waits for a program that does not respond.
 SETTLE_S = 10.0
 # A simulator that must be recycled after two dozen resets is recycled every few seconds. Logging each time
 # would fill the log.
@@ -332,7 +332,7 @@ def await_one(restarters: Sequence[Restarter], check: Check = go_on) -> None:
 
     Args:
         restarters: the restarters; some may be idle or lost.
-        check: called every tenth of a second; it raises to end the wait.
+        check: a function that is called every tenth of a second, and raises to end the wait.
     """
     works = _under_way(restarters)
     while works and not wait(works, LOOK_EVERY_S, FIRST_COMPLETED).done:

@@ -21,7 +21,7 @@ log = structlog.get_logger(__name__)
 
 NAME = "mlflow"
 URI_VARIABLE = "MLFLOW_TRACKING_URI"
-# # With the client's default timeouts, a server that does not respond would block training for minutes.
+# With the client's default timeouts, a server that does not respond would block training for minutes.
 PATIENCE = {"MLFLOW_HTTP_REQUEST_TIMEOUT": "10", "MLFLOW_HTTP_REQUEST_MAX_RETRIES": "2"}
 MOST_PARAMETERS = 100  # the server's limit for one request
 LONGEST_PARAMETER = 6000

@@ -17,7 +17,7 @@ log = structlog.get_logger(__name__)
 
 NAME = "wandb"
 MODES = ("offline", "online")
-# # This is the default grace period without the time for the simulators and the checkpoint; see
+# This time is the default grace period minus the time for the simulators and the checkpoint, see
 # `waiting.shutdown_deadline`.
 FINISH_S = 5
 
@@ -56,8 +56,8 @@ class Wandb(Tracker):
             group=configuration["job"],
             config=dict(configuration),
             dir=str(directory.path),
-            # # The console is off, because the pod's log has the output. Git is disabled, because it may not
-            # be installed.
+            # The console is off, because the pod's log has the output. Git is disabled, because it may not be
+            # installed.
             settings=wandb.Settings(
                 console="off",
                 disable_git=True,

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import time
 
-# # The checkpoint needs half of the default grace period, and a pending call may last twice its deadline. So
+# The checkpoint needs half of the default grace period, and a pending call may last twice its deadline. So
 # this time is left for further waits.
 LEFT_S = 10.0
 

@@ -12,7 +12,7 @@ from palaestra_trainer.waiting.greenlets import let_others
 from palaestra_trainer.webots.message_decoding import BOOL, FLOAT64, RANGE, NumberReading
 from palaestra_trainer.webots.services import Services
 
-# # Webots replaces only these characters when it converts a device's name to a path.
+# Webots replaces only these characters when it converts a device's name to a path.
 _REPLACED = str.maketrans("-. ()", "_____")
 
 

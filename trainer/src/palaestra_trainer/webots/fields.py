@@ -14,8 +14,7 @@ from palaestra_trainer.errors import ConfigurationError
 Value = bool | int | float | str | tuple[float, ...]
 
 _MULTIPLE: Final = 0x10  # Webots adds this to the type number of a field that may have several values
-# # For an exact identity quaternion, which has no axis, Webots would keep the old rotation and report
-# success.
+# For an exact identity quaternion, which has no axis, Webots would keep the old rotation and report success.
 _SMALLEST_TURN: Final = 1e-6
 
 

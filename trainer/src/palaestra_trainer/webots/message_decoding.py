@@ -11,7 +11,7 @@ import struct
 from functools import cache
 from typing import Any
 
-# # The numbers after the header, as codes of `struct`; the last number is the reading.
+# The numbers after the header, as codes of `struct`; the last number is the reading.
 RANGE = "Bffff"  # sensor_msgs/Range: type, field of view, least, most
 BOOL = "?"
 FLOAT64 = "d"

@@ -24,7 +24,7 @@ from palaestra_trainer.webots.devices import Sensor
 from palaestra_trainer.webots.observer import Observer
 from palaestra_trainer.webots.supervisor import Supervisor
 
-# # Two extra steps deliver the messages of a lost wake-up. A sensor that is still silent afterwards has a
+# Two extra steps deliver the messages of a lost wake-up. A sensor that is still silent afterwards has a
 # fault.
 _MOST_EXTRA_STEPS = 2
 
