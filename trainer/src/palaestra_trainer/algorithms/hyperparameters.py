@@ -1,9 +1,9 @@
 """Check the values of hyperparameters against a constructor's signature, and convert them to its types.
 
 A job is YAML, which cannot contain a schedule, a tuple or a class. A job writes a schedule as text, as points
-or as the name of a function, see `schedules` and `own_schedules`. It writes a list for a tuple. Activation
-functions and optimizers have their PyTorch names. For every argument of a policy that is a class, the job may
-write `module:Class`.
+or as the name of a function, see `schedules` and `own_schedules`. For a tuple, the job writes a list.
+Activation functions and optimizers have their PyTorch names. For every argument of a policy that is a class,
+the job may write `module:Class`.
 """
 
 from __future__ import annotations

@@ -30,7 +30,7 @@ from palaestra_trainer.configuration import nearest
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.user_code import imports
 
-# A job cannot set these arguments of the classes as plain hyperparameters. The training loop sets some of
+# A job cannot set these arguments of an algorithm's class as hyperparameters. The training loop sets some of
 # them, and other modules check others. `optimize_memory_usage` does not work with buffers for valid rows,
 # because they store rows of several members in one column.
 OURS = frozenset(

@@ -65,7 +65,7 @@ class StackedFrames(gymnasium.Wrapper[Any, Any, Any, Any]):
     observation comes first. At the beginning of an episode, zeros stand for the missing older observations.
 
     Args:
-        env: the environment; its observation is a Box.
+        env: the environment, whose observation must be a Box.
         frames: number of observations in a stack.
 
     Raises:

@@ -94,8 +94,8 @@ def run(
 ) -> int:
     """Train to the end and return the exit code; resume if the directory has a checkpoint.
 
-    If the run is finished, only report its result. Call this function in the main thread, because that thread
-    receives signals. With `must_resume`, never begin a new run.
+    If the run is already finished, report its result without training. Call this function in the main thread,
+    because that thread receives signals. With `must_resume`, never begin a new run.
     """
     around = AttemptDependencies(
         make_members=make_members,

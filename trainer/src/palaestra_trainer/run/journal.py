@@ -28,7 +28,7 @@ class Journal:
 
     Args:
         path: the file; it may be missing.
-        clock: returns seconds from any starting point.
+        clock: a function that returns seconds from any starting point.
     """
 
     def __init__(self, path: Path, clock: Callable[[], float] = time.monotonic) -> None:

@@ -29,7 +29,7 @@ class FaultLog:
     Args:
         path: the file; it may be missing.
         attempt: number of the attempt.
-        clock: returns seconds from any starting point.
+        clock: a function that returns seconds from any starting point.
     """
 
     def __init__(self, path: Path, attempt: int, clock: Callable[[], float] = time.monotonic) -> None:

@@ -25,9 +25,9 @@ class GoodputLedger:
     transport.
 
     Args:
-        clock: returns seconds from any starting point.
-        waited: returns the seconds that the calling thread has waited for simulators, from any starting
-            point.
+        clock: a function that returns seconds from any starting point.
+        waited: a function that returns the seconds that the calling thread has waited for simulators, from
+            any starting point.
     """
 
     def __init__(

@@ -72,7 +72,7 @@ class _Turn(greenlet):
         return ended
 
     def _do_works(self) -> None:
-        """Do a work, switch to the parent, and do the next work after the next switch."""
+        """Call `work`, switch to the parent, and repeat both after each switch back."""
         while self.work is not None and self.parent is not None:
             try:
                 self.result = self.work()

@@ -152,7 +152,7 @@ class Webots:
             WrongData: the simulator refuses to pause, or refuses the devices of a robot.
         """
         if self._launcher.ready() and not self.available():
-            self.stop()  # the simulator hangs, and blocks the start of another simulator
+            self.stop()  # the simulator hangs, and must end before another can start
         self._disconnect()
         self._launcher.start()
         self.wait_available()
