@@ -1,4 +1,4 @@
-"""The package that runs in the trainer's container and in notebooks."""
+"""The package for programs in the trainer's container and in notebooks."""
 
 from __future__ import annotations
 
@@ -25,30 +25,30 @@ defer_compiler()
 
 
 def load_policy(run_or_zip: str | Path) -> TrainedPolicy:
-    """Return the policy of a run directory, or of a model zip inside one; see `policies.load_policy`."""
+    """Return the trained policy of a run directory or of its model.zip; see `policies.load_policy`."""
     from palaestra_trainer.run import policies
 
     return policies.load_policy(run_or_zip)
 
 
 def make_env(environment: str | None = None, *, role: str = "Collect", **options: Any) -> FaultTolerantEnv:
-    """Return a gymnasium.Env in its own simulator, for a training loop of any library.
+    """Return a gymnasium.Env that has its own simulator, for a training loop of any library.
 
-    A fault of the simulator ends an episode as truncated, with the last observation before it, reward 0 and
-    `info["palaestra"]["sim_fault"]`. The next `reset` waits until the simulator is restarted, within its
-    restart budget.
+    A fault of the simulator truncates the episode. That step returns the last observation before the fault,
+    reward 0 and `info["palaestra"]["sim_fault"]`. The next `reset` waits until the simulator is restarted, if
+    its restart budget allows that.
 
-    The simulator is that of the newest `Webots` facade of this process that no environment uses, else a free
-    simulator of PALAESTRA_CONFIG. If that variable is not set, as in a notebook, a new simulator is started:
-    a stub, or MuJoCo for `SeeTarget-v0`.
+    If this process has a `Webots` facade that no environment uses, the environment takes the simulator of the
+    newest such facade. Otherwise it takes a free simulator of PALAESTRA_CONFIG. If that variable is not set,
+    as in a notebook, a new simulator is started: the stub, or MuJoCo for `SeeTarget-v0`.
 
     Args:
         environment: id of the environment; by default the environment of PALAESTRA_CONFIG.
         role: the role of the simulator in PALAESTRA_CONFIG, `Collect` or `Evaluate`.
-        options: options of the environment.
+        options: keyword arguments of the environment.
 
     Raises:
-        ConfigurationError: the environment is missing or wrong, or no simulator with the role is free.
+        ConfigurationError: the environment is missing or wrong, or all simulators with the role are in use.
         FaultBudgetSpent: the simulator does not start.
     """
     from palaestra_trainer.fault_tolerant.env import FaultTolerantEnv
@@ -61,12 +61,13 @@ def make_vec_env(
 ) -> FaultTolerantVectorEnv:
     """Return a gymnasium VectorEnv whose simulators step at the same time; see `make_env`.
 
-    Episodes are reset in their last step (`AutoresetMode.SAME_STEP`). After a fault, that step waits until
-    the simulator is restarted, and the other simulators wait with it.
+    The last step of an episode also resets it (`AutoresetMode.SAME_STEP`). After a fault, this step waits
+    until the faulty simulator is restarted, and the other simulators wait too.
 
     Args:
         environment: see `make_env`.
-        num_envs: number of simulators; by default all with this role in PALAESTRA_CONFIG, else one.
+        num_envs: number of simulators; by default all simulators with this role in PALAESTRA_CONFIG, or one
+            simulator if that variable is not set.
         role: see `make_env`.
         options: see `make_env`.
 
@@ -100,15 +101,17 @@ def make_sb3_vec_env(
 def report(*, step: int, success_rate: float | None = None) -> None:
     """Report the progress of your own training program to /status, /metrics and the operator.
 
-    Call it at least once every `stallDeadlineSeconds`. After the first report, the operator ends a program
-    whose step stays the same for longer. If PALAESTRA_CONFIG is not set, as in a notebook, it does nothing.
+    Call this function at least once every `stallDeadlineSeconds`. After the first report, the operator ends a
+    program whose step does not change within that time. If PALAESTRA_CONFIG is not set, as in a notebook, the
+    function does nothing.
 
     Args:
-        step: environment steps learned from, over all attempts; the program is complete at the job's `steps`.
-        success_rate: success rate of the last evaluation, 0 to 1; None keeps the previous value.
+        step: number of environment steps that the program has learned from in all attempts. The run is
+            complete when this number reaches the job's `steps`.
+        success_rate: success rate of the last evaluation, 0 to 1; None keeps the rate of the previous report.
 
     Raises:
-        ValueError: the step is negative, or the rate not within 0 to 1.
+        ValueError: the step is negative, or the rate is not within 0 to 1.
         ConfigurationError: the configuration cannot be read, or its statusAddress is in use.
     """
     from palaestra_trainer.run import custom_program

@@ -1,4 +1,4 @@
-"""The errors of a trainer, and whether a retry can help.
+"""The errors of a trainer; the tree says for each error whether a retry can help.
 
 TrainerError
 ├── ConfigurationError   the configuration is wrong; retrying cannot help     exit 2
@@ -29,8 +29,8 @@ import traceback
 from typing import ClassVar, Literal
 
 FaultKind = Literal["dead", "hung", "wrong_data"]
-# Lines of these libraries do not show the mistake of a job's author: they only call the author's code, or
-# are called by it.
+# A mistake of a job's author is not in the lines of these libraries. They only call the author's code, or the
+# author's code calls them.
 _LIBRARIES = {
     "gymnasium",
     "importlib",
@@ -43,7 +43,7 @@ _LIBRARIES = {
 
 
 def fact_of(error: BaseException) -> str:
-    """Return class, text, file and line of an error that the code of a job's author raised."""
+    """Return class, text, file and line of an error in the code of a job's author."""
     fact = f"{type(error).__name__}: {error}"
     frames = (
         (frame.f_globals.get("__name__", "").partition(".")[0], frame.f_code.co_filename, line)
@@ -62,18 +62,18 @@ class ConfigurationError(TrainerError, ValueError):
 
 
 class MasterLost(TrainerError, ConnectionError):
-    """The ROS master does not respond; its names are lost and nodes do not register again."""
+    """The ROS master does not respond. Its registrations are lost, and nodes do not register again."""
 
 
 class UnreadableAnswer(TrainerError, ValueError):
     """The ROS master or a node sent an invalid ROS response.
 
-    Services and topics convert it to `WrongData`, a fault of the simulator that they belong to.
+    Services and topics convert this error to `WrongData`, a fault of their simulator.
     """
 
 
 class CallbackFailed(TrainerError, RuntimeError):
-    """A callback of the job raised an error, which is the `__cause__` of this one."""
+    """A callback of the job raised an error; `__cause__` holds that error."""
 
 
 class FaultBudgetSpent(TrainerError, RuntimeError):
@@ -81,11 +81,11 @@ class FaultBudgetSpent(TrainerError, RuntimeError):
 
 
 class Diverged(TrainerError, ArithmeticError):
-    """A number of the environment, a loss or a weight is NaN or infinite; retrying from here cannot help."""
+    """A reward, an observation, a loss or a weight is NaN or infinite; a retry from this step cannot help."""
 
 
 class ExportError(TrainerError, RuntimeError):
-    """The exported policy acts differently from the policy in model.zip; nothing was written."""
+    """The exported policy acts differently from the policy in model.zip; the file was not written."""
 
 
 class NoSuchSensor(TrainerError, NotImplementedError):
@@ -97,18 +97,18 @@ class MissingCapability(ConfigurationError, NoSuchSensor):
 
 
 class NoReading(TrainerError, RuntimeError):
-    """A sensor has sent no reading yet; the first readings arrive with its first sampling period."""
+    """A sensor has not sent a reading yet; its first reading arrives after one sampling period."""
 
 
 class Paused(TrainerError, RuntimeError):
     """The simulation is paused; a step would block its controller forever.
 
-    This is a mistake of the caller: the simulator is healthy, and a restart cannot help.
+    The caller made a mistake: the simulator is healthy, so a restart cannot help.
     """
 
 
 class SimulatorFault(TrainerError):
-    """One simulator failed; restart only that one.
+    """One simulator failed; restart only that simulator.
 
     Attributes:
         simulator: the ROS name or group name of the simulator.
@@ -122,33 +122,34 @@ class SimulatorFault(TrainerError):
 
 
 class SimulatorDead(SimulatorFault, ConnectionError):
-    """Its connections are refused or were closed."""
+    """The simulator refuses connections, or its connections were closed."""
 
     kind = "dead"
 
 
 class SimulatorRefused(SimulatorDead):
-    """Its process ended with the exit code by which a program refuses its input.
+    """The simulator's process ended with the exit code of a program that refuses its input.
 
     If two processes in a row fail with the same message before the run's first step, the job is wrong.
     """
 
 
 class SimulatorHung(SimulatorFault, TimeoutError):
-    """It is connected and does not respond within the deadline."""
+    """The simulator is connected and does not respond within the deadline."""
 
     kind = "hung"
 
 
 class WrongData(SimulatorFault, ValueError):
-    """It sent invalid data."""
+    """The simulator sent invalid data."""
 
     kind = "wrong_data"
 
 
 class WorldMisfit(WrongData):
-    """Its world lacks a device or node that the program needs, as a complete list or a clear response shows.
+    """The simulator's world lacks a device or node that the program needs.
 
-    If an earlier process had a right world, this is a fault like others. If two processes in a row report it
-    before the run's first step, the configuration is wrong.
+    The simulator's complete list of devices or its response shows that the device or node is missing. If an
+    earlier process had the right world, a restart can help. If two processes in a row lack it before the
+    run's first step, the configuration is wrong.
     """

@@ -1,6 +1,6 @@
-"""The hyperparameters that choose a buffer, with the names of Stable-Baselines3 and rl-baselines3-zoo.
+"""The hyperparameters that choose a buffer; their names are those of Stable-Baselines3 and RL-Zoo.
 
-A job names HerReplayBuffer, or a class of its author as `module:Class`.
+A job may choose HerReplayBuffer, or a buffer class of its author as `module:Class`.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from palaestra_trainer.job.user_code import imports
 
 @dataclass(frozen=True, slots=True)
 class BufferKind:
-    """A kind of buffer, and the two hyperparameters that choose one.
+    """A type of buffer, and the two hyperparameters that choose a buffer of this type.
 
     Attributes:
         chooser: the hyperparameter that names a class.
-        options: the hyperparameter with the keyword arguments of that class.
-        base: the class that it must extend.
-        by_name: classes that are named without a module.
+        options: the hyperparameter that holds the keyword arguments of that class.
+        base: the class that the named class must extend.
+        by_name: classes that a job names without a module.
     """
 
     chooser: str
@@ -38,7 +38,7 @@ class BufferKind:
 
     @property
     def names(self) -> tuple[str, str]:
-        """Both hyperparameters."""
+        """The names of both hyperparameters."""
         return self.chooser, self.options
 
 
@@ -49,13 +49,13 @@ NAMES = (*REPLAY.names, *ROLLOUT.names)
 
 
 def mistakes(given: Mapping[str, Any]) -> Iterator[str]:
-    """Yield a message with field, fact and remedy for each of these hyperparameters that is wrong."""
+    """Yield a message with field, fact and remedy for each wrong hyperparameter of a buffer."""
     for kind in KINDS:
         yield from _mistakes(kind, given.get(kind.chooser), given.get(kind.options))
 
 
 def arguments(given: Mapping[str, Any], observation: spaces.Space[Any]) -> dict[str, Any]:
-    """Return the keyword arguments of the algorithm's class for these hyperparameters.
+    """Return the keyword arguments that these hyperparameters set for the algorithm's class.
 
     Raises:
         ConfigurationError: the buffer does not accept the environment's observation.
@@ -104,11 +104,11 @@ def _unknown(field: str, options: Mapping[str, Any], known: Mapping[str, object]
 
 
 def _own(kind: BufferKind, name: str) -> type[BaseBuffer]:
-    """Return a subclass of the class that `name` names; it stores or samples only valid rows."""
+    """Return a subclass of the class `name`; the subclass stores or samples only valid rows."""
     return own_buffers.with_valid_rows(imports.class_named(name, f"{FIELD}.{kind.chooser}", kind.base))
 
 
 def _options(cls: type[BaseBuffer]) -> dict[str, object]:
-    """Return the keyword arguments that an author's class adds; the algorithm sets those of its base."""
+    """Return the keyword arguments that an author's class adds to those that the algorithm sets."""
     given = {*parameters(ReplayBuffer), *parameters(RolloutBuffer)}
     return {name: found for name, found in parameters(cls).items() if name not in given}

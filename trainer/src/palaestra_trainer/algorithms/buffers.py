@@ -1,8 +1,7 @@
-"""Buffers that keep invalid rows out of every loss.
+"""Buffers of which algorithms sample only valid rows, so a fault does not affect a loss.
 
-A row is invalid if its simulator broke during the step. The episode is truncated
-before it: the value of the last valid row is bootstrapped, so the fault is not a
-penalty.
+A row is invalid if its simulator failed during the step. The episode is truncated before an invalid row. The
+learner bootstraps the value after the last valid row, so the policy is not punished for the fault.
 """
 
 from __future__ import annotations
@@ -30,7 +29,8 @@ def valid_rows(infos: Sequence[dict[str, Any]]) -> np.ndarray:
 
 
 COLUMNS = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
-# With this size a million rows need only some dozens of files, and a few new steps are cheap to write.
+# With chunks of this size, a million rows need only some dozens of files, and a few new rows are cheap to
+# save.
 CHUNK_BYTES = 4 << 20
 
 
@@ -38,10 +38,11 @@ class Positions(NamedTuple):
     """The write positions of a replay buffer.
 
     Attributes:
-        next: row for the next step.
-        full: whether every row is in use; if not, only the rows before `next` are.
-        newest: for each member the row of its last step; None if no row is.
-        columns: for each member its next row and whether its column is full; empty for a flat buffer.
+        next: number of the row for the next step.
+        full: whether every row is in use; if not, only the rows before `next` are in use.
+        newest: for each member the row of its last step; None if the buffer does not hold that row.
+        columns: for each member the next row of its column, and whether that column is full; empty for a
+            buffer without columns.
     """
 
     next: int
@@ -51,21 +52,20 @@ class Positions(NamedTuple):
 
     @classmethod
     def from_json(cls, content: Sequence[Any]) -> Positions:
-        """Return the positions that were written as JSON."""
+        """Return the positions from their JSON data."""
         row, full, newest, columns = content
         return cls(row, full, tuple(newest), tuple((at, filled) for at, filled in columns))
 
 
 class ValidReplayBuffer(ReplayBuffer):
-    """A replay buffer of valid rows, one after the other, of all members.
+    """A replay buffer that stores the valid rows of all members one after the other.
 
-    Storage is flat (one column), so that a step of n members may append fewer
-    than n rows. Rows are kept on disk in chunks; only changed chunks are written
-    again.
+    The buffer has only one column, because a step of n members may append fewer than n rows. A checkpoint
+    stores the rows in chunks, and only changed chunks are written again.
 
     Attributes:
-        chunk_rows: rows of one chunk; the last one may have fewer.
-        changed: numbers of the chunks that have changed; clear it after saving them.
+        chunk_rows: number of rows of one chunk; the last chunk may have fewer.
+        changed: numbers of the chunks that have changed; clear this set after saving the chunks.
     """
 
     def __init__(
@@ -84,7 +84,7 @@ class ValidReplayBuffer(ReplayBuffer):
 
     @property
     def positions(self) -> Positions:
-        """The write positions of the buffer; set it to restore them."""
+        """The write positions of the buffer; set this property to restore them."""
         return Positions(self.pos, self.full, tuple(self._newest))
 
     @positions.setter
@@ -105,11 +105,11 @@ class ValidReplayBuffer(ReplayBuffer):
         done: np.ndarray,
         infos: list[dict[str, Any]],
     ) -> None:
-        """Append the valid rows; the row before an invalid one ends as truncated."""
+        """Append the valid rows of a step; before an invalid row, mark the member's last row as truncated."""
         for row, info in enumerate(infos):
             if is_valid(info):
                 one = slice(row, row + 1)
-                # In a full buffer this row may have been the newest one of another member.
+                # In a full buffer, this row may overwrite the newest row of another member.
                 self._newest = [None if newest == self.pos else newest for newest in self._newest]
                 self._newest[row] = self.pos
                 self.changed.add(self.pos // self.chunk_rows)
@@ -118,11 +118,11 @@ class ValidReplayBuffer(ReplayBuffer):
                 self._truncate(self._newest[row])
 
     def rows(self, start: int = 0, stop: int | None = None) -> dict[str, np.ndarray]:
-        """Return the rows from `start` to `stop` by column, as views of memory of shape (rows, 1, ...)."""
+        """Return the rows from `start` to `stop` by column, as views of shape (rows, 1, ...)."""
         return {name: column[start:stop] for name, column in self._columns().items()}
 
     def fill(self, start: int, rows: Mapping[str, np.ndarray]) -> None:
-        """Write back rows that `rows` returned; the write positions do not change.
+        """Restore rows that `rows` returned, from row `start` on; the write positions do not change.
 
         Raises:
             ValueError: the rows have another shape.
@@ -131,7 +131,7 @@ class ValidReplayBuffer(ReplayBuffer):
             column[start : start + len(rows[name])] = rows[name]
 
     def keep(self, kept: np.ndarray) -> None:
-        """Drop all rows in use except the `kept` ones, which move to the start, oldest first."""
+        """Keep only the `kept` rows of those in use, and move them to the start, oldest first."""
         order = np.roll(np.arange(self.size()), -self.pos if self.full else 0)
         order = order[kept[order]]
         self.fill(0, {name: column[order] for name, column in self.rows().items()})
@@ -140,7 +140,7 @@ class ValidReplayBuffer(ReplayBuffer):
         self.changed = set(range(-(-self.size() // self.chunk_rows)))
 
     def _columns(self) -> dict[str, np.ndarray]:
-        """Return the whole columns by name, in the order of `COLUMNS`; a Dict has a column for each key."""
+        """Return all columns by name, in the order of `COLUMNS`; each key of a Dict has its own column."""
         columns: dict[str, np.ndarray] = {}
         for name in COLUMNS:
             columns |= by_name(getattr(self, name), name)
@@ -154,7 +154,7 @@ class ValidReplayBuffer(ReplayBuffer):
 
 
 class ValidDictReplayBuffer(ValidReplayBuffer, DictReplayBuffer):
-    """The same for observations that are a Dict."""
+    """A replay buffer of valid rows for observations that are a Dict."""
 
 
 class ValidRolloutBuffer(RolloutBuffer):
@@ -163,20 +163,20 @@ class ValidRolloutBuffer(RolloutBuffer):
     valid: np.ndarray
 
     def reset(self) -> None:
-        """Empty the buffer; every row is valid until `mark` changes that."""
+        """Empty the buffer; every row counts as valid until `mark` sets its mask."""
         self.valid = np.ones((self.buffer_size, self.n_envs), dtype=bool)
         super().reset()
 
     def mark(self, valid: np.ndarray) -> None:
-        """Set the mask of valid rows for the next added step; shape (n_envs,)."""
+        """Set the mask of valid rows for the step that `add` stores next; shape (n_envs,)."""
         if self.pos < self.buffer_size:
             self.valid[self.pos] = valid
 
     def compute_returns_and_advantage(self, last_values: torch.Tensor, dones: np.ndarray) -> None:
-        """Compute both as for a rollout that was truncated before each invalid row.
+        """Compute returns and advantages as if the rollout was truncated before each invalid row.
 
-        An invalid row ends its episode. Its reward is set to its own value, so its error is 0. So the row
-        before it uses only the value of the state between them.
+        An invalid row ends its episode. The reward of that row is set to the row's value estimate, so its
+        advantage is 0. So the row before bootstraps from the value of the state between both rows.
         """
         self.rewards[~self.valid] = self.values[~self.valid]
         super().compute_returns_and_advantage(last_values, dones)
@@ -184,24 +184,24 @@ class ValidRolloutBuffer(RolloutBuffer):
     def get(self, batch_size: int | None = None) -> Generator[Any, None, None]:
         """Yield minibatches of valid rows in random order."""
         if not self.generator_ready:
-            next(super().get(1))  # flattens the rows of all members into one column
+            next(super().get(1))  # this call flattens the rows of all members into one column
         rows = np.random.permutation(np.flatnonzero(self.swap_and_flatten(self.valid)))
         for batch in self._parts(rows, batch_size or max(len(rows), 1)):
             yield self._get_samples(batch)
 
     def _parts(self, rows: np.ndarray, size: int) -> Iterator[np.ndarray]:
-        """Yield `rows` in parts of `size`; the last one may be smaller."""
+        """Yield `rows` in parts of `size`; the last part may be smaller."""
         return (rows[start : start + size] for start in range(0, len(rows), size))
 
 
 class ValidDictRolloutBuffer(ValidRolloutBuffer, DictRolloutBuffer):
-    """The same for observations that are a Dict."""
+    """A rollout buffer with invalid rows for observations that are a Dict."""
 
 
 def batches(rows: np.ndarray, size: int) -> Iterator[np.ndarray]:
-    """Yield `rows` in parts of `size`; a single last row joins the part before it.
+    """Yield `rows` in parts of `size`; add a single last row to the part before it.
 
-    The deviation of a single advantage is NaN.
+    A part with a single row would have one advantage, whose standard deviation is NaN.
     """
     for start in range(0, max(len(rows) - 1, 1), size):
         is_last = start + size >= len(rows) - 1

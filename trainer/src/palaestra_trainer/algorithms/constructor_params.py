@@ -1,4 +1,4 @@
-"""The parameters of classes that pass keyword arguments to the class that they extend."""
+"""The constructor parameters of a class whose `**kwargs` go to the class that it extends."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Configurable = type[BaseAlgorithm] | type[BasePolicy]
 
 @cache
 def parameters(cls: Configurable) -> Mapping[str, inspect.Parameter]:
-    """Return the named parameters of a class by name, with those that its `**kwargs` pass on."""
+    """Return the named parameters of a class by name, including parameters behind its `**kwargs`."""
     found: dict[str, inspect.Parameter] = {}
     for constructor in _constructors(cls):
         these = named(inspect.signature(constructor))
@@ -28,7 +28,7 @@ def parameters(cls: Configurable) -> Mapping[str, inspect.Parameter]:
 
 
 def types(cls: Configurable) -> Mapping[str, Any]:
-    """Return the annotations of these parameters; Any if an annotation is missing or cannot be resolved."""
+    """Return the annotations of `parameters(cls)`; Any if an annotation is missing or cannot be resolved."""
     found: dict[str, Any] = {}
     for constructor in _constructors(cls):
         found = _hints(constructor) | found
@@ -36,7 +36,7 @@ def types(cls: Configurable) -> Mapping[str, Any]:
 
 
 def _constructors(cls: type[object]) -> Iterator[Any]:
-    """Yield the constructors that get arguments, from the class to the first one without `**kwargs`."""
+    """Yield the constructors of a class and its ancestors, up to the first without `**kwargs`."""
     for ancestor in cls.__mro__:
         constructor = vars(ancestor).get("__init__")
         if constructor is None:

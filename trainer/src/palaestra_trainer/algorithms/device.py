@@ -1,7 +1,7 @@
-"""The device of a model's networks: the CPU, unless a job requests a GPU and PyTorch finds one.
+"""Choose the device of a model: the CPU, unless a job requests a GPU and PyTorch finds a GPU.
 
-The CPU is the default even with a GPU. Networks of some hundred units learn faster on it. Only on the CPU
-does a resumed run end with exactly the same numbers.
+The CPU is the default even if the node has a GPU, because networks of some hundred units learn faster on the
+CPU. A resumed run ends with exactly the same numbers only on the CPU.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ log = structlog.get_logger(__name__)
 
 
 def usable(wanted: Device) -> Device:
-    """Return the device to use: `wanted`, or the CPU if PyTorch finds no GPU, which is logged."""
+    """Return the wanted device; if PyTorch does not find a GPU, log a warning and return the CPU."""
     if wanted == "cuda" and not torch.cuda.is_available():
         log.warning(
             "PyTorch sees no GPU, so the CPU is used",

@@ -1,9 +1,10 @@
-"""Detect NaN and infinite numbers in a learner, at the update that produced them.
+"""Detect NaN and infinite numbers in a model right after the update that produced them.
 
-After each update, its losses and every learned tensor are checked: one norm per tensor, all in one call.
-The check takes 0.05 to 0.2 ms: 0.6 % of an update of DQN, 0.04 % of one of PPO and 2 % of one of A2C, whose
-rollout of five steps takes as long as its update. A model does not act, and is not evaluated or saved, before
-this check. `palaestra_trainer.simulators.finite_check` checks observations and rewards.
+After each update, the losses and every learned tensor are checked. One call computes the norms of all
+tensors. The check takes 0.05 to 0.2 ms, which is 0.6 % of an update of DQN and 0.04 % of an update of PPO.
+For A2C it is 2 % of an update; a rollout of A2C has five steps and takes as long as the update. The model
+acts, is evaluated and is saved only after this check. `palaestra_trainer.simulators.finite_check` checks
+observations and rewards.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ REMEDY = "lower algorithm.hyperparameters.learning_rate or clip gradients harder
 
 
 class Learner:
-    """The parts of a model that learning changes: its losses, and its learned tensors."""
+    """The values of a model that learning changes: its losses, and its learned tensors."""
 
     def __init__(self, model: BaseAlgorithm) -> None:
         self._model = model
@@ -31,16 +32,17 @@ class Learner:
         self._tensors: Mapping[str, torch.Tensor] = dict(model.policy.named_parameters()) | own
 
     def check(self, step: int) -> None:
-        """Check that every number is finite.
+        """Check that all losses and learned tensors are finite.
 
         Raises:
-            Diverged: a number is not; the message names the step, and the losses and tensors with it.
+            Diverged: a number is NaN or infinite; the message names the step, and the losses and tensors that
+                hold it.
         """
         if found := self.not_finite():
             raise Diverged(f"step {step}: {found}; {REMEDY}")
 
     def not_finite(self) -> str:
-        """Return the losses and tensors that hold NaN or infinity, as text; "" if all are finite."""
+        """Return the names of losses and tensors that hold NaN or infinity, as text; "" if all are finite."""
         losses = list(_wrong_losses(self._model.logger.name_to_value))
         tensors = list(self._wrong_tensors())
         more = f" and {len(tensors) - 1} other tensors" if len(tensors) > 1 else ""
@@ -49,7 +51,8 @@ class Learner:
     def _wrong_tensors(self) -> Iterator[str]:
         if math.isfinite(get_total_norm(self._tensors.values()).item()):
             return
-        # The norm of very large finite numbers may be infinite, so each suspect tensor is checked again.
+        # The norm of very large finite numbers may be infinite, so the numbers of each tensor are checked
+        # too.
         for name, tensor in self._tensors.items():
             numbers = tensor.detach()
             wrong = numbers[~torch.isfinite(numbers)]
@@ -58,7 +61,7 @@ class Learner:
 
 
 def _wrong_losses(values: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the losses that are not finite; other values, such as an explained variance, may be infinite."""
+    """Yield the losses that are not finite. Other values may be infinite, such as the explained variance."""
     for name, value in values.items():
         if name.startswith("train/") and name.endswith("loss") and not math.isfinite(value):
             yield f"{name} is {value}"

@@ -15,9 +15,11 @@ class Batch:
     """The steps of some whole episodes, one after the other.
 
     Attributes:
-        observations: the observation before each step, shape (steps, *observation); for a Dict, by key.
-        actions: the action of each step, before it is clipped to its bounds; shape (steps, *action).
-        returns: discounted reward from each step to its episode's end, shape (steps,), float32.
+        observations: the observation before each step, shape (steps, *observation); for a Dict, an array for
+            each key.
+        actions: the action of each step, not clipped to the bounds of the space; shape (steps, *action).
+        returns: for each step the discounted sum of the rewards until the end of its episode; shape (steps,),
+            float32.
     """
 
     observations: Observations
@@ -35,9 +37,9 @@ class _Episode:
 class EpisodeRecorder:
     """Collects up to `wanted` whole valid episodes of each of `environments` environments.
 
-    When an environment has `wanted` episodes, its further ones are dropped.
-    Episodes with an invalid row are dropped too. An environment whose last row was
-    invalid counts as absent, perhaps permanently: the others do not wait for it.
+    When an environment has `wanted` episodes, its further episodes are dropped. Episodes with an invalid row
+    are dropped too. An environment whose last row was invalid counts as absent. The update does not wait for
+    an absent environment, because its simulator may never return.
     """
 
     def __init__(self, environments: int, wanted: int) -> None:
@@ -48,13 +50,13 @@ class EpisodeRecorder:
 
     @property
     def complete(self) -> bool:
-        """Whether every environment has `wanted` episodes, except absent ones."""
+        """Whether every environment that is not absent has `wanted` episodes."""
         ready = [len(episodes) == self._wanted for episodes in self._whole]
         return any(ready) and all(done or away for done, away in zip(ready, self._away, strict=True))
 
     @property
     def longest(self) -> int:
-        """Steps of the longest episode that has not ended."""
+        """The number of steps of the longest open episode."""
         return max(len(episode.rewards) for episode in self._current)
 
     def add(
@@ -65,7 +67,7 @@ class EpisodeRecorder:
         dones: np.ndarray,
         valid: np.ndarray,
     ) -> None:
-        """Add one vector step; every array has a row for each environment."""
+        """Add one vector step; each array has one row per environment."""
         for index, (episode, whole) in enumerate(zip(self._current, self._whole, strict=True)):
             self._away[index] = not valid[index]
             if self._away[index]:
@@ -91,7 +93,7 @@ class EpisodeRecorder:
 
 
 def returns_to_go(rewards: list[float], gamma: float) -> np.ndarray:
-    """Return for each step the discounted sum of its reward and all later ones, float32."""
+    """Return for each step the discounted sum of its reward and of all later rewards, float32."""
     returns = np.zeros(len(rewards), dtype=np.float32)
     later = 0.0
     for step in range(len(rewards) - 1, -1, -1):

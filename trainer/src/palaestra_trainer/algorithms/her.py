@@ -1,9 +1,9 @@
-"""Hindsight experience replay: learning from goals that an episode reached by accident.
+"""Hindsight experience replay, which learns from goals that an episode reached by accident.
 
-A job chooses it by hyperparameters of Stable-Baselines3 and rl-baselines3-zoo: `replay_buffer_class` and
-`replay_buffer_kwargs`. Goals are drawn from whole episodes. So each member has its own column, with its own
-write position, and a fault closes the episode at its last valid row. Source of the method: Andrychowicz et
-al. (2017), https://arxiv.org/abs/1707.01495
+A job chooses this method by two hyperparameters of Stable-Baselines3 and rl-baselines3-zoo:
+`replay_buffer_class` and `replay_buffer_kwargs`. New goals are drawn from whole episodes. So each member has
+its own column and write position. A fault closes the member's episode at its last valid row. Source of the
+method: Andrychowicz et al. (2017), https://arxiv.org/abs/1707.01495
 """
 
 from __future__ import annotations
@@ -52,11 +52,11 @@ def mistakes(options: Mapping[str, Any], field: str) -> Iterator[str]:
 
 
 def refuse_other_observations(observation: spaces.Space[Any]) -> None:
-    """Check that an observation has goals.
+    """Check that an observation holds an achieved and a desired goal.
 
     Raises:
-        ConfigurationError: it is not a Dict with the keys of a goal environment, or its goals have different
-            shapes.
+        ConfigurationError: the observation is not a Dict with the keys of a goal environment, or the two
+            goals have different shapes.
     """
     parts = observation.spaces if isinstance(observation, spaces.Dict) else {}
     if not parts.keys() >= {"observation", *GOALS}:
@@ -72,9 +72,10 @@ def refuse_other_observations(observation: spaces.Space[Any]) -> None:
 
 
 class ValidHerReplayBuffer(ValidDictReplayBuffer, HerReplayBuffer):
-    """Hindsight experience replay of valid rows, with a column for each member.
+    """A buffer for hindsight experience replay that stores valid rows, with a column for each member.
 
-    Only rows of closed episodes are sampled. An episode that is longer than its column keeps its last rows.
+    Only rows of closed episodes are sampled. Of an episode that is longer than its column, only the last rows
+    are kept.
     """
 
     def __init__(
@@ -90,7 +91,8 @@ class ValidHerReplayBuffer(ValidDictReplayBuffer, HerReplayBuffer):
         HerReplayBuffer.__init__(
             self, buffer_size, observation_space, action_space, env, device=device, n_envs=n_envs, **options
         )
-        # Infos are not stored: checkpoints would have to pickle them, and `compute_reward` does not get them.
+        # Infos are not stored, because checkpoints would have to pickle them. So `compute_reward` does not
+        # get infos.
         self.infos = np.empty((0, n_envs))
         self._next = [0] * n_envs
         self._filled = [False] * n_envs
@@ -116,11 +118,12 @@ class ValidHerReplayBuffer(ValidDictReplayBuffer, HerReplayBuffer):
         self._next = [row for row, _ in positions.columns]
         self._filled = [filled for _, filled in positions.columns]
         for column, start in enumerate(positions.newest):
-            # Without a start, the episode does not continue: it is never closed, so its rows are not sampled.
+            # Without a start, the open episode does not continue. It is never closed, so its rows are not
+            # sampled.
             rows = 0 if start is None else (self._next[column] - start) % self.buffer_size
             self._under_way[column] = self.buffer_size if start == self._next[column] else rows
             open_rows = self._rows_under_way(column)
-            if self.ep_length[open_rows, column].any():  # the episode was closed in a dropped rollout
+            if self.ep_length[open_rows, column].any():  # a dropped rollout had closed the episode
                 self._set_episode(open_rows, column, self._start(column), 0)
 
     def size(self) -> int:
@@ -128,7 +131,7 @@ class ValidHerReplayBuffer(ValidDictReplayBuffer, HerReplayBuffer):
         return max(map(self._used, range(self.n_envs)))
 
     def can_sample(self) -> bool:
-        """Return whether an episode is closed; log the first time that this is False."""
+        """Return whether at least one episode is closed; log the first False result."""
         ready = bool((self.ep_length > 0).any())
         if not ready and not self._waited:
             self._waited = True
@@ -144,7 +147,7 @@ class ValidHerReplayBuffer(ValidDictReplayBuffer, HerReplayBuffer):
         done: np.ndarray,
         infos: list[dict[str, Any]],
     ) -> None:
-        """Append each valid row to its member's column; an invalid row closes the episode before it."""
+        """Append each valid row to its member's column; if a row is invalid, close the member's episode."""
         actions = action.reshape((self.n_envs, self.action_dim))
         for column, info in enumerate(infos):
             if not is_valid(info):
@@ -164,7 +167,7 @@ class ValidHerReplayBuffer(ValidDictReplayBuffer, HerReplayBuffer):
                 self._close(column)
 
     def keep(self, kept: np.ndarray) -> None:
-        """Drop every episode with a row that is not `kept`."""
+        """Drop every episode that has a row outside of `kept`."""
         for column in range(self.n_envs):
             lost = np.flatnonzero(~kept[: self._used(column)])
             for start in set(self.ep_start[lost, column].tolist()):
@@ -195,7 +198,7 @@ class ValidHerReplayBuffer(ValidDictReplayBuffer, HerReplayBuffer):
         self._under_way[column] = min(self._under_way[column] + 1, self.buffer_size)
 
     def _forget_episode_from(self, row: int, column: int) -> None:
-        """Exclude `row` and the later rows of its old episode from sampling, because `row` is overwritten."""
+        """Exclude `row` and the later rows of its old episode from sampling, before `row` is overwritten."""
         length = int(self.ep_length[row, column])
         if length:
             rest = length - (row - int(self.ep_start[row, column])) % self.buffer_size

@@ -1,8 +1,9 @@
-"""Check the values of hyperparameters against a signature, and convert them to its types.
+"""Check the values of hyperparameters against a constructor's signature, and convert them to its types.
 
-A job cannot contain a schedule, a tuple or a class. Schedules are text, points or names of functions, see
-`schedules` and `own_schedules`, and a list is written for a tuple. Activation functions and optimizers have
-their PyTorch names, and any class that a policy takes may be written as `module:Class`.
+A job is YAML, which cannot contain a schedule, a tuple or a class. A job writes a schedule as text, as points
+or as the name of a function, see `schedules` and `own_schedules`. For a tuple, the job writes a list.
+Activation functions and optimizers have their PyTorch names. For every argument of a policy that is a class,
+the job may write `module:Class`.
 """
 
 from __future__ import annotations
@@ -36,13 +37,13 @@ CLASSES: Mapping[str, Mapping[str, type[Any]]] = {
         for it in (optim.Adam, optim.AdamW, optim.NAdam, optim.RAdam, optim.RMSprop, optim.SGD)
     },
 }
-# Some arguments of a policy must be a subclass of these.
+# For each of these arguments of a policy, the job must name a subclass of the class on the right.
 BASES: Mapping[str, type[Any]] = {
     "activation_fn": nn.Module,
     "optimizer_class": optim.Optimizer,
     "features_extractor_class": BaseFeaturesExtractor,
 }
-# Files of RL-Zoo write PyTorch's classes with a module, by any of its usual names.
+# Files of RL-Zoo write PyTorch's classes with their module, such as `th.nn.Tanh` or `nn.Tanh`.
 _MODULE = re.compile(r"^((torch|th)\.)?(nn|optim)\.(?=\w+$)")
 _GIVEN = frozenset({"self", "observation_space", "action_space", "lr_schedule", "use_sde", "return"})
 _WORDS = {int: "a whole number", float: "a number", bool: "true or false", str: "text", type(None): "null"}
@@ -51,7 +52,7 @@ _WORDS = {int: "a whole number", float: "a number", bool: "true or false", str: 
 def mistakes(
     cls: type[BaseAlgorithm], policy: type[BasePolicy], hyperparameters: Mapping[str, Any]
 ) -> Iterator[str]:
-    """Yield a message with field, fact and remedy for each value that the class or its policy refuses."""
+    """Yield a message with field, fact and remedy for each value that the class or its policy rejects."""
     known = types(cls)
     for name, value in hyperparameters.items():
         annotation = known.get(name, Any)
@@ -64,10 +65,10 @@ def mistakes(
 
 
 def arguments(cls: type[BaseAlgorithm], hyperparameters: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the keyword arguments of the class for these hyperparameters.
+    """Return the keyword arguments that these hyperparameters set for the class.
 
     Raises:
-        ConfigurationError: a class that they name cannot be imported.
+        ConfigurationError: a class that a hyperparameter names cannot be imported.
     """
     known = types(cls)
     chosen = {name: _argument(name, value, known.get(name, Any)) for name, value in hyperparameters.items()}
@@ -77,7 +78,7 @@ def arguments(cls: type[BaseAlgorithm], hyperparameters: Mapping[str, Any]) -> d
 
 
 def policy_class(cls: type[BaseAlgorithm], named: str | type[BasePolicy] | None) -> type[BasePolicy]:
-    """Return the policy whose arguments a job may set: the one that it names, else the one for numbers."""
+    """Return the policy whose arguments a job may set: the job's own policy, or else the MLP policy."""
     if isinstance(named, type):
         return named
     aliases = cls.policy_aliases
@@ -133,9 +134,9 @@ def _mistakes_of_schedule(field: str, name: str) -> Iterator[str]:
 
 
 def _class(argument: str, name: Any) -> type[Any] | None:
-    """Return the class for a policy's argument: `module:Class`, or a PyTorch name in upper or lower case.
+    """Return the class that a policy's argument names: `module:Class`, or a PyTorch name in any case.
 
-    The name may have its module, as in `torch.nn.Tanh`, `th.nn.Tanh` or `nn.Tanh`.
+    A PyTorch name may include its module, as in `torch.nn.Tanh`, `th.nn.Tanh` or `nn.Tanh`.
     """
     if imports.names_class(name):
         return imports.class_named(name, f"{FIELD}.policy_kwargs.{argument}", BASES.get(argument, object))
@@ -149,7 +150,7 @@ def _bare(name: str) -> str:
 
 
 def _refused(value: Any, annotation: Any) -> str:
-    """Return the reason why a value does not match an annotation, as text; "" if it matches."""
+    """Return the reason why a value does not match an annotation, as text; "" if the value matches."""
     if get_origin(annotation) is type:
         return f"{value!r} is refused; name a class as module:Class"
     config = ConfigDict(arbitrary_types_allowed=True)
@@ -183,7 +184,7 @@ def _kinds(annotation: Any) -> set[Any]:
 
 
 def _words(annotation: Any) -> str:
-    """Return the accepted values of an annotation, as text for a person who writes YAML."""
+    """Return the values that an annotation accepts, in the words of YAML."""
     origin, parts = get_origin(annotation), get_args(annotation)
     if annotation in _WORDS:
         return _WORDS[annotation]

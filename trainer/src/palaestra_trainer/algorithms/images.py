@@ -1,7 +1,7 @@
-"""Image observations: their network, and the order of their channels.
+"""The network for image observations, and the order of their channels.
 
-Environments return images with channels last. Stable-Baselines3 transposes them for PyTorch, so its models
-get channels first. A checkpoint keeps the layout of the environments.
+Environments return images with channels last. Stable-Baselines3 transposes these images for PyTorch, so its
+models get images with channels first. A checkpoint stores images in the layout of the environments.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ from palaestra_trainer.job.configuration import Cnn
 
 
 def with_network(policy_kwargs: dict[str, Any], cnn: Cnn | None) -> dict[str, Any]:
-    """Return the policy's arguments, with the network for images if the job sets `cnn`."""
+    """Return the arguments of the policy; if the job sets `cnn`, they include the network for images."""
     if cnn is None:
         return policy_kwargs
-    # As with NatureCNN, features and outputs are connected directly unless `net_arch` names layers.
+    # As with NatureCNN, the output layer follows the features directly, unless the job sets `net_arch`.
     return {"net_arch": [], **policy_kwargs, "features_extractor_class": SmallCnn}
 
 
 def with_channels_first(env: VecEnv) -> VecEnv:
-    """Return an environment whose images have channels first; one without images is returned unchanged.
+    """Return the environment with channels of its images first; without images, return it unchanged.
 
-    Otherwise Stable-Baselines3 would transpose after the normalizer, whose statistics would then have another
-    layout.
+    Without this wrapper, Stable-Baselines3 would transpose the images after the normalizer. The statistics of
+    the normalizer would then have another layout than the observations of the model.
     """
     last = [image for image in images_in(env.observation_space) if not is_image_space_channels_first(image)]
     return VecTransposeImage(env) if last else env
@@ -64,7 +64,7 @@ def _channels_first(images: np.ndarray) -> np.ndarray:
 
 
 def _transposed(model: BaseAlgorithm) -> Sequence[str | None]:
-    """Return the keys of the images that are transposed for a model; [None]: the observation is one image."""
+    """Return the keys of images that are transposed for a model; [None] if the observation is an image."""
     env = model.get_env()
     wrapper = None if env is None else unwrap_vec_wrapper(env, VecTransposeImage)
     if not isinstance(wrapper, VecTransposeImage):

@@ -1,4 +1,4 @@
-"""Settings with which a run learns little or takes more steps than set; they are logged, not refused."""
+"""Settings that make a run learn little or exceed its steps; the trainer logs them, but accepts the job."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from palaestra_trainer.algorithms.reinforce import REINFORCE
 
 
 def futile(model: BaseAlgorithm, steps: int) -> Iterator[str]:
-    """Yield a line for each setting of a new model that does not fit the steps of its run."""
+    """Yield a warning for each setting of a new model that is unsuitable for the steps of its run."""
     if isinstance(model, OffPolicyAlgorithm) and model.learning_starts >= steps:
         yield (
             f"{FIELD}.learning_starts: {model.learning_starts} is not less than steps ({steps}), so nothing "
@@ -39,6 +39,6 @@ def futile(model: BaseAlgorithm, steps: int) -> Iterator[str]:
 
 
 def _steps_of_rollout(model: OffPolicyAlgorithm) -> int:
-    """Return the steps of all members before an update; 0 if it waits for whole episodes."""
+    """Return the steps of all members before an update; 0 if an update waits for whole episodes."""
     frequency = cast("TrainFreq", model.train_freq)
     return frequency.frequency * model.n_envs if frequency.unit is TrainFrequencyUnit.STEP else 0

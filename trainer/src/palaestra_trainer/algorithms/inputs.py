@@ -1,7 +1,8 @@
-"""Copy the inputs of networks of a job's author.
+"""Give the networks of a job's author copies of their inputs.
 
-Stable-Baselines3 passes a network the same memory that it later stores as a row, and passes the same batch to
-the networks of actor and critic. A network that writes into its input would change the data for learning.
+Stable-Baselines3 passes an array to a network, and later stores the same array as a row. It also passes the
+same batch to the networks of actor and critic. A network that writes into its input would change the data for
+learning.
 """
 
 from __future__ import annotations
@@ -17,12 +18,12 @@ _LIBRARIES = {"palaestra_trainer", "sb3_contrib", "stable_baselines3", "torch"}
 
 
 def give_copies(model: BaseAlgorithm) -> None:
-    """Make each network of the job's author in the policy of `model` get copies of its inputs."""
+    """Pass copies of the inputs to each network of the job's author in the policy of `model`."""
     _hook(model.policy, set())
 
 
 def _hook(module: nn.Module, seen: set[int]) -> None:
-    """Hook the outermost modules of other packages; `seen` has the modules that were visited before."""
+    """Hook the outermost modules of other packages; `seen` holds the ids of visited modules."""
     if id(module) in seen:
         return
     seen.add(id(module))

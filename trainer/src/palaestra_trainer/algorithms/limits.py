@@ -1,6 +1,7 @@
-"""The ranges of hyperparameters; with values outside of them an algorithm fails later, or learns nothing.
+"""The ranges of hyperparameters; with a value outside, an algorithm fails later, or does not learn.
 
-The algorithms check few of them, and most of these only in `learn`, when simulators are up.
+The algorithms themselves check few of these values. They check most of them only in `learn`, after the
+simulators have started.
 """
 
 from __future__ import annotations
@@ -15,12 +16,12 @@ _EPISODES = "episode"
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """The numbers that a hyperparameter may have.
+    """The range of values that a hyperparameter may have.
 
     Attributes:
-        least: the smallest number.
-        most: the greatest number; None: no upper limit.
-        open: whether `least` itself is refused.
+        least: the smallest allowed number.
+        most: the greatest allowed number; None: no upper limit.
+        open: whether `least` itself is not allowed.
     """
 
     least: float
@@ -28,7 +29,7 @@ class Range:
     open: bool = False
 
     def __contains__(self, value: float) -> bool:
-        """Return whether a number is in the range; NaN is not."""
+        """Return whether a number is in the range; NaN is never in a range."""
         enough = value > self.least if self.open else value >= self.least
         return enough and (self.most is None or value <= self.most)
 
@@ -80,15 +81,15 @@ RANGES_OF_POLICY: Mapping[str, Range] = {
     "n_lstm_layers": COUNT,
     "n_quantiles": COUNT,
 }
-# Batch normalization and the deviation of advantages need at least two rows.
+# Batch normalization and the standard deviation of advantages need at least two rows.
 LEAST_BATCH: Mapping[str, int] = {"CrossQ": 2, "RecurrentPPO": 2, "MaskablePPO": 2}
 
 
 def out_of_range(cls: type, given: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    """Yield name and fact of each number that is out of its range; values of other types are ignored.
+    """Yield name and fact of each number that is out of its range; ignore values of other types.
 
     Args:
-        cls: class of the algorithm; a class that extends one of the table has the same ranges.
+        cls: class of the algorithm; a subclass has the ranges of the class that it extends.
         given: hyperparameters by name.
     """
     ranges = dict(RANGES)
@@ -108,7 +109,7 @@ def out_of_range(cls: type, given: Mapping[str, Any]) -> Iterator[tuple[str, str
 
 
 def needs_one_member(given: Mapping[str, Any]) -> bool:
-    """Return whether hyperparameters count in episodes, which only one collecting simulator allows."""
+    """Return whether `train_freq` counts episodes; that works only with one collecting simulator."""
     frequency = given.get("train_freq")
     return isinstance(frequency, list | tuple) and frequency[-1] == _EPISODES
 
@@ -120,7 +121,7 @@ def _outside(prefix: str, given: Mapping[str, Any], ranges: Mapping[str, Range])
 
 
 def _layers(layers: Any) -> Iterator[tuple[str, str]]:
-    """Yield name and fact of each invalid width of a layer; layers may be lists by the name of a network."""
+    """Yield name and fact of each invalid layer width in a list, or in a dict of lists by network."""
     lists = layers.values() if isinstance(layers, dict) else [layers]
     for widths in lists:
         for width in widths if isinstance(widths, list) else ():
@@ -129,7 +130,7 @@ def _layers(layers: Any) -> Iterator[tuple[str, str]]:
 
 
 def _first(frequency: Any) -> Any:
-    """Return the number of a frequency, which may be a list of number and unit; None if it has no number."""
+    """Return the number of a frequency, also if it is a list of number and unit; None without a number."""
     value = frequency[0] if isinstance(frequency, list | tuple) and frequency else frequency
     return value if _is_number(value) else None
 

@@ -1,7 +1,8 @@
 """Check the algorithm of a job, and create the model.
 
-Hyperparameters are keyword arguments of the class. Their names and values are checked against its signature,
-so a mistake is found before a simulator starts. Each value that a job sets replaces one default.
+Hyperparameters are keyword arguments of the algorithm's class. Names and values are checked against the
+signature of the class, so a mistake is found before a simulator starts. Each value that a job sets replaces a
+default.
 """
 
 from __future__ import annotations
@@ -26,10 +27,11 @@ from palaestra_trainer.job.configuration import Algorithm, Device
 
 
 def check(algorithm: Algorithm) -> RegisteredAlgorithm:
-    """Return the entry of the algorithm if its name and all its hyperparameters are right.
+    """Return the entry of the algorithm, after a check of its name and all its hyperparameters.
 
     Raises:
-        ConfigurationError: one line for each unknown name, with the nearest known one, and each wrong value.
+        ConfigurationError: a name is unknown or a value is wrong; the message has one line for each, and
+            suggests the nearest known name.
     """
     entry = entry_of(algorithm.name)
     policy = hyperparameters.policy_class(entry.original, named_policy(algorithm, entry))
@@ -67,7 +69,7 @@ def _out_of_range(entry: RegisteredAlgorithm, given: Mapping[str, Any]) -> list[
 
 
 def _refuse_members(chosen: Mapping[str, Any], members: int) -> None:
-    """Refuse hyperparameters that this number of collecting simulators does not allow."""
+    """Refuse hyperparameters that do not work with this number of collecting simulators."""
     if limits.needs_one_member(chosen) and members > 1:
         raise ConfigurationError(
             f"{hyperparameters.FIELD}.train_freq: counts in episodes, which only one collecting simulator "
@@ -81,29 +83,31 @@ def _refuse_members(chosen: Mapping[str, Any], members: int) -> None:
 
 
 def resolve(algorithm: Algorithm, environment: str) -> Algorithm:
-    """Return the algorithm with all its hyperparameters: those of the job, and defaults for the rest.
+    """Return the algorithm with all its hyperparameters, from the job or else from the defaults.
 
     Args:
         algorithm: the algorithm of the job.
-        environment: the id of its environment, as in the job.
+        environment: the id of the job's environment.
     """
     arena = environment.rpartition(":")[2] in ARENA_ENVIRONMENTS
     return with_defaults(algorithm, entry_of(algorithm.name).arena if arena else {})
 
 
 def with_defaults(algorithm: Algorithm, better: Mapping[str, Any]) -> Algorithm:
-    """Return the algorithm with all its hyperparameters; `better` replaces defaults of the class."""
+    """Return the algorithm with all its hyperparameters; values in `better` replace defaults of the class."""
     known = entry_of(algorithm.name).defaults
     return algorithm.model_copy(update={"hyperparameters": {**known, **better, **algorithm.hyperparameters}})
 
 
 def make_model(algorithm: Algorithm, env: VecEnv, seed: int, device: Device = "cpu") -> BaseAlgorithm:
-    """Return a new model of the algorithm for `env` on a device; `seed` decides its initial weights.
+    """Return a new model of the algorithm for `env` on a device; its initial weights follow from `seed`.
 
-    If the algorithm normalizes, the model's own environment does that, see `normalization`.
+    If the job sets `normalize`, the environment of the model normalizes observations and rewards, see
+    `normalization`.
 
     Raises:
-        ConfigurationError: the algorithm does not fit the environment, or a hyperparameter has a wrong value.
+        ConfigurationError: the algorithm does not support the environment's spaces, or a hyperparameter has a
+            wrong value.
     """
     entry = entry_of(algorithm.name)
     given = with_defaults(algorithm, {}).hyperparameters
@@ -118,7 +122,7 @@ def make_model(algorithm: Algorithm, env: VecEnv, seed: int, device: Device = "c
         chosen["action_noise"] = added
     chosen["policy_kwargs"] = with_network(chosen["policy_kwargs"], algorithm.cnn)
     if "target_update_interval" in chosen:
-        # A vector step is num_envs steps, and the target cannot be updated more often than each vector step.
+        # A vector step has num_envs steps, and the target network is updated at most once per vector step.
         chosen["target_update_interval"] = max(chosen["target_update_interval"], env.num_envs)
     if algorithm.normalize:
         if not algorithm.normalize.observations or isinstance(env.observation_space, spaces.Dict):
@@ -131,7 +135,8 @@ def make_model(algorithm: Algorithm, env: VecEnv, seed: int, device: Device = "c
         raise
     except (ArithmeticError, AssertionError, AttributeError, LookupError, TypeError, ValueError) as error:
         # Stable-Baselines3 checks values and spaces by assertions, and a policy of the job's author may raise
-        # anything. A RuntimeError is not caught: the device may be out of memory, and a retry may help.
+        # any error. A RuntimeError is not caught, because it may come from a lack of device memory, and a
+        # retry may help.
         raise ConfigurationError(
             f"algorithm: {algorithm.name} refuses its hyperparameters or the environment's spaces "
             f"({fact_of(error)}); change them, or use another algorithm"
@@ -142,7 +147,7 @@ def make_model(algorithm: Algorithm, env: VecEnv, seed: int, device: Device = "c
 
 
 def _refuse_dropping_all(model: BaseAlgorithm) -> None:
-    """Refuse a TQC that drops all quantiles of its critics, because the mean of no quantiles is NaN."""
+    """Refuse a TQC that drops all quantiles of its critics; their mean would be NaN."""
     if not isinstance(model, TQC) or model.top_quantiles_to_drop_per_net < model.critic.n_quantiles:
         return
     raise ConfigurationError(

@@ -1,7 +1,7 @@
-"""MaskablePPO's rollouts without invalid rows.
+"""Rollout buffers of MaskablePPO that do not sample invalid rows.
 
-A row has the mask with which its action was chosen. While a simulator restarts, its rows have masks that
-allow every action; these rows reach no loss.
+Each row has the mask with which its action was chosen. While a simulator restarts, the masks of its rows
+allow every action. These rows are invalid, so they do not affect a loss.
 """
 
 from __future__ import annotations
@@ -15,12 +15,13 @@ from palaestra_trainer.algorithms.buffers import ValidRolloutBuffer, batches
 
 
 class _Masked(ValidRolloutBuffer):
-    """A rollout buffer of rows with masks."""
+    """A rollout buffer whose rows have masks."""
 
     def _parts(self, rows: np.ndarray, size: int) -> Iterator[np.ndarray]:
-        """Yield `rows` in parts of `size`; a single last row joins the part before it.
+        """Yield `rows` in parts of `size`; add a single last row to the part before it.
 
-        Unlike PPO, MaskablePPO computes the deviation even of a single advantage, which is NaN.
+        Unlike PPO, MaskablePPO normalizes the advantage even of a single row, whose standard deviation is
+        NaN.
         """
         return batches(rows, size)
 

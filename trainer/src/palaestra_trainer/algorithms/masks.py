@@ -1,4 +1,4 @@
-"""Algorithms that choose only among actions that a mask of the environment allows."""
+"""Functions for algorithms that choose only actions that a mask of the environment allows."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from palaestra_trainer.job.configuration import Algorithm
 
 
 def is_masked(algorithm: Algorithm) -> bool:
-    """Return whether an algorithm needs masks of the allowed actions from the environment."""
+    """Return whether an algorithm needs masks of allowed actions from its environment."""
     return issubclass(entry_of(algorithm.name).original, MaskablePPO)
 
 
 def takes_masks(policy: object) -> bool:
-    """Return whether a model, or the policy of one, chooses only among allowed actions."""
+    """Return whether a model or a policy chooses only actions that a mask allows."""
     return isinstance(policy.model if isinstance(policy, Normalized) else policy, MaskablePPO)
 
 
@@ -29,7 +29,7 @@ def refuse_without_masks(algorithm: Algorithm, env: gymnasium.Env[Any, Any], nam
 
     Args:
         algorithm: the algorithm of the job.
-        env: the environment; its simulator need not be up.
+        env: the environment; its simulator need not have started.
         name: id of the environment.
 
     Raises:
@@ -48,8 +48,8 @@ def predict_allowed(policy: Any, masks: Any, *seen: Any, deterministic: bool = T
     Args:
         policy: a policy for which `takes_masks` is True.
         masks: masks as `action_masks` returns them.
-        seen: observation, state, and whether an episode begins.
-        deterministic: whether the most probable action is chosen.
+        seen: observation, state, and whether an episode begins, as for `predict` of the policy.
+        deterministic: whether to choose the most probable action.
     """
     action, state = policy.predict(*seen, deterministic=deterministic, action_masks=masks)
     return action, state

@@ -1,4 +1,4 @@
-"""Noise on actions, with the hyperparameters of rl-baselines3-zoo: `noise_type` and `noise_std`.
+"""Noise on actions, set by the hyperparameters `noise_type` and `noise_std` of rl-baselines3-zoo.
 
 Each member has its own noise process, which restarts with each episode.
 """
@@ -28,7 +28,7 @@ NAMES = ("noise_type", "noise_std")
 
 
 def mistakes(given: Mapping[str, Any], field: str) -> Iterator[str]:
-    """Yield a message with field, fact and remedy for each of the two hyperparameters that is wrong."""
+    """Yield a message with field, fact and remedy for each wrong value of `noise_type` or `noise_std`."""
     kind, deviation = given.get("noise_type"), given.get("noise_std")
     if kind is not None and kind not in KINDS:
         yield f"{field}.noise_type: {kind!r} is not known; {nearest(str(kind), dict(KINDS))}"
@@ -40,7 +40,7 @@ def mistakes(given: Mapping[str, Any], field: str) -> Iterator[str]:
 
 
 def action_noise(given: Mapping[str, Any], env: VecEnv) -> ActionNoise | None:
-    """Return the noise of a model in `env`; None if no type is set, or if actions are not a Box."""
+    """Return the noise of a model in `env`; None if the job sets no type, or if actions are not a Box."""
     kind = given.get("noise_type")
     if kind is None or not isinstance(env.action_space, spaces.Box):
         return None
@@ -50,13 +50,13 @@ def action_noise(given: Mapping[str, Any], env: VecEnv) -> ActionNoise | None:
 
 
 def positions(noise: ActionNoise | None) -> np.ndarray | None:
-    """Return the state of each member's process, shape (members, *action); None if the noise has no state."""
+    """Return the states of the members' noise, shape (members, *action); None for noise without state."""
     processes = _processes(noise)
     return np.stack([process.noise_prev for process in processes]) if processes else None
 
 
 def put_back(noise: ActionNoise | None, before: np.ndarray) -> None:
-    """Set the processes to the states in `before`; the process of a member without one starts at 0."""
+    """Set the noise processes to the states in `before`; a member without a state there starts at 0."""
     for process, position in zip(_processes(noise), before, strict=False):
         process.noise_prev = position
 

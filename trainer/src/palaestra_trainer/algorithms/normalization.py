@@ -1,9 +1,10 @@
-"""Normalize observations and rewards: Stable-Baselines3's VecNormalize, with statistics of valid rows only.
+"""Normalize observations and rewards as Stable-Baselines3's VecNormalize does, from valid rows only.
 
-Observations are shifted and scaled by their running mean and deviation; rewards are scaled by the deviation
-of the discounted return. In a Dict, each Box of numbers has its own statistics. Images and discrete values
-are not normalized. Invalid rows affect neither a statistic nor a loss. A policy cannot be used without the
-statistics, so they are in the file of the model. docs/decisions/0010-normalize.md gives the reasons.
+Observations are shifted by their running mean and divided by their running deviation. Rewards are divided by
+the running deviation of the discounted return. In a Dict, each Box of numbers has its own statistics. Images
+and discrete values are not normalized. Invalid rows affect neither the statistics nor a loss. A policy needs
+the statistics of its training, so model.zip contains them. docs/decisions/0010-normalize.md gives the
+reasons.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from palaestra_trainer.job.configuration import Normalize
 
 @dataclass(frozen=True, slots=True)
 class Moments:
-    """Mean, variance and number of the samples so far; the arrays are never changed."""
+    """Mean, variance and number of the samples so far, in arrays that never change."""
 
     mean: np.ndarray
     variance: np.ndarray
@@ -34,7 +35,7 @@ class Moments:
 
     @classmethod
     def of(cls, running: RunningMeanStd) -> Self:
-        """Return the moments of Stable-Baselines3's statistics; updates of these replace the arrays."""
+        """Return the moments of Stable-Baselines3's statistics, whose updates replace these arrays."""
         return cls(running.mean, running.var, running.count)
 
     def put_back(self, running: RunningMeanStd) -> None:
@@ -42,7 +43,7 @@ class Moments:
         running.mean, running.var, running.count = self.mean, self.variance, self.count
 
     def to_json(self) -> dict[str, Any]:
-        """Return them as JSON data, without loss of precision."""
+        """Return the moments as JSON data, without loss of precision."""
         return {
             "mean": np.asarray(self.mean).tolist(),
             "variance": np.asarray(self.variance).tolist(),
@@ -54,7 +55,7 @@ class Moments:
         """Return the moments from the result of `to_json`.
 
         Raises:
-            KeyError, TypeError, ValueError: the content is not such a result, or of another shape.
+            KeyError, TypeError, ValueError: `content` is not a result of `to_json`, or has another shape.
         """
         mean, variance = (np.array(content[name], dtype=np.float64) for name in ("mean", "variance"))
         if mean.shape != shape or variance.shape != shape:
@@ -63,12 +64,13 @@ class Moments:
 
 
 class ValidNormalize(VecNormalize):
-    """VecNormalize for rows of which some may be invalid.
+    """A VecNormalize that ignores invalid rows.
 
     Args:
-        venv: marks the invalid rows of a step or a reset (`palaestra_trainer.environments.infos`).
-        wanted: the values to normalize, and the limits to which they are clipped.
-        gamma: discount of the return; its deviation scales the rewards.
+        venv: the environment; it marks invalid rows of a step or a reset, see
+            `palaestra_trainer.environments.infos`.
+        wanted: the values to normalize, and the limits to which these values are clipped.
+        gamma: discount of the return whose deviation divides the rewards.
     """
 
     venv: VecEnv
@@ -87,7 +89,7 @@ class ValidNormalize(VecNormalize):
 
     @property
     def scales(self) -> Mapping[str, Moments]:
-        """The statistics of observations and rewards, if these are normalized; set it to restore them."""
+        """The statistics of the normalized values; set this property to restore them."""
         return {name: Moments.of(running) for name, running in self._running().items()}
 
     @scales.setter
@@ -96,7 +98,7 @@ class ValidNormalize(VecNormalize):
             scales[name].put_back(running)
 
     def reset(self) -> Any:
-        """Return the first observations of new episodes, normalized."""
+        """Return the normalized first observations of new episodes."""
         observations = cast("Observations", self.venv.reset())
         self.old_obs = observations
         self.returns = np.zeros(self.num_envs)
@@ -104,11 +106,11 @@ class ValidNormalize(VecNormalize):
         return self.normalize_obs(observations)
 
     def step_wait(self) -> VecEnvStepReturn:
-        """Return the rows of a step, normalized by statistics that already include its valid rows."""
+        """Return the normalized rows of a step; its valid rows update the statistics first."""
         rows, rewards, dones, infos = self.venv.step_wait()
         observations, valid = cast("Observations", rows), valid_rows(infos)
         self.old_obs, self.old_reward = observations, rewards
-        # If no episode could begin, the observation is still the last one of the previous episode.
+        # If a reset failed, the row still holds the last observation of the previous episode.
         blind = dones & ~valid_rows(self.unwrapped.reset_infos)
         self._see(part(observations, valid & ~blind))
         self._earn(rewards, valid)
@@ -119,9 +121,9 @@ class ValidNormalize(VecNormalize):
         return self.normalize_obs(observations), self.normalize_reward(rewards), dones, infos
 
     def go_on(self, observations: Observations, returns: np.ndarray) -> Any:
-        """Set the last observations and returns of a resumed run; return the observations normalized.
+        """Set the last observations and returns of a resumed run; return the normalized observations.
 
-        `returns` are the discounted rewards of the running episodes, one per member.
+        `returns` holds for each member the discounted reward of its running episode.
         """
         self.old_obs, self.returns = observations, returns
         return self.normalize_obs(observations)
@@ -133,7 +135,7 @@ class ValidNormalize(VecNormalize):
         return scales | {"epsilon": self.epsilon}
 
     def learn_from_json(self, content: Mapping[str, Any]) -> None:
-        """Load statistics that another normalizer with the same settings wrote by `to_json`.
+        """Load the statistics that another normalizer with the same settings returned from `to_json`.
 
         Raises:
             KeyError, TypeError, ValueError: the content is invalid, or its settings are different.
@@ -148,17 +150,17 @@ class ValidNormalize(VecNormalize):
         self.scales = {name: Moments.from_json(content[name], np.shape(running[name].mean)) for name in there}
 
     def take_over(self, content: Mapping[str, Any]) -> None:
-        """Load some statistics that `to_json` wrote; the clip values of this run do not change.
+        """Load some of the statistics that `to_json` wrote; the clip values of this run do not change.
 
         Raises:
-            KeyError, TypeError, ValueError: the content is not such a result, or of another shape.
+            KeyError, TypeError, ValueError: `content` is not a result of `to_json`, or has another shape.
         """
         running = self._running()
         found = {name: Moments.from_json(content[name], np.shape(running[name].mean)) for name in content}
         self.scales = {**self.scales, **found}
 
     def _running(self) -> dict[str, RunningMeanStd]:
-        """Return the statistics by name: rewards, and observations or each key of them."""
+        """Return the statistics by name: "rewards", and "observations" or "observations/key" for each key."""
         observations = self._seen() if self.norm_obs else {}
         return observations | ({"rewards": self.ret_rms} if self.norm_reward else {})
 
@@ -181,10 +183,10 @@ class ValidNormalize(VecNormalize):
 
 
 class Normalized:
-    """A policy that takes unnormalized observations and normalizes them as during its training.
+    """A policy that takes raw observations and normalizes them as in its training.
 
     Attributes:
-        model: the model, which takes normalized observations.
+        model: the model; it needs normalized observations.
     """
 
     def __init__(self, model: BaseAlgorithm, normalizer: ValidNormalize) -> None:
@@ -199,18 +201,18 @@ class Normalized:
         deterministic: bool = False,  # noqa: FBT001, FBT002 - as in Stable-Baselines3
         **masks: Any,
     ) -> tuple[Any, Any]:
-        """Return an action for one observation, and the policy's next state; MaskablePPO takes masks."""
+        """Return an action for a raw observation, and the policy's next state; MaskablePPO takes `masks`."""
         seen = self._normalizer.normalize_obs(observation)
         return self.model.predict(seen, state, episode_start, deterministic, **masks)
 
 
 def normalizer_of(model: BaseAlgorithm) -> ValidNormalize | None:
-    """Return the normalizer of a model's observations and rewards; None: the model does not normalize."""
+    """Return the normalizer of a model; None if the model uses raw observations and rewards."""
     found = model.get_vec_normalize_env()
     return found if isinstance(found, ValidNormalize) else None
 
 
 def policy_of(model: BaseAlgorithm) -> BaseAlgorithm | Normalized:
-    """Return the policy of a model for unnormalized observations; its statistics do not change."""
+    """Return the policy of a model for raw observations; its use does not change the statistics."""
     normalizer = normalizer_of(model)
     return Normalized(model, normalizer) if normalizer else model

@@ -1,4 +1,4 @@
-"""The observations of all members at once: one array, or an array for each key of a Dict."""
+"""Functions for the observations of all members: one array, or a dict with an array for each key."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ def part(observations: Any, rows: Any) -> Any:
 
 
 def each(observations: Any, change: Callable[[Any], Any]) -> Any:
-    """Return observations after `change` was applied to their array, or to each of their arrays."""
+    """Apply `change` to the array of observations, or to each of their arrays; return the results."""
     if isinstance(observations, dict):
         return {key: change(column) for key, column in observations.items()}
     return change(observations)
 
 
 def stacked(rows: Sequence[Any]) -> Observations:
-    """Return single observations as the rows of one array, or of one array per key; empty without any."""
+    """Return single observations as rows of one array, or of one array per key."""
     if rows and isinstance(rows[0], dict):
         return {key: np.array([row[key] for row in rows]) for key in rows[0]}
     return np.array(rows)
@@ -49,7 +49,7 @@ def from_names(arrays: Mapping[str, np.ndarray], name: str) -> Observations:
 
 
 def equal_rows(one: Observations, other: Observations) -> np.ndarray:
-    """Return a mask of the equal rows, for the rows that both have; shape (rows,), bool."""
+    """Return a mask of equal rows, for the row numbers that both arguments have; shape (rows,), bool."""
     pairs = [(column, by_name(other, "")[name]) for name, column in by_name(one, "").items()]
     rows = min(len(column) for pair in pairs for column in pair)
     return np.array(

@@ -1,7 +1,8 @@
-"""Buffers of a job's author: classes that extend a buffer of Stable-Baselines3.
+"""Support for buffer classes of a job's author, which extend a buffer of Stable-Baselines3.
 
-In Python's method resolution order, such a class comes after the buffer for valid rows. So its `add` gets one
-valid row at a time, and its returns are those of a rollout that was truncated before each invalid row.
+In Python's method resolution order, the author's class comes after the buffer for valid rows. So its method
+`add` gets one valid row at a time. Its returns are computed as if the rollout was truncated before each
+invalid row.
 """
 
 from __future__ import annotations
@@ -35,35 +36,36 @@ from palaestra_trainer.algorithms.hyperparameters import FIELD
 from palaestra_trainer.algorithms.maskable import ValidMaskableDictRolloutBuffer, ValidMaskableRolloutBuffer
 from palaestra_trainer.errors import ConfigurationError, fact_of
 
-# Each rollout buffer has a class for valid rows; subclasses come before the classes that they extend.
+# The class for valid rows of each rollout buffer; subclasses come before the classes that they extend.
 VALID_ROLLOUTS: Mapping[type[Any], type[Any]] = {
     MaskableDictRolloutBuffer: ValidMaskableDictRolloutBuffer,
     MaskableRolloutBuffer: ValidMaskableRolloutBuffer,
     DictRolloutBuffer: ValidDictRolloutBuffer,
     RolloutBuffer: ValidRolloutBuffer,
 }
-# An author's class may extend one of these.
+# An author's class may extend a class on the left; its subclass for valid rows is on the right.
 _VALID: Mapping[type[Any], type[Any]] = {
     DictReplayBuffer: ValidDictReplayBuffer,
     ReplayBuffer: ValidReplayBuffer,
     **VALID_ROLLOUTS,
 }
-# These classes read the rows after a row; in a single column the next row may belong to another member.
+# These classes also sample the rows that follow a row. In a single column, the next row may belong to another
+# member.
 _NEIGHBOURS = (HerReplayBuffer, NStepReplayBuffer)
 _STATE_METHODS = ("state_dict", "load_state_dict")
 
 
 class OwnBuffer(BaseBuffer):
-    """The state of an author's buffer that a checkpoint keeps besides the rows.
+    """The base of an author's buffer in use; it gives checkpoints the state that the author's class adds.
 
-    It is the result of `state_dict` if the class has `state_dict` and `load_state_dict`, else every attribute
-    that the class adds.
+    If the class has the methods `state_dict` and `load_state_dict`, this state is the result of `state_dict`.
+    Otherwise it is every attribute that the class adds.
 
     Raises:
         ConfigurationError: a checkpoint cannot hold an attribute.
     """
 
-    _rows_only: type[BaseBuffer]  # the buffer for valid rows that this one extends
+    _rows_only: type[BaseBuffer]  # the buffer for valid rows that this class extends
 
     def __init__(
         self,
@@ -78,7 +80,7 @@ class OwnBuffer(BaseBuffer):
         self.own_state()
 
     def own_state(self) -> dict[str, Any]:
-        """Return the state that the class adds, by name: arrays, tensors, and JSON values.
+        """Return the state that the author's class adds, by name: arrays, tensors, and JSON values.
 
         Raises:
             ConfigurationError: a value has another type, or the author's `state_dict` failed.
@@ -107,7 +109,7 @@ class OwnBuffer(BaseBuffer):
             setattr(self, name, value)
 
     def keep(self, kept: np.ndarray) -> None:
-        """Refuse to drop rows that are not `kept`, because only the class knows the state that they need.
+        """Refuse to drop rows, because only the author's class knows which of its state belongs to a row.
 
         Raises:
             ConfigurationError: always.
@@ -131,15 +133,15 @@ def field_of(cls: type[BaseBuffer]) -> str:
 
 
 def of_valid_rows(cls: Any) -> Any:
-    """Return the class of a buffer if it is for valid rows, else its subclass from `with_valid_rows`."""
+    """Return `cls` if it is a buffer for valid rows, or else its subclass from `with_valid_rows`."""
     return cls if issubclass(cls, ValidReplayBuffer | ValidRolloutBuffer) else with_valid_rows(cls)
 
 
 def with_valid_rows(named: type[BaseBuffer]) -> type[BaseBuffer]:
-    """Return a subclass of an author's buffer, with its name, that stores or samples only valid rows.
+    """Return a subclass of an author's buffer that stores or samples only valid rows, with the same name.
 
     Raises:
-        ConfigurationError: its samples would contain invalid rows, or rows of another episode.
+        ConfigurationError: samples of this buffer would contain invalid rows, or rows of another episode.
     """
     if issubclass(named, _NEIGHBOURS):
         raise ConfigurationError(
@@ -149,7 +151,7 @@ def with_valid_rows(named: type[BaseBuffer]) -> type[BaseBuffer]:
     base = next((base for base in _VALID if issubclass(named, base)), None)
     if base is None or getattr(named, "get", None) is not getattr(base, "get", None):
         raise ConfigurationError(
-            f"{field_of(named)}: {named.__name__} draws batches of its own (get), in which may be rows "
+            f"{field_of(named)}: {named.__name__} draws batches of its own (get), which may have rows "
             "that a fault spoiled; override compute_returns_and_advantage, add or _get_samples instead"
         )
     content = {"__doc__": named.__doc__, "__module__": named.__module__, "_rows_only": _VALID[base]}
@@ -160,7 +162,7 @@ def refuse_other_observations(cls: type[BaseBuffer], observation: spaces.Space[A
     """Check that a buffer accepts the observation.
 
     Raises:
-        ConfigurationError: only one of the two is for a Dict: the buffer or the observation.
+        ConfigurationError: the observation is a Dict and the buffer does not take a Dict, or the reverse.
     """
     takes_dict = issubclass(cls, DictReplayBuffer | DictRolloutBuffer)
     if takes_dict == isinstance(observation, spaces.Dict):
@@ -188,10 +190,10 @@ def _has_state_methods(buffer: BaseBuffer) -> bool:
 
 
 def _can_be_written(value: Any) -> bool:
-    """Return whether a value stays the same when it is written and read."""
+    """Return whether a checkpoint can write a value and read an equal value."""
     if isinstance(value, np.ndarray):
         return not value.dtype.hasobject
-    if isinstance(value, torch.Tensor | float):  # NaN is not equal to itself
+    if isinstance(value, torch.Tensor | float):  # no comparison, because NaN is not equal to itself
         return True
     try:
         return bool(json.loads(json.dumps(value)) == value)

@@ -1,6 +1,6 @@
-"""Schedules of a job's author: functions of the remaining share of the steps, named as `module:function`.
+"""Import schedules of a job's author, which are functions of the remaining share of the steps.
 
-A model contains the name of the function, never its code.
+A job names such a function as `module:function`, and the model.zip contains only this name.
 """
 
 from __future__ import annotations
@@ -15,14 +15,15 @@ _TRIED = (1.0, 0.5, 0.0)  # remaining shares of the steps
 
 
 def own_schedule(name: str, field: str) -> Callable[[float], float]:
-    """Return the function that `name` names, after a check of a few of its values.
+    """Return the function `name`, after a check of a few of its values.
 
     Args:
         name: `module:function`.
         field: field of the job, for messages.
 
     Raises:
-        ConfigurationError: it cannot be imported, or does not return finite numbers of 0 or more.
+        ConfigurationError: the function cannot be imported, or returns a value that is negative, infinite or
+            not a number.
     """
     schedule: Callable[[float], float] = imports.object_named(name, f"{field}: {name}")
     for left in _TRIED:

@@ -1,7 +1,8 @@
-"""RecurrentPPO's rollouts without invalid rows.
+"""Rollout buffers of RecurrentPPO that do not sample invalid rows.
 
 An LSTM learns from whole sequences, so rows are not shuffled. Sequences do not contain invalid rows. The
-first valid row after them begins an episode, so the LSTM restarts there, in collection and in the update.
+first valid row after an invalid row begins an episode. There the LSTM restarts, both in the collection of
+rows and in the update.
 """
 
 from __future__ import annotations
@@ -19,9 +20,9 @@ class _Sequences(ValidRolloutBuffer):
     """A rollout buffer that yields minibatches of valid rows in their order."""
 
     def get(self, batch_size: int | None = None) -> Generator[Any, None, None]:
-        """Yield minibatches of valid rows; they begin at a random row, as in RecurrentPPO's own buffer."""
+        """Yield minibatches of valid rows, from a random row on, as RecurrentPPO's own buffer does."""
         if not self.generator_ready:
-            next(super(ValidRolloutBuffer, self).get(1))  # flattens the rows of all members into one column
+            next(super(ValidRolloutBuffer, self).get(1))  # this call flattens the rows of all members
         rows = np.flatnonzero(self.swap_and_flatten(self.valid))
         first_of_member = np.zeros((self.buffer_size, self.n_envs))
         first_of_member[0] = 1.0

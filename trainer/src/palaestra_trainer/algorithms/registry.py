@@ -1,8 +1,8 @@
-"""The algorithms by name, with their defaults.
+"""The table of algorithms, with their defaults.
 
-The defaults are those of the class: Stable-Baselines3's, sb3-contrib's, or ours for REINFORCE. Only the
-arena's environments have other defaults, which were found by experiment. A job may also name a class of its
-author as `module:Class`; its entry is created when it is needed.
+The defaults are those of the algorithm's class in Stable-Baselines3, in sb3-contrib, or in this package for
+REINFORCE. Only the environments of the arena have other defaults, which were found by experiments. A job may
+also name a class of its author as `module:Class`; `entry_of` creates its entry.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.job.configuration import nearest
 from palaestra_trainer.job.user_code import imports
 
-# A job cannot set these arguments of the classes as plain hyperparameters. The training loop sets some, and
-# others are checked elsewhere. Buffers for valid rows cannot support the rest, because they store rows of
-# several members in one column.
+# A job cannot set these arguments of an algorithm's class as hyperparameters. The training loop sets some of
+# them, and other modules check others. `optimize_memory_usage` does not work with buffers for valid rows,
+# because they store rows of several members in one column.
 OURS = frozenset(
     {
         "self", "policy", "env", "seed", "device", "verbose", "tensorboard_log", "_init_setup_model",
@@ -42,18 +42,19 @@ OURS = frozenset(
 )  # fmt: skip
 ARENA_ENVIRONMENTS = frozenset({"MoveToTargetEnv-v0"})
 _ANY_ACTIONS = (spaces.Box, spaces.Discrete, spaces.MultiDiscrete, spaces.MultiBinary)
-_LOG_INTERVAL = {True: 10, False: 1}  # off policy: episodes; on policy: rollouts
+_LOG_INTERVAL = {True: 10, False: 1}  # episodes off policy, rollouts on policy
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RegisteredAlgorithm:
-    """One algorithm.
+    """The entry of an algorithm.
 
     Attributes:
-        original: its class in its package; this class loads a model.zip.
-        arena: hyperparameters that suit the arena's environments better than the defaults of the class.
-        actions: types of action spaces that it supports; None: unknown until a model is created.
-        log_interval: episodes off policy, or rollouts on policy, between two records of values.
+        original: the algorithm's class in its package; this class loads a model.zip.
+        arena: hyperparameters that are better for the arena's environments than the defaults of the class.
+        actions: types of action spaces that the algorithm supports; None: unknown until a model is created.
+        log_interval: episodes of an off-policy algorithm, or rollouts of an on-policy algorithm, between two
+            records of values.
     """
 
     original: type[BaseAlgorithm]
@@ -63,27 +64,27 @@ class RegisteredAlgorithm:
 
     @property
     def cls(self) -> type[BaseAlgorithm]:
-        """The class that counts and learns from only valid rows."""
+        """The subclass that counts only valid rows, and learns only from valid rows."""
         return with_valid_rows(self.original)
 
     @property
     def takes_noise(self) -> bool:
-        """Whether noise may be added to its actions."""
+        """Whether a job may add noise to the algorithm's actions."""
         return "action_noise" in parameters(self.original)
 
     @property
     def replays(self) -> bool:
-        """Whether it learns from a replay buffer."""
+        """Whether the algorithm learns from a replay buffer."""
         return issubclass(self.original, OffPolicyAlgorithm)
 
     @property
     def takes_rollout_buffers(self) -> bool:
-        """Whether the class of its rollout buffer is an argument."""
+        """Whether the class of the algorithm's rollout buffer is one of its arguments."""
         return buffer_options.ROLLOUT.chooser in parameters(self.original)
 
     @property
     def known(self) -> list[str]:
-        """The names of its hyperparameters."""
+        """The names of the algorithm's hyperparameters."""
         names = [name for name in parameters(self.original) if name not in OURS]
         return [
             *names,
@@ -94,7 +95,7 @@ class RegisteredAlgorithm:
 
     @property
     def defaults(self) -> dict[str, Any]:
-        """The defaults of the class, without those that JSON cannot write."""
+        """The defaults of the class, except values that JSON cannot write."""
         known = parameters(self.original)
         return {
             name: known[name].default
@@ -130,8 +131,8 @@ def _entry(
 
 ALGORITHMS: Mapping[str, RegisteredAlgorithm] = MappingProxyType(
     {
-        # DQN has soft target updates at every step and as many gradient steps as environment steps, because
-        # hard updates ended 10 points lower on the same 50,000 steps.
+        # DQN has soft target updates at every step, and as many gradient steps as environment steps. With
+        # hard updates, the success rate after the same 50,000 steps was 10 points lower.
         "DQN": _entry(
             sb3.DQN,
             spaces.Discrete,
@@ -202,7 +203,7 @@ ALGORITHMS: Mapping[str, RegisteredAlgorithm] = MappingProxyType(
 
 @cache
 def entry_of(name: str) -> RegisteredAlgorithm:
-    """Return the entry of an algorithm: one of the table, or that of a class `module:Class`.
+    """Return the entry of an algorithm: from the table, or a new entry for a class `module:Class`.
 
     Raises:
         ConfigurationError: no algorithm has that name, or the class cannot be used as an algorithm.
@@ -213,7 +214,7 @@ def entry_of(name: str) -> RegisteredAlgorithm:
         raise ConfigurationError(f"algorithm.name: {name} cannot be used: {why}")
     if imports.names_class(name):
         entry = _entry(imports.class_named(name, "algorithm.name", BaseAlgorithm))
-        with_valid_rows(entry.original)  # raises if invalid rows would reach its losses
+        with_valid_rows(entry.original)  # raises an error if invalid rows would reach the losses
         return entry
     raise ConfigurationError(
         f"algorithm.name: {name} is not an algorithm; {nearest(name, dict(ALGORITHMS))} "
@@ -222,6 +223,6 @@ def entry_of(name: str) -> RegisteredAlgorithm:
 
 
 def _plain_name(name: str) -> str:
-    """Return the name of a class of Stable-Baselines3 or sb3-contrib without its module."""
+    """Return the name of a class; without its module for a class of Stable-Baselines3 or sb3-contrib."""
     module, _, last = name.rpartition(":")
     return last if module.partition(".")[0] in {"sb3_contrib", "stable_baselines3"} else name

@@ -1,8 +1,8 @@
 """REINFORCE (Williams, 1992), as a Stable-Baselines3 algorithm.
 
-It learns from whole episodes, by the gradient of log pi(a|s) * (G - b): G is the
-discounted return from the step on, b an optional baseline. It has save, load,
-predict, callbacks and logger of `BaseAlgorithm`, and uses the same policies.
+It learns from whole episodes, by the gradient of log pi(a|s) * (G - b). G is the discounted return from the
+step on, and b is an optional baseline. The class inherits save, load, predict, callbacks and logger from
+`BaseAlgorithm`, and uses the policies of Stable-Baselines3.
 """
 
 from __future__ import annotations
@@ -31,30 +31,29 @@ from palaestra_trainer.environments.episode_end import EpisodeEnd
 
 
 class REINFORCE(BaseAlgorithm):
-    """Monte-Carlo policy gradient.
+    """The Monte-Carlo policy gradient algorithm REINFORCE.
 
-    One update learns from `episodes_per_update` whole episodes of each
-    environment. The number is the same for each, because taking the episodes that
-    end first would prefer short ones. Further episodes that an environment plays
-    until the others finish are dropped, and so are episodes that a fault
-    truncated. The update does not wait for an environment that restarts. Training
-    ends when an episode ends at or after `total_timesteps`. A truncated episode
-    counts as ended: its return is the sum until then.
+    One update learns from `episodes_per_update` whole episodes of each environment. The number is the same
+    for each environment, because an update with the first episodes to end would prefer short episodes. If an
+    environment finishes further episodes before the others are ready, these are dropped. Episodes that a
+    fault truncated are dropped too. The update does not wait for an environment that restarts. Training ends
+    with the first episode that ends at or after `total_timesteps`. The return of a truncated episode is the
+    sum of its rewards until its last step.
 
     Args:
         policy: "MlpPolicy", "CnnPolicy", "MultiInputPolicy" or an actor-critic class; its value network is
-            trained only if it is the baseline.
-        env: environment or VecEnv to learn in.
+            trained only for the baseline "value".
+        env: environment or VecEnv in which the policy learns.
         learning_rate: learning rate of Adam, or a function of the remaining progress (1 to 0).
-        episodes_per_update: whole episodes of each environment in one update.
-        gamma: discount per step, 0 to 1.
-        baseline: "value" subtracts a learned V(s), "none" subtracts nothing.
-        normalize_advantage: give G - b mean 0 and deviation 1 within an update; without a baseline
-            no mean is subtracted, and G is divided by its root mean square.
-        ent_coef: weight of the policy's entropy; prevents early certainty.
+        episodes_per_update: number of whole episodes of each environment in one update.
+        gamma: discount factor per step, 0 to 1.
+        baseline: "value" subtracts a learned V(s) from the return; "none" does not subtract a baseline.
+        normalize_advantage: scale G - b to mean 0 and deviation 1 within an update; without a baseline, G is
+            only divided by its root mean square.
+        ent_coef: weight of the policy's entropy in the loss; more entropy keeps the policy exploring.
         vf_coef: weight of the baseline's squared error.
-        max_grad_norm: longest gradient; longer ones are scaled down.
-        stats_window_size: episodes in the logged means.
+        max_grad_norm: largest norm of the gradient; a longer gradient is scaled down to this norm.
+        stats_window_size: number of the newest episodes in the logged means.
         tensorboard_log: folder of event files, if no logger is set.
         policy_kwargs: keyword arguments of the policy, e.g. `net_arch`.
         verbose: 0 quiet, 1 info.
@@ -138,7 +137,7 @@ class REINFORCE(BaseAlgorithm):
         reset_num_timesteps: bool = True,  # noqa: FBT001, FBT002 - as in Stable-Baselines3
         progress_bar: bool = False,  # noqa: FBT001, FBT002 - as in Stable-Baselines3
     ) -> Self:
-        """Return this model, trained until the first episode end at or after `total_timesteps`.
+        """Train until the first episode that ends at or after `total_timesteps`; return this model.
 
         `log_interval` counts updates; the other arguments are Stable-Baselines3's.
         """
@@ -160,7 +159,7 @@ class REINFORCE(BaseAlgorithm):
     def collect_episodes(self, callback: BaseCallback) -> Batch | None:
         """Return the whole valid episodes of one update; None if the callback ended training.
 
-        At the end of training there may be fewer than `episodes_per_update` of each environment.
+        At the end of training, an environment may have fewer than `episodes_per_update` episodes.
 
         Raises:
             ConfigurationError: an episode does not end.
@@ -186,13 +185,13 @@ class REINFORCE(BaseAlgorithm):
             if dones.any() and self.num_timesteps >= self._total_timesteps:
                 break
         if not dones.all():
-            # An environment may be in an episode that began with the policy before the update.
+            # An environment may be in an episode that began with the policy of the previous update.
             self._last_obs = self.env.reset()  # type: ignore[assignment]  # as in Stable-Baselines3
         callback.on_rollout_end()
         return recorder.batch(self.gamma)
 
     def train(self, batch: Batch) -> None:
-        """Take one gradient step on the episodes in `batch`; no step if it is empty."""
+        """Take one gradient step on the episodes in `batch`; do nothing for an empty batch."""
         if not len(batch.returns):
             return
         self.policy.set_training_mode(True)
@@ -206,7 +205,7 @@ class REINFORCE(BaseAlgorithm):
         self.logger.record("train/loss", loss.item())
 
     def dump_logs(self) -> None:
-        """Write the means over the last episodes, the speed, and the values that `train` recorded."""
+        """Write means over the last episodes, the speed, and the values that `train` recorded."""
         seconds = max((time.time_ns() - self.start_time) / 1e9, sys.float_info.epsilon)
         fps = int((self.num_timesteps - self._num_timesteps_at_start) / seconds)
         self.logger.record("time/episodes", self._episode_num, exclude="tensorboard")
@@ -238,7 +237,7 @@ class REINFORCE(BaseAlgorithm):
         return loss
 
     def _advantages(self, returns: torch.Tensor, values: torch.Tensor) -> torch.Tensor:
-        """Return G - b of each step, normalized if `normalize_advantage`."""
+        """Return G - b of each step, normalized if `normalize_advantage` is set."""
         if self.baseline == "none":
             return returns / (returns.square().mean().sqrt() + 1e-8) if self.normalize_advantage else returns
         advantages = returns - values

@@ -1,7 +1,7 @@
-"""The size of a replay buffer, computed from the spaces before the buffer exists.
+"""Compute the size of a replay buffer from the spaces, before the buffer exists.
 
-NumPy allocates memory when a row is first written. So a buffer with more rows than the run has steps needs
-memory only for these steps.
+The memory of a NumPy array is allocated page by page when rows are first written. So a buffer with more rows
+than the run has steps needs memory only for the rows of these steps.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from palaestra_trainer.job.configuration import Algorithm
 
 _FLOAT = np.dtype(np.float32).itemsize
 _REWARD_DONE_TIMEOUT = 3 * _FLOAT
-# Start and length of its episode, with hindsight experience replay.
+# With hindsight experience replay, each row also stores the start and the length of its episode.
 _EPISODE = 2 * np.dtype(np.int64).itemsize
 
 
@@ -29,8 +29,8 @@ class ReplaySize:
     """The size of a replay buffer.
 
     Attributes:
-        rows: rows that the run can fill: `buffer_size`, or the steps of the run if they are fewer.
-        row_bytes: observation, next observation, action, reward, end and time limit of one row.
+        rows: number of rows that the run can fill: the smaller of `buffer_size` and the steps of the run.
+        row_bytes: size of one row: observation, next observation, action, reward, end and time limit.
     """
 
     rows: int
@@ -38,23 +38,23 @@ class ReplaySize:
 
     @property
     def memory_bytes(self) -> int:
-        """Memory of all rows."""
+        """The memory that all rows need."""
         return self.rows * self.row_bytes
 
     def disk_bytes(self, every_steps: int, keep: int) -> int:
-        """Return the size of all checkpoints together; they share rows that did not change between them.
+        """Return the size of all checkpoints together; checkpoints share the rows that did not change.
 
-        Each checkpoint but the newest has its own copy of the rows that were overwritten before the next one.
-        While a checkpoint is written, one more than `keep` exists.
+        Each checkpoint except the newest has its own copy of the rows that were overwritten before the next
+        checkpoint. While a new checkpoint is written, `keep` + 1 checkpoints exist.
         """
         return self.memory_bytes + keep * min(every_steps, self.rows) * self.row_bytes
 
     def most_rows(self, memory_bytes: int, disk_bytes: int, every_steps: int, keep: int) -> int:
-        """Return the most rows with which a buffer fits into memory, and its checkpoints on the disk."""
+        """Return the largest number of rows for which memory and the disk for checkpoints suffice."""
         in_memory = memory_bytes // self.row_bytes
         on_disk = disk_bytes // self.row_bytes
-        # With up to `every_steps` rows, each checkpoint may have all rows for itself; with more rows, each
-        # has `every_steps` rows for itself.
+        # With at most `every_steps` rows, checkpoints may share no rows. With more rows, each checkpoint has
+        # its own copy of `every_steps` rows.
         fitting = on_disk - keep * every_steps
         return max(0, min(in_memory, fitting if fitting >= every_steps else on_disk // (keep + 1)))
 
@@ -62,12 +62,12 @@ class ReplaySize:
 def replay_size(
     algorithm: Algorithm, observation: spaces.Space[Any], action: spaces.Space[Any], steps: int
 ) -> ReplaySize | None:
-    """Return the size of an algorithm's replay buffer; None: it has no buffer, or no policy takes the space.
+    """Return the size of an algorithm's replay buffer; None: it has no buffer, or no policy for the space.
 
     Args:
         algorithm: the algorithm with all its hyperparameters.
-        observation: the environment's space.
-        action: the environment's space.
+        observation: the environment's observation space.
+        action: the environment's action space.
         steps: steps of the whole run.
     """
     buffer_size = algorithm.hyperparameters.get("buffer_size")

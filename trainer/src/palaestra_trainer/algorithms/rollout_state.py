@@ -1,9 +1,10 @@
-"""The state of each algorithm besides its saved tensors: a rollout changes it, and a resume needs it.
+"""The state of each algorithm that a rollout changes and a resume needs, besides the saved tensors.
 
 Every algorithm counts steps, and keeps its last observation and statistics of episodes. `checkpoint.state`
-saves these, and the action noise. This table has the rest, by class: networks that a rollout changes, the
-state of an LSTM, counts. A user's class has the entry of its nearest ancestor in the table. Without such an
-ancestor, the whole policy is copied at each boundary, because a rollout may change any part.
+saves these values and the action noise. The table of this module lists the rest for each class: networks that
+a rollout changes, the state of an LSTM, and counts. A user's class has the entry of its nearest ancestor in
+the table. Without such an ancestor, the whole policy is copied at each boundary between rollouts, because a
+rollout may change any network.
 """
 
 from __future__ import annotations
@@ -21,12 +22,13 @@ from palaestra_trainer.algorithms.reinforce import REINFORCE
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RolloutState:
-    """The attributes of an algorithm that change in a rollout, besides those that every algorithm has.
+    """The attributes that a rollout of an algorithm changes, besides those that every algorithm has.
 
     Attributes:
-        networks: networks with tensors that a rollout changes; an update may change them too.
+        networks: names of networks with tensors that a rollout changes; an update may change these tensors
+            too.
         memories: states of recurrent networks, nested tuples of tensors of shape (layers, members, units).
-        numbers: its counts, and numbers derived from them.
+        numbers: counts of the algorithm, and numbers that it derives from its counts.
     """
 
     networks: tuple[str, ...] = ()
@@ -47,7 +49,7 @@ ROLLOUT_STATES: Mapping[type[BaseAlgorithm], RolloutState] = MappingProxyType(
                 sb3.PPO,
                 sb3.A2C,
                 sb3.SAC,
-                sb3.TD3,  # includes DDPG, which is a subclass
+                sb3.TD3,  # also for DDPG, which is a subclass
                 sb3_contrib.TQC,
                 sb3_contrib.TRPO,
                 sb3_contrib.CrossQ,
@@ -61,6 +63,6 @@ ROLLOUT_STATES: Mapping[type[BaseAlgorithm], RolloutState] = MappingProxyType(
 
 
 def rollout_state_of(model: BaseAlgorithm) -> RolloutState:
-    """Return the entry of the model's class, or of its nearest ancestor that has one."""
+    """Return the entry of the model's class, or of the nearest ancestor in the table."""
     known = (ROLLOUT_STATES[cls] for cls in type(model).__mro__ if cls in ROLLOUT_STATES)
     return next(known, _UNKNOWN)

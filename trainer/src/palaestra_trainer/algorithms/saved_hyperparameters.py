@@ -1,6 +1,6 @@
-"""The hyperparameters that a run began with; the run keeps them even if the defaults change later.
+"""Save the hyperparameters with which a run begins, so later changes of defaults do not affect it.
 
-All of them are in a file of the run directory.
+A file in the run directory holds all of them.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ def begin_with(
 
     Args:
         configuration: the configuration of the run.
-        directory: the directory of the run, which may not have begun.
-        before: the run whose checkpoint it resumes from, itself or another; None: it begins without one.
+        directory: the directory of the run; the run may not have begun yet.
+        before: the run, this or another, from whose checkpoint the attempt resumes; None: it does not resume.
 
     Raises:
         ConfigurationError: the file in the run directory cannot be read.
@@ -39,7 +39,7 @@ def begun_with(configuration: Configuration, directory: RunDirectory) -> Algorit
 
 
 def keep(algorithm: Algorithm, directory: RunDirectory) -> None:
-    """Write the algorithm with which a run begins into its directory, unless the run has begun.
+    """Write the hyperparameters with which a run begins into its directory, unless the run has begun.
 
     Raises:
         OSError: the file could not be written.

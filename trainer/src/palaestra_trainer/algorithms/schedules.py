@@ -1,13 +1,13 @@
-"""Schedules that a job writes as text or as a list of points.
+"""Convert a schedule that a job writes as text or as a list of points.
 
-`lin_0.001` falls from 0.001 at the start to 0 at the end, as in rl-baselines3-zoo. A list has points
-[share of the steps, value], such as `[[0, 0.001], [0.5, 0.0002]]`, with straight lines between them. Before
-the first and after the last point the value is constant.
+`lin_0.001` falls from 0.001 at the start of the training to 0 at its end, as in rl-baselines3-zoo. A list has
+points [share of the steps, value], such as `[[0, 0.001], [0.5, 0.0002]]`. Between two points the value
+changes linearly. Before the first point and after the last point the value is constant.
 
 Stable-Baselines3 pickles the schedules of a model into its model.zip. So a schedule consists of classes and
-functions of the standard library, NumPy and Stable-Baselines3: the file has only their names and some
-numbers. A class of this package would have to be importable by every reader of the file, or be stored as byte
-code, which only the version of Python that wrote it can read.
+functions of the standard library, NumPy and Stable-Baselines3, and the file has only their names and some
+numbers. To load a class of this package, every reader of the file would need this package. If the file
+contained the class as byte code, only the same version of Python could read it.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ LINEAR = re.compile(r"lin_(\d+(?:\.\d*)?(?:e-?\d+)?)")
 def schedule_of(value: Any) -> Callable[[float], float] | None:
     """Return the schedule that a value of a job describes; None if the value is not a schedule.
 
-    The schedule takes the remaining share of the training, 1 to 0.
+    The argument of the schedule is the remaining share of the training, from 1 to 0.
     """
     if isinstance(value, str) and (number := LINEAR.fullmatch(value)):
         return LinearSchedule(float(number[1]), 0.0, 1.0)
@@ -35,7 +35,7 @@ def schedule_of(value: Any) -> Callable[[float], float] | None:
 
 
 def _through(points: list[list[float]]) -> Callable[[float], float]:
-    """Return a schedule of straight lines between points [share of the steps, value], by increasing share."""
+    """Return a schedule that is linear between points [share of the steps, value], by increasing share."""
     left = [1.0 - share for share, _ in reversed(points)]
     return partial(np.interp, xp=left, fp=[float(value) for _, value in reversed(points)])
 

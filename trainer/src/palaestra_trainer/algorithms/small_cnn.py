@@ -1,10 +1,10 @@
-"""A small convolutional network for images, as a features extractor of Stable-Baselines3.
+"""A small convolutional network for images, which Stable-Baselines3 uses as a features extractor.
 
-It has 16 and 32 channels and 128 units, where NatureCNN has 32, 64 and 64 channels and 512 units.
+This network has layers of 16 and 32 channels and 128 units; NatureCNN has 32, 64 and 64 channels and 512
+units.
 
-A model.zip has only the name of this class, so Stable-Baselines3 loads the file if this package is installed.
-If the file contained the class itself, it would be byte code, which only the version of Python that wrote it
-can read.
+A model.zip contains only the name of this class, so Stable-Baselines3 can load the file if this package is
+installed. If the file contained the class as byte code, only the same version of Python could read it.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ class SmallCnn(BaseFeaturesExtractor):
 
     Args:
         observation_space: images with channels first.
-        features_dim: units of the last layer.
+        features_dim: number of units of the last layer.
     """
 
     def __init__(self, observation_space: spaces.Box, features_dim: int = 128) -> None:

@@ -1,6 +1,6 @@
-"""Check that an algorithm fits an environment, and choose its policy.
+"""Check that an algorithm supports the spaces of an environment, and choose its policy.
 
-The checks need only the spaces, so they refuse a mismatch before a simulator starts.
+The checks need only the spaces, so a mismatch is refused before a simulator starts.
 """
 
 from __future__ import annotations
@@ -29,7 +29,8 @@ def policy_of_spaces(
     """Return the policy of an algorithm for these observations and actions.
 
     Raises:
-        ConfigurationError: the algorithm does not fit the environment; one line for each reason.
+        ConfigurationError: the algorithm does not support the spaces; the message has one line for each
+            reason.
     """
     refuse_spaces(algorithm, seen, acted)
     if lines := [*_about_images(algorithm, seen), *_about_normalization(algorithm, seen)]:
@@ -38,17 +39,17 @@ def policy_of_spaces(
 
 
 def refuse_spaces(algorithm: Algorithm, seen: spaces.Space[Any], acted: spaces.Space[Any]) -> None:
-    """Refuse observations and actions that the algorithm would misread, or does not support.
+    """Refuse spaces that the algorithm would misinterpret or does not support.
 
     Raises:
-        ConfigurationError: one line for each reason.
+        ConfigurationError: a space is refused; the message has one line for each reason.
     """
     if lines := [*flaws_of_observation(seen), *_about_actions(algorithm.name, acted)]:
         raise ConfigurationError("\n".join(lines))
 
 
 def named_policy(algorithm: Algorithm, entry: RegisteredAlgorithm) -> str | type[BasePolicy] | None:
-    """Return the policy that the job names: an alias of the algorithm or a class; None if it names no policy.
+    """Return the policy that the job names, as an alias or a class; None if the job names no policy.
 
     Raises:
         ConfigurationError: the name is neither an alias nor a class.
@@ -71,15 +72,16 @@ def aliases(cls: type[BaseAlgorithm]) -> Mapping[str, type[BasePolicy]]:
 
 
 def images_in(space: spaces.Space[Any]) -> list[spaces.Box]:
-    """Return the images of an observation: the observation itself, or parts of a Dict."""
+    """Return the spaces of images in an observation: the observation itself, or parts of a Dict."""
     parts = space.spaces.values() if isinstance(space, spaces.Dict) else [space]
     return [part for part in parts if isinstance(part, spaces.Box) and is_image_space(part)]
 
 
 def scalable(space: spaces.Space[Any]) -> list[str] | bool:
-    """Return the keys of a Dict whose parts may be normalized; for another space, whether it may be.
+    """Return the keys of a Dict that can be normalized; for another space, return whether it can.
 
-    Networks scale images themselves, and the numbers of a Discrete are labels without a scale.
+    Images are excluded because networks scale images themselves. Discrete is excluded because its numbers are
+    labels without a scale.
     """
     if isinstance(space, spaces.Dict):
         return [key for key, part in space.spaces.items() if scalable(part)]

@@ -1,7 +1,8 @@
-"""The remedy for a name that is not a hyperparameter of the algorithm.
+"""Find the remedy for a name that is not a hyperparameter of the algorithm.
 
-The most similar hyperparameter is suggested only for a misspelling. For a name with another meaning, such as
-`n_timesteps`, which is not `n_steps`, the remedy is the field of the job for that value.
+The remedy for a misspelled name is the most similar hyperparameter. Some names are similar to a
+hyperparameter, but have another meaning: `n_timesteps` is not `n_steps`. For such a name, the remedy is the
+field of the job for that value.
 """
 
 from __future__ import annotations
@@ -13,10 +14,10 @@ from palaestra_protocol.foreign_words import ELSEWHERE, FROM_ZOO, OF_ZOO
 from palaestra_trainer.algorithms.registry import ALGORITHMS, RegisteredAlgorithm
 from palaestra_trainer.job.configuration import nearest
 
-# The least similarity to a known word. Those of gama and num_steps are greater; those of n_timesteps and
-# n_epochs to n_steps are less.
+# A name with at least this similarity to a hyperparameter counts as misspelled, such as gama for gamma. The
+# similarity of n_timesteps or n_epochs to n_steps is less.
 _MISSPELLED = 0.85
-# Other libraries use these names for the same value.
+# Other libraries use the names on the left for the hyperparameters on the right.
 _SAME: Mapping[str, str] = MappingProxyType(
     {
         "clip_coef": "clip_range",
@@ -45,10 +46,10 @@ def mistakes(
 
     Args:
         algorithm: name of the algorithm in the job.
-        entry: its entry.
-        of_policy: the arguments of its policy.
+        entry: entry of the algorithm.
+        of_policy: the arguments of the algorithm's policy.
         given: the names that the job sets.
-        field: the field of the job with these names.
+        field: the field of the job that holds these names.
     """
     known = entry.known
     unknown = [word for word in given if word not in known]

@@ -1,9 +1,8 @@
-"""Subclasses of Stable-Baselines3 algorithms that count and learn from only valid rows.
+"""Subclasses of Stable-Baselines3 algorithms that count only valid rows and learn only from them.
 
-Two mixins override methods that Stable-Baselines3 calls between a step and its
-storage; no code is copied. `with_valid_rows` adds one of them to a class. A saved
-model contains neither that subclass nor the names of the buffers, so the original
-class can load it.
+Two mixins override methods that Stable-Baselines3 calls between a step and its storage, so this module copies
+no code. `with_valid_rows` returns a subclass of an algorithm with one of the mixins. A saved model names
+neither that subclass nor the buffers, so the original class can load the model.
 """
 
 from __future__ import annotations
@@ -40,20 +39,20 @@ from palaestra_trainer.algorithms.recurrent import (
 from palaestra_trainer.algorithms.reinforce import REINFORCE
 from palaestra_trainer.errors import ConfigurationError
 
-# Each rollout buffer is replaced by the class on its right. Other classes of buffers are refused, because
-# they may need rows that these do not store.
+# Each rollout buffer on the left is replaced by the class on its right. Other buffer classes are refused,
+# because they may store more than these classes do.
 _MASKED: Mapping[type[RolloutBuffer], type[Any]] = {
     **own_buffers.VALID_ROLLOUTS,
     RecurrentRolloutBuffer: ValidRecurrentRolloutBuffer,
     RecurrentDictRolloutBuffer: ValidRecurrentDictRolloutBuffer,
 }
-# Evaluations and exported files give masks only to MaskablePPO and its subclasses.
+# Evaluations and exported policies pass masks only to MaskablePPO and its subclasses.
 _WITH_MASKS = (MaskableRolloutBuffer, MaskableDictRolloutBuffer)
 _BUFFERS = ("replay_buffer_class", "replay_buffer_kwargs", "rollout_buffer_class", "rollout_buffer_kwargs")
 
 
 class ValidRowsCounted(BaseAlgorithm):
-    """Counts only valid rows as steps; an invalid row is never part of an episode."""
+    """An algorithm that counts only valid rows as steps."""
 
     def _update_info_buffer(self, infos: list[dict[str, Any]], dones: np.ndarray | None = None) -> None:
         valid = valid_rows(infos)
@@ -65,10 +64,10 @@ class ValidRowsCounted(BaseAlgorithm):
 
 
 class OffPolicyRows(ValidRowsCounted, OffPolicyAlgorithm):
-    """An off-policy algorithm that stores valid rows, and ends at its number of steps.
+    """An off-policy algorithm that stores only valid rows, and stops at the target of the run.
 
     Raises:
-        ConfigurationError: it creates its own kind of replay buffer, in which invalid rows would be stored.
+        ConfigurationError: the algorithm creates its own replay buffer, which would store invalid rows.
     """
 
     def _setup_model(self) -> None:
@@ -82,23 +81,23 @@ class OffPolicyRows(ValidRowsCounted, OffPolicyAlgorithm):
     def collect_rollouts(
         self, env: Any, callback: BaseCallback, train_freq: TrainFreq, *args: Any, **kwargs: Any
     ) -> RolloutReturn:
-        """Collect the steps of `train_freq`, but stop at the target of the run."""
+        """Collect the steps of `train_freq`, but stop at the run's number of steps."""
         if train_freq.unit is TrainFrequencyUnit.STEP:
             missing = math.ceil((self._total_timesteps - self.num_timesteps) / env.num_envs)
             train_freq = train_freq._replace(frequency=max(1, min(train_freq.frequency, missing)))
         return super().collect_rollouts(env, callback, train_freq, *args, **kwargs)
 
     def train(self, gradient_steps: int, batch_size: int = 100) -> None:
-        """Learn from the buffer, unless it has no rows to sample, e.g. because of faults."""
+        """Learn from the replay buffer; do nothing while the buffer has no rows to sample."""
         if cast("ValidReplayBuffer", self.replay_buffer).can_sample():
             super().train(gradient_steps=gradient_steps, batch_size=batch_size)
 
 
 class OnPolicyRows(ValidRowsCounted, OnPolicyAlgorithm):
-    """An on-policy algorithm whose rollouts mask invalid rows.
+    """An on-policy algorithm whose rollout buffer never samples invalid rows.
 
     Raises:
-        ConfigurationError: it creates its own kind of rollout buffer, in which rows would not be masked.
+        ConfigurationError: the algorithm creates its own rollout buffer, which would sample invalid rows.
     """
 
     def _masked(self) -> ValidRolloutBuffer:
@@ -128,7 +127,7 @@ class OnPolicyRows(ValidRowsCounted, OnPolicyAlgorithm):
         )
 
     def _refuse_masks(self, buffer: RolloutBuffer) -> None:
-        """Refuse a buffer with masks in an algorithm without masks, and one without masks in MaskablePPO."""
+        """Refuse a buffer with masks for an algorithm without masks, or without masks for MaskablePPO."""
         takes_masks = isinstance(self, MaskablePPO)
         if isinstance(buffer, _WITH_MASKS) == takes_masks:
             return
@@ -145,7 +144,8 @@ class OnPolicyRows(ValidRowsCounted, OnPolicyAlgorithm):
     def train(self) -> None:
         """Learn from the rollout, unless too few of its rows are valid.
 
-        The deviation of a single advantage is NaN.
+        With `normalize_advantage`, a single valid row is too few, because the deviation of a single advantage
+        is NaN.
         """
         rollout = self._masked()
         if rollout.valid.sum() < (2 if getattr(self, "normalize_advantage", False) else 1):
@@ -158,7 +158,7 @@ class OnPolicyRows(ValidRowsCounted, OnPolicyAlgorithm):
 
 @cache
 def with_valid_rows(cls: type[BaseAlgorithm]) -> type[BaseAlgorithm]:
-    """Return a subclass of `cls`, with its name, that counts and learns from only valid rows.
+    """Return a subclass of `cls`, with its name, that counts only valid rows and learns only from them.
 
     Raises:
         ConfigurationError: `cls` is neither an on-policy nor an off-policy algorithm of Stable-Baselines3.

@@ -1,1 +1,1 @@
-"""The programs of this package, a module each; `program` has what they share."""
+"""The command-line programs of this package; the module `program` has their common functions."""

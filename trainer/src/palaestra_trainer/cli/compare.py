@@ -1,4 +1,4 @@
-"""`palaestra-compare`: the policies of two runs on the same fresh episodes."""
+"""`palaestra-compare` compares the policies of two runs on the same fresh episodes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from palaestra_protocol.imports import import_without, without_collections
 
-# With rich, structlog would format tracebacks, but the log has them as plain text.
+# If structlog finds rich, it formats tracebacks with rich, but the log must have plain text.
 import_without("rich", "structlog")
 
 from palaestra_protocol.linux import require_linux
@@ -58,13 +58,13 @@ def compare(arguments: Sequence[str] | None = None) -> int:
     try:
         with Interruption() as interruption:
             return _compare(chosen, interruption)
-    # The environment's code may end the program.
+    # The environment's code may raise SystemExit.
     except (KeyboardInterrupt, TrainerError, OSError, SystemExit) as error:
         return refuse_without_run(error)
 
 
 def compare_and_leave() -> int:
-    """Run `palaestra-compare` as a program that ends soon, even if a thread of a job's code still runs."""
+    """Run `palaestra-compare`, and end the process soon even if a thread of a job's code still runs."""
     return leaving(compare())
 
 

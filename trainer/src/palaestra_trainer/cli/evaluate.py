@@ -1,4 +1,4 @@
-"""`palaestra-eval`: the policy of a run on fresh episodes."""
+"""`palaestra-eval` evaluates the policy of a run on fresh episodes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any
 
 from palaestra_protocol.imports import import_without, without_collections
 
-# With rich, structlog would format tracebacks, but the log has them as plain text.
+# If structlog finds rich, it formats tracebacks with rich, but the log must have plain text.
 import_without("rich", "structlog")
 
 from palaestra_protocol.linux import require_linux
@@ -70,14 +70,14 @@ def evaluate(arguments: Sequence[str] | None = None) -> int:
     configure_logs()
     try:
         _evaluate(chosen)
-    # The environment's code may end the program.
+    # The environment's code may raise SystemExit.
     except (KeyboardInterrupt, TrainerError, OSError, SystemExit) as error:
         return refuse_without_run(error)
     return ExitCode.DONE
 
 
 def evaluate_and_leave() -> int:
-    """Run `palaestra-eval` as a program that ends soon, even if a thread of the job's code still runs."""
+    """Run `palaestra-eval`, and end the process soon even if a thread of the job's code still runs."""
     return leaving(evaluate())
 
 
@@ -114,7 +114,7 @@ def _write_result(result: dict[str, Any]) -> None:
 
 
 def _drivers(text: str) -> tuple[str, ...]:
-    """Return the simulators of an option `NAME,NAME`."""
+    """Return the names of simulators in the value of the option --in, such as `stub,mujoco`."""
     names = tuple(dict.fromkeys(text.split(",")))
     for name in names:
         if name not in DRIVERS:

@@ -1,4 +1,4 @@
-"""`palaestra-export`: the best policy of a run as one file for other programs."""
+"""`palaestra-export` writes the best policy of a run as one file for other programs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 
 from palaestra_protocol.imports import import_without, without_collections
 
-# With rich, structlog would format tracebacks, but the log has them as plain text.
+# If structlog finds rich, it formats tracebacks with rich, but the log must have plain text.
 import_without("rich", "structlog")
 
 from palaestra_protocol.pod.status import ExitCode
@@ -58,5 +58,5 @@ def export(arguments: Sequence[str] | None = None) -> int:
 
 
 def export_and_leave() -> int:
-    """Run `palaestra-export` as a program that ends soon, even if a thread of the job's code still runs."""
+    """Run `palaestra-export`, and end the process soon even if a thread of the job's code still runs."""
     return leaving(export())

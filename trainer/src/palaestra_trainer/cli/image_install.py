@@ -1,9 +1,9 @@
-"""`palaestra-install`: installs a user's project while an image is built FROM one of ours.
+"""`palaestra-install` installs a user's project while an image is built FROM one of ours.
 
-The project, and those of its dependencies that the image lacks, go to the first folder of PYTHONPATH. The
-packages of the image stay as they were tested: the project can neither replace nor hide them. If the image
-has all dependencies, no package index is needed, because the image has the build backends hatchling and
-setuptools.
+The project goes to the first folder of PYTHONPATH, together with the dependencies that the image lacks. The
+packages of the image stay as they were tested, because the project can neither replace nor hide them. If the
+image has all dependencies, the build works without a package index: the image also contains the build
+backends hatchling and setuptools.
 """
 
 from __future__ import annotations
@@ -57,10 +57,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def install(folder: Path, target: Path) -> None:
-    """Install the project in `folder` into `target`, whole or not at all.
+    """Install the project in `folder` into `target`; after an error, `target` is unchanged.
 
     Raises:
-        ConfigurationError: the project cannot be built, or would replace or hide a part of the image.
+        ConfigurationError: the project cannot be built, or it would replace or hide a package of the image.
     """
     with tempfile.TemporaryDirectory() as scratch:
         source, staged = Path(scratch, "source"), Path(scratch, "staged")
@@ -71,13 +71,14 @@ def install(folder: Path, target: Path) -> None:
             shutil.copytree(source, staged)
         _check_names(folder, staged, target)
         _check_requirements(staged)
-        # Byte code is compiled now, because the root file system of a pod is read-only.
+        # The byte code is compiled while the image is built, because the root file system of a pod is
+        # read-only.
         compileall.compile_dir(staged, quiet=1, stripdir=str(staged), prependdir=str(target))
         _replace(staged, target)
 
 
 def _replace(staged: Path, target: Path) -> None:
-    """Copy the staged files to `target`, and remove older versions of the same distributions first."""
+    """Remove older versions of the staged distributions from `target`, then copy the staged files there."""
     new = {canonicalize_name(PathDistribution(path).name) for path in staged.glob("*.dist-info")}
     for path in target.glob("*.dist-info"):
         old = PathDistribution(path)
@@ -92,14 +93,14 @@ def _target() -> Path:
     first, *_ = os.environ.get("PYTHONPATH", "").split(os.pathsep)
     if not first:
         raise ConfigurationError(
-            "PYTHONPATH: is not set, and its first folder is where a project goes; "
+            "PYTHONPATH: is not set, but a project is installed into its first folder; "
             "run this in a Dockerfile FROM palaestra-trainer"
         )
     return Path(first)
 
 
 def _copy(folder: Path, source: Path) -> None:
-    """Copy a project to a folder where a build backend may write."""
+    """Copy a project to a folder in which a build backend can write files."""
     if not folder.is_dir():
         raise ConfigurationError(f"{folder}: is not a folder; name the one with your project")
 
@@ -116,9 +117,10 @@ def _copy(folder: Path, source: Path) -> None:
 
 
 def _install_project(source: Path, staged: Path) -> None:
-    """Build the project and install it into `staged` with everything that the image lacks.
+    """Build the project and install it into `staged`, with the dependencies that the image lacks.
 
-    uv skips the packages of the image, even if another version is required; `_check_requirements` finds that.
+    uv skips the packages of the image, even if the project requires another version of one.
+    `_check_requirements` finds such a conflict later.
     """
     project = _pyproject(source)
     there = list(distributions())
@@ -144,7 +146,7 @@ def _pyproject(source: Path) -> Mapping[str, Any]:
 
 
 def _check_names(folder: Path, staged: Path, target: Path) -> None:
-    """Refuse a project without a module, and one that hides a module of the image."""
+    """Refuse a project without a module, and a project that would hide a module of the image."""
     names = sorted(_importable(staged))
     if not names or "__init__" in names:
         fact = "is itself a package" if names else "holds neither a module nor a package"
@@ -170,7 +172,7 @@ def _elsewhere(name: str, target: Path) -> bool:
 
 
 def _check_requirements(staged: Path) -> None:
-    """Refuse a project that needs another version or an extra of a package that the image lacks."""
+    """Refuse a project that needs a version or an extra of a package that the image does not have."""
     new = [PathDistribution(path) for path in staged.glob("*.dist-info")]
     there = [*new, *distributions()]
     for distribution in new:
@@ -184,7 +186,7 @@ def _check_requirements(staged: Path) -> None:
 
 
 def _unmet(requirements: Iterable[Requirement], there: Sequence[Distribution]) -> Iterator[Requirement]:
-    """Yield the requirements that no distribution meets, including those of the extras that they name."""
+    """Yield the requirements that no distribution meets, including the requirements of requested extras."""
     for requirement in requirements:
         found = _found(requirement, there)
         if found is None or not requirement.specifier.contains(found.version, prereleases=True):
@@ -195,7 +197,7 @@ def _unmet(requirements: Iterable[Requirement], there: Sequence[Distribution]) -
 
 
 def _requirements(distribution: Distribution, extra: str = "") -> Iterator[Requirement]:
-    """Yield the requirements of a distribution on this platform; with an extra, only those of the extra."""
+    """Yield the requirements of a distribution, or only those of an extra, on this platform."""
     for requirement in map(Requirement, distribution.requires or ()):
         marker = requirement.marker
         always = marker is None or marker.evaluate({"extra": ""})

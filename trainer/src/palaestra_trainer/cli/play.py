@@ -1,7 +1,8 @@
-"""`python -P -m palaestra_trainer.cli.play RUN`: the policy of a run plays episodes until it is interrupted.
+"""`python -P -m palaestra_trainer.cli.play RUN` plays episodes with a run's policy until SIGTERM.
 
-It is the program of a TrainingJob (`trainer.command`), whose simulators it uses; it learns nothing. It prints
-a line for each episode. A simulator that breaks is restarted, and the next episode begins.
+A TrainingJob can name this program as its `trainer.command`. The program plays in the simulators of that job,
+and does not learn. The program prints a line for each episode. A simulator that fails is restarted, and the
+next episode begins.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ USAGE = "usage: python -P -m palaestra_trainer.cli.play RUN"
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Play until SIGTERM, and return the exit code."""
+    """Play episodes until SIGTERM, and return the exit code."""
     if len(arguments) != 1:
         sys.stderr.write(f"{USAGE}\n")
         return ExitCode.CONFIGURATION
@@ -35,7 +36,7 @@ def main(arguments: Sequence[str]) -> int:
     except TrainerError as error:
         sys.stderr.write(f"{error}\n")
         return 1
-    return ExitCode.INTERRUPTED  # so the runner does not call the run complete
+    return ExitCode.INTERRUPTED  # with another code, the run would count as complete
 
 
 def _play(policy: Any, env: Any, interrupted: threading.Event) -> None:

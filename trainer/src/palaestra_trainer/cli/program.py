@@ -1,4 +1,4 @@
-"""Common parts of this package's programs: their help, and their end with a line and an exit code."""
+"""Functions for all programs of this package: their help, their messages and their exit codes."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from palaestra_trainer.waiting.exit import leave_after
 
 log = structlog.get_logger(__name__)
 
-LEFT_S = 10.0  # for the work of libraries at the exit of Python, such as an upload
-KEYBOARD_INTERRUPT = 130  # the exit status that shells give a process ended by SIGINT
+LEFT_S = 10.0  # time for the work of libraries at the exit of Python, such as an upload
+KEYBOARD_INTERRUPT = 130  # the exit status that shells report for a process that SIGINT ended
 _KEPT = (ExitCode.CONFIGURATION, ExitCode.FAULT_BUDGET)
 
 
@@ -31,7 +31,7 @@ def parser(name: str, description: str, exit_codes: str) -> argparse.ArgumentPar
 
 
 def refuse(error: BaseException) -> int:
-    """Log an error, a line for each mistake, write it as termination message, and return its exit code."""
+    """Log each line of an error, write it as the termination message, and return its exit code."""
     end = end_of(error)
     for line in end.message.splitlines():
         log.error(line, reason=end.reason)
@@ -40,7 +40,7 @@ def refuse(error: BaseException) -> int:
 
 
 def refuse_without_run(error: BaseException) -> int:
-    """Log the error of a program that saves nothing to resume from, and return its exit code."""
+    """Log the error of a program that cannot be resumed, and return its exit code."""
     if isinstance(error, KeyboardInterrupt | Interrupted):
         log.error("ended by Ctrl-C")
         return KEYBOARD_INTERRUPT
@@ -49,13 +49,13 @@ def refuse_without_run(error: BaseException) -> int:
 
 
 def write_line(line: str) -> None:
-    """Write a line to standard output at once, also if that is a pipe."""
+    """Write a line to standard output at once, even if the output is a pipe."""
     sys.stdout.write(f"{line}\n")
     sys.stdout.flush()
 
 
 def leaving(code: int) -> int:
-    """Return an exit code, and end the process soon even if a thread of the job's code still runs."""
+    """Return the exit code, and let the process end soon even if a thread of the job's code still runs."""
     sys.stdout.flush()
     leave_after(LEFT_S, code)
     return code

@@ -1,4 +1,4 @@
-"""`palaestra-report`: the report of runs, or a film of one, from their directories."""
+"""`palaestra-report` writes a report of one or several runs, or a film of one run."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _film(runs: Sequence[RunDirectory], film: Path) -> int:
-    """Write a film of the one run."""
+    """Write a film of a run; refuse several runs."""
     if len(runs) > 1:
         sys.stderr.write(f"{film}: a film shows one run; give one run directory\n")
         return ExitCode.CONFIGURATION

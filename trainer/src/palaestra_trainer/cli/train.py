@@ -1,4 +1,4 @@
-"""`palaestra-train`: one attempt of a run."""
+"""`palaestra-train` runs one attempt of a training run."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 from palaestra_protocol.imports import import_without, without_collections
 
-# With rich, structlog would format tracebacks, but the log has them as plain text.
+# If structlog finds rich, it formats tracebacks with rich, but the log must have plain text.
 import_without("rich", "structlog")
 
 from palaestra_protocol.linux import require_linux
@@ -63,7 +63,7 @@ def train(arguments: Sequence[str] | None = None) -> int:
     except (TrainerError, OSError) as error:
         return refuse(error)
     with leaving_when_asked():
-        # The imports are here so that a wrong configuration is reported at once, not seconds later.
+        # These imports take seconds, so they come after the check of the configuration.
         with without_collections():
             from palaestra_trainer.run import attempt
             from palaestra_trainer.simulators.connect import connect_members
@@ -72,7 +72,7 @@ def train(arguments: Sequence[str] | None = None) -> int:
 
 
 def train_and_leave() -> int:
-    """Run `palaestra-train` as a program that ends soon, even if a thread of the job's code still runs."""
+    """Run `palaestra-train`, and end the process soon even if a thread of the job's code still runs."""
     code = train()
     end_undisturbed()
     return leaving(code)

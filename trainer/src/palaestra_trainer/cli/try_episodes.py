@@ -1,4 +1,4 @@
-"""`palaestra-try`: a few episodes of a job's environment, before any training."""
+"""`palaestra-try` plays a few episodes in a job's environment, before any training."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from palaestra_protocol.imports import import_without, without_collections
 
-# With rich, structlog would format tracebacks, but the log has them as plain text.
+# If structlog finds rich, it formats tracebacks with rich, but the log must have plain text.
 import_without("rich", "structlog")
 
 from palaestra_protocol.linux import require_linux
@@ -69,13 +69,13 @@ def attempt(arguments: Sequence[str] | None = None) -> int:
     try:
         with Interruption() as interruption:
             return _attempt(chosen, interruption)
-    # The environment's code may end the program.
+    # The environment's code may raise SystemExit.
     except (KeyboardInterrupt, TrainerError, OSError, SystemExit) as error:
         return refuse_without_run(error)
 
 
 def try_and_leave() -> int:
-    """Run `palaestra-try` as a program that ends soon, even if a thread of the job's code still runs."""
+    """Run `palaestra-try`, and end the process soon even if a thread of the job's code still runs."""
     return leaving(attempt())
 
 
@@ -120,7 +120,7 @@ def _attempt(chosen: argparse.Namespace, interruption: Interruption) -> int:
 def _agent(
     chosen: argparse.Namespace, restarter: Restarter, seed: int, interruption: Interruption
 ) -> Iterator[tuple[Agent, list[str]]]:
-    """Yield the agent, with lines for the person who is one."""
+    """Yield the agent, and lines that explain the keys to a person who drives."""
     from palaestra_trainer.cli.trying import agents, keyboard, keymap
 
     env = restarter.member.env
@@ -138,7 +138,7 @@ def _agent(
 
 
 def _alone(configuration: Configuration) -> Configuration:
-    """Return the configuration with its first collecting simulator only."""
+    """Return the configuration with only its first collecting simulator."""
     first = configuration.with_role(Role.COLLECT)[0]
     alone = first.model_copy(update={"min_simulators": None, "standby": False})
     return configuration.model_copy(update={"simulators": (alone,)})
@@ -154,9 +154,9 @@ def _head(configuration: Configuration, restarter: Restarter) -> list[str]:
 
 
 def _short(space: object) -> str:
-    """Return a space as a line."""
+    """Return a space as one line of text."""
     return textwrap.shorten(str(space), _WIDEST, placeholder=" ...")
 
 
 def _drop(line: str) -> None:
-    """Show nothing."""
+    """Ignore a line, because the output is JSON."""

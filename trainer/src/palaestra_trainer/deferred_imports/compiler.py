@@ -1,8 +1,9 @@
-"""Import PyTorch's compiler only if something is compiled; this saves a second of processor time per start.
+"""Import PyTorch's compiler only if a program compiles; this saves a second of processor time per start.
 
-The first optimizer of a program imports `torch._dynamo`, and SymPy with it, to call `disable` and
-`graph_break`. Without compiled code these two have no effect, so a stand-in provides them. As soon as a
-program uses any other part, as `torch.compile` does, the compiler itself replaces the stand-in.
+The first optimizer of a program imports `torch._dynamo` to call its functions `disable` and `graph_break`.
+That import also loads SymPy. Without compiled code these two functions have no effect, so a stand-in module
+provides them. When a program uses any other attribute of the compiler, as `torch.compile` does, the compiler
+itself replaces the stand-in.
 """
 
 from __future__ import annotations
@@ -17,14 +18,14 @@ from types import ModuleType
 from typing import Any
 
 NAME = "torch._dynamo"
-_ANSWER = "__dynamo_disable"  # the attribute of a function in which PyTorch keeps the result of `disable`
+_ANSWER = "__dynamo_disable"  # attribute of a function in which PyTorch stores the result of `disable`
 
-# Each function of the stand-in, and the module of PyTorch that calls it.
+# The functions of the stand-in, each with the module of PyTorch that calls it.
 _OF_PYTORCH = {"disable": "torch._compile", "graph_break": "torch.optim.optimizer"}
 
 
 def defer_compiler() -> None:
-    """Defer the compiler from now on, unless it is imported already; safe to repeat."""
+    """Defer the import of the compiler, unless it is already imported; further calls have no effect."""
     if NAME not in sys.modules and not any(isinstance(finder, _Finder) for finder in sys.meta_path):
         sys.meta_path.insert(0, _Finder())
 
@@ -35,24 +36,24 @@ class _StandIn(ModuleType):
         self._asked_about: list[Callable[..., Any]] = []
 
     def _graph_break(self) -> None:
-        pass  # without a compiler there is no graph
+        pass  # without a compiler, a program has no graph to break
 
     def _disable(self, fn: Callable[..., Any], *_: Any, **_options: Any) -> Callable[..., Any]:
         self._asked_about.append(fn)
         return fn
 
     def __getattr__(self, name: str) -> Any:
-        if name.startswith("__"):  # programs that inspect all modules read such names of every module
+        if name.startswith("__"):  # programs that inspect all modules read such attributes
             raise AttributeError(name)
-        # If a user's function calls `disable`, it must stay disabled when another function is compiled. So
-        # only PyTorch's own calls get the stand-in.
+        # A function that a user's program passes to `disable` must stay disabled when another function is
+        # compiled. So only PyTorch's own calls of `disable` get the stand-in.
         asks = sys._getframe(1).f_globals.get("__name__")  # noqa: SLF001 - inspect.stack reads source files
         if asks == _OF_PYTORCH.get(name):
             return getattr(self, f"_{name}")
         return getattr(self.give_way(), name)
 
     def give_way(self) -> ModuleType:
-        """Replace this module by the compiler; PyTorch will call its `disable` again for each function."""
+        """Import the compiler instead of this stand-in; PyTorch then calls the real `disable` again."""
         if sys.modules.get(NAME) is self:
             sys.meta_path[:] = [finder for finder in sys.meta_path if not isinstance(finder, _Finder)]
             del sys.modules[NAME]
@@ -65,7 +66,7 @@ class _Finder(MetaPathFinder):
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        """Return the spec of the stand-in, or that of a submodule of the compiler after its import."""
+        """Return the spec of the stand-in, or the spec of a submodule after the compiler was imported."""
         standing = sys.modules.get(NAME)
         if fullname.startswith(f"{NAME}.") and isinstance(standing, _StandIn):
             standing.give_way()
@@ -90,7 +91,7 @@ class _LoaderOfStandIn(SourceFileLoader):
 
 
 class _Imported(Loader):
-    """Loads a module that was imported while its spec was searched for."""
+    """A loader for a module that was imported while Python searched for its spec."""
 
     def create_module(self, spec: ModuleSpec) -> ModuleType:
         return sys.modules[spec.name]

@@ -1,9 +1,10 @@
-"""Import Stable-Baselines3 without libraries that most programs never use: a third of their start time.
+"""Import Stable-Baselines3 without libraries that most programs never use; this saves a third of their start.
 
-Its modules import pandas, Matplotlib and rich for functions that no training calls. They import TensorBoard's
-writer even if nothing is written. While these modules are executed, stand-ins replace the libraries. A
-stand-in imports its library at the first use, so everything still works. Other modules import the libraries
-themselves, and a library that is already imported gets no stand-in.
+The modules of Stable-Baselines3 import pandas, Matplotlib and rich for functions that no training calls. They
+import TensorBoard's writer even if the program does not write event files. While Python executes these
+modules, a stand-in module replaces each library. A stand-in imports its library at the first use, so every
+function of the library still works. When other modules import a library, they get the library itself. A
+library that is already imported is not replaced.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from importlib.util import spec_from_file_location
 from types import MappingProxyType, ModuleType
 from typing import Any
 
-# Each tuple holds a library and those of its submodules that are imported by name.
+# Each tuple holds a library, and the submodules of it that Stable-Baselines3 imports by name.
 _MATPLOTLIB = ("matplotlib", "matplotlib.figure")
 _PANDAS = ("pandas",)
 _PROGRESS_BAR = ("tqdm.rich",)
@@ -34,7 +35,7 @@ IMPORTERS: Mapping[str, tuple[tuple[str, ...], ...]] = MappingProxyType(
 
 
 def defer_unused_imports() -> None:
-    """Defer these libraries from now on; safe to repeat."""
+    """Defer the import of these libraries from now on; further calls have no effect."""
     if not any(isinstance(finder, _Finder) for finder in sys.meta_path):
         sys.meta_path.insert(0, _Finder())
 
@@ -43,7 +44,7 @@ class _Finder(MetaPathFinder):
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        """Return the spec of a module in `IMPORTERS`, with our loader; None leaves it to other finders."""
+        """Return the spec of a module in `IMPORTERS`, with our loader; for other modules return None."""
         if fullname not in IMPORTERS:
             return None
         found = PathFinder.find_spec(fullname, path, target)
@@ -60,7 +61,7 @@ class _LoaderWithStandIns(SourceFileLoader):
 
 
 class _StandIn(ModuleType):
-    """A stand-in for a module; while an importer is executed, its attributes are stand-ins too."""
+    """A stand-in for a module; its attributes are stand-ins too while an importer is executed."""
 
     def __getattr__(self, name: str) -> Any:
         if sys.modules.get(self.__name__) is self:
@@ -69,7 +70,7 @@ class _StandIn(ModuleType):
 
 
 class _Later:
-    """A stand-in for a class or function that an importer uses in an annotation, or calls later."""
+    """A stand-in for a class or function; an importer uses it in an annotation, or calls it later."""
 
     def __init__(self, home: _StandIn, name: str) -> None:
         self._home, self._name = home, name

@@ -1,8 +1,8 @@
-"""Gymnasium environments; importing this package registers them.
+"""Gymnasium environments, which the import of this package registers.
 
-Both ways work: `import palaestra_trainer.environments`, then
-`gymnasium.make("MoveToTargetEnv-v0", ...)`, or in one line
-`gymnasium.make("palaestra_trainer.environments:MoveToTargetEnv-v0", ...)`.
+A program can run `import palaestra_trainer.environments` and then `gymnasium.make("MoveToTargetEnv-v0",
+...)`. It can also do both in one call, `gymnasium.make("palaestra_trainer.environments:MoveToTargetEnv-v0",
+...)`.
 """
 
 import gymnasium
@@ -33,9 +33,9 @@ __all__ = [
     "SeeTargetEnv",
 ]
 
-# Entry points are text, because they import simulators, and this package must not import those.
-# max_episode_steps is not set: the environments count their steps themselves, because Sparse rewards the
-# last step.
+# Entry points are text, because the modules that they name import simulators, and this package must not.
+# max_episode_steps is not set, because the reward `Sparse` depends on the end of time. So the environments
+# count their steps themselves.
 gymnasium.register(id="MoveToTargetEnv-v0", entry_point="palaestra_trainer.simulators.entry_point:make")
 gymnasium.register(id="SeeTarget-v0", entry_point="palaestra_trainer.simulators.entry_point:make_seeing")
 gymnasium.register(

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from palaestra_trainer.environments.options import Driving
 from palaestra_trainer.robots.geometry import SPEED_M_S, TURN_RAD_S, Movement, Twist
 
-SCALE = (SPEED_M_S, SPEED_M_S, TURN_RAD_S)  # the velocity of 1 in a continuous action
+SCALE = (SPEED_M_S, SPEED_M_S, TURN_RAD_S)  # velocities for a continuous action of 1, 1, 1
 
 
 def action_space(options: Driving) -> spaces.Space[Any]:
@@ -23,14 +23,14 @@ def action_space(options: Driving) -> spaces.Space[Any]:
 
 
 def twist(action: Any, options: Driving) -> Twist:
-    """Return the velocity of an action of `action_space(options)`, see `Omnidrive.drive`."""
+    """Return the velocity for an action of `action_space(options)`, as `Omnidrive.drive` takes it."""
     if options.actions == "continuous":
         return _scaled(action)
     return options.movements[int(action)].twist
 
 
 def nearest(wanted: Twist, options: Driving) -> Any:
-    """Return the action whose velocity is nearest to the wanted one."""
+    """Return the action whose velocity is nearest to the wanted velocity."""
     if options.actions == "continuous":
         return np.clip(np.divide(wanted, SCALE), -1.0, 1.0).astype(np.float32)
     return _nearest(wanted, options.movements)

@@ -1,7 +1,7 @@
-"""Policies without learning, as a baseline that a trained policy must beat.
+"""Baselines: policies without learning that a trained policy must beat.
 
-Each is a function of the environment, not of the observation, so that it works with
-every choice of parts. `make bench` prints their success next to that of the trained policy.
+Each baseline is a function of the environment, not of the observation, so it works with every choice of
+observation parts. `make bench` prints the success rates of the baselines next to that of the trained policy.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ Policy = Callable[[MoveToTargetEnv], Any]
 
 
 def random_movement(env: MoveToTargetEnv) -> Any:
-    """Return a random action; all are equally likely."""
+    """Return a random action; all actions are equally likely."""
     return env.action_space.sample()
 
 
 def straight_to_target(env: MoveToTargetEnv) -> Any:
-    """Return the action whose direction is nearest to that of the target, or a stop near the target.
+    """Return the action that drives most directly to the target; near the target, return a stop.
 
-    It uses no sensor, so a cylinder in the way ends the episode.
+    This policy uses no sensor, so a cylinder in its way ends the episode.
     """
     forward_m, left_m = env.situation.target_ahead
     distance_m = math.hypot(forward_m, left_m)

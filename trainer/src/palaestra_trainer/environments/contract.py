@@ -1,7 +1,7 @@
-"""Check the results of resets and steps against gymnasium's API; return each mistake as text for a message.
+"""Check the results of resets and steps against gymnasium's API; return mistakes as text for a message.
 
-`mismatch` is a complete check. The checks of every reset and step are weaker, because they run thousands of
-times a second: they accept a number beyond the bounds of a Box.
+`mismatch` is a complete check of an observation. The checks of every reset and step run thousands of times a
+second. So they are weaker, and accept a number beyond the bounds of a Box.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ _LENGTHS = {"reset": 2, "step": 5}
 
 
 def broken_by_reset(space: spaces.Space[Any], result: Any) -> str:
-    """Return the mistake in the result of a reset; "" if it is right."""
+    """Return the mistake in the result of a reset; "" if the result is right."""
     if not isinstance(result, tuple) or len(result) != _LENGTHS["reset"]:
         return kind_of(result)
     return _unlike(space, result[0]) or _no_info(result[1])
 
 
 def broken_by_step(space: spaces.Space[Any], result: Any) -> str:
-    """Return the mistake in the result of a step; "" if it is right."""
+    """Return the mistake in the result of a step; "" if the result is right."""
     if not isinstance(result, tuple) or len(result) != _LENGTHS["step"]:
         return kind_of(result)
     observation, reward, *ends, info = result
@@ -37,7 +37,7 @@ def broken_by_step(space: spaces.Space[Any], result: Any) -> str:
 
 
 def kind_of(result: Any) -> str:
-    """Return the class of a value as text; for a tuple, the classes of its parts too."""
+    """Return the class of a value as text; for a tuple, also the classes of its parts."""
     if isinstance(result, tuple):
         return f"a tuple of {len(result)}: ({', '.join(type(part).__name__ for part in result)})"
     return f"a {type(result).__name__}"
@@ -48,7 +48,7 @@ def _no_info(info: Any) -> str:
 
 
 def _unlike(space: spaces.Space[Any], observation: Any) -> str:
-    """Return the difference in type, shape or keys of an observation from its space; "" if they are equal."""
+    """Return the difference in type, shape or keys between an observation and its space; "" if equal."""
     fact = _mismatch_of_kind(space, observation)
     return fact and f"an observation of another kind ({fact})"
 
@@ -62,7 +62,7 @@ def _mismatch_of_kind(space: spaces.Space[Any], observation: Any) -> str:
 
 
 def mismatch(space: spaces.Space[Any], observation: Any) -> str:
-    """Return the reason why an observation is not in its space, as text; "" if it is."""
+    """Return the reason why an observation is not in its space, as text; "" if it is in the space."""
     if isinstance(space, spaces.Dict):
         return _mismatch_of_dict(space, observation, mismatch)
     if isinstance(space, spaces.Box):

@@ -1,4 +1,4 @@
-"""Copies of the values that are passed between the trainer and the code of a job's author.
+"""Copy the values that pass between the trainer and the code of a job's author.
 
 An environment may return the same array at every step, write into an action, or keep the dict that it
 returned. So the trainer and the environment never share an object.
@@ -16,7 +16,7 @@ def copied(value: Any) -> Any:
     """Return a copy that shares no array, dict, list or set with the original.
 
     A mapping of any class becomes a dict, because the original may be frozen. Objects of other classes are
-    returned as they are: a copy of a robot or a socket would not work.
+    returned without a copy, because a copy of a robot or a socket would not work.
     """
     if isinstance(value, np.ndarray):
         return value.copy()

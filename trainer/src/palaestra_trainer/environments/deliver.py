@@ -1,7 +1,7 @@
-"""The task: drive to three targets in turn, and stand on each.
+"""The task to drive to three targets in turn, and to stand on each.
 
-World, robot, observations and rewards are those of `MoveToTargetEnv`, so one world has tasks of different
-difficulty.
+World, robot, observations and rewards are those of `MoveToTargetEnv`. So the same world has tasks of
+different difficulty.
 """
 
 from __future__ import annotations
@@ -18,23 +18,23 @@ from palaestra_trainer.robots.geometry import Point
 class DeliverEnv(MoveToTargetEnv):
     """Drive to three targets in turn and stand on each: within 0.20 m, slower than 0.05 m/s.
 
-    It differs from `MoveToTargetEnv` in these points:
+    The task differs from `MoveToTargetEnv` in these points:
 
-    - The mark shows one target. When the robot stands on it, the mark moves to the next one, at least 1 m
-      away, and the episode continues. `options.targets` is the number of targets.
-    - `target` of an observation is the current target; `to_reach` is the share of the targets that are
-      left: 1, 2/3, 1/3. It is observed by default.
-    - `success` is paid for each target. `info["outcome"]` of such a step is `delivered`, for the last target
-      `reached`; `info["is_success"]` is true only for the last target.
+    - The mark shows one target. When the robot stands on this target, the mark moves to the next target, at
+      least 1 m away, and the episode continues. `options.targets` is the number of targets.
+    - The part `target` of an observation is the current target. The part `to_reach` is the share of the
+      targets that are left: 1, 2/3, 1/3. By default the observation includes `to_reach`.
+    - The robot earns `success` for each target. `info["outcome"]` of such a step is `delivered`, or `reached`
+      for the last target. `info["is_success"]` is true only for the last target.
     - Time is up after 300 steps.
 
     `reset(options={"start": (x, y, heading), "target": (x, y)})` sets the start and the first target.
 
     Args:
         robot: the robot to drive.
-        scene: arranges episodes.
+        scene: the scene, which places robot and mark for each episode.
         options: observation, actions and rewards.
-        on_close: called by `close`.
+        on_close: a function that `close` calls.
 
     Raises:
         MissingCapability: the robot is not a Robotino.

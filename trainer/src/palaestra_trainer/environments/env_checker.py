@@ -1,9 +1,9 @@
 """Check the results of an environment against gymnasium's API.
 
-gymnasium's own wrapper only warns, and training would continue with wrong rows. Here its checks of the first
-reset and the first step raise an error that names the expected and the actual value. Types and shapes of
-later results are checked too, see `contract`. NaN and infinity are not checked here, because the learner
-reports them as divergence.
+gymnasium's own wrapper only warns, so training would continue with wrong rows. The wrapper of this module
+applies gymnasium's checks to the first reset and the first step. It raises an error that names the expected
+and the actual value. It also checks types and shapes of later results, see `contract`. It does not check for
+NaN and infinity, because the learner reports them as divergence.
 """
 
 from __future__ import annotations
@@ -31,16 +31,17 @@ from palaestra_trainer.errors import ConfigurationError
 
 RESET = "reset(self, *, seed=None, options=None) that returns (observation, info)"
 STEP = "step(self, action) that returns (observation, reward, terminated, truncated, info)"
-_one_at_a_time = threading.Lock()  # a lock, because warnings are caught for the whole process
+_one_at_a_time = threading.Lock()  # `catch_warnings` affects all threads
 
 
 def held(env: gymnasium.Env[Any, Any], name: str) -> gymnasium.Env[Any, Any]:
-    """Return the environment in a wrapper that raises ConfigurationError if its first reset or step is wrong.
+    """Wrap the environment so that a wrong result of a reset or a step raises ConfigurationError.
 
-    There are two checks: outside and inside the wrappers of `gymnasium.make`, which unpack a step's result.
+    There is a check outside and another inside the wrappers of `gymnasium.make`, because these wrappers
+    unpack the result of a step.
 
     Raises:
-        ConfigurationError: its spaces, or the signatures of its methods, are wrong.
+        ConfigurationError: the environment's spaces or the signatures of its methods are wrong.
     """
     layer, lowest = env, None
     while isinstance(layer, gymnasium.Wrapper):
@@ -52,7 +53,7 @@ def held(env: gymnasium.Env[Any, Any], name: str) -> gymnasium.Env[Any, Any]:
 
 
 def refuse_statistics(env: gymnasium.Env[Any, Any], name: str) -> None:
-    """Refuse wrappers with statistics: a model does not keep them, and each simulator has other ones.
+    """Refuse wrappers with statistics; a model does not save these, and they differ between simulators.
 
     Raises:
         ConfigurationError: the environment has such a wrapper.
@@ -61,20 +62,20 @@ def refuse_statistics(env: gymnasium.Env[Any, Any], name: str) -> None:
         if isinstance(env, NormalizeObservation | NormalizeReward):
             raise ConfigurationError(
                 f"environment.id: {name}: {type(env).__name__} has statistics that the policy's file lacks, "
-                "other ones in each simulator; remove it, and set algorithm.normalize"
+                "and each simulator has different ones; remove the wrapper, and set algorithm.normalize"
             )
         env = env.env
 
 
 class Checked(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """An environment whose resets and steps are checked, the first ones more; results are not changed.
+    """A wrapper that checks resets and steps, the first of each completely, and returns results unchanged.
 
     Args:
         env: the environment.
-        name: its name in messages.
+        name: name of the environment in messages.
 
     Raises:
-        ConfigurationError: its spaces, or the signatures of its methods, are wrong.
+        ConfigurationError: the environment's spaces or the signatures of its methods are wrong.
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any], name: str) -> None:
@@ -153,7 +154,7 @@ class Checked(gymnasium.Wrapper[Any, Any, Any, Any]):
 
 
 class _Returned(gymnasium.Env[Any, Any]):
-    """An environment that returns a recorded result, for gymnasium's checkers."""
+    """An environment that returns a recorded result, as an argument of gymnasium's checkers."""
 
     def __init__(self, space: spaces.Space[Any], result: Any) -> None:
         self.observation_space = space
@@ -171,7 +172,7 @@ class _Returned(gymnasium.Env[Any, Any]):
 
 
 def _objections(check: Callable[..., Any], returned: _Returned) -> list[str]:
-    """Return the complaints of one of gymnasium's checkers, from warnings and exceptions."""
+    """Return the text of the warnings and the exception of one of gymnasium's checkers."""
     arguments = {"action": None} if check is env_step_passive_checker else {}
     with _one_at_a_time, warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")

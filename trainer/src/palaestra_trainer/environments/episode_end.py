@@ -1,4 +1,4 @@
-"""A limit for episodes that do not end while another part of the program waits for their end."""
+"""Limit the steps of an episode for whose end another part of the program waits."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ REMEDY = "return truncated after a number of steps, or register it with max_epis
 
 
 class EpisodeEnd:
-    """Watches one episode: logs once a minute that it has not ended, and raises after `MOST_STEPS` steps.
+    """Watches one episode; logs every minute that it has not ended, and raises after `MOST_STEPS` steps.
 
     Args:
-        waits: the name of the waiting part, for messages.
-        clock: returns seconds.
+        waits: name of the part of the program that waits, for messages.
+        clock: a function that returns seconds from any starting point.
     """
 
     def __init__(self, waits: str, clock: Callable[[], float] = time.monotonic) -> None:

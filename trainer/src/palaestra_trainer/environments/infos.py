@@ -1,14 +1,15 @@
-"""The info of a step, and the keys in it that Palaestra sets.
+"""The keys that Palaestra sets in the info of a step.
 
-Stable-Baselines3 reads `episode`, `terminal_observation` and `TimeLimit.truncated`. Palaestra puts its other
-facts about a step into a dict of its own, `info["palaestra"]`, so that no key of an environment is taken for
-one of Palaestra:
+Stable-Baselines3 reads the keys `episode`, `terminal_observation` and `TimeLimit.truncated`. Palaestra puts
+its other facts about a step into a separate dict, `info["palaestra"]`. So the keys of an environment and
+those of Palaestra cannot be confused:
 
-- `valid`: False in a row that must not be learned from
-- `sim_fault`: in the row that a fault truncated: kind, simulator, fact, episode and step
-- `recovering`: in the rows after it, until the simulator is up again; False once it was given up
-- `extra_steps`: simulation steps that a late message made necessary
-- `hidden`: values of the environment under keys that Stable-Baselines3 or Palaestra uses
+- `valid`: False in a row that the algorithm must not learn from
+- `sim_fault`: only in the row of a fault: its kind, simulator, fact, episode and step
+- `recovering`: in the rows after the fault, until the simulator is up again; False after the simulator was
+  given up
+- `extra_steps`: simulation steps in addition to the usual one, because a message was late
+- `hidden`: the environment's own values for keys that Stable-Baselines3 or Palaestra uses
 """
 
 from __future__ import annotations
@@ -27,24 +28,24 @@ OF_STABLE_BASELINES3 = ("episode", "terminal_observation")
 
 
 def ours(info: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return Palaestra's part of the info of a step; empty if it has none."""
+    """Return Palaestra's dict in the info of a step, or an empty dict if the info does not have one."""
     found = info.get(OURS)
     return found if isinstance(found, Mapping) else {}
 
 
 def is_valid(info: Mapping[str, Any]) -> bool:
-    """Return whether a row may be learned from."""
+    """Return whether an algorithm may learn from a row."""
     return bool(ours(info).get("valid", True))
 
 
 def extra_steps(info: Mapping[str, Any]) -> int:
-    """Return the extra simulation steps of a step; 0 if a user's environment sets an invalid value."""
+    """Return the extra simulation steps of an environment step; 0 if its info holds an invalid value."""
     steps = ours(info).get("extra_steps", 0)
     return steps if isinstance(steps, int) and steps > 0 else 0
 
 
 def of_environment(info: Mapping[str, Any], **words: Any) -> dict[str, Any]:
-    """Return an environment's info with our `words`; its keys that we or others use are moved to `hidden`."""
+    """Return an environment's info with our `words`; move its values for reserved keys to `hidden`."""
     taken = {name: info[name] for name in OF_STABLE_BASELINES3 if name in info}
     if OURS in info and ours(info).keys() != {"extra_steps"}:
         taken[OURS] = info[OURS]

@@ -1,7 +1,7 @@
-"""Create the environment of a job, of any class.
+"""Create the environment of a job, from any registered class.
 
-The environment gets those of robot, scene and reward that its signature accepts. This module reports
-mismatches before a simulator starts.
+The environment gets the arguments `robot`, `scene` and `reward` if its signature accepts them. This module
+reports mismatches before a simulator starts.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ _OF_MAKE = ("max_episode_steps",)  # an argument of gymnasium.make itself
 
 
 def make_environment(wanted: Environment, robot: RobotAbc, scene: Scene) -> gymnasium.Env[Any, Any]:
-    """Return the environment of a job with `robot` and `scene`; its first reset and step are checked.
+    """Return the environment of a job with `robot` and `scene`, in a wrapper that checks its results.
 
     Raises:
-        ConfigurationError: it is not registered, or its signature does not fit the job.
-        MissingCapability: the robot lacks one of its `needs`.
+        ConfigurationError: the environment is not registered, or its signature does not fit the job.
+        MissingCapability: the robot lacks a capability in the environment's `needs`.
     """
     arguments = _checked(wanted, {"robot": robot, "scene": scene})
     require(robot, getattr(_creator(wanted.id, _spec(wanted.id)), "needs", ()), wanted.id)
@@ -52,10 +52,10 @@ def make_environment(wanted: Environment, robot: RobotAbc, scene: Scene) -> gymn
 
 
 def keywords(wanted: Environment) -> dict[str, Any]:
-    """Return the keyword arguments that a job gives its environment, without robot and scene.
+    """Return the keyword arguments that a job passes to its environment, without robot and scene.
 
     Raises:
-        ConfigurationError: it is not registered, or its signature does not fit the job.
+        ConfigurationError: the environment is not registered, or its signature does not fit the job.
     """
     given = _checked(wanted, dict.fromkeys(("robot", "scene")))
     return {name: value for name, value in given.items() if name not in {"robot", "scene"}}
@@ -65,7 +65,7 @@ def creator_of(name: str) -> Callable[..., Any]:
     """Return the class or function that creates the environments of a registered name.
 
     Raises:
-        ConfigurationError: it is not registered, or its entry point does not exist.
+        ConfigurationError: the name is not registered, or its entry point does not exist.
     """
     return _creator(name, _spec(name))
 

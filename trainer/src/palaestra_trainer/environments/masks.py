@@ -1,8 +1,8 @@
-"""Masks of actions; an environment returns them from its method `action_masks`, the name in sb3-contrib.
+"""Masks of actions, as an environment returns them from its method `action_masks` for sb3-contrib.
 
 A mask has one truth value for each choice. In a Discrete space each action is a choice. In a MultiDiscrete
-space the choices of the first number come first, then those of the second, and so on. In a MultiBinary space
-each number has two choices: 0, then 1.
+space the mask begins with the choices of the first number, then follow the choices of the second number, and
+so on. In a MultiBinary space each number has two choices: 0, then 1.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ ACTION_MASKS = "action_masks"
 
 
 def gives_masks(env: gymnasium.Env[Any, Any]) -> bool:
-    """Return whether the environment, or a wrapper around it, has the method `action_masks`."""
+    """Return whether the environment or one of its wrappers has the method `action_masks`."""
     return env.has_wrapper_attr(ACTION_MASKS) and callable(env.get_wrapper_attr(ACTION_MASKS))
 
 
 def choices_of(space: spaces.Space[Any]) -> list[int]:
-    """Return the number of choices of each number of an action.
+    """Return for each number of an action how many choices it has.
 
     Raises:
-        TypeError: actions of this kind have no masks.
+        TypeError: actions of this type of space have no masks.
     """
     match space:
         case spaces.Discrete():
@@ -49,12 +49,12 @@ def masks_in(given: Any, space: spaces.Space[Any], *, count: int | None = None) 
     """Return masks of actions as truth values; shape (masks, choices).
 
     Args:
-        given: one mask or several, of any shape.
+        given: one mask or several masks, of any shape.
         space: the space of the actions.
         count: the number of masks; None: any number.
 
     Raises:
-        ValueError: a value is not a mask of this space, or one of the masks allows nothing.
+        ValueError: a value is not a mask of this space, or a mask does not allow any action.
     """
     choices = choices_of(space)
     expected = f"expected {sum(choices)} truth values, one for each choice of {space}; got"
@@ -76,7 +76,7 @@ def masks_in(given: Any, space: spaces.Space[Any], *, count: int | None = None) 
 
 
 def mask_of(env: gymnasium.Env[Any, Any]) -> np.ndarray:
-    """Return a copy of the mask that the environment returns now; shape (choices,), bool.
+    """Return a copy of the environment's current mask; shape (choices,), bool.
 
     Raises:
         ConfigurationError: the value is not a mask of the environment's actions, or allows no action.
@@ -94,7 +94,7 @@ def mask_of(env: gymnasium.Env[Any, Any]) -> np.ndarray:
 
 
 def allows(mask: np.ndarray, space: spaces.Space[Any], action: Any) -> bool:
-    """Return whether a mask of the space allows the action."""
+    """Return whether a mask for this space allows the action."""
     chosen = np.asarray(action).ravel().astype(np.int64)
     return all(bool(part[at]) for part, at in zip(_parts(mask, choices_of(space)), chosen, strict=True))
 
@@ -104,6 +104,6 @@ def _parts(mask: np.ndarray, choices: list[int]) -> list[np.ndarray]:
 
 
 def _odd(mask: np.ndarray) -> Any:
-    """Return the first value that is not a truth value."""
+    """Return the first value that is not a truth value, or the first value if all are."""
     values = mask.ravel().tolist()
     return next((value for value in values if value not in (0, 1)), values[0])

@@ -1,9 +1,8 @@
-"""The task: drive to the target and stand there.
+"""The task to drive to the target and stand there.
 
-The environment is built from a robot and a scene, and depends on neither ROS nor
-Webots. It defines the episode: its observations, its end and its rewards. A
-`SimulatorFault` of the robot passes through it unchanged; the caller that steps
-the environment decides what the fault means for learning.
+The environment consists of a robot and a scene, and depends on neither ROS nor Webots. It defines the
+observations, the rewards and the end of an episode. It does not catch a `SimulatorFault` of the robot. The
+caller of `step` decides how learning treats the fault.
 """
 
 from __future__ import annotations
@@ -38,14 +37,14 @@ Info = dict[str, Any]
 class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
     """Drive to the target and stand there: within 0.20 m, slower than 0.05 m/s.
 
-    A Robotino drives on a walled floor of 4 x 4 m with four cylinders; start, heading and
-    target differ in every episode. A step is one control period of the robot (0.192 s
-    in simulation): at 0.5 m/s it drives 0.1 m, and it stands within two steps of STOP.
+    A Robotino drives on a walled floor of 4 x 4 m with four cylinders; start, heading and target differ in
+    every episode. A step is one control period of the robot (0.192 s in simulation). At 0.5 m/s the robot
+    drives 0.1 m in a step, and after STOP it stands within two steps.
 
     ## Actions
 
-    `actions="discrete"`: `Discrete(n)`, one of the `movements`, in their order. The example
-    move-to-target.yaml chooses the first five, which learn faster; by default it is all of them:
+    With `actions="discrete"`, the space is `Discrete(n)` for the `movements` in their order, by default all
+    of this table. The example move-to-target.yaml chooses the first five, with which a policy learns faster:
 
     | action | movement   | forward (m/s) | left (m/s) | turning (rad/s) |
     |--------|------------|---------------|------------|-----------------|
@@ -67,8 +66,8 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
 
     ## Observation
 
-    `Box(float32)`: the parts named by `observe` one after the other, each number clipped
-    to its bounds. The index counts within its part. Sensor 0 points forward, and the others
+    The space is a `Box(float32)` with the parts that `observe` names, one after the other. Each number is
+    clipped to its bounds. The index counts within a part. Sensor 0 points forward, and the other sensors
     follow counter-clockwise every 40 degrees.
 
     | part      | index | meaning                                       | unit      | min  | max |
@@ -84,12 +83,13 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
     | time_left | 0     | steps left of `max_steps`                     | 1         | 0    | 1   |
     | to_reach  | 0     | targets left; always 1 with a single target   | 1         | 0    | 1   |
 
-    The default is all parts except `position` and `to_reach`; docs/explain/tasks.md describes its cost.
+    By default `observe` names all parts except `position` and `to_reach`; docs/explain/tasks.md describes the
+    cost.
 
     ## Reward
 
-    A weighted sum of the terms in `palaestra_trainer.environments.rewards`, each also
-    in `info["reward_terms"]`.
+    The reward is a weighted sum of the terms in `palaestra_trainer.environments.rewards`;
+    `info["reward_terms"]` has each term.
 
     | term      | Dense | Sparse | min  | max | is                                                  |
     |-----------|-------|--------|------|-----|-----------------------------------------------------|
@@ -102,32 +102,32 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
 
     ## Start
 
-    Only the seed of `reset(seed=s)` decides the episode. Start and target are drawn uniformly
-    from the positions where the robot has 0.1 m of free space around it, at least 1 m apart,
-    and the heading from all directions. `options={"start": (x, y, heading), "target": (x, y)}`
-    sets one or both.
+    Only the seed of `reset(seed=s)` decides the start, the target and the heading. Start and target are drawn
+    uniformly from the free positions, at least 1 m apart. At a free position the robot has 0.1 m of free
+    space around it. The heading is drawn from all directions. `options={"start": (x, y, heading), "target":
+    (x, y)}` sets one or both.
 
     ## End of an episode
 
-    Terminated: the robot stands on the target (`info["is_success"]`), or it bumped into
-    something. After `max_steps` steps, `time_up` decides: with `"truncated"` (the default for
-    Dense) a learner estimates the value of later steps; with `"terminated"` (the default for
-    Sparse) it ignores them.
+    An episode is terminated when the robot stands on the target (`info["is_success"]`) or bumps into an
+    object. After `max_steps` steps, the option `time_up` decides. With `"truncated"` (the default for Dense)
+    a learner estimates the value of later steps. With `"terminated"` (the default for Sparse) a learner
+    counts later steps as worth 0.
 
     ## Info
 
-    `is_success`, `outcome` (running, reached, collided, time_up), `reward_terms` (by name,
-    weighted), `extra_steps` (control periods that a late sensor made necessary).
+    `is_success`, `outcome` (running, reached, collided, time_up), `reward_terms` (by name, weighted),
+    `extra_steps` (control periods that the step waited for a late sensor).
 
-    `render()` is not implemented: it raises NotImplementedError. `close()` leaves the simulator
-    running; its pod or the program that started it ends it. After `close()` another environment can
-    use a simulator of PALAESTRA_CONFIG, and a stub that `gymnasium.make` started for this one ends.
+    `render()` raises NotImplementedError. `close()` does not end a simulator of PALAESTRA_CONFIG, so another
+    environment can use it afterwards. `close()` ends a stub that `gymnasium.make` started for this
+    environment.
 
     Args:
         robot: the robot to drive.
-        scene: arranges episodes.
+        scene: the scene, which places robot and mark for each episode.
         options: observation, actions and rewards.
-        on_close: called by `close`.
+        on_close: a function that `close` calls.
 
     Raises:
         MissingCapability: the robot is not a Robotino.
@@ -156,7 +156,7 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
 
     @property
     def situation(self) -> StepState:
-        """The complete state now, including parts that are not observed.
+        """The current complete state, including values that are not in the observation.
 
         Raises:
             ResetNeeded: no episode has begun.
@@ -168,15 +168,15 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, Info]:
-        """Begin an episode; return its first observation, and an info with its start and target.
+        """Begin an episode; return its first observation, and an info that holds start and target.
 
         Args:
-            seed: decides the episode; without one, the episode follows from the previous seed.
+            seed: decides the episode; None: the random generator continues from the last seed.
             options: `start` (x, y, heading) and `target` (x, y), in meters and radians.
 
         Raises:
-            ConfigurationError: an option is unknown, or its position is in an obstacle.
-            SimulatorFault: as the robot raised it.
+            ConfigurationError: an option is unknown, or names a position in an obstacle.
+            SimulatorFault: the simulator of the robot failed.
         """
         super().reset(seed=seed)
         self._scene.begin(int(self.np_random.integers(2**31)))
@@ -190,11 +190,11 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
         return self._numbers_of(seen), {"start": task.start, "target": task.target}
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, Info]:
-        """Drive according to `action` for one control period; return the result.
+        """Drive with the velocity of `action` for one control period; return the result of the step.
 
         Raises:
             ResetNeeded: no episode has begun.
-            SimulatorFault: as the robot raised it.
+            SimulatorFault: the simulator of the robot failed.
         """
         before = self.situation
         self._robot.drive(*twist(action, self.options))
@@ -210,7 +210,7 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
         return self._numbers_of(after), *result(step, self.options, extra_steps)
 
     def close(self) -> None:
-        """Release the simulator, if this environment took it from PALAESTRA_CONFIG; safe to repeat."""
+        """Release the simulator if it is one of PALAESTRA_CONFIG; further calls have no effect."""
         if self._on_close is not None:
             self._on_close()
 
@@ -233,7 +233,7 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
         return EpisodeOutcome.TIME_UP if self._steps >= self.options.max_steps else EpisodeOutcome.RUNNING
 
     def _more_targets(self, places: FreePlaces, first: Point) -> Iterable[Point]:
-        """Return the targets after the first; this task has only one, and a subclass may have more."""
+        """Return the targets after the first target; here none, but a subclass may return some."""
         del places, first
         return ()
 

@@ -1,8 +1,9 @@
-"""The task with its goal in the observation: drive to the target and stay there.
+"""The task to drive to the target and stay there, with the goal in the observation.
 
-It is for algorithms that learn from other goals than the desired one, such as hindsight experience replay.
-The interface is that of gymnasium-robotics: a Dict with `achieved_goal` and `desired_goal`, and rewards that
-are a function of both. Robot, scene and faults are as in `MoveToTargetEnv`, which plays the episodes.
+The task is for algorithms that also learn from goals that the policy reached by accident, such as hindsight
+experience replay. The interface is that of gymnasium-robotics: a Dict with `achieved_goal` and
+`desired_goal`, and rewards that are a function of both. An inner `MoveToTargetEnv` plays the episodes, so
+robot, scene and faults are the same as there.
 """
 
 from __future__ import annotations
@@ -27,18 +28,18 @@ Numbers = NDArray[np.float32]
 Observation = dict[str, Numbers]
 Info = dict[str, Any]
 
-FARTHEST_M = 2.0 * math.sqrt(2.0) * UNIT_M  # the distance from corner to corner
+FARTHEST_M = 2.0 * math.sqrt(2.0) * UNIT_M  # the distance between opposite corners of the floor
 
 
 class MoveToTargetGoalEnv(gymnasium.Env[Observation, Any]):
     """Drive to the target and stay there, within 0.20 m, until time is up.
 
-    Robot, floor, start and target are those of `MoveToTargetEnv`, and so are the actions.
+    Robot, floor, start, target and actions are those of `MoveToTargetEnv`.
 
     ## Observation
 
-    `Dict`; the tables of `MoveToTargetEnv` describe the numbers of `observation`: by default its parts
-    sensors, velocity, position and time_left. The part `target` is refused.
+    The space is a `Dict`. The key `observation` has by default the parts sensors, velocity, position and
+    time_left; the tables of `MoveToTargetEnv` describe their numbers. The part `target` is refused.
 
     | key           | index | meaning                                      | unit | min | max |
     |---------------|-------|----------------------------------------------|------|-----|-----|
@@ -48,38 +49,38 @@ class MoveToTargetGoalEnv(gymnasium.Env[Observation, Any]):
 
     ## Reward
 
-    `compute_reward(achieved_goal, desired_goal, info)`, also for many goals at once; `info` is not used.
-    It is the term `reached` in `info["reward_terms"]`.
+    `compute_reward(achieved_goal, desired_goal, info)` returns the reward of one pair of goals or of many
+    pairs. It does not use `info`. The term `reached` in `info["reward_terms"]` holds the reward.
 
     | reward | min | max | is                                                            |
     |--------|-----|-----|---------------------------------------------------------------|
     | Sparse | 0   | 1   | 1 within 0.20 m of the desired goal                           |
     | Dense  | 0   | 1   | 1 at the desired goal, falling linearly to 0 at 5.66 m         |
 
-    Rewards are never negative, unlike in gymnasium-robotics: a collision ends the episode, and an early end
-    must not be worth more than further steps.
+    Rewards are never negative, unlike in gymnasium-robotics. A collision ends the episode, and with negative
+    rewards an early end would be worth more than further steps.
 
     ## Start
 
-    As in `MoveToTargetEnv`, with the same seeds and options.
+    An episode starts as in `MoveToTargetEnv`, with the same seeds and options.
 
     ## End of an episode
 
-    Terminated: the robot bumped into something (`compute_terminated`). An episode continues after the robot
-    reaches the target, so the value of a goal is the same whether the goal was desired or achieved. After
+    An episode is terminated when the robot bumps into something (`compute_terminated`). It continues after
+    the robot reaches the target, so the value of a goal is the same for a desired and an achieved goal. After
     `max_steps` steps the episode is truncated (`compute_truncated`), or terminated with
     `time_up="terminated"`.
 
     ## Info
 
-    `is_success`: the robot is within 0.20 m of the target; the last step of an episode counts.
+    `is_success`: whether the robot is within 0.20 m of the target; for the episode, its last step counts.
     `outcome` (running, reached, collided, time_up), `reward_terms`, `extra_steps`.
 
     Args:
         robot: the robot to drive.
-        scene: arranges episodes.
+        scene: the scene, which places robot and mark for each episode.
         options: observation, actions and rewards.
-        on_close: called by `close`.
+        on_close: a function that `close` calls.
     """
 
     needs: ClassVar[tuple[type, ...]] = MoveToTargetEnv.needs
@@ -114,11 +115,11 @@ class MoveToTargetGoalEnv(gymnasium.Env[Observation, Any]):
         return self._seen(numbers), info
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, Info]:
-        """Drive according to `action` for one control period; return the result.
+        """Drive with the velocity of `action` for one control period; return the result of the step.
 
         Raises:
             ResetNeeded: no episode has begun.
-            SimulatorFault: as the robot raised it.
+            SimulatorFault: the simulator of the robot failed.
         """
         numbers, _, _, _, driven = self._drive.step(action)
         self._steps += 1
@@ -136,7 +137,7 @@ class MoveToTargetGoalEnv(gymnasium.Env[Observation, Any]):
         return seen, reward, terminated, self.compute_truncated(achieved, desired, info), info
 
     def compute_reward(self, achieved_goal: Numbers, desired_goal: Numbers, info: Any) -> Numbers:
-        """Return the reward of each pair of goals; shape (...), for goals of shape (..., 2)."""
+        """Return the reward of each pair of goals, with shape (...) for goals of shape (..., 2)."""
         del info
         distance_m = _distance_m(achieved_goal, desired_goal)
         if self.options.reward == "Sparse":
@@ -159,7 +160,7 @@ class MoveToTargetGoalEnv(gymnasium.Env[Observation, Any]):
         return self._is_time_up(info) and not time_up_terminates(self.options)
 
     def close(self) -> None:
-        """Release the simulator, if this environment took it from PALAESTRA_CONFIG; safe to repeat."""
+        """Release the simulator if it is one of PALAESTRA_CONFIG; further calls have no effect."""
         self._drive.close()
 
     def _outcome(self, *, reached: bool) -> EpisodeOutcome:

@@ -1,7 +1,7 @@
-"""The task: drive to the target between obstacles that a laser scanner detects.
+"""The task to drive to the target between obstacles that a laser scanner detects.
 
-The environment is built from a scene and any robot that steers, scans and knows its pose; it depends on
-neither ROS nor Webots. A `SimulatorFault` of the robot passes through it unchanged.
+The environment consists of a scene and any robot that can steer, scan and report its pose. It depends on
+neither ROS nor Webots. It does not catch a `SimulatorFault` of the robot.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ from palaestra_trainer.robots.capabilities import Localization, Scanner, Steerin
 from palaestra_trainer.robots.geometry import Point, Pose
 
 REACHED_M = 0.15
-BUMPED_M = 0.05  # distance from the robot's outline; a scanner may not see an object that is nearer
+BUMPED_M = 0.05  # distance from the robot's outline; a scanner may not detect a nearer object
 SECTORS = 24
-SEEN_M = 0.8  # a sector whose nearest object is beyond this distance counts as empty
+SEEN_M = 0.8  # a sector counts as empty if its nearest object is farther than this
 TARGET_M = 2.0  # the unit of the distance to the target
-# Shares of the robot's greatest speeds: forward, counter-clockwise.
+# The movements as shares of the robot's greatest speeds: forward, counter-clockwise.
 MOVES = ((0.9, 0.0), (0.55, 0.33), (0.55, -0.33), (0.0, 0.55), (0.0, -0.55))
 
 Observation = NDArray[np.float32]
@@ -40,10 +40,10 @@ Info = dict[str, Any]
 class NavigateEnv(gymnasium.Env[Observation, Any]):
     """Drive to the target, to within 0.15 m, between obstacles that the scanner detects.
 
-    It was made for a TurtleBot3 Burger in the world `court`: 3 x 3 m with two boxes and two cylinders. It
-    works with any robot that has `Steering`, `Scanner` and `Localization`. Start, heading and target differ
-    in every episode. A step is one control period of the robot (0.192 s in simulation), in which a Burger
-    drives 4 cm.
+    The task was made for a TurtleBot3 Burger in the world `court`, a floor of 3 x 3 m with two boxes and two
+    cylinders. It works with any robot that has `Steering`, `Scanner` and `Localization`. Start, heading and
+    target differ in every episode. A step is one control period of the robot (0.192 s in simulation), in
+    which a Burger drives 4 cm.
 
     ## Actions
 
@@ -66,8 +66,9 @@ class NavigateEnv(gymnasium.Env[Observation, Any]):
 
     ## Observation
 
-    `Box(float32)`. A sector is a 24th of the scanner's view; the first is the rightmost, which for a view of
-    360 degrees begins behind the robot, and the others follow counter-clockwise.
+    The space is a `Box(float32)`. A sector is a 24th of the scanner's view. The first sector is the
+    rightmost; for a view of 360 degrees it begins behind the robot. The other sectors follow
+    counter-clockwise.
 
     | index | meaning                                         | unit     | min  | max |
     |-------|-------------------------------------------------|----------|------|-----|
@@ -80,34 +81,36 @@ class NavigateEnv(gymnasium.Env[Observation, Any]):
 
     ## Reward
 
-    The terms and weights are those of `MoveToTargetEnv`, each also in `info["reward_terms"]`. The distance of
-    `proximity` is from the robot's outline to the nearest scanned point.
+    The terms and weights are those of `MoveToTargetEnv`; `info["reward_terms"]` has each term. For
+    `proximity`, the distance is measured from the robot's outline to the nearest scanned point.
 
     ## Start
 
-    Only the seed of `reset(seed=s)` decides the episode. Start and target are drawn uniformly from the
-    positions of the scene's layout where the robot has 0.1 m of free space around it, at least 1 m apart, and
-    the heading from all directions. `options={"start": (x, y, heading), "target": (x, y)}` sets one or both.
+    Only the seed of `reset(seed=s)` decides the start, the target and the heading. Start and target are drawn
+    uniformly from the free positions of the scene's layout, at least 1 m apart. At a free position the robot
+    has 0.1 m of free space around it. The heading is drawn from all directions. `options={"start": (x, y,
+    heading), "target": (x, y)}` sets one or both.
 
     ## End of an episode
 
-    Terminated: the robot is within 0.15 m of the target (`info["is_success"]`), or something is nearer than
-    0.05 m to its outline. After `max_steps` steps, `time_up` decides, as in `MoveToTargetEnv`.
+    An episode is terminated when the robot is within 0.15 m of the target (`info["is_success"]`), or when an
+    object is nearer than 0.05 m to its outline. After `max_steps` steps, the option `time_up` decides between
+    terminated and truncated, as in `MoveToTargetEnv`.
 
     ## Info
 
-    `is_success`, `outcome` (running, reached, collided, time_up), `reward_terms` (by name,
-    weighted), `extra_steps` (control periods that a late sensor made necessary).
+    `is_success`, `outcome` (running, reached, collided, time_up), `reward_terms` (by name, weighted),
+    `extra_steps` (control periods that the step waited for a late sensor).
 
     Args:
         robot: the robot to drive, with the capabilities in `needs`.
-        scene: arranges episodes.
+        scene: the scene, which places robot and mark for each episode.
         options: actions and rewards.
-        on_close: called by `close`.
+        on_close: a function that `close` calls.
 
     Raises:
         MissingCapability: the robot lacks a capability.
-        NoSuchSensor: the robot is connected and lacks the scanner.
+        NoSuchSensor: the connected robot does not have the scanner.
     """
 
     needs: ClassVar[tuple[type, ...]] = (RobotAbc, Steering, Scanner, Localization)
@@ -130,7 +133,8 @@ class NavigateEnv(gymnasium.Env[Observation, Any]):
             if self.options.actions == "continuous"
             else spaces.Discrete(len(MOVES))
         )
-        # These four are the same robot, because Python has no type for a class with several capabilities.
+        # These four attributes are the same robot, because Python has no type for a class with several
+        # capabilities.
         self._robot: RobotAbc = robot
         self._wheels: Steering = robot
         self._scanner: Scanner = robot
@@ -142,11 +146,11 @@ class NavigateEnv(gymnasium.Env[Observation, Any]):
         self._scanner.use_scanner()
 
     def reset(self, *, seed: int | None = None, options: Info | None = None) -> tuple[Observation, Info]:
-        """Begin an episode that follows from `seed` alone; return its first observation.
+        """Begin the episode that `seed` decides; return its first observation and info.
 
         Raises:
-            ConfigurationError: `options` names an impossible start or target.
-            SimulatorFault: as the robot raised it.
+            ConfigurationError: `options` sets an impossible start or target.
+            SimulatorFault: the simulator of the robot failed.
         """
         super().reset(seed=seed)
         self._scene.begin(int(self.np_random.integers(2**31)))
@@ -158,11 +162,11 @@ class NavigateEnv(gymnasium.Env[Observation, Any]):
         return self._observe(self._place.pose(), 0.0, 0.0), info
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, Info]:
-        """Drive according to `action` for one control period; return the result.
+        """Drive with the velocity of `action` for one control period; return the result of the step.
 
         Raises:
             ResetNeeded: no episode has begun.
-            SimulatorFault: as the robot raised it.
+            SimulatorFault: the simulator of the robot failed.
         """
         before = self._place.pose()
         before_m = math.hypot(*self._ahead(before))
@@ -180,7 +184,7 @@ class NavigateEnv(gymnasium.Env[Observation, Any]):
         return seen, *result(step, self.options, extra_steps)
 
     def close(self) -> None:
-        """Release the simulator, if this environment took it from PALAESTRA_CONFIG; safe to repeat."""
+        """Release the simulator if it is one of PALAESTRA_CONFIG; further calls have no effect."""
         if self._on_close is not None:
             self._on_close()
 

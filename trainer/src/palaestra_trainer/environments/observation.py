@@ -1,7 +1,7 @@
-"""The observation of an environment, in parts that can be chosen.
+"""The observation of an environment; the job chooses its parts.
 
-A `StepState` is the complete state after a step. An `ObservationPart` converts a part of it
-to numbers near [-1, 1], with bounds for each. The table `PARTS` defines all parts.
+A `StepState` is the complete state after a step. An `ObservationPart` converts some values of this state to
+numbers near [-1, 1], and has bounds for each number. The table `PARTS` defines all parts.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ class StepState:
         distances_m: shape (9,), see `RobotinoAbc`.
         bumped: whether the bumper touches something.
         pose: pose of the robot in the world's frame.
-        velocity: forward, left (m/s), counter-clockwise (rad/s): means over the last step.
-        target: x, y in meters, in the world's frame.
-        time_left: share of the episode's steps that are left, from 1 to 0.
-        to_reach: share of the episode's targets that are left, including the current one: from 1 down.
+        velocity: mean velocity over the last step: forward and left in m/s, counter-clockwise in rad/s.
+        target: x and y of the current target in meters, in the world's frame.
+        time_left: share of the episode's steps that are left; it falls from 1 to 0.
+        to_reach: share of the episode's targets that the robot has not reached, including the current target.
     """
 
     distances_m: NDArray[np.float32]
@@ -60,7 +60,7 @@ class StepState:
 
 @dataclass(frozen=True, slots=True)
 class ObservationPart:
-    """A part of an observation: the function that measures its numbers, and their bounds."""
+    """A part of an observation: the function that computes its numbers, and the bounds of the numbers."""
 
     measure: Callable[[StepState], Sequence[float]]
     low: tuple[float, ...]
@@ -68,7 +68,7 @@ class ObservationPart:
 
 
 def in_frame(heading_rad: float, x_m: float, y_m: float) -> Point:
-    """Convert a vector in the world's frame to the frame of a robot with this heading: forward, left."""
+    """Convert a vector from the world's frame to forward and left of a robot with this heading."""
     c, s = math.cos(heading_rad), math.sin(heading_rad)
     return x_m * c + y_m * s, y_m * c - x_m * s
 
@@ -83,8 +83,8 @@ def velocity(before: Pose, after: Pose, elapsed_s: float) -> Twist:
 
 
 def _sensors(seen: StepState) -> Sequence[float]:
-    # The numbers are nearness, because it is 0 in the usual case that nothing is in range, while a distance
-    # would be 1. In 10,000 steps, a policy learned as much from nearness as in 40,000 from distances.
+    # The numbers are nearness, which is 0 in the usual case that no object is in range; a distance would be
+    # 1. A policy learned as much from nearness in 10,000 steps as from distances in 40,000 steps.
     least, most = SENSOR_RANGE_M
     nearness = (most - seen.distances_m) / (most - least)
     return [*nearness.tolist(), float(seen.bumped)]
@@ -133,7 +133,7 @@ def space(parts: Sequence[str]) -> spaces.Box:
 def observe(seen: StepState, parts: Sequence[str], within: spaces.Box) -> NDArray[np.float32]:
     """Return the numbers of these parts, clipped to the bounds of `within`."""
     numbers = [number for name in parts for number in PARTS[name].measure(seen)]
-    # This is the same as np.clip, in half the time.
+    # This computes the same as np.clip in half the time.
     wanted = np.array(numbers, np.float32)
     cut_off: NDArray[np.float32] = np.minimum(np.maximum(wanted, within.low), within.high)
     return cut_off

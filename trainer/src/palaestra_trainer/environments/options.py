@@ -1,4 +1,4 @@
-"""The options of the tasks; they vary a task without changes to its code."""
+"""The options of the tasks; a job sets them to vary a task without changes to its code."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from palaestra_trainer.robots.geometry import Movement
 
 ACTIONS = ("discrete", "continuous")
 TIME_UP = ("terminated", "truncated")
-# `Sparse` has a reward for time-up, so time-up terminates its episodes. `Dense` has no such reward, so its
-# episodes are truncated: see docs/explain/tasks.md.
+# `Sparse` has a reward for the end of time, so the end of time terminates its episodes. `Dense` has no such
+# reward, so the end of time truncates its episodes. docs/explain/tasks.md gives the reasons.
 TIME_UP_OF = {"Dense": "truncated", "Sparse": "terminated"}
 
 
@@ -22,7 +22,7 @@ FRAMES = (1, 3)
 
 
 class Episodes(Protocol):
-    """The options of every task that ends at a target; see `MoveToTargetOptions`."""
+    """The options of all tasks that end at a target; see `MoveToTargetOptions`."""
 
     @property
     def reward(self) -> str:
@@ -41,12 +41,12 @@ class Episodes(Protocol):
 
     @property
     def time_up(self) -> str | None:
-        """The end of an episode when time is up, see `TIME_UP`; None: `TIME_UP_OF` the reward."""
+        """How an episode ends when time is up, a value of `TIME_UP`; None: `TIME_UP_OF` the reward."""
         ...
 
 
 class Driving(Episodes, Protocol):
-    """The options of every task of a robot that drives in all directions; see `MoveToTargetOptions`."""
+    """The options of all tasks for a robot that drives in all directions; see `MoveToTargetOptions`."""
 
     @property
     def movements(self) -> Sequence[Movement]:
@@ -62,12 +62,13 @@ class MoveToTargetOptions:
         reward: `Dense` gives a reward at each step, `Sparse` only at the end of an episode.
         observe: the parts of the observation, in this order.
         movements: the choices of a discrete action, in this order.
-        actions: `discrete` (one of `movements`) or `continuous` (a twist).
+        actions: `discrete`, one of `movements`, or `continuous`, a twist.
         max_steps: steps until time is up.
-        time_up: the end of an episode then, `terminated` or `truncated`; None: `TIME_UP_OF` the reward.
+        time_up: how an episode ends when time is up, `terminated` or `truncated`; None: `TIME_UP_OF` the
+            reward.
 
     Raises:
-        ConfigurationError: one line for every mistake.
+        ConfigurationError: an option is wrong; the message has one line for every mistake.
     """
 
     reward: str = "Dense"
@@ -83,14 +84,14 @@ class MoveToTargetOptions:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GoalOptions(MoveToTargetOptions):
-    """The options of `MoveToTargetGoalEnv`, checked: those of `MoveToTargetOptions` with other defaults.
+    """The checked options of `MoveToTargetGoalEnv`, which are `MoveToTargetOptions` with other defaults.
 
     Args:
-        observe: the parts of `observation`; `target` is refused, because the goal has keys of its own.
-        time_up: see `MoveToTargetOptions`; `truncated`, because time-up has no reward.
+        observe: the parts of `observation`; `target` is refused, because the goal has its own keys.
+        time_up: see `MoveToTargetOptions`; by default `truncated`, because the end of time has no reward.
 
     Raises:
-        ConfigurationError: one line for every mistake.
+        ConfigurationError: an option is wrong; the message has one line for every mistake.
     """
 
     observe: Sequence[str] = ("sensors", "velocity", "position", "time_left")
@@ -103,13 +104,13 @@ class GoalOptions(MoveToTargetOptions):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DeliverOptions(MoveToTargetOptions):
-    """The options of `DeliverEnv`, checked: those of `MoveToTargetOptions`, with defaults for more targets.
+    """The checked options of `DeliverEnv`: `MoveToTargetOptions` with defaults for several targets.
 
     Args:
         targets: number of targets in an episode.
 
     Raises:
-        ConfigurationError: one line for every mistake.
+        ConfigurationError: an option is wrong; the message has one line for every mistake.
     """
 
     observe: Sequence[str] = ("sensors", "velocity", "target", "time_left", "to_reach")
@@ -135,7 +136,7 @@ class SeeOptions:
         cylinders: whether the arena's four cylinders stand on the floor.
 
     Raises:
-        ConfigurationError: one line for every mistake.
+        ConfigurationError: an option is wrong; the message has one line for every mistake.
     """
 
     reward: str = "Dense"
@@ -161,7 +162,7 @@ class NavigateOptions:
         time_up: see `MoveToTargetOptions`.
 
     Raises:
-        ConfigurationError: one line for every mistake.
+        ConfigurationError: an option is wrong; the message has one line for every mistake.
     """
 
     reward: str = "Dense"
@@ -174,7 +175,7 @@ class NavigateOptions:
 
 
 def time_up_terminates(options: Episodes) -> bool:
-    """Return whether time-up terminates an episode, so that a learner estimates no value after it."""
+    """Return whether the end of time terminates an episode; a learner then estimates no value after it."""
     return (options.time_up or TIME_UP_OF[options.reward]) == "terminated"
 
 
@@ -182,7 +183,7 @@ def parse(given: Mapping[str, Any]) -> MoveToTargetOptions:
     """Return the options of `MoveToTargetEnv` from the values in a job file.
 
     Raises:
-        ConfigurationError: one line for every mistake.
+        ConfigurationError: an option is wrong; the message has one line for every mistake.
     """
     return parse_as(MoveToTargetOptions, given)
 
@@ -191,10 +192,10 @@ _Chosen = TypeVar("_Chosen", bound=MoveToTargetOptions | SeeOptions | NavigateOp
 
 
 def parse_as(kind: type[_Chosen], given: Mapping[str, Any]) -> _Chosen:
-    """Return options from the values in a job file, where movements and parts are names.
+    """Return options from the values in a job file, in which movements and parts are written as names.
 
     Raises:
-        ConfigurationError: one line for every mistake.
+        ConfigurationError: an option is wrong; the message has one line for every mistake.
     """
     known = [field.name for field in fields(kind)]
     if unknown := [name for name in given if name not in known]:

@@ -1,7 +1,7 @@
-"""Tasks on a floor: from a start to a target, at free positions of a layout.
+"""Tasks on a floor: drive from a start to a target, both at free positions of a layout.
 
-The layout comes from the scene, so this module depends on no world. A position is free for a robot if its
-outline keeps `CLEARANCE_M` from every obstacle.
+The layout comes from the scene, so this module does not depend on a world. A position is free if a robot
+there keeps a distance of `CLEARANCE_M` between its outline and every obstacle.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.robots.geometry import Point, Pose
 from palaestra_trainer.robots.layout import FloorLayout
 
-CLEARANCE_M = 0.10  # between the robot's outline and any obstacle, at the start and on the target
-OF_THE_RUN = ("training_progress", "episode")  # options of every reset of a run; these tasks ignore them
+CLEARANCE_M = 0.10  # least distance between the robot's outline and obstacles, at the start and on the target
+OF_THE_RUN = ("training_progress", "episode")  # options of every reset in a run; not used here
 APART_M = 1.0  # smallest distance from start to target
-MOST_DRAWS = 10_000  # if so many random points are not free, the layout has no free position
+MOST_DRAWS = 10_000  # after this many random points without a free one, the layout counts as full
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +47,7 @@ class FreePlaces:
     apart_m: float = APART_M
 
     def free(self, x_m: float, y_m: float) -> bool:
-        """Return whether the robot keeps at least `CLEARANCE_M` from every obstacle at this position."""
+        """Return whether the robot at this position keeps at least `CLEARANCE_M` from every obstacle."""
         return self.layout.gap(x_m, y_m) >= self.radius_m + CLEARANCE_M
 
     def draw(self, random: np.random.Generator) -> Point:
@@ -78,10 +78,10 @@ class FreePlaces:
     def draw_task(
         self, random: np.random.Generator, start: Pose | None = None, target: Point | None = None
     ) -> EpisodeTask:
-        """Return a task with free positions at least `apart_m` apart and a random heading; keep given values.
+        """Return a task with random free positions and a random heading, except for the given values.
 
         Raises:
-            ConfigurationError: the floor has no such positions.
+            ConfigurationError: the floor has no free positions at least `apart_m` apart.
         """
         heading_rad = float(random.uniform(-math.pi, math.pi))
         if start and target:
@@ -97,11 +97,14 @@ class FreePlaces:
         raise self._full()
 
     def chosen_task(self, random: np.random.Generator, chosen: Mapping[str, Any]) -> EpisodeTask:
-        """Return a task; `chosen` may set `start` (x, y, heading; or a Pose) and `target` (x, y).
+        """Return a random task, with the values that `chosen` sets.
+
+        `chosen` may have `start`, which is x, y, heading or a Pose, and `target`, which is x, y.
 
         Raises:
-            ConfigurationError: a name is unknown, the number of values is wrong, the target is in an
-                obstacle, the robot would touch one at the start, or the floor has no free position.
+            ConfigurationError: a name in `chosen` is unknown, the number of values is wrong, the target is in
+                an obstacle, the robot would touch an obstacle at the start, or the floor has no free
+                position.
         """
         if unknown := sorted(set(chosen) - {"start", "target", *OF_THE_RUN}):
             raise ConfigurationError(f"reset option {unknown[0]!r} is not known; use start or target")
@@ -117,7 +120,7 @@ class FreePlaces:
         return self.draw_task(random, start, target)
 
     def _check(self, name: str, x_m: float, y_m: float, radius_m: float) -> None:
-        """Refuse a position without `radius_m` of free floor; the simulator would push the robot away."""
+        """Refuse a position without `radius_m` of free floor; the simulator would push a robot there away."""
         if self.layout.gap(x_m, y_m) > radius_m:  # false for NaN too
             return
         fact = "puts the robot in an obstacle" if radius_m else "is in an obstacle"
@@ -138,7 +141,7 @@ class FreePlaces:
 
 
 def _numbers(name: str, given: Any, wanted: tuple[str, ...]) -> list[float]:
-    """Return the wanted numbers from any value that numpy accepts as a row of numbers."""
+    """Return the numbers of a value that NumPy can convert to a one-dimensional array."""
     with suppress(TypeError, ValueError):
         row = np.asarray(given, dtype=float)
         if row.shape == (len(wanted),):

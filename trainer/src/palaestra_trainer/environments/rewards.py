@@ -1,8 +1,8 @@
-"""The reward of a step: small named terms, and their weights in one place.
+"""The reward of a step: a weighted sum of small named terms.
 
-A term is a pure function of one transition, with its own range, and has a weight. An
-environment reports every weighted term by name, so that a curve in TensorBoard shows
-from which terms a policy gets its reward.
+A term is a pure function of one transition with a known range. `WEIGHTS` has the weight of each term. An
+environment reports every weighted term by name, so curves in TensorBoard show from which terms a policy gets
+its reward.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from enum import Enum
 
 from palaestra_trainer.robots.base import SENSOR_RANGE_M
 
-MARGIN_M = 0.18  # the space that should stay free around the robot, which drives half of it in a step
+MARGIN_M = 0.18  # free space to keep around the robot, which drives half of this in a step
 
 
 class EpisodeOutcome(Enum):
-    """The way in which an episode ended, or that it continues, possibly with the next of several targets."""
+    """The outcome of a step: how the episode ended, or that it continues."""
 
     RUNNING = "running"
     DELIVERED = "delivered"
@@ -27,18 +27,18 @@ class EpisodeOutcome(Enum):
 
     @property
     def terminal(self) -> bool:
-        """Whether the task itself is over, not only its time."""
+        """Whether the task itself ended: the robot reached the last target or collided."""
         return self in (EpisodeOutcome.REACHED, EpisodeOutcome.COLLIDED)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Transition:
-    """The facts of one step that rewards use.
+    """The values of one step from which rewards are computed.
 
     Attributes:
         before_m: meters to the target before the step.
         after_m: meters to the target after the step.
-        nearest_m: meters to the nearest object after the step, as the sensors measure it.
+        nearest_m: meters to the nearest object after the step, as the robot's sensors measure it.
         outcome: the outcome after the step.
     """
 
@@ -52,36 +52,36 @@ Term = Callable[[Transition], float]
 
 
 def progress(step: Transition) -> float:
-    """Return meters gained toward the target; negative when the robot moved away.
+    """Return the meters that the robot came nearer to the target; negative if it moved away.
 
-    Bounded by the distance driven, so standing still earns exactly 0.
+    The value is at most the distance driven, so standing still earns exactly 0.
     """
     return step.before_m - step.after_m
 
 
 def success(step: Transition) -> float:
-    """Return 1 when the robot came to stand on the target, or on the current one of several, else 0."""
+    """Return 1 if the robot came to stand on the current target, else 0."""
     return float(step.outcome in (EpisodeOutcome.REACHED, EpisodeOutcome.DELIVERED))
 
 
 def collision(step: Transition) -> float:
-    """Return 1 when the robot ran into something, else 0."""
+    """Return 1 if the robot ran into an object, else 0."""
     return float(step.outcome is EpisodeOutcome.COLLIDED)
 
 
 def proximity(step: Transition) -> float:
-    """Return the used share of the margin around the robot, from 0 to 1 (the nearest measurable distance)."""
+    """Return how far the nearest object is inside the margin; 1 at the nearest measurable distance."""
     used_m = MARGIN_M - step.nearest_m
     return max(0.0, used_m) / (MARGIN_M - SENSOR_RANGE_M[0])
 
 
 def time_up(step: Transition) -> float:
-    """Return 1 when the last step was taken and the target not reached, else 0."""
+    """Return 1 if this was the last step and the robot did not reach the target, else 0."""
     return float(step.outcome is EpisodeOutcome.TIME_UP)
 
 
 def duration(step: Transition) -> float:  # noqa: ARG001 - every term has the same form
-    """Return 1 for every step, as the cost of time."""
+    """Return 1 for every step; its negative weight makes time cost reward."""
     return 1.0
 
 
@@ -101,5 +101,5 @@ WEIGHTS: dict[str, dict[str, float]] = {
 
 
 def reward_terms(reward: str, step: Transition) -> dict[str, float]:
-    """Return every term of a reward (`Dense` or `Sparse`) by name, weighted; their sum is the reward."""
+    """Return the weighted terms of `Dense` or `Sparse` by name; the sum of the terms is the reward."""
     return {name: weight * TERMS[name](step) for name, weight in WEIGHTS[reward].items()}

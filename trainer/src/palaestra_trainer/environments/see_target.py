@@ -1,8 +1,8 @@
-"""The task: find the red pole in the camera's image and drive to it.
+"""The task to find the red pole in the camera's image and drive to it.
 
-The environment is built from a robot with a color camera and a scene, and depends on
-neither ROS nor Webots. It defines the episode: its observations, its end and its
-rewards. A `SimulatorFault` of the robot passes through it unchanged.
+The environment consists of a scene and a robot with a color camera, and depends on neither ROS nor Webots. It
+defines the observations, the rewards and the end of an episode. It does not catch a `SimulatorFault` of the
+robot.
 """
 
 from __future__ import annotations
@@ -35,25 +35,24 @@ Info = dict[str, Any]
 
 
 class SeeTargetEnv(gymnasium.Env[Observation, Any]):
-    """See the red pole and drive to it, to within 0.45 m of its middle.
+    """Find the red pole with the camera, and drive to within 0.45 m of its middle.
 
-    A Robotino with a camera of 64 x 48 pixels drives on a walled floor of 4 x 4 m with a red
-    pole, 0.5 m high, that is visible but cannot be touched. Start, heading and position of the
-    pole differ in every episode, so the pole is often out of sight at the start. The pole
-    counts as reached at 0.45 m, where its top and its foot leave the image. A step is one
-    control period of the robot (0.192 s in simulation): at 0.5 m/s it drives 0.1 m, at 1 rad/s
-    it turns 11 degrees.
+    A Robotino with a camera of 64 x 48 pixels drives on a walled floor of 4 x 4 m with a red pole, 0.5 m
+    high. The pole is visible, but the robot cannot collide with it. Start, heading and position of the pole
+    differ in every episode, so the pole is often out of sight at the start. The pole counts as reached at
+    0.45 m, where its top and its foot leave the image. A step is one control period of the robot (0.192 s in
+    simulation). In a step the robot drives 0.1 m at 0.5 m/s, and turns 11 degrees at 1 rad/s.
 
     ## Actions
 
-    They are as in `MoveToTargetEnv`: with `actions="discrete"` one of the `movements`, all seven by
-    default; with `actions="continuous"` forward, left and turning, `Box(-1, 1, (3,), float32)`.
-    Three movements are enough: FORWARD, TURN_LEFT and TURN_RIGHT.
+    The actions are those of `MoveToTargetEnv`. With `actions="discrete"` an action is one of the `movements`,
+    by default one of all seven. With `actions="continuous"` it is forward, left and turning, `Box(-1, 1,
+    (3,), float32)`. Three movements are enough: FORWARD, TURN_LEFT and TURN_RIGHT.
 
     ## Observation
 
-    `Box(uint8)`: only the image of the camera. With `frames=3` it has the newest three images,
-    the oldest first; the first observation of an episode has the same image three times.
+    The space is a `Box(uint8)` with only the image of the camera. With `frames=3` it has the newest three
+    images, the oldest first. The first observation of an episode then has the same image three times.
 
     | axis | frames=1 | frames=3 | min | max | meaning                                   |
     |------|----------|----------|-----|-----|-------------------------------------------|
@@ -63,7 +62,7 @@ class SeeTargetEnv(gymnasium.Env[Observation, Any]):
 
     ## Reward
 
-    The terms and weights are those of `MoveToTargetEnv`, each also in `info["reward_terms"]`.
+    The terms and weights are those of `MoveToTargetEnv`; `info["reward_terms"]` has each term.
 
     | term      | Dense | Sparse | min  | max | is                                                  |
     |-----------|-------|--------|------|-----|-----------------------------------------------------|
@@ -76,31 +75,32 @@ class SeeTargetEnv(gymnasium.Env[Observation, Any]):
 
     ## Start
 
-    Only the seed of `reset(seed=s)` decides the episode. Start and pole are drawn uniformly
-    from the positions where the robot has 0.1 m of free space around it, at least 1 m apart,
-    and the heading from all directions. `options={"start": (x, y, heading), "target": (x, y)}`
-    sets one or both. With `cylinders=True` the world's four cylinders stand on the floor and
-    can hide the pole.
+    Only the seed of `reset(seed=s)` decides the start, the heading and the position of the pole. Start and
+    pole are drawn uniformly from the free positions, at least 1 m apart. At a free position the robot has 0.1
+    m of free space around it. The heading is drawn from all directions. `options={"start": (x, y, heading),
+    "target": (x, y)}` sets one or both. With `cylinders=True` the world's four cylinders stand on the floor
+    and can hide the pole.
 
     ## End of an episode
 
-    Terminated: the robot reached the pole (`info["is_success"]`), or it bumped into something.
-    After `max_steps` steps, `time_up` decides, as in `MoveToTargetEnv`.
+    An episode is terminated when the robot reaches the pole (`info["is_success"]`) or bumps into an object.
+    After `max_steps` steps, the option `time_up` decides between terminated and truncated, as in
+    `MoveToTargetEnv`.
 
     ## Info
 
-    `is_success`, `outcome` (running, reached, collided, time_up), `reward_terms` (by name,
-    weighted), `extra_steps` (control periods that a late sensor made necessary).
+    `is_success`, `outcome` (running, reached, collided, time_up), `reward_terms` (by name, weighted),
+    `extra_steps` (control periods that the step waited for a late sensor).
 
     Args:
         robot: the robot to drive, a `RobotinoAbc` with `Cameras`; its color camera has 64 x 48 pixels.
-        scene: arranges episodes.
+        scene: the scene, which places robot and pole for each episode.
         options: images, actions and rewards.
-        on_close: called by `close`.
+        on_close: a function that `close` calls.
 
     Raises:
         MissingCapability: the robot is not a Robotino with cameras.
-        NoSuchSensor: the robot is connected and lacks the color camera.
+        NoSuchSensor: the connected robot does not have the color camera.
     """
 
     needs: ClassVar[tuple[type, ...]] = (RobotinoAbc, Cameras)
@@ -118,7 +118,7 @@ class SeeTargetEnv(gymnasium.Env[Observation, Any]):
         shape = (rows, columns, colors * self.options.frames)
         self.observation_space = gymnasium.spaces.Box(0, 255, shape, np.uint8)
         self.action_space = action_space(self.options)
-        # Both are the same robot, because Python has no type for a class with two capabilities.
+        # Both attributes are the same robot, because Python has no type for a class with two capabilities.
         self._robot: RobotinoAbc = robot
         self._eyes: Cameras = robot
         self._scene = scene
@@ -130,7 +130,7 @@ class SeeTargetEnv(gymnasium.Env[Observation, Any]):
 
     @property
     def target_m(self) -> float:
-        """Meters from the robot's center to the pole's.
+        """Meters from the robot's center to the center of the pole.
 
         Raises:
             ResetNeeded: no episode has begun.
@@ -141,11 +141,11 @@ class SeeTargetEnv(gymnasium.Env[Observation, Any]):
         return math.dist((pose.x_m, pose.y_m), self._target)
 
     def reset(self, *, seed: int | None = None, options: Info | None = None) -> tuple[Observation, Info]:
-        """Begin an episode that follows from `seed` alone; return its first observation.
+        """Begin the episode that `seed` decides; return its first observation and info.
 
         Raises:
-            ConfigurationError: `options` names an impossible start or target, or the image has another size.
-            SimulatorFault: as the robot raised it.
+            ConfigurationError: `options` sets an impossible start or target, or the image has another size.
+            SimulatorFault: the simulator of the robot failed.
         """
         super().reset(seed=seed)
         self._scene.begin(int(self.np_random.integers(2**31)))
@@ -159,11 +159,11 @@ class SeeTargetEnv(gymnasium.Env[Observation, Any]):
         return self._seen(), {"start": task.start, "target": task.target}
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, Info]:
-        """Drive according to `action` for one control period; return the result.
+        """Drive with the velocity of `action` for one control period; return the result of the step.
 
         Raises:
             ResetNeeded: no episode has begun.
-            SimulatorFault: as the robot raised it.
+            SimulatorFault: the simulator of the robot failed.
         """
         before_m = self.target_m
         self._robot.drive(*twist(action, self.options))
@@ -179,12 +179,12 @@ class SeeTargetEnv(gymnasium.Env[Observation, Any]):
         return self._seen(), *result(step, self.options, extra_steps)
 
     def close(self) -> None:
-        """Release the simulator, if this environment took it from PALAESTRA_CONFIG; safe to repeat."""
+        """Release the simulator if it is one of PALAESTRA_CONFIG; further calls have no effect."""
         if self._on_close is not None:
             self._on_close()
 
     def _raise_cylinders(self) -> None:
-        """Put the objects that the world stores under its floor on the floor."""
+        """Move the cylinders to the floor; the world stores them below it."""
         for thing in self._scene.layout().obstacles:
             if thing.top_m < 0.0:
                 self._scene.put(thing.name, (thing.x_m, thing.y_m, 0.5 * (thing.top_m - thing.bottom_m)))
@@ -197,7 +197,7 @@ class SeeTargetEnv(gymnasium.Env[Observation, Any]):
         return EpisodeOutcome.TIME_UP if self._steps >= self.options.max_steps else EpisodeOutcome.RUNNING
 
     def _image(self) -> Observation:
-        """Return a copy of the camera's image, because the original is valid only until the next step."""
+        """Return a copy of the camera's image; the original is valid only until the next step."""
         image = self._eyes.color_image()
         if image.shape != IMAGE:
             raise ConfigurationError(

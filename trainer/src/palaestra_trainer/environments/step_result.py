@@ -1,4 +1,4 @@
-"""The result of a step, the same in every task: reward, end of the episode and info."""
+"""Build the result of a step for every task: reward, terminated, truncated and info."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def result(step: Transition, options: Episodes, extra_steps: int) -> Result:
     Args:
         step: the step.
         options: options of the task.
-        extra_steps: control periods that a late sensor made necessary.
+        extra_steps: control periods that the step waited for a late sensor.
     """
     outcome, terms = step.outcome, reward_terms(options.reward, step)
     info = {

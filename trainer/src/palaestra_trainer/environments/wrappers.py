@@ -1,7 +1,7 @@
-"""The wrappers that a job puts around its environment, and the stacking of the newest observations.
+"""Apply the wrappers of a job to its environment, and stack the newest observations.
 
-They are part of the environment of every simulator, so training, evaluations, resumes and programs of users
-have the same wrappers. `env_checker` refuses wrappers with statistics.
+The environment of every simulator has these wrappers, so they are the same in training, in evaluations, after
+a resume and in programs of users. `env_checker` refuses wrappers with statistics.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _BRIGHTEST = 255
 
 
 def mistakes(wanted: Environment) -> Iterator[str]:
-    """Yield field, fact and remedy of each wrapper that cannot be used."""
+    """Yield a message with field, fact and remedy for each wrapper that cannot be used."""
     for index, wrapper in enumerate(wanted.wrappers or ()):
         field = f"{FIELD}[{index}]"
         try:
@@ -38,7 +38,7 @@ def mistakes(wanted: Environment) -> Iterator[str]:
 
 
 def wrapped(env: gymnasium.Env[Any, Any], wanted: Environment) -> gymnasium.Env[Any, Any]:
-    """Return the environment in the wrappers of a job, the first one innermost; stack observations last.
+    """Return the environment in the wrappers of a job, the first innermost; stack observations last.
 
     Raises:
         ConfigurationError: a wrapper cannot be created, or the observations cannot be stacked.
@@ -59,14 +59,14 @@ def wrapped(env: gymnasium.Env[Any, Any], wanted: Environment) -> gymnasium.Env[
 
 
 class StackedFrames(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """The newest observations of an episode as one, in the layout of Stable-Baselines3's VecFrameStack.
+    """A wrapper that stacks the newest observations of an episode, in the layout of VecFrameStack.
 
-    The oldest comes first: along the channels of an image, or along the last axis of other observations. At
-    the beginning of an episode, zeros replace the observations before it.
+    Images are stacked along their channels, and other observations along their last axis. The oldest
+    observation comes first. At the beginning of an episode, zeros stand for the missing older observations.
 
     Args:
-        env: the environment; its observation is a Box.
-        frames: number of observations.
+        env: the environment, whose observation must be a Box.
+        frames: number of observations in a stack.
 
     Raises:
         ConfigurationError: the observation is not a Box with an axis.
@@ -87,7 +87,7 @@ class StackedFrames(gymnasium.Wrapper[Any, Any, Any, Any]):
         self._stacked = np.zeros_like(low)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Any:
-        """Return the first observation, after zeros."""
+        """Return the first observation of an episode, stacked after zeros."""
         observation, info = self.env.reset(seed=seed, options=options)
         self._stacked = np.zeros_like(self._stacked)
         return self._with(observation), info
@@ -98,7 +98,7 @@ class StackedFrames(gymnasium.Wrapper[Any, Any, Any, Any]):
         return self._with(observation), *others
 
     def _with(self, observation: Any) -> np.ndarray:
-        """Return a new array, because an environment may return the same one at every step."""
+        """Stack an observation into a new array, because an environment may reuse its array in every step."""
         older = np.moveaxis(self._stacked, self._axis, 0)[self._width :]
         newest = np.moveaxis(np.asarray(observation, self._stacked.dtype), self._axis, 0)
         self._stacked = np.moveaxis(np.concatenate((older, newest)), 0, self._axis)
@@ -106,7 +106,7 @@ class StackedFrames(gymnasium.Wrapper[Any, Any, Any, Any]):
 
 
 def _has_channels_first(space: spaces.Box) -> bool:
-    """Return whether a space is an image with its channels first, as Stable-Baselines3 recognizes it."""
+    """Return whether Stable-Baselines3 recognizes a space as an image with channels first."""
     is_image = (
         len(space.shape) == _AXES_OF_AN_IMAGE
         and space.dtype == np.uint8

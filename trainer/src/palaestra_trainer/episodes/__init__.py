@@ -1,1 +1,1 @@
-"""Play episodes on a run's simulators, to collect rows for learning or to evaluate the policy."""
+"""Play episodes in a run's simulators, to collect rows for learning or to evaluate the policy."""

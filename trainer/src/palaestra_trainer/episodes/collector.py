@@ -1,12 +1,13 @@
-"""One member that plays episode after episode, and its row in each vector step.
+"""A member that plays one episode after another, and returns its row of each vector step.
 
-It converts gymnasium's step into the row that Stable-Baselines3 expects: reset in the same step,
-`terminal_observation`, `TimeLimit.truncated`, Monitor's `episode`.
+The collector converts a step of gymnasium into the row that Stable-Baselines3 expects. The last step of an
+episode also resets the environment. The info has `terminal_observation`, `TimeLimit.truncated`, and `episode`
+as the Monitor wrapper sets it.
 
-It converts a fault into invalid rows (`valid` is False), so that the other members need not wait for the
-broken one. The row of the fault ends the episode (done, truncated, `sim_fault`). In the rows after it
-`recovering` is True. The last recovering row has `done=True` and the first observation of the next episode.
-After a member was given up, `recovering` is False, and no last row follows.
+The collector converts a fault into invalid rows (`valid` is False), so the other members need not wait for
+the faulty member. The row of the fault ends the episode (done, truncated, `sim_fault`). In the following
+rows, `recovering` is True. The last recovering row has `done=True` and the first observation of the next
+episode. If the member is given up, all further rows are invalid and `recovering` is False.
 `palaestra_trainer.environments.infos` describes these keys.
 """
 
@@ -39,10 +40,11 @@ class CollectedRow(NamedTuple):
     """The row of one member in a vector step.
 
     Attributes:
-        observation: the next observation; if `done`, the first of the next episode if that has begun.
+        observation: the next observation; if `done`, the first observation of the next episode, if that
+            episode has begun.
         reward: reward of this step; 0 in an invalid row.
-        done: whether an episode ended: terminated, truncated by a time limit, or truncated by a fault. In a
-            recovering row: whether the next episode has begun.
+        done: whether an episode ended, by termination, by a time limit or by a fault. In a recovering row:
+            whether the next episode has begun.
         info: the environment's info, with the keys in this module's docstring.
     """
 
@@ -53,15 +55,15 @@ class CollectedRow(NamedTuple):
 
 
 class Collector:
-    """Plays the episodes of one member; the seed of each follows from its number.
+    """Plays the episodes of one member; the seed of each episode follows from its number.
 
     Attributes:
         restarter: the restarter of the member.
         run_seed: the replica's seed.
-        index: the member's position among the collecting ones.
+        index: the member's index among the collecting members.
         episode: number of the next episode.
-        training_progress: share of training, 0 to 1, that is complete when the next episode begins.
-        reset_info: the environment's info of the last reset; not `valid` if no episode began.
+        training_progress: share of the training that is complete when the next episode begins, 0 to 1.
+        reset_info: the environment's info of the last reset; if the reset failed, `valid` is False in it.
     """
 
     def __init__(self, restarter: Restarter, run_seed: int, index: int, check: Check = go_on) -> None:
@@ -73,14 +75,14 @@ class Collector:
         self.reset_info: dict[str, Any] = {}
         self._check = check
         self._started = time.monotonic()
-        # This observation is returned before the first reset, if the member is not up yet.
+        # `begin` returns this observation while the member has not started.
         self._observation: Any = blank(self.env.observation_space)
         self._return, self._length = 0.0, 0
         self._actions: ActionLog | None = None
         self._news: dict[str, Any] = {}
         self._found_broken: SimulatorFault | None = None
         self._hidden: set[str] = set()
-        self._newest: dict[str, Any] = {}  # info of the last step
+        self._newest: dict[str, Any] = {}  # the info of the last step
 
     @property
     def env(self) -> Environment:
@@ -96,7 +98,7 @@ class Collector:
 
     @property
     def moment(self) -> SceneState:
-        """The member's episode, its step, its target and the newest terms of the reward, for a viewer."""
+        """The episode, step, target and newest reward terms of the member, for a viewer."""
         terms = self._newest.get("reward_terms")
         given = list(terms.items())[:MOST_TERMS] if isinstance(terms, dict) else []
         rewards = {str(name): float(value) for name, value in given if isinstance(value, int | float)}
@@ -113,11 +115,11 @@ class Collector:
         return TargetMarker(position=(*sight.target, 0.0))
 
     def next_seed(self) -> int:
-        """Return the seed that the next episode will have."""
+        """Return the seed of the next episode."""
         return episode_seed(self.run_seed, COLLECT, self.index, self.episode)
 
     def begin(self, options: dict[str, Any] | None = None) -> Any:
-        """Return the first observation of the next episode; while the member restarts, the last observation.
+        """Begin the next episode if the member is up; return the current observation.
 
         Raises:
             FaultBudgetSpent: the member's restart budget is used up.
@@ -133,10 +135,10 @@ class Collector:
         return self._observation
 
     def action_mask(self) -> np.ndarray:
-        """Return a mask of the actions that are allowed in the next step.
+        """Return the mask of allowed actions for the next step.
 
-        While the member restarts, all are allowed, because no action is taken. If the request for the mask
-        fails, the next step reports the fault.
+        While the member restarts, the mask allows all actions, because the member does not execute them. If
+        the request for the mask fails, the next step reports the fault.
         """
         if self._actions is not None and self._found_broken is None:
             try:
@@ -146,10 +148,11 @@ class Collector:
         return all_allowed(self.env.action_space)
 
     def resume(self, state: EpisodeState, *, masked: bool = False) -> Any:
-        """Take the actions of `state` again and return the observation after them; nothing is counted.
+        """Take the actions of `state` again without counting them; return the observation afterwards.
 
-        If the member breaks meanwhile, it begins the next episode instead. It also does so if its environment
-        does not repeat: the episode ends earlier than before or, if `masked`, the mask forbids an action.
+        If the member fails meanwhile, the next episode begins. The next episode also begins if the
+        environment is not deterministic: the repeated episode ends earlier, or, if `masked` is set, the mask
+        forbids a repeated action.
 
         Raises:
             FaultBudgetSpent: the member's restart budget is used up.
@@ -174,8 +177,8 @@ class Collector:
     def step(self, action: Any) -> CollectedRow:
         """Return the row of one step.
 
-        A fault ends the episode. The member is restarted in the background, and every row is invalid until it
-        is up again.
+        A fault ends the episode. The member is then restarted in the background, and its rows are invalid
+        until it is up again.
 
         Raises:
             FaultBudgetSpent: the member's restart budget is used up.
@@ -247,13 +250,13 @@ class Collector:
         self.restarter.begin_restart(fault, self._length)
 
     def _recover(self) -> CollectedRow:
-        """Return the row of a step without a running episode."""
+        """Return the row of a step while no episode runs; begin the next episode if the member is up."""
         seen = self._observation
         self.begin()
         return self._invalid(seen, done=self._actions is not None, recovering=not self.restarter.lost)
 
     def _invalid(self, seen: Any, *, done: bool, **words: Any) -> CollectedRow:
-        """Return a row that must not be learned from; the first one after a fault has its `sim_fault`."""
+        """Return an invalid row; the first invalid row after a fault holds its `sim_fault`."""
         words = {"valid": False} | words | self._news
         self._news = {}
         info = {OURS: words, TRUNCATED: done, "terminal_observation": copied(seen)}

@@ -1,4 +1,4 @@
-"""The state of an episode, as its number and the actions taken in it; these reproduce the episode."""
+"""The state of an episode: its number and its actions so far, which reproduce the episode."""
 
 from __future__ import annotations
 
@@ -10,13 +10,12 @@ import numpy as np
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EpisodeState:
-    """The position of a member in its episodes; the environment can be brought back to it.
+    """The position of a member in its episodes; a resume plays the episode up to this position again.
 
     Attributes:
-        episode: number of the current episode, or of the next one to begin.
-        actions: actions taken in it so far, shape (steps, *action), read-only; None: no episode has
-            begun.
-        training_progress: the share of training, 0 to 1, that was complete when the episode began.
+        episode: number of the current episode, or of the next episode if `actions` is None.
+        actions: the actions of the episode so far, shape (steps, *action), read-only; None: no episode runs.
+        training_progress: share of the training that was complete when the episode began, 0 to 1.
     """
 
     episode: int
@@ -25,21 +24,21 @@ class EpisodeState:
 
 
 class ActionLog:
-    """The actions of one episode; reading them is always cheap."""
+    """The actions of one episode, in an array that grows; reading it does not copy."""
 
     def __init__(self) -> None:
         self._rows = np.empty((0,))
         self._length = 0
 
     def append(self, action: Any) -> None:
-        """Add one action; arrays that `taken` returned before stay unchanged."""
+        """Add one action; this does not change the arrays that `taken` returned before."""
         if self._length == len(self._rows):
             self._grow(np.asarray(action))
         self._rows[self._length] = action
         self._length += 1
 
     def taken(self) -> np.ndarray:
-        """Return the actions so far, shape (steps, *action), a view."""
+        """Return a view of the actions so far, shape (steps, *action)."""
         return self._rows[: self._length]
 
     def _grow(self, action: np.ndarray) -> None:

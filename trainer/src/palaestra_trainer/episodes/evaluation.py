@@ -1,8 +1,7 @@
-"""Evaluate a policy: play whole episodes with given seeds and return their results.
+"""Evaluate a policy in whole episodes with given seeds.
 
-If a fault truncates an episode, a free simulator plays it again with the same seed.
-So an evaluation always has all of its episodes, and two policies are compared
-on the same ones.
+If a fault truncates an episode, a free simulator plays this episode again with the same seed. So an
+evaluation always has all of its episodes, and two policies are compared on the same episodes.
 """
 
 from __future__ import annotations
@@ -51,12 +50,13 @@ class Episode:
     """The result of one episode.
 
     Attributes:
-        seed: seed of its reset.
-        total_reward: undiscounted sum of its rewards.
+        seed: seed of the episode's reset.
+        total_reward: undiscounted sum of the episode's rewards.
         length: number of environment steps.
         success: the last step's `info["is_success"]`; None: the environment did not report it.
-        outcome: the last step's `info["outcome"]`, a text; None: the environment did not report it.
-        film: a recording of it; None: the robot does not drive on a floor, or too many were recorded.
+        outcome: the last step's `info["outcome"]` if it is a text, else None.
+        film: a recording of the episode; None: the robot does not drive on a floor, or the episode is not one
+            of the first `MOST_FILMS`.
     """
 
     seed: int
@@ -67,7 +67,7 @@ class Episode:
     film: Film | None = field(default=None, compare=False, repr=False)
 
     def record(self) -> dict[str, Any]:
-        """Return the episode as part of a line of evaluations.jsonl, without unreported values."""
+        """Return the episode as in evaluations.jsonl, without values that the environment did not report."""
         known = {"success": self.success, "outcome": self.outcome}
         return {"seed": self.seed, "return": round(self.total_reward, 4), "length": self.length} | {
             name: value for name, value in known.items() if value is not None
@@ -76,11 +76,11 @@ class Episode:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EvaluationResult:
-    """The episodes of one evaluation, at least one, and the faults and time that they took.
+    """The result of one evaluation: at least one episode, the number of faults, and the time.
 
     Attributes:
-        episodes: in the order of their seeds.
-        faults: number of episodes that a fault truncated and that were played again.
+        episodes: the episodes in the order of the given seeds.
+        faults: how often a fault truncated an episode, which was then played again.
         seconds: wall time of the whole evaluation.
     """
 
@@ -95,14 +95,15 @@ class EvaluationResult:
 
     @property
     def success_interval(self) -> SuccessInterval | None:
-        """The 95 % interval around `success_rate`; None if that is None."""
+        """The 95 % interval around `success_rate`; None if the rate is None."""
         successes = self._successes()
         return wilson(sum(map(bool, successes)), len(successes)) if successes else None
 
     def _successes(self) -> list[bool | None]:
-        """Return the success of each episode, or [] if no episode reported it.
+        """Return the success of each episode; [] if no episode reported its success.
 
-        An environment may report success and never failure, so None then counts as failure.
+        An environment may report only successes, so None counts as failure if another episode reports a
+        success.
         """
         successes = [episode.success for episode in self.episodes]
         return [] if all(success is None for success in successes) else successes
@@ -119,11 +120,11 @@ class EvaluationResult:
 
     @property
     def score(self) -> tuple[float, float]:
-        """The rank of an evaluation: its success rate, then its mean return; the best has the highest."""
+        """The rank of an evaluation: by success rate, then by mean return; the best has the highest rank."""
         return (self.success_rate or 0.0, self.mean_return)
 
     def summary(self) -> dict[str, float | int | None]:
-        """Return the means."""
+        """Return the means over the episodes, and their number."""
         rate = self.success_rate
         return {
             "episodes": len(self.episodes),
@@ -134,7 +135,7 @@ class EvaluationResult:
         }
 
     def record(self) -> dict[str, Any]:
-        """Return the means, the interval and each episode, as in a line of evaluations.jsonl."""
+        """Return the content of a line of evaluations.jsonl: the means, the interval and each episode."""
         interval = self.success_interval
         return {
             **self.summary(),
@@ -146,16 +147,16 @@ class EvaluationResult:
 def evaluate(
     policy: ActingPolicy, member: Member | Restarter, seeds: Iterable[int], check: Check = go_on
 ) -> EvaluationResult:
-    """Evaluate `policy`, with deterministic actions, in one episode for each of `seeds`.
+    """Evaluate the deterministic actions of `policy` in one episode for each of `seeds`.
 
     Args:
-        policy: chooses the actions.
-        member: the simulator for the episodes, or its restarter.
-        seeds: at least one; an episode that a fault truncated is played again with its seed.
+        policy: the policy, which chooses the actions.
+        member: the member that plays the episodes, or its restarter.
+        seeds: the seeds of the episodes, at least one; an episode that a fault truncated is played again.
         check: called before each step and during waits for a simulator; it raises to cancel the evaluation.
 
     Raises:
-        FaultBudgetSpent: the simulator broke more often than its budget allows.
+        FaultBudgetSpent: the simulator failed more often than its restart budget allows.
     """
     restarter = member if isinstance(member, Restarter) else Restarter(member)
     return evaluate_on_all(policy, [restarter], seeds, check)
@@ -164,9 +165,10 @@ def evaluate(
 def evaluate_on_all(
     policy: ActingPolicy, restarters: Sequence[Restarter], seeds: Iterable[int], check: Check = go_on
 ) -> EvaluationResult:
-    """Evaluate as `evaluate` does, with the episodes distributed over several simulators at once.
+    """Evaluate as `evaluate` does, but distribute the episodes over several simulators.
 
-    If a simulator breaks, another one plays its episode. The broken one is restarted or given up meanwhile.
+    If a simulator fails, another simulator plays its episode. Meanwhile the faulty simulator is restarted or
+    given up.
     """
     started = time.monotonic()
     games = _Games(policy, seeds)
@@ -189,10 +191,11 @@ def evaluate_on_all(
 
 
 class _Games:
-    """The episodes of one evaluation: those still to play, and those that are complete.
+    """The open and the complete episodes of one evaluation.
 
-    Each thread plays one episode at a time and puts it back if a fault truncates it. So an idle thread stays
-    until the last episode is complete, because it may have to play that one again.
+    Each thread plays one episode at a time. If a fault truncates the episode, the thread puts it back. An
+    idle thread waits until the last episode is complete, because it may have to play a truncated episode
+    again.
 
     Attributes:
         faults: number of episodes that a fault truncated.
@@ -252,9 +255,9 @@ def _play_at_once(games: _Games, restarters: Sequence[Restarter], check: Check) 
 def _play(
     policy: ActingPolicy, restarter: Restarter, game: tuple[int, int], check: Check, rewards: list[float]
 ) -> Episode:
-    """Play one episode to its end; `game` is its number and seed.
+    """Play one episode to its end; `game` holds the number and the seed of the episode.
 
-    If an error ends it, `rewards` holds the reward of each step before the error.
+    If an error ends the episode, `rewards` holds the reward of each step before the error.
     """
     number, seed = game
     observation, _ = restarter.reset(seed, reset_options(EVALUATING, number), check)

@@ -1,4 +1,4 @@
-"""Recordings of evaluation episodes from above, of a bounded size however long the episode is."""
+"""Recordings of evaluation episodes, seen from above; their size is bounded even for long episodes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from palaestra_trainer.simulators.interface import Located
 
 MOST_FRAMES = 500
 MOST_OBSTACLES = 200
-MOST_FILMS = 200  # an evaluation records its first episodes; a film takes 6 kB
+MOST_FILMS = 200  # an evaluation records only its first episodes; a film takes 6 kB
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -20,10 +20,10 @@ class Film:
     """One recorded episode.
 
     Attributes:
-        poses: x, y and heading of each frame, one after the other; the first frame is after the reset.
-        targets: number of the frame from which on the target is at this point.
+        poses: x, y and heading of all frames in one array; the first frame shows the state after the reset.
+        targets: pairs of a frame's number and the position of the target from that frame on.
         frame_s: seconds of simulated time between two frames.
-        first: the sight after the reset, with the floor and the size of the robot.
+        first: the state after the reset, with the floor and the size of the robot.
     """
 
     poses: array[float]
@@ -32,7 +32,7 @@ class Film:
     first: Sight
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as JSON data in meters and radians, rounded to a millimeter and a milliradian."""
+        """Return the film as JSON data, rounded to a millimeter and a milliradian."""
         floor = self.first.floor
         frames = range(0, len(self.poses), 3)
         film: dict[str, Any] = {
@@ -55,10 +55,10 @@ class Film:
 
 
 class Filming:
-    """Records one episode of a member; of a long one only every second, fourth, ... step.
+    """Records one episode of a member; of a long episode only every second, fourth, ... step.
 
     Args:
-        member: it is recorded only if it is `Located`; None: nothing is recorded.
+        member: the member; without the interface `Located`, or if it is None, the film stays empty.
     """
 
     def __init__(self, member: object) -> None:
@@ -69,7 +69,7 @@ class Filming:
         self._every, self._steps = 1, 0
 
     def look(self) -> None:
-        """Record the state now: call it after the reset and after each step."""
+        """Record the current state; call this method after the reset and after each step."""
         sight = self._member.sight() if self._member and self._steps % self._every == 0 else None
         self._steps += 1
         if sight is None:
@@ -82,7 +82,7 @@ class Filming:
             self._drop_every_second()
 
     def film(self) -> Film | None:
-        """Return the recording so far; None if nothing was seen."""
+        """Return the recording so far; None if it has no frames."""
         if self._first is None:
             return None
         return Film(

@@ -1,15 +1,15 @@
-"""How much more often one policy succeeds than another one, from episodes that both have played.
+"""Estimate how much more often one policy succeeds than another, from episodes that both played.
 
-Pure: the same counts give the same interval. No clock, no randomness.
+The functions are pure: they use no clock and no random numbers, so the same counts give the same interval.
 
 Each episode is a fair bet against a candidate difference. A portfolio of all constant bets, weighted by the
-arcsine law, begins with a capital of 1. If the candidate is the true difference, the capital is a martingale,
-so the probability that it ever reaches 1/alpha is at most alpha, however often somebody looks (Ville 1939).
-The interval contains the candidates whose capital is below 1/alpha. Against the difference 0, episodes with
-equal results change nothing, and the test is a sequential form of McNemar's.
+arcsine law, begins with a capital of 1. If the candidate is the true difference, the capital is a martingale.
+Then the probability that the capital ever reaches 1/alpha is at most alpha, however often the interval is
+computed (Ville 1939). The interval contains the candidates whose capital is below 1/alpha. For the candidate
+0, episodes with equal results do not change the capital, so the test is a sequential form of McNemar's test.
 
 Source of the portfolio: Cover (1991), Mathematical Finance 1. Source of intervals from bets: Ryu and Bhatt
-(2024), IEEE Transactions on Information Theory 70. The others, and the reasons, are in
+(2024), IEEE Transactions on Information Theory 70. Further sources and the reasons are in
 docs/decisions/0026-comparing-two-policies.md.
 """
 
@@ -27,7 +27,7 @@ import numpy as np
 from palaestra_trainer.episodes.wilson import CONFIDENCE
 
 ALPHA = 1.0 - CONFIDENCE
-_HALVINGS = 40  # halvings of the interval between the observed difference and a bound; 1e-12 of it is left
+_HALVINGS = 40  # how often a search interval is halved for a bound, to 1e-12 of its length
 
 
 class Difference(NamedTuple):
@@ -39,13 +39,13 @@ class Difference(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pairs:
-    """Counts of episodes that two policies, A and B, have both played.
+    """Counts of the episodes that both policies, A and B, have played.
 
     Attributes:
-        both: episodes in which both succeeded.
+        both: episodes in which both policies succeeded.
         only_a: episodes in which A succeeded and B did not.
         only_b: episodes in which B succeeded and A did not.
-        neither: episodes in which both failed.
+        neither: episodes in which both policies failed.
     """
 
     both: int = 0
@@ -55,7 +55,7 @@ class Pairs:
 
     @classmethod
     def of(cls, results: Iterable[tuple[bool, bool]]) -> Pairs:
-        """Return the counts of the results of A and B in each episode."""
+        """Count the pairs of results of A and B in each episode."""
         seen = list(results)
         return cls(
             both=seen.count((True, True)),
@@ -71,17 +71,17 @@ class Pairs:
 
     @property
     def equal(self) -> int:
-        """The number of episodes in which both had the same result."""
+        """The number of episodes in which both policies had the same result."""
         return self.both + self.neither
 
     @property
     def successes(self) -> tuple[int, int]:
-        """The episodes in which A succeeded, and those in which B did."""
+        """The number of episodes in which A succeeded, and the number in which B succeeded."""
         return self.both + self.only_a, self.both + self.only_b
 
     @property
     def difference(self) -> float:
-        """The success rate of A minus that of B, -1 to 1; 0 without episodes."""
+        """The success rate of A minus the success rate of B, -1 to 1; 0 without episodes."""
         return (self.only_a - self.only_b) / self.episodes if self.episodes else 0.0
 
 
@@ -95,11 +95,11 @@ class Verdict(StrEnum):
 
 
 def verdict(pairs: Pairs, margin: float) -> Verdict:
-    """Return the verdict of the episodes; in at most 5 % of comparisons is any verdict wrong.
+    """Return the verdict of the episodes so far; at most 5 % of comparisons ever get a wrong verdict.
 
     Args:
         pairs: the episodes so far.
-        margin: policies are alike if their success rates differ by at most this much.
+        margin: the verdict is ALIKE if the success rates differ by at most this number.
     """
     low, high = interval(pairs)
     if low > 0.0:
@@ -110,9 +110,10 @@ def verdict(pairs: Pairs, margin: float) -> Verdict:
 
 
 def interval(pairs: Pairs, alpha: float = ALPHA) -> Difference:
-    """Return bounds of the success rate of A minus that of B, valid after any number of episodes.
+    """Return bounds of the difference between the success rates of A and B.
 
-    The probability that the true difference is ever outside, after however many episodes, is at most `alpha`.
+    The bounds are valid after any number of episodes: if they are computed after every episode, the
+    probability that the true difference is ever outside is at most `alpha`.
     """
     gained = partial(log_capital, pairs, weights=_weights(pairs))
     most, middle = -log(alpha), pairs.difference
@@ -120,12 +121,12 @@ def interval(pairs: Pairs, alpha: float = ALPHA) -> Difference:
 
 
 def log_capital(pairs: Pairs, difference: float, weights: np.ndarray | None = None) -> float:
-    """Return the logarithm of the capital that bets against a true difference have won, from 1 at the start.
+    """Return the logarithm of the capital that bets against a candidate difference have won.
 
     Args:
         pairs: the episodes so far.
-        difference: the candidate, between -1 and 1.
-        weights: those of `pairs`, if the caller has computed them.
+        difference: the candidate for the true difference, between -1 and 1.
+        weights: the result of `_weights(pairs)`, if the caller has computed it.
     """
     ahead = (1.0 + difference) / 2.0  # the mean of (1 + A's result - B's result) / 2
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -141,9 +142,9 @@ def _times_log(count: np.ndarray, share: float) -> np.ndarray:
 
 
 def _weights(pairs: Pairs) -> np.ndarray:
-    """Return the logarithm of the part that does not depend on the candidate, for each k.
+    """Return, for each k, the logarithm of the factor that does not depend on the candidate.
 
-    An equal result pays as a fair coin would: k is the number of those that would have fallen to A.
+    An episode with equal results pays like a fair coin. k is the number of such episodes that count for A.
     """
     equal, k = pairs.equal, np.arange(pairs.equal + 1)
     factorial, gamma = _log_factorials(equal), _log_gammas(pairs.episodes)
@@ -163,9 +164,10 @@ def _log_gammas(most: int) -> np.ndarray:
 
 
 def _last_within(gained: Callable[[float], float], inside: float, outside: float, most: float) -> float:
-    """Return the candidate farthest from `inside`, toward `outside`, whose log capital is below `most`.
+    """Return the candidate nearest to `outside` whose log capital is below `most`.
 
-    The capital is a log-convex function of the candidate, so it does not fall again.
+    The capital is a log-convex function of the candidate, so from `inside` to `outside` it does not fall
+    again.
     """
     if gained(outside) < most:
         return outside

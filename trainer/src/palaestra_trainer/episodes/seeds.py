@@ -1,9 +1,8 @@
-"""The seed of every episode: a pure function of the episode's stream and number.
+"""Compute the seed of every episode, as a pure function of the episode's stream and number.
 
-A run that was killed and resumed plays the same episodes as one that was not,
-because no seed depends on the process. Each stream (collecting, evaluating,
-confirming, and any name given to `palaestra-eval --seeds`) has its own sequence
-of seeds, so that a policy is never evaluated on the episodes that selected it.
+A run that was killed and resumed plays the same episodes as an uninterrupted run, because seeds do not depend
+on the process. Each stream has its own sequence of seeds: collecting, evaluating, confirming, and any name of
+`palaestra-eval --seeds`. So a policy is not confirmed or finally evaluated on the episodes that selected it.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ import numpy as np
 COLLECT = "collect"
 EVALUATE = "A"
 CONFIRM = "C"  # `palaestra-eval` uses B by default
-_FRESH = 2**31  # the seeds of a run are all below this number
+_FRESH = 2**31  # all seeds of a run are below this number
 
 
 def episode_seed(run_seed: int, stream: str, simulator: int, episode: int) -> int:
@@ -24,10 +23,10 @@ def episode_seed(run_seed: int, stream: str, simulator: int, episode: int) -> in
 
     Args:
         run_seed: the replica's seed, not negative.
-        stream: the purpose of the episode.
-        simulator: index of the simulator among those of its role; 0 if
-            several share one stream, as evaluators do.
-        episode: its number, counted from 0 over the whole run.
+        stream: name of the stream, which stands for the purpose of the episode.
+        simulator: index of the simulator among those of its role; 0 if several simulators share a stream, as
+            in evaluations.
+        episode: number of the episode in the whole run, counted from 0.
     """
     name = int.from_bytes(hashlib.sha256(stream.encode()).digest()[:8])
     sequence = np.random.SeedSequence((run_seed, name, simulator, episode))
@@ -35,14 +34,14 @@ def episode_seed(run_seed: int, stream: str, simulator: int, episode: int) -> in
 
 
 def episode_seeds(run_seed: int, stream: str, episodes: int, first: int = 0) -> Iterator[int]:
-    """Yield the seeds of `episodes` episodes of a stream that simulators share, from number `first` on."""
+    """Yield seeds for `episodes` episodes of a shared stream, from episode number `first` on."""
     return (episode_seed(run_seed, stream, 0, first + episode) for episode in range(episodes))
 
 
 def fresh_seeds(stream: str, episodes: int, first: int = 0) -> Iterator[int]:
-    """Yield the seeds of `episodes` episodes that no run of any job uses, from number `first` on.
+    """Yield seeds for `episodes` episodes that no run uses, from episode number `first` on.
 
-    They are in [2**31, 2**32), and those of runs are below, so the policies of two runs are compared on
-    episodes that neither has learned from, nor been chosen by.
+    These seeds are in [2**31, 2**32), and the seeds of runs are below 2**31. So two policies are compared on
+    episodes that neither of them learned from, and that did not select either of them.
     """
     return (_FRESH + seed for seed in episode_seeds(0, stream, episodes, first))

@@ -1,10 +1,9 @@
-"""Many simulators as one Stable-Baselines3 VecEnv that tolerates faults.
+"""A Stable-Baselines3 VecEnv of many simulators that tolerates their faults.
 
-All members step at the same time, in turns of the caller's thread: each sends
-the step to its simulator before the thread waits for the first response. A
-broken member is restarted in the background. Its rows are invalid until it is
-up again, see `palaestra_trainer.episodes.collector`, and the other members
-continue. The thread waits for a restart only if no member can step.
+All members step at the same time: the caller's thread sends a step to every simulator before it waits for the
+first response. A faulty member is restarted in the background, while the other members continue. Its rows are
+invalid until it is up again, see `palaestra_trainer.episodes.collector`. The thread waits for a restart only
+if no member can step.
 """
 
 from __future__ import annotations
@@ -40,10 +39,11 @@ class SimulatorsVecEnv(MembersVecEnv):
     """The collecting simulators of a run, for Stable-Baselines3.
 
     Args:
-        restarters: the restarter of each member; rows are in their order.
-        run_seed: the replica's seed; each episode's seed is derived from it.
+        restarters: the restarter of each member; rows have the same order.
+        run_seed: the replica's seed; the seed of each episode is derived from this seed.
         check: called every tenth of a second during waits for members; it raises to end the wait.
-        judge: an environment without a simulator that computes rewards of goals; None: members compute them.
+        judge: an environment without a simulator that computes rewards of goals; None: the members'
+            environments compute them.
     """
 
     def __init__(
@@ -75,13 +75,13 @@ class SimulatorsVecEnv(MembersVecEnv):
             restarter.unpause()
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
-        """Set the run's seed, if one is given; return the seeds of the next episodes."""
+        """Set the run's seed, unless `seed` is None; return the seeds of the next episodes."""
         for collector in self._collectors:
             collector.run_seed = collector.run_seed if seed is None else seed
         return [collector.next_seed() for collector in self._collectors]
 
     def reset(self) -> VecEnvObs:
-        """Return the first observations of new episodes, begun in all members at once."""
+        """Begin new episodes in all members at the same time; return their first observations."""
         with self._watcher.spending(Cause.TRANSPORT):
             observations = take_turns(
                 partial(collector.begin, options or None)
@@ -92,23 +92,23 @@ class SimulatorsVecEnv(MembersVecEnv):
         return self._stack(observations)
 
     def set_training_progress(self, training_progress: float) -> None:
-        """Set the share of training, 0 to 1, that is complete when the next episodes begin."""
+        """Set the share of the training that is complete when the next episodes begin, 0 to 1."""
         for collector in self._collectors:
             collector.training_progress = training_progress
 
     def snapshot(self) -> list[EpisodeState]:
-        """Return the position of each member in its episodes; cheap. Later steps do not change the result."""
+        """Return the position of each member in its episodes; later steps do not change the result."""
         return [collector.state for collector in self._collectors]
 
     def moments(self) -> dict[str, SceneState]:
-        """Return where each member is in its episode, by name; computed by the caller, in any thread."""
+        """Return the episode and step of each member by name; any thread may call this method."""
         return {collector.restarter.name: collector.moment for collector in self._collectors}
 
     def resume(self, states: Sequence[EpisodeState], *, masked: bool = False) -> VecEnvObs:
-        """Bring all members back to their states, at once; return their observations.
+        """Bring all members back to their states at the same time; return their observations.
 
-        The steps for it are not counted; returns and lengths of the episodes continue from their old values.
-        If `masked`, no member takes an action that its mask forbids now.
+        The steps that this takes are not counted. Returns and lengths of the episodes continue from their old
+        values. If `masked` is set, a member does not take an action that its mask forbids now.
         """
         observations = take_turns(
             partial(collector.resume, state, masked=masked)
@@ -118,10 +118,10 @@ class SimulatorsVecEnv(MembersVecEnv):
         return self._stack(observations)
 
     def step_wait(self) -> VecEnvStepReturn:
-        """Step all members at once; return observations, rewards, dones and infos.
+        """Step all members at the same time; return observations, rewards, dones and infos.
 
         Raises:
-            FaultBudgetSpent: a member broke more often than its budget allows.
+            FaultBudgetSpent: a member failed more often than its restart budget allows.
             Diverged: an environment's observation or reward is not finite.
         """
         self._await_somebody()
@@ -143,9 +143,9 @@ class SimulatorsVecEnv(MembersVecEnv):
         )
 
     def close(self) -> None:
-        """End background work and close the environments; the caller stops the simulators.
+        """End restarts in the background and close the environments; the caller stops the simulators.
 
-        An environment that raises an error is logged, and the others are closed too.
+        If an environment raises an error, the error is logged, and the other environments are closed too.
         """
         settle(self._restarters)
         for restarter in self._restarters:
@@ -157,8 +157,9 @@ class SimulatorsVecEnv(MembersVecEnv):
     ) -> list[Any]:
         """Return the result of a method of each chosen environment.
 
-        `compute_reward` is called on the judge, because members may be restarting. It gets copies, because
-        the goals are learned from later. `action_masks` is not called on a member that restarts or is lost.
+        `compute_reward` is called on the judge, because members may be restarting. The judge gets copies,
+        because the learner uses the goals later. `action_masks` is not called on a member that restarts or is
+        lost.
         """
         if method_name == ACTION_MASKS and self._gives_masks:
             return self._action_masks(indices)
@@ -167,7 +168,7 @@ class SimulatorsVecEnv(MembersVecEnv):
         return [self._judge.get_wrapper_attr(method_name)(*copied(method_args), **copied(method_kwargs))]
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
-        """Return an attribute of the chosen environments; for `action_masks`, the method of the collector."""
+        """Return an attribute of each chosen environment; for `action_masks`, its collector's method."""
         if attr_name == ACTION_MASKS and self._gives_masks:
             return [self._collectors[index].action_mask for index in self._get_indices(indices)]
         return super().get_attr(attr_name, indices)
@@ -177,7 +178,7 @@ class SimulatorsVecEnv(MembersVecEnv):
             return take_turns(self._collectors[index].action_mask for index in self._get_indices(indices))
 
     def _await_somebody(self) -> None:
-        """If no member can step, wait for the end of a restart; a vector of only invalid rows is useless."""
+        """If no member can step, wait until a member is restarted; only invalid rows would be useless."""
         if all(restarter.busy or restarter.lost for restarter in self._restarters):
             with self._watcher.spending(Cause.RECOVERING):
                 await_one(self._restarters, self._check)

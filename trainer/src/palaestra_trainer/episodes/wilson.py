@@ -1,4 +1,4 @@
-"""The confidence interval of a success rate that was measured on a few episodes."""
+"""Compute the confidence interval of a success rate from a few episodes."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ CONFIDENCE = 0.95
 def wilson(successes: int, episodes: int) -> SuccessInterval:
     """Return the Wilson score interval of a success rate, rounded to four decimals.
 
-    Unlike the normal approximation, it stays within 0 and 1, and has a width even if all or no episodes
-    succeed. Source: Wilson (1927), Journal of the American Statistical Association 22.
+    Unlike the normal approximation, this interval stays within 0 and 1. Its width is positive even if all or
+    no episodes succeed. Source: Wilson (1927), Journal of the American Statistical Association 22.
 
     Raises:
         ValueError: `episodes` is 0, or `successes` is not within 0 and `episodes`.

@@ -1,7 +1,8 @@
-"""A trained policy as one file, for programs without Palaestra, Stable-Baselines3 or PyTorch.
+"""Export a trained policy as one file, for programs without Palaestra, Stable-Baselines3 or PyTorch.
 
 The file takes observations as the environment returns them, and returns actions that the environment accepts.
-It is compared with the policy before it is written. It is not written if it acts differently.
+Before the file is written, its actions are compared with those of the policy. If they differ, the file is not
+written.
 """
 
 from palaestra_trainer.exporting.exporter import FORMATS, Exported, export

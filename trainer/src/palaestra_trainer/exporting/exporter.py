@@ -1,4 +1,4 @@
-"""Export the best policy of a run: read, convert, compare, write."""
+"""Export the best policy of a run: read it, convert it, compare both, and write the file."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ FORMATS: Mapping[str, str] = {"onnx": "onnx_file", "safetensors": "safetensors_f
 
 
 class Format(Protocol):
-    """The interface of a module of this package that writes one format."""
+    """The interface that a module of this package has if it writes a format."""
 
     def content(self, acting: PolicyModule, sheet: Mapping[str, Any]) -> bytes:
         """Return the bytes of a file."""
@@ -33,13 +33,13 @@ class Format(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Exported:
-    """A file that was written.
+    """The result of an export.
 
     Attributes:
-        path: the file.
-        observations: number of observations on which the file was compared with the policy.
-        largest_difference: the largest difference of a number of an action in that comparison; a continuous
-            one as a share of its range.
+        path: the file that was written.
+        observations: number of observations in the comparison of the file with the policy.
+        largest_difference: the largest difference of an action's number in that comparison; for continuous
+            actions, as a share of the range.
     """
 
     path: Path
@@ -48,11 +48,11 @@ class Exported:
 
 
 def export(run: Path, to: str, file: Path | None = None) -> Exported:
-    """Write the best policy of a run directory in the format `to`; by default to `policy.<to>` in it.
+    """Write the best policy of a run in the format `to`; by default to `policy.<to>` in its directory.
 
     Raises:
-        ConfigurationError: the model is missing, or a library of the extra `export` is.
-        ExportError: the file would act differently; nothing was written.
+        ConfigurationError: the model or a library of the extra `export` is missing.
+        ExportError: the file would act differently from the policy, so it was not written.
         OSError: the file could not be written.
     """
     known = _format(to)

@@ -1,7 +1,7 @@
-"""The data sheet in an exported file: its inputs, its actions, and the run that trained it.
+"""Create the data sheet in an exported file: inputs, actions, and the run that trained the policy.
 
-Meanings and units are copied from the tables in the environment's docstring, under the headings for actions
-and observations. If the docstring has no tables, the sheet has only the spaces.
+Meanings and units come from the tables under the headings for actions and observations in the environment's
+docstring. If the docstring has no tables, the sheet has only the spaces.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ from palaestra_trainer.job.configuration import Configuration, Environment
 from palaestra_trainer.job.run_directory import RunDirectory
 from palaestra_trainer.run.summary import measured
 
-KEY = "palaestra"  # the key of the sheet in a file's metadata
-MOST_BOUNDS = 1_000  # for a space with more numbers, bounds are not listed one by one
+KEY = "palaestra"  # the key of the data sheet in a file's metadata
+MOST_BOUNDS = 1_000  # for a space with more numbers, the sheet has only the extreme bounds
 
 Table = list[dict[str, str]]
 
 
 def data_sheet(acting: PolicyModule, configuration: Configuration, directory: RunDirectory) -> dict[str, Any]:
-    """Return the sheet of a run's best policy, as JSON data."""
+    """Return the data sheet of a run's best policy, as JSON data."""
     result = measured(directory)
     environment = configuration.environment
     tables = _tables(environment)
@@ -81,7 +81,7 @@ def describe(space: spaces.Space[Any]) -> dict[str, Any]:
 
 
 def _bounds(values: np.ndarray) -> Any:
-    """Return one number if all are equal, else each; infinite ones as text, because JSON has no infinity."""
+    """Return one number for equal bounds, else a list; infinity as text, because JSON has no infinity."""
     if values.size and (values == values.flat[0]).all():
         return _number(values.flat[0])
     if values.size > MOST_BOUNDS:
@@ -97,7 +97,7 @@ def _number(value: Any) -> float | str:
 def _tables(environment: Environment) -> dict[str, list[Table]]:
     """Return the tables of an environment's docstring about observations and actions.
 
-    Wrappers may change both, so an environment with wrappers gets no tables.
+    Wrappers may change observations and actions. So for an environment with wrappers, return empty lists.
     """
     found: dict[str, list[Table]] = {"observation": [], "action": []}
     if environment.wrappers or environment.frame_stack:
@@ -110,7 +110,7 @@ def _tables(environment: Environment) -> dict[str, list[Table]]:
 
 
 def _docstring(name: str) -> str:
-    """Return the docstring of the environment's class; "" if its module cannot be imported here."""
+    """Return the docstring of the environment's class; "" if its module cannot be imported."""
     with suppress(ConfigurationError):
         creator: Any = creator_of(name)
         creator = getattr(creator, "environment_class", creator)
@@ -123,7 +123,7 @@ def _docstring(name: str) -> str:
 
 
 def _chapters(text: str) -> Iterator[tuple[str, str]]:
-    """Yield heading and text of each chapter."""
+    """Yield heading and text of each Markdown section."""
     _, *chapters = re.split(r"^#+ ", text, flags=re.MULTILINE)
     for chapter in chapters:
         heading, _, body = chapter.partition("\n")
@@ -131,7 +131,7 @@ def _chapters(text: str) -> Iterator[tuple[str, str]]:
 
 
 def _read(text: str) -> Iterator[Table]:
-    """Yield the tables of a text; a table has a dictionary for each row."""
+    """Yield the Markdown tables of a text; a table is a list with a dictionary for each row."""
     lines = [line.strip() for line in text.splitlines()]
     for is_table, group in itertools.groupby(lines, key=lambda line: line.startswith("|")):
         if is_table:

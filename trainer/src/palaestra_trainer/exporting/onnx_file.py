@@ -1,4 +1,4 @@
-"""A policy as an ONNX file, which any ONNX runtime can run without other code."""
+"""Convert a policy to an ONNX file, which any ONNX runtime can run without other code."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ from palaestra_trainer.exporting.sample_observations import drawn, drawn_masks
 from palaestra_trainer.exporting.verify import Arrays, Run
 
 OPSET = 17  # the opset of ONNX 1.12, released in 2022
-# PyTorch's exporter does not accept these types; each has a larger type that it accepts.
+# PyTorch's exporter does not accept the types on the left, but accepts the larger types on the right.
 _UNTAKEN = {"uint16": "int32", "uint32": "int64", "uint64": "int64"}
-_BATCH = 3  # larger than 1, because the exporter could treat 1 as a constant
+_BATCH = 3  # larger than 1, because the exporter could treat a size of 1 as a constant
 
 
 def content(acting: PolicyModule, sheet: Mapping[str, Any]) -> bytes:
-    """Return the file with the data sheet in its metadata; its batches may have any size.
+    """Return the bytes of the file, with the data sheet in its metadata; batches may have any size.
 
-    PyTorch omits inputs that do not affect an output. The sheet names them as `unused`.
+    PyTorch omits inputs that do not affect an output. The data sheet lists these inputs as `unused`.
 
     Raises:
         ExportError: PyTorch's exporter cannot convert the policy.
@@ -65,7 +65,7 @@ def _converted(acting: PolicyModule) -> onnx.ModelProto:
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         written = Path(folder) / "policy.onnx"
         # The exporter warns about Python values that it treats as constants. The comparison with the policy
-        # shows whether they are.
+        # detects a value that is not constant.
         warnings.simplefilter("ignore")
         torch.onnx.export(
             acting,

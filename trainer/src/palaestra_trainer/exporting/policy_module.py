@@ -1,8 +1,9 @@
-"""A policy as one PyTorch module, from the environment's observation to a deterministic action.
+"""A policy as one PyTorch module that maps observations of the environment to deterministic actions.
 
-Like `TrainedPolicy.predict`, it also handles channels of images, normalization, and the bounds of actions. A
-recurrent policy takes its state as inputs and returns the next state; an episode begins with zeros. A policy
-of MaskablePPO takes masks as a further input; `palaestra_trainer.environments.masks` describes them.
+Like `TrainedPolicy.predict`, the module also handles channels of images, normalization, and the bounds of
+actions. For a recurrent policy, the module takes the policy's state as inputs and returns the next state. The
+state at the start of an episode is zeros. For a policy of MaskablePPO, masks are a further input;
+`palaestra_trainer.environments.masks` describes masks.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ class Normalizer(nn.Module):
         mean: mean of each number.
         variance: variance of each number.
         clip: largest absolute value of a result.
-        epsilon: added to the variance.
+        epsilon: number that is added to the variance.
     """
 
     mean: torch.Tensor
@@ -49,10 +50,10 @@ class Normalizer(nn.Module):
 
 
 class PolicyModule(nn.Module):
-    """The deterministic policy, with its normalizer.
+    """A deterministic policy with its normalizers, as a PyTorch module.
 
     Args:
-        loaded: the policy; it is set to evaluation mode, and stays on the CPU.
+        loaded: the policy, on the CPU; the module sets it to evaluation mode.
 
     Raises:
         ExportError: an observation has the name of the input for masks.
@@ -60,9 +61,10 @@ class PolicyModule(nn.Module):
     Attributes:
         spaces: the space of each input, in the layout of the environment.
         action_space: the space of an action.
-        choices: the number of choices of each number of an action; empty: the policy takes no masks.
+        choices: for each number of an action how many choices it has; empty: the policy does not take masks.
         state_shape: layers and units of the state; None: the policy has no state.
-        normalizers: one for each input, in their order; `Identity` for an input that is not normalized.
+        normalizers: the normalizer of each input, in the order of `spaces`; `Identity` for an input that is
+            not normalized.
     """
 
     def __init__(self, loaded: TrainedPolicy) -> None:
@@ -98,7 +100,7 @@ class PolicyModule(nn.Module):
         return ["action", *(f"next_{name}" for name in STATE if self.state_shape)]
 
     def begin(self, observations: int) -> tuple[torch.Tensor, ...]:
-        """Return the state at the start of an episode for a batch; empty if the policy has none."""
+        """Return the state at the start of an episode for a batch; empty for a policy without state."""
         if self.state_shape is None:
             return ()
         layers, units = self.state_shape
@@ -114,21 +116,21 @@ class PolicyModule(nn.Module):
         return (self._bounded(action), *state)
 
     def seen(self, inputs: tuple[torch.Tensor, ...]) -> Any:
-        """Return the observations of a batch in the form that the networks take."""
+        """Return the observations of a batch in the form that the networks need."""
         parts = zip(self.spaces, self.normalizers, inputs, strict=False)
         seen = {name: self._channels_first(name, normalize(part)) for name, normalize, part in parts}
         return seen if list(seen) != [OBSERVATION] else seen[OBSERVATION]
 
     def memory(self, inputs: tuple[torch.Tensor, ...]) -> tuple[Any, ...]:
-        """Return the state in the inputs, and flags of new episodes; empty if the policy has no state."""
+        """Return the state in the inputs, and flags of new episodes; empty for a policy without state."""
         if self.state_shape is None:
             return ()
         hidden, cell = inputs[len(self.spaces) :]
-        # The flags are 0, because a state of zeros already begins an episode.
+        # The flags are always 0, because an episode begins with a state of zeros.
         return (hidden, cell), torch.zeros_like(hidden[0, :, 0])
 
     def _channels_first(self, name: str, part: torch.Tensor) -> torch.Tensor:
-        """Return a batch of images with channels first; anything else unchanged."""
+        """Return a batch of images with channels first; return other parts unchanged."""
         return part.permute(0, 3, 1, 2) if self.spaces[name].shape != self._seen[name].shape else part
 
     def _bounded(self, action: torch.Tensor) -> torch.Tensor:
@@ -144,21 +146,23 @@ class PolicyModule(nn.Module):
 
 
 class Scoring(PolicyModule):
-    """The scores of discrete actions; the policy takes the best. Only for a comparison, never for a file.
+    """A module that returns the scores of discrete actions, for the comparison of a file with its policy.
 
-    Its only output has the name of the action. Masks do not change the scores.
+    The policy takes the action with the best score. This module is never written to a file. Its only output
+    has the name of the action. Masks do not change the scores.
     """
 
     @property
     def outputs(self) -> list[str]:
-        """The name of the scores."""
+        """The name of the output with the scores."""
         return ["action"]
 
     def forward(self, *inputs: torch.Tensor) -> tuple[torch.Tensor, ...]:
         """Return the scores for a batch.
 
         Raises:
-            AttributeError: the policy lacks the networks and distributions of Stable-Baselines3's policies.
+            AttributeError: the policy does not have the networks and distributions of Stable-Baselines3's
+                policies.
         """
         observation = self.seen(inputs)
         if hasattr(self.policy, "q_net"):
@@ -172,12 +176,12 @@ class Scoring(PolicyModule):
 
 
 def parts_of(space: spaces.Space[Any]) -> dict[str, spaces.Space[Any]]:
-    """Return the space of each key of a Dict, in its order; any other space is a single part."""
+    """Return the space of each key of a Dict, in its order; another space is the only part."""
     return dict(space.spaces) if isinstance(space, spaces.Dict) else {OBSERVATION: space}
 
 
 def as_returned(space: spaces.Space[Any]) -> spaces.Space[Any]:
-    """Return the space of images with channels last, as environments return them; any other unchanged."""
+    """Return the space of images with channels last, as environments return images; others unchanged."""
     if not (isinstance(space, spaces.Box) and is_image_space(space) and is_image_space_channels_first(space)):
         return space
     low, high = (np.moveaxis(bound, 0, -1) for bound in (space.low, space.high))

@@ -1,7 +1,8 @@
-"""A policy's tensors as a safetensors file, for a network that a person builds.
+"""Write a policy's tensors to a safetensors file, for a network that a user builds.
 
-The names begin with `policy.`, followed by the name in Stable-Baselines3's policy. The statistics of the n-th
-input's normalizer begin with `normalizers.<n>.`; the data sheet has its clip value.
+The name of a tensor is `policy.` and its name in Stable-Baselines3's policy. The names of the statistics of
+the n-th input's normalizer begin with `normalizers.<n>.`. The data sheet has the clip value of each
+normalizer.
 """
 
 from __future__ import annotations
@@ -21,14 +22,14 @@ from palaestra_trainer.exporting.verify import Arrays, Run
 
 
 def content(acting: PolicyModule, sheet: Mapping[str, Any]) -> bytes:
-    """Return the file with the data sheet in its metadata."""
-    # Some policies have one network under two names, but the format does not allow shared memory.
+    """Return the bytes of the file, with the data sheet in its metadata."""
+    # Some policies have a network under two names, but the format does not allow tensors to share memory.
     tensors = {name: tensor.detach().clone().contiguous() for name, tensor in acting.state_dict().items()}
     return safetensors.torch.save(tensors, {KEY: json.dumps(sheet)})
 
 
 def runner(file: bytes, acting: PolicyModule) -> Run:
-    """Return a function that runs a copy of the policy with all tensors of the file."""
+    """Return a function that runs a copy of the policy with the tensors of the file."""
     copy = deepcopy(acting)
     with torch.no_grad():
         for tensor in copy.state_dict().values():

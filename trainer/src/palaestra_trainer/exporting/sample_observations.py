@@ -1,9 +1,10 @@
-"""Observations for the comparison of a file with its policy: similar to those of episodes, always the same.
+"""Generate the observations on which a file is compared with its policy, always the same ones.
 
-The bounds of a space do not show the usual numbers: bounds may be infinite, or the largest number of a type.
-Numbers drawn evenly between them would drive a network to its limits, where all actions are the same. So the
-numbers of a Box have several scales, from a hundredth up to the bounds. A network cannot tell images of noise
-apart, so images have areas of different brightness and contrast.
+The observations should be similar to those of episodes, but the bounds of a space do not show the usual
+numbers. A bound may be infinite, or the largest number of a type. Numbers drawn uniformly between such bounds
+would saturate a network, and all actions would be the same. So the numbers of a Box have several scales, from
+a hundredth up to the bounds. A network gives the same output for all images of noise, so the images have
+areas of different brightness and contrast.
 """
 
 from __future__ import annotations
@@ -16,16 +17,16 @@ from stable_baselines3.common.preprocessing import is_image_space
 
 from palaestra_trainer.exporting.policy_module import Normalizer, PolicyModule
 
-EPISODE = 100  # number of observations of one scale; then a recurrent policy begins a new episode
-_FARTHEST = 1e4  # greatest distance from the middle of a space, if its bounds allow more
+EPISODE = 100  # number of observations with the same scale; then a recurrent policy begins a new episode
+_FARTHEST = 1e4  # largest distance from the middle of a space, if its bounds allow a larger one
 _NEAREST = 1e-2
-_DEVIATIONS = 5.0  # greatest distance in deviations, if statistics of observations are known
+_DEVIATIONS = 5.0  # largest distance from the mean in deviations, if the policy normalizes observations
 _AREAS = 6  # number of areas along each side of an image
 _LARGEST_WHOLE = 2.0**62  # float64 cannot hold the largest whole number of 64 bits
 
 
 def drawn(acting: PolicyModule, count: int) -> dict[str, np.ndarray]:
-    """Return `count` observations of each part."""
+    """Return `count` observations for each input of the policy."""
     observations = {}
     for number, (name, space) in enumerate(acting.spaces.items()):
         if isinstance(space, spaces.Box) and is_image_space(space):
@@ -39,7 +40,7 @@ def drawn(acting: PolicyModule, count: int) -> dict[str, np.ndarray]:
 
 
 def drawn_masks(acting: PolicyModule, count: int) -> np.ndarray:
-    """Return masks that allow about half of the choices, at least one per number; shape (count, choices)."""
+    """Return random masks that allow about half of the choices; shape (count, choices)."""
     generator = np.random.default_rng(0)
     parts = []
     for choices in acting.choices:
@@ -50,9 +51,9 @@ def drawn_masks(acting: PolicyModule, count: int) -> np.ndarray:
 
 
 def magnitudes(acting: PolicyModule, observations: dict[str, np.ndarray]) -> np.ndarray:
-    """Return for each observation the largest number that a network gets, at least 1.
+    """Return for each observation the largest number that a network receives, at least 1.
 
-    A network computes with 24 bits of precision, so the errors of its actions grow with that number.
+    A network computes with 24 bits of precision, so the rounding errors of its actions grow with this number.
     """
     found = np.ones(len(next(iter(observations.values()))))
     for (name, space), normalize in zip(acting.spaces.items(), acting.normalizers, strict=True):
@@ -64,7 +65,7 @@ def magnitudes(acting: PolicyModule, observations: dict[str, np.ndarray]) -> np.
 
 
 def _images(shape: tuple[int, ...], count: int, seed: int) -> np.ndarray:
-    """Return `count` random images, shape (count, rows, columns, channels); `shape` has the last three."""
+    """Return `count` random images of the shape (rows, columns, channels)."""
     rows, columns, channels = shape
     generator = np.random.default_rng(seed)
     areas = generator.uniform(-255.0, 255.0, (count, _AREAS, _AREAS, channels))
@@ -76,7 +77,7 @@ def _images(shape: tuple[int, ...], count: int, seed: int) -> np.ndarray:
 
 
 def _numbers(box: spaces.Box, normalize: Any, count: int, seed: int) -> np.ndarray:
-    """Return numbers of a Box, shape (count, *box.shape)."""
+    """Return random numbers of a Box, shape (count, *box.shape)."""
     low, high = (bound.astype(np.float64) for bound in (box.low, box.high))
     middle, farthest = _middle(low, high, normalize)
     far = np.random.default_rng(seed).uniform(-1.0, 1.0, (count, *box.shape)) * _scales(farthest, count)
@@ -88,7 +89,7 @@ def _numbers(box: spaces.Box, normalize: Any, count: int, seed: int) -> np.ndarr
 
 
 def _middle(low: np.ndarray, high: np.ndarray, normalize: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Return the middle of a Box, and the greatest distance of drawn numbers from it."""
+    """Return the middle of a Box, and the largest distance of generated numbers from the middle."""
     if isinstance(normalize, Normalizer):
         return normalize.mean.numpy(), _DEVIATIONS * np.sqrt(normalize.variance.numpy() + normalize.epsilon)
     half = high / 2 - low / 2
@@ -98,7 +99,7 @@ def _middle(low: np.ndarray, high: np.ndarray, normalize: Any) -> tuple[np.ndarr
 
 
 def _scales(farthest: np.ndarray, count: int) -> np.ndarray:
-    """Return the scale of each observation: the largest in every other episode, smaller ones between."""
+    """Return the scale of each observation: the largest scale in every other episode, else smaller ones."""
     episodes = np.arange(count) // EPISODE
     ladder = np.where(episodes % 2, (episodes // 2 % EPISODE) / max(1, episodes.max() // 2), 0.0)
     nearest = np.minimum(1.0, _NEAREST / np.maximum(farthest, _NEAREST))

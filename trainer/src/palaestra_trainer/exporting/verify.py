@@ -15,35 +15,38 @@ from palaestra_trainer.exporting.sample_observations import EPISODE, drawn, draw
 from palaestra_trainer.run.policies import TrainedPolicy
 
 OBSERVATIONS = 1_000
-TOLERANCE = 1e-5  # allowed difference of a continuous action, as a share of its range
-# A comparison counts only if at least so many actions are between the bounds, or if scores differ by so
-# many tolerances.
+TOLERANCE = 1e-5  # largest allowed difference of a continuous action, as a share of its range
+# A comparison is meaningful only if at least this number of actions are between the bounds, or if scores
+# differ by this number of tolerances.
 _TELLING = 10
 
 Arrays = tuple[np.ndarray, ...]
-Run = Callable[..., Arrays]  # takes the inputs of a batch and returns its outputs
+Run = Callable[..., Arrays]  # a function from the inputs of a batch to its outputs
 Convert = Callable[[PolicyModule], Run]
 
 
 def compare(convert: Convert, acting: PolicyModule, policy: TrainedPolicy) -> float:
-    """Return the largest difference of an action on 1,000 observations, as a share of its range.
+    """Return the largest difference between the actions of file and policy, as a share of the range.
 
-    A policy that takes masks is compared twice: with random masks, and with masks that allow everything.
+    The comparison uses 1,000 observations. A policy that takes masks is compared twice: with random masks,
+    and with masks that allow all actions.
 
     Args:
-        convert: converts a module to a file, and returns a function that runs the file.
-        acting: the module of the file that will be written.
+        convert: a function that converts a module to a file, and returns a function that runs this file.
+        acting: the module from which the file will be written.
         policy: the policy that the file must reproduce.
 
     Raises:
-        ExportError: discrete actions differ, or continuous ones by more than the tolerance; or the comparison
-            shows nothing, because a wrong file could have the same actions on these observations.
+        ExportError: discrete actions differ, or continuous actions differ by more than the tolerance. It is
+            also raised if the comparison proves nothing, because a wrong file could have the same actions on
+            these observations.
     """
     observations = drawn(acting, OBSERVATIONS)
     run = convert(acting)
     played = [_played(run, acting, policy, observations, masks) for masks in _masks(acting)]
     difference = max(_difference(*actions, acting, observations) for actions in played)
-    # Random masks alone can make actions differ between observations, so the last masks allow everything.
+    # Random masks make even the actions of a constant policy differ, so the check uses the masks that allow
+    # all.
     _, expected = played[-1]
     _refuse_what_shows_nothing(convert, acting, policy, observations, expected)
     return difference
@@ -73,7 +76,7 @@ def _masks(acting: PolicyModule) -> list[Arrays]:
 def _difference(
     ours: np.ndarray, expected: np.ndarray, acting: PolicyModule, observations: dict[str, np.ndarray]
 ) -> float:
-    """Return the largest difference of an action, as a share of its range; refuse one that is too large."""
+    """Return the largest difference between actions, as a share of the range; refuse a too large one."""
     if ours.shape != expected.shape:
         raise ExportError(f"actions have the shape {ours.shape}, not {expected.shape}; {_REMEDY}")
     apart = _apart(ours, expected)
@@ -101,7 +104,7 @@ def _refuse_what_shows_nothing(
     observations: dict[str, np.ndarray],
     taken: np.ndarray,
 ) -> None:
-    """Refuse actions at their bounds, and equal actions unless their scores show that the file is right."""
+    """Refuse actions at their bounds; refuse equal actions unless the scores show that the file is right."""
     rows = taken.reshape(len(taken), -1)
     same = bool((rows == rows[0]).all())
     if isinstance(acting.action_space, spaces.Box):
@@ -119,13 +122,13 @@ def _refuse_what_shows_nothing(
 
 
 def _scores_show(convert: Convert, scoring: Scoring, observations: dict[str, np.ndarray]) -> bool:
-    """Return whether the scores of actions depend on the observations, and are the same in a file."""
+    """Return whether the scores of actions depend on the observations, and are the same from a file."""
     masks = map(torch.from_numpy, _masks(scoring)[-1])
     inputs = [*map(torch.from_numpy, observations.values()), *masks, *scoring.begin(OBSERVATIONS)]
     try:
         with torch.no_grad():
             expected = scoring(*inputs)[0].numpy()
-    except AttributeError:  # a policy of the job's author may compute scores in its own way
+    except AttributeError:  # a policy of the job's author may not have these networks
         return False
     (ours,) = convert(scoring)(*(part.numpy() for part in inputs))
     allowed = TOLERANCE * max(1.0, float(np.abs(expected).max()))
@@ -137,10 +140,10 @@ def _scores_show(convert: Convert, scoring: Scoring, observations: dict[str, np.
 def _span_and_tolerance(
     acting: PolicyModule, expected: np.ndarray, magnitude: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the range of each number of an action, and its allowed difference.
+    """Return the range of each number of an action, and the largest allowed difference.
 
-    An action that is only clipped may use a small part of the range; then the range of its values counts. Its
-    network may compute with numbers around 1, even if the range is small.
+    If actions are only clipped, they may use a small part of the space's range. Then the range of the actual
+    values counts, but at least 1, because the network may compute with numbers around 1.
     """
     space = acting.action_space
     if not isinstance(space, spaces.Box):
@@ -152,7 +155,7 @@ def _span_and_tolerance(
     if not acting.policy.squash_output:
         largest = np.maximum(0.5, np.abs(expected).max(axis=0))
         span = np.minimum(span, np.maximum(1.0, np.ptp(expected, axis=0)))
-    if acting.state_shape is not None:  # a state accumulates the errors of its episode
+    if acting.state_shape is not None:  # the state of a policy accumulates errors during an episode
         magnitude = np.maximum.accumulate(magnitude.reshape(-1, EPISODE), axis=1).ravel()
     rounding = 2 * np.spacing(largest.astype(np.float32)).astype(np.float64)
     rough = magnitude.reshape(-1, *[1] * span.ndim)
@@ -170,7 +173,7 @@ def _played_at_once(
 def _played_in_turn(
     run: Run, acting: PolicyModule, policy: TrainedPolicy, observations: Mapping[str, np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the actions of file and policy, each observation with the state after the previous one."""
+    """Return the actions of file and policy; each step uses the state after the previous step."""
     ours, expected = [], []
     state: Arrays = ()
     other: Any = None

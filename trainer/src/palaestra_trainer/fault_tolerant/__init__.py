@@ -1,5 +1,5 @@
-"""Environments for training loops of other libraries, which tolerate faults of simulators.
+"""Environments that tolerate faults of simulators, for training loops of other libraries.
 
-Such a loop cannot skip a row, so it never gets an invalid one: a fault ends the episode as truncated, and the
-next reset waits until the simulator is restarted.
+Such a loop cannot skip a row, so the environments never return an invalid row. A fault truncates the episode,
+and the next reset waits until the simulator is restarted.
 """

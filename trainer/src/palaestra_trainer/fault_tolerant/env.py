@@ -1,4 +1,4 @@
-"""One member as a gymnasium wrapper that tolerates faults."""
+"""A gymnasium wrapper around the environment of one member that tolerates faults."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from palaestra_trainer.simulators.interface import Step
 
 
 class FaultTolerantEnv(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """The environment of one simulator; a fault truncates the episode, the next reset waits for the restart.
+    """The environment of one simulator; a fault truncates the episode.
 
-    As with other wrappers of gymnasium, `unwrapped` is the environment itself, and `get_wrapper_attr` finds
-    its attributes and methods.
+    The `reset` after a fault waits until the simulator is restarted. As with other wrappers of gymnasium,
+    `unwrapped` is the environment itself, and `get_wrapper_attr` finds its attributes and methods.
 
     Args:
         players: a group of one member.
 
     Attributes:
-        env: the environment of the episode; another object after a standby took over.
+        env: the environment of the current episode; after a takeover by a standby, it is another object.
     """
 
     def __init__(self, players: EnvGroup) -> None:
@@ -32,9 +32,10 @@ class FaultTolerantEnv(gymnasium.Wrapper[Any, Any, Any, Any]):
 
     @property
     def spec(self) -> EnvSpec | None:
-        """None unless it was set, because a second environment with this robot cannot be created from a spec.
+        """The spec that a program set, else None; a second environment cannot be created from a spec.
 
-        The spec of the environment itself is `unwrapped.spec`.
+        A spec would have to contain this robot, which only one environment can use. The spec of the inner
+        environment is `unwrapped.spec`.
         """
         return self._spec
 
@@ -43,9 +44,10 @@ class FaultTolerantEnv(gymnasium.Wrapper[Any, Any, Any, Any]):
         self._spec = spec
 
     def set_wrapper_attr(self, name: str, value: Any, *, force: bool = True) -> bool:
-        """Set an attribute where it is defined, else in this wrapper if `force`; return whether it was set.
+        """Set an attribute of the environment, or else of this wrapper; return whether it was set.
 
-        An attribute of the environment is set again after a restart and after a standby took over.
+        If no object has the attribute, it is set on this wrapper only if `force` is True. An attribute of the
+        environment is set again after a restart, and after a standby took over.
         """
         if hasattr(self, name) or not self.env.has_wrapper_attr(name):
             return super().set_wrapper_attr(name, value, force=force)
@@ -55,7 +57,7 @@ class FaultTolerantEnv(gymnasium.Wrapper[Any, Any, Any, Any]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
-        """Begin an episode; return its first observation and info. Waits until the simulator is restarted.
+        """Wait until the simulator is up, and begin an episode; return its first observation and info.
 
         Raises:
             As `EnvGroup.begin`.
@@ -65,7 +67,7 @@ class FaultTolerantEnv(gymnasium.Wrapper[Any, Any, Any, Any]):
         return self._player.observation, self._player.reset_info
 
     def step(self, action: Any) -> Step:
-        """Return the result of the environment's step; after a fault, the last observation, truncated.
+        """Return the result of the environment's step, or after a fault a truncated row.
 
         Raises:
             As `EnvGroup.step`.
@@ -73,5 +75,5 @@ class FaultTolerantEnv(gymnasium.Wrapper[Any, Any, Any, Any]):
         return self._players.step(action).step
 
     def close(self) -> None:
-        """Stop the simulator and release it; safe to repeat."""
+        """Stop the simulator and release it; further calls have no effect."""
         self._players.close()

@@ -1,4 +1,4 @@
-"""A group of environments that begin and step together, each in its own simulator."""
+"""A group of environments that reset and step at the same time, each in its own simulator."""
 
 from __future__ import annotations
 
@@ -22,16 +22,17 @@ def _nothing(rows: Sequence[StepResult]) -> None:
 
 
 class EnvGroup:
-    """One `EpisodeRunner` for each member.
+    """A group that has an `EpisodeRunner` for each member.
 
-    `close` releases the simulators; otherwise they are released at the end of the process.
+    `close` releases the simulators. Without a call of `close`, they are released at the end of the process.
 
     Args:
-        restarters: the restarter of each member; the members are up or being started.
-        release: stops and releases the simulators.
-        deadline_s: the longest wait for a simulator that restarts.
-        wait_for_restart: whether the step with the fault waits for the restart; False: the next reset waits.
-        played: called with the rows of each step.
+        restarters: the restarter of each member; the members have started or are starting.
+        release: a function that stops and releases the simulators.
+        deadline_s: the longest time to wait for a simulator that restarts.
+        wait_for_restart: whether the step with the fault waits until the restart is complete; if not, the
+            next reset waits.
+        played: a function that gets the rows of each step.
 
     Attributes:
         all: the runners, in the order of `restarters`.
@@ -55,7 +56,7 @@ class EnvGroup:
         atexit.register(self.close)
 
     def begin(self, seeds: Sequence[int | None], options: Sequence[Options]) -> None:
-        """Begin an episode in each member at once; wait until all are up.
+        """Begin an episode in every member at the same time; first wait until all members are up.
 
         Raises:
             FaultBudgetSpent: the restart budget of a member is spent.
@@ -69,7 +70,7 @@ class EnvGroup:
         self._begin_prepared()
 
     def step(self, action: Any) -> StepResult:
-        """Step the only member and return its row; if its episode ended, no new one begins.
+        """Step the only member and return its row; do not begin a new episode.
 
         Raises:
             ResetNeeded: no episode is running.
@@ -84,7 +85,7 @@ class EnvGroup:
         return row
 
     def step_all(self, actions: Sequence[Any]) -> list[StepResult]:
-        """Step all members at once and return their rows; if an episode ended, the next one has begun.
+        """Step all members at the same time and return their rows; begin a new episode after each that ended.
 
         Raises:
             ResetNeeded: a member has no running episode.
@@ -99,7 +100,7 @@ class EnvGroup:
         return rows
 
     def close(self) -> None:
-        """Release the simulators; safe to repeat, without effect in a forked process."""
+        """Release the simulators; further calls, and calls in a forked process, have no effect."""
         if self._process == os.getpid():
             self._process = None
             atexit.unregister(self.close)

@@ -1,8 +1,8 @@
-"""One member that plays episodes for a training loop that cannot handle faults.
+"""Play the episodes of one member for a training loop that cannot handle faults.
 
-Each row has valid numbers. A fault ends the episode as truncated, with the last observation before it,
-reward 0 and `sim_fault` (`palaestra_trainer.environments.infos`). The member is restarted in the background,
-and the next episode begins when it is up.
+Every row is valid. A fault truncates the episode: the row has the last observation before the fault, reward 0
+and `sim_fault` (`palaestra_trainer.environments.infos`). The member is restarted in the background, and the
+next episode begins when the member is up.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class StepResult(NamedTuple):
     Attributes:
         step: the result of gymnasium's `step`.
         episode: return, length and seconds of the episode, under the names of Stable-Baselines3's Monitor.
-            None except in the last step of an episode without a fault.
+            Only the last step of an episode without a fault has these values; in other steps it is None.
     """
 
     step: Step
@@ -39,12 +39,12 @@ class StepResult(NamedTuple):
 
     @property
     def ended(self) -> bool:
-        """Whether this step is the last one of its episode."""
+        """Whether this step is the last step of its episode."""
         return self.step[2] or self.step[3]
 
     @property
     def marked(self) -> dict[str, Any]:
-        """The info for Stable-Baselines3; the row of a fault has only Palaestra's keys."""
+        """The info for Stable-Baselines3; in the row of a fault, the info has only Palaestra's keys."""
         cut = self.ended and self.episode is None
         return self.info if cut else of_environment(self.info)
 
@@ -63,7 +63,7 @@ class EpisodeRunner:
         self.restarter = restarter
         self.playing = False
         self.observation: Any = None
-        self._last: Any = None  # a copy, because the training loop may write into the original
+        self._last: Any = None  # a copy, because the training loop may write into `observation`
         self.reset_info: dict[str, Any] = {}
         self._return, self._length, self._began = 0.0, 0, 0.0
         self._random, _ = np_random()
@@ -71,13 +71,14 @@ class EpisodeRunner:
 
     @property
     def env(self) -> Environment:
-        """The member's environment; another object after a standby took over."""
+        """The member's environment; after a takeover by a standby, it is another object."""
         return self.restarter.member.env
 
     def prepare(self, seed: int | None = None, options: dict[str, Any] | None = None) -> None:
-        """Choose the next episode. Without `seed`, its seed is the next one in the sequence of the last seed.
+        """Set seed and options of the next episode.
 
-        If a fault makes an episode begin twice, its seed stays the same.
+        If `seed` is None, the seed of the episode comes from the random generator of the last given seed. If
+        a fault makes an episode begin twice, its seed stays the same.
         """
         if seed is not None:
             self._random, _ = np_random(seed)
@@ -85,12 +86,12 @@ class EpisodeRunner:
         self.playing = False
 
     def begin(self) -> None:
-        """Begin the chosen episode if the member is up; after a fault, begin to restart the member instead.
+        """Begin the prepared episode if the member is up; if that fails, begin to restart the member.
 
         Raises:
-            FaultBudgetSpent: its restart budget is spent.
-            ConfigurationError: its world lacks a device or node that the environment needs, or it cannot be
-                restarted.
+            FaultBudgetSpent: the member's restart budget is spent.
+            ConfigurationError: the member's world lacks a device or node that the environment needs, or the
+                member cannot be restarted.
             MasterLost: no ROS master responds.
             Diverged: the observation is not finite.
         """
@@ -115,7 +116,7 @@ class EpisodeRunner:
         """
         if not self.playing:
             raise ResetNeeded(f"{self.restarter.name}: no episode is under way; call reset() first")
-        self.playing = False  # stays False if an interrupt ends the step
+        self.playing = False  # remains False if an interrupt ends the step
         try:
             step = self.restarter.step(action)
         except SimulatorFault as fault:

@@ -1,4 +1,4 @@
-"""Create the members of fault-tolerant environments: in a facade, in a job, or in new simulators."""
+"""Create the members of fault-tolerant environments from a facade, from a job, or from new simulators."""
 
 from __future__ import annotations
 
@@ -39,11 +39,12 @@ from palaestra_trainer.simulators.restarter import Restarter
 def make_players(
     environment_id: str | None, number: int | None, role_name: str, options: dict[str, Any]
 ) -> EnvGroup:
-    """Return a group of environments of one class, each in its own simulator, which is up.
+    """Return a group of environments of one class, each in its own running simulator.
 
-    The simulator is that of the newest `Webots` facade of this process that no environment uses. Without such
-    a facade, or for more than one simulator, those of PALAESTRA_CONFIG are used. If that is not set, new ones
-    are started: stubs, or MuJoCo for `SeeTarget-v0`.
+    If this process has a `Webots` facade that no environment uses, the environment takes the simulator of the
+    newest such facade. Without such a facade, or for more than one simulator, the simulators of
+    PALAESTRA_CONFIG are used. If that variable is not set, new simulators are started: stubs, or MuJoCo for
+    `SeeTarget-v0`.
 
     Args:
         environment_id: the id of the environment; None: that of PALAESTRA_CONFIG.
@@ -136,7 +137,7 @@ def _in_own(environment: Environment, number: int, world: str, driver: str) -> E
 def _allocated(
     stack: ExitStack, configuration: Configuration, number: int | None, role: Role
 ) -> tuple[SimulatorConfiguration, ...]:
-    """Return simulators that are reserved until `stack` closes; no simulator may be given up."""
+    """Reserve simulators until `stack` closes; return them with a minimum that allows none to be given up."""
     every = max(1, len(configuration.with_role(role)))
     entries = []
     for _ in range(number or every):
@@ -149,7 +150,7 @@ def _allocated(
 def _started(
     stack: ExitStack, configuration: Configuration, members: Sequence[Member], watcher: Watcher
 ) -> list[Restarter]:
-    """Start the members and return their restarters; closing `stack` stops the members."""
+    """Start the members and return their restarters; when `stack` closes, it stops the members."""
     fleet = Fleet(configuration, members, watcher)
     stack.callback(fleet.stop)
     fleet.start()

@@ -1,4 +1,4 @@
-"""Members as a Stable-Baselines3 VecEnv that tolerates faults."""
+"""A Stable-Baselines3 VecEnv of members that tolerates faults."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from palaestra_trainer.simulators.base_vec_env import MembersVecEnv
 
 
 class FaultTolerantVecEnv(MembersVecEnv):
-    """All members step at the same time, as in `FaultTolerantVectorEnv`.
+    """A VecEnv whose members all step at the same time, as in `FaultTolerantVectorEnv`.
 
-    The info of an episode's last step has `terminal_observation`, `TimeLimit.truncated` and the `episode`
-    that Stable-Baselines3's Monitor would add. If a fault truncated the episode, the info has `sim_fault`
-    (`palaestra_trainer.environments.infos`) and no `episode`, so that `rollout/ep_rew_mean` does not count
-    the episode.
+    The info of an episode's last step has `terminal_observation`, `TimeLimit.truncated`, and `episode` as
+    Stable-Baselines3's Monitor sets it. If a fault truncated the episode, the info has `sim_fault`
+    (`palaestra_trainer.environments.infos`) but not `episode`. So `rollout/ep_rew_mean` does not count that
+    episode.
 
     Args:
         players: the members, in the order of the rows.
 
     Raises:
-        ConfigurationError: Stable-Baselines3 would misread the environment's observations or actions.
+        ConfigurationError: Stable-Baselines3 would misinterpret the environment's observations or actions.
     """
 
     def __init__(self, players: EnvGroup) -> None:
@@ -36,7 +36,7 @@ class FaultTolerantVecEnv(MembersVecEnv):
         super().__init__([player.restarter for player in players.all])
 
     def reset(self) -> VecEnvObs:
-        """Begin an episode in each member at once; return the first observations.
+        """Begin an episode in every member at the same time; return the first observations.
 
         Raises:
             As `EnvGroup.begin`.
@@ -47,7 +47,7 @@ class FaultTolerantVecEnv(MembersVecEnv):
         return self._seen()
 
     def step_wait(self) -> VecEnvStepReturn:
-        """Step all members at once; return observations, rewards, dones and infos.
+        """Step all members at the same time; return observations, rewards, dones and infos.
 
         Raises:
             As `EnvGroup.step_all`.
@@ -61,7 +61,7 @@ class FaultTolerantVecEnv(MembersVecEnv):
         )
 
     def close(self) -> None:
-        """Stop the simulators and release them; safe to repeat."""
+        """Stop the simulators and release them; further calls have no effect."""
         self._players.close()
 
     def _seen(self) -> VecEnvObs:

@@ -1,4 +1,4 @@
-"""Members as a gymnasium VectorEnv that tolerates faults."""
+"""A gymnasium VectorEnv of members that tolerates faults."""
 
 from __future__ import annotations
 
@@ -17,11 +17,12 @@ Stepped = tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]
 
 
 class FaultTolerantVectorEnv(VectorEnv[Any, Any, np.ndarray]):
-    """All members step at the same time; an episode that ends is reset in the same step.
+    """A VectorEnv whose members all step at the same time; the last step of an episode also resets it.
 
     The last observation and info of an episode are `infos["final_obs"]` and `infos["final_info"]`. If a fault
-    ended it, `infos["final_info"]["palaestra"]["sim_fault"]` is set. The step then waits until that simulator
-    is restarted, and the others wait with it: this interface has no row for a simulator that does not step.
+    ended the episode, `infos["final_info"]["palaestra"]["sim_fault"]` is set. The step then waits until the
+    faulty simulator is restarted. The other simulators wait too, because this interface needs a row from
+    every simulator.
 
     Args:
         players: the members, in the order of the rows.
@@ -40,10 +41,11 @@ class FaultTolerantVectorEnv(VectorEnv[Any, Any, np.ndarray]):
     def reset(
         self, *, seed: Seeds = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
-        """Begin an episode in each member at once; return the first observations and infos.
+        """Begin an episode in every member at the same time; return the first observations and infos.
 
         Args:
-            seed: seed of the first member; the next ones get `seed + 1` and so on. Or one seed for each.
+            seed: seed of the first member; the second member gets `seed + 1`, and so on. A list has a seed
+                for each member.
             options: options of the environment's reset, the same for each member.
 
         Raises:
@@ -57,7 +59,7 @@ class FaultTolerantVectorEnv(VectorEnv[Any, Any, np.ndarray]):
         return self._stacked(), infos
 
     def step(self, actions: Any) -> Stepped:
-        """Step all members at once; return observations, rewards, terminations, truncations and infos.
+        """Step all members at the same time; return the five results of a step, one row per member.
 
         Raises:
             As `EnvGroup.step_all`.
@@ -77,7 +79,7 @@ class FaultTolerantVectorEnv(VectorEnv[Any, Any, np.ndarray]):
         )
 
     def call(self, name: str, *arguments: Any, **options: Any) -> tuple[Any, ...]:
-        """Return the result of a method of each environment, or an attribute, as `SyncVectorEnv` does."""
+        """Return the result of a method, or an attribute, of each environment, as `SyncVectorEnv` does."""
         found = [player.env.get_wrapper_attr(name) for player in self._players.all]
         return tuple(each(*arguments, **options) if callable(each) else each for each in found)
 
@@ -86,7 +88,7 @@ class FaultTolerantVectorEnv(VectorEnv[Any, Any, np.ndarray]):
         return self.call(name)
 
     def set_attr(self, name: str, values: Any) -> None:
-        """Set an attribute of each environment; `values` is one for all, or a list or tuple of one for each.
+        """Set an attribute of each environment; `values` is one value for all, or a list or tuple of values.
 
         Raises:
             ValueError: the numbers of values and environments differ.

@@ -1,17 +1,15 @@
-"""The configuration of one replica: reads and checks the whole training.yaml.
+"""Read and check training.yaml, the configuration of one replica.
 
-The plan writes the file, and the modules of this package read it only through
-this one; reports and experiment trackers show the file as it is. A wrong file
-is refused before anything starts. All its mistakes are reported at once, each
-with field, fact and remedy. The hyperparameters of each algorithm are defined
-in `palaestra_trainer.algorithms`, not here, because reading a configuration
-must not import a learning library.
+The operator's plan writes the file. The modules of this package read the file only through this module;
+reports and experiment trackers show its text unchanged. A wrong file is refused before a simulator starts.
+The error lists all mistakes of the file, each with field, fact and remedy. The hyperparameters of each
+algorithm are defined in `palaestra_trainer.algorithms`, not here, because reading a configuration must not
+import a learning library.
 
-Unknown fields are logged and ignored. A job may name a `trainer.image` that is
-older than the operator that writes the file, and a newer operator writes a new
-field only if the job sets it. Typing mistakes of users do not reach this
-module, because the job is checked before the file is written. An unknown value
-is refused, because it would change the training.
+Unknown fields are logged and ignored. A job may name a `trainer.image` that is older than the operator that
+writes the file. A newer operator writes a new field only if the job sets that field. Misspelled fields of
+users do not reach this module, because the operator checks the job before it writes the file. An unknown
+value of a known field is refused, because the training would differ from the job.
 """
 
 from __future__ import annotations
@@ -37,7 +35,7 @@ log = structlog.get_logger(__name__)
 _UNKNOWN = "extra_forbidden"  # pydantic's type of this error
 
 CONFIG_VARIABLE = "PALAESTRA_CONFIG"
-CONFIRM_EPISODES = 100  # with these, a rate of 95 % is known to within 4 %
+CONFIRM_EPISODES = 100  # with 100 episodes, a success rate of 95 % is known to within 4 %
 
 Positive = Annotated[int, Field(ge=1)]
 Reward = Literal["Dense", "Sparse"]
@@ -48,7 +46,7 @@ DEFAULT_ROBOT = "Robotino"
 
 
 class _Section(BaseModel):
-    """A section of the file: immutable, with names in camelCase in YAML; `parse` handles unknown fields."""
+    """An immutable section of the file, with camelCase names in YAML; `parse` handles unknown fields."""
 
     model_config = ConfigDict(
         alias_generator=to_camel,
@@ -62,7 +60,7 @@ class Wrapper(_Section):
     """A wrapper around the environment, see `environments.wrappers`.
 
     Attributes:
-        name: its class, as `module:Class`.
+        name: class of the wrapper, as `module:Class`.
         options: keyword arguments of the class.
     """
 
@@ -75,10 +73,11 @@ class Environment(_Section):
 
     Attributes:
         id: name under which the environment is registered with gymnasium.
-        reward: Dense gives a reward at each step, Sparse only at the end of an episode.
+        reward: with Dense the environment gives a reward at each step, with Sparse only at the end of an
+            episode.
         options: keyword arguments of the environment.
-        wrappers: wrappers around it, the innermost first; None: no wrappers.
-        frame_stack: number of newest observations that are stacked into one; None: no stacking.
+        wrappers: wrappers around the environment, the innermost first; None: no wrappers.
+        frame_stack: number of newest observations that are stacked into one observation; None: no stacking.
     """
 
     id: str
@@ -89,11 +88,11 @@ class Environment(_Section):
 
 
 class Normalize(_Section):
-    """Observations and rewards that are scaled before learning, see `algorithms.normalization`.
+    """How observations and rewards are normalized before learning, see `algorithms.normalization`.
 
     Attributes:
-        observations: whether each is scaled by its running mean and deviation.
-        rewards: whether they are scaled by the running deviation of the discounted return.
+        observations: whether each observation is normalized by its running mean and deviation.
+        rewards: whether rewards are divided by the running deviation of the discounted return.
         clip_observations: the largest absolute value of a normalized observation.
         clip_rewards: the largest absolute value of a normalized reward.
     """
@@ -108,7 +107,7 @@ class Callback(_Section):
     """A callback of the job's author, see `run.callbacks`.
 
     Attributes:
-        name: its class, as `module:Class`.
+        name: class of the callback, as `module:Class`.
         options: keyword arguments of the class.
     """
 
@@ -117,14 +116,15 @@ class Callback(_Section):
 
 
 class Algorithm(_Section):
-    """The learning algorithm.
+    """The learning algorithm of the run.
 
     Attributes:
         name: a name in the table of algorithms, or `module:Class`.
-        hyperparameters: values that differ from that table's defaults.
+        hyperparameters: values that replace the defaults of the algorithm.
         normalize: the values that are normalized; None: no values.
         cnn: the convolutional network for images; None: Stable-Baselines3's NatureCNN.
-        policy: a policy of the algorithm, or `module:Class`; None: the one for the observation.
+        policy: a policy of the algorithm, or `module:Class`; None: the algorithm's policy for this type of
+            observation.
         callbacks: callbacks of the job's author, in the order of their calls; None: no callbacks.
     """
 
@@ -137,13 +137,13 @@ class Algorithm(_Section):
 
 
 class Evaluation(_Section):
-    """How often and on how many episodes the policy is evaluated, and the success rate that ends training.
+    """When the policy is evaluated, on how many episodes, and the success rate that ends training.
 
     Attributes:
         every_steps: environment steps between two evaluations; 0: no evaluations.
         episodes: episodes of one evaluation, shared among all evaluating simulators.
-        stop_at_success_rate: training ends when this share (0 to 1) succeeds, in an evaluation and then in
-            its confirmation.
+        stop_at_success_rate: training ends when this share of the episodes (0 to 1) succeeds in an evaluation
+            and again in its confirmation.
         confirm_episodes: episodes of a confirmation; 0: no confirmation; None: `CONFIRM_EPISODES`.
     """
 
@@ -159,19 +159,19 @@ class Evaluation(_Section):
 
 
 class Checkpoint(_Section):
-    """How often a checkpoint is saved, and how many of the newest are kept."""
+    """How often a checkpoint is saved, and how many of the newest checkpoints are kept."""
 
     every_steps: Positive = 5000
     keep: Positive = 3
 
 
 class Recycle(_Section):
-    """Limits after which a healthy simulator is restarted between episodes; the first one reached counts.
+    """Limits for a healthy simulator; when it reaches one of them, it is restarted after its episode.
 
     Attributes:
-        after_resets: resets since it was taken into use.
-        after_minutes: minutes since it was taken into use; time as a standby does not count.
-        above_memory_bytes: memory of all of its processes together.
+        after_resets: resets since the simulator was taken into use.
+        after_minutes: minutes since the simulator was taken into use; its time as a standby does not count.
+        above_memory_bytes: memory of all its processes together.
     """
 
     after_resets: Positive | None = None
@@ -180,7 +180,7 @@ class Recycle(_Section):
 
 
 class Restart(_Section):
-    """The faults that one simulator may have: `limit` restarts within any `within_seconds`."""
+    """The restart budget of one simulator: at most `limit` restarts within any `within_seconds`."""
 
     limit: Annotated[int, Field(ge=0)] = 10
     within_seconds: Annotated[float, Field(gt=0)] = 600
@@ -191,14 +191,14 @@ class SimulatorConfiguration(_Section):
 
     Attributes:
         name: `<group>-<index>`, unique in the file.
-        role: Collect gathers experience, Evaluate measures the policy.
-        min_simulators: how many simulators of its group the run needs to continue; None: all of them.
-        control: address of its sidecar's control port.
+        role: Collect for collecting experience, Evaluate for evaluating the policy.
+        min_simulators: number of simulators of its group that must work for the run to continue; None: all.
+        control: address of the control port of the simulator's sidecar.
         driver: the simulator program: stub, mujoco, webots or command.
-        options: its command-line options.
-        world: path of its generated world.
-        standby: whether its sidecar runs a second simulator as a standby for this one.
-        start_deadline_seconds: seconds after its start within which it must respond.
+        options: command-line options of the simulator program.
+        world: path of the generated world that the simulator loads.
+        standby: whether the sidecar also runs a standby for this simulator.
+        start_deadline_seconds: seconds within which the simulator must respond after its start.
     """
 
     name: str
@@ -217,18 +217,19 @@ class SimulatorConfiguration(_Section):
 
 
 class Configuration(_Section):
-    """The complete configuration of one replica: the resolved TrainingJob for it.
+    """The complete configuration of one replica, which the operator derives from the TrainingJob.
 
     Attributes:
-        seed: the job's seed plus the replica's index; all other seeds are derived from it.
-        device: device of the model; cuda: the GPU that the job requested, if PyTorch finds one.
-        steps: valid environment steps of the whole run, all simulators together.
-        resume_from: the run directory of another job; a run without a checkpoint of its own resumes from
-            the newest checkpoint there.
-        initial_policy: a model.zip whose policy a new run begins with; None: random weights.
-        stall_deadline_seconds: the run fails after this long without an environment step.
+        seed: the job's seed plus the replica's index; all other seeds are derived from this seed.
+        device: device of the model; cuda: the GPU that the job requested, or the CPU if PyTorch finds no GPU.
+        steps: number of valid environment steps of the whole run, of all simulators together.
+        resume_from: the run directory of another job; a run that has not saved a checkpoint yet resumes from
+            the newest checkpoint in that directory.
+        initial_policy: a model.zip with whose policy a new run begins; None: random weights.
+        stall_deadline_seconds: the run fails after this time without an environment step.
         robot: class of the robot, `module:Class` or a name of `robots.registry`; None: `DEFAULT_ROBOT`.
-        command: the user's own program that replaces the built-in loop; not used here.
+        command: the user's own program that replaces the built-in training loop; the trainer does not read
+            it.
         status_address: `host:port` of /metrics, /status and /healthz.
     """
 
@@ -267,10 +268,11 @@ class Configuration(_Section):
 
 
 def load(path: Path | None = None) -> Configuration:
-    """Return the configuration in `path`, or by default in the file that PALAESTRA_CONFIG names.
+    """Return the configuration in the file `path`; None stands for the file that PALAESTRA_CONFIG names.
 
     Raises:
-        ConfigurationError: the file is missing, not YAML, or wrong; one line for each mistake.
+        ConfigurationError: the file is missing, not YAML, or wrong; the message has one line for each
+            mistake.
     """
     chosen = path or _path_of_environment(os.environ)
     try:
@@ -288,7 +290,7 @@ def load_run(folder: Path) -> Configuration:
     """Return the configuration of the run in `folder`.
 
     Raises:
-        ConfigurationError: it is not a run directory, or its training.yaml is wrong.
+        ConfigurationError: `folder` is not a run directory, or its training.yaml is wrong.
     """
     file = RunDirectory(folder).configuration
     if not file.exists():
@@ -299,10 +301,10 @@ def load_run(folder: Path) -> Configuration:
 
 
 def parse(content: object, *, source: str = "training.yaml") -> Configuration:
-    """Return the configuration that `content`, a YAML document as Python data, describes.
+    """Return the configuration that `content` describes, which is the Python data of a YAML document.
 
     Raises:
-        ConfigurationError: one line for each mistake, each with field, fact and remedy.
+        ConfigurationError: the message has one line for each mistake, with field, fact and remedy.
     """
     try:
         return Configuration.model_validate(content)
@@ -320,17 +322,17 @@ def parse(content: object, *, source: str = "training.yaml") -> Configuration:
 def dump(configuration: Configuration) -> str:
     """Return YAML text from which `load` reads an equal configuration."""
     content = configuration.model_dump(mode="json", by_alias=True, exclude_none=True)
-    # The text is ASCII, because YAML reads some other characters as line ends.
+    # The text is pure ASCII, because YAML reads some other characters as line ends.
     return yaml.safe_dump(content, sort_keys=False)
 
 
 def nearest(word: str, known: Mapping[str, object] | list[str], likeness: float = 0.6) -> str:
-    """Return the remedy for an unknown name: the most similar known name, or all of them.
+    """Return the remedy for an unknown name: use the most similar known name, or one of all known names.
 
     Args:
         word: the unknown name.
         known: the known names.
-        likeness: how similar a name must be, 0 to 1.
+        likeness: the least similarity, 0 to 1, with which a known name is suggested.
     """
     close = difflib.get_close_matches(word, list(known), n=1, cutoff=likeness)
     return f"did you mean {close[0]}?" if close else f"use one of {', '.join(sorted(known))}"

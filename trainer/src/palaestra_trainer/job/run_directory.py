@@ -1,8 +1,8 @@
-"""The folder of one run on its volume: its files, and functions that write them.
+"""The files in the folder of one run on its volume, and functions that write these files.
 
-The folder alone is enough to inspect the run and to resume it. Whole files are
-replaced atomically (temporary name, fsync, rename, fsync of the folder); lines
-are appended with fsync. So after a crash each file is either old or new.
+This folder is enough to inspect the run and to resume it. A whole file is replaced atomically: its new
+content gets a temporary name, then follow fsync, rename and fsync of the folder. Lines are appended with
+fsync. So after a crash each file has either its old or its new content.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _NO_SUCH_CALL = frozenset({errno.EINVAL, errno.ENOTSUP, errno.ENOSYS, errno.EBAD
 
 
 class RunDirectory:
-    """One run directory; it may be missing.
+    """One run directory; the folder may be missing.
 
     Attributes:
         path: the folder itself.
@@ -47,7 +47,7 @@ class RunDirectory:
 
     @property
     def end(self) -> Path:
-        """The end of the newest attempt, if its trainer could write it."""
+        """The end of the newest attempt; the file is missing if the trainer could not write it."""
         return self.path / "end.json"
 
     @property
@@ -57,12 +57,12 @@ class RunDirectory:
 
     @property
     def faults(self) -> Path:
-        """One JSON line per fault of a simulator, and one when it is up again."""
+        """One JSON line per fault of a simulator, and one line when that simulator is up again."""
         return self.path / "faults.jsonl"
 
     @property
     def hyperparameters(self) -> Path:
-        """All hyperparameters that the run began with, including defaults."""
+        """All hyperparameters with which the run began, including defaults."""
         return self.path / "hyperparameters.json"
 
     @property
@@ -72,12 +72,12 @@ class RunDirectory:
 
     @property
     def journal(self) -> Path:
-        """The counters as of some seconds ago; the next attempt reads them after a kill."""
+        """The counters of some seconds ago; after a kill, the next attempt continues from these."""
         return self.path / "journal.json"
 
     @property
     def model(self) -> Path:
-        """The best model by evaluation, a Stable-Baselines3 zip."""
+        """The model with the best evaluation, as a zip of Stable-Baselines3."""
         return self.path / "model.zip"
 
     @property
@@ -92,7 +92,7 @@ class RunDirectory:
 
     @property
     def summary(self) -> Path:
-        """The result of the run; the file exists once the run is finished."""
+        """The result of the run; the file exists only after the run has finished."""
         return self.path / "summary.json"
 
     @property
@@ -102,11 +102,11 @@ class RunDirectory:
 
     @property
     def trackers(self) -> Path:
-        """The id of this run in each experiment tracker that the job uses."""
+        """The ids of this run in the experiment trackers of the job."""
         return self.path / "trackers.json"
 
     def begin_attempt(self, pod_uid: str, reason: str, versions: Mapping[str, str] | None = None) -> int:
-        """Record the start of an attempt, and the versions with which it runs; return its number, from 1."""
+        """Record the start of an attempt and the versions of its software; return its number, from 1."""
         started = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
         with_versions = {} if versions is None else {"versions": dict(versions)}
         append_line(self.attempts, {"pod": pod_uid, "started": started, "reason": reason} | with_versions)
@@ -114,7 +114,7 @@ class RunDirectory:
 
 
 def append_line(path: Path, content: dict[str, Any]) -> None:
-    """Append `content` as one JSON line that survives a crash of the machine."""
+    """Append `content` as one JSON line, and wait until the line is on the disk."""
     with path.open("ab+") as file:
         torn = False
         if file.tell():
@@ -146,7 +146,7 @@ def drop_lines(path: Path, unwanted: Callable[[dict[str, Any]], bool]) -> None:
 
 
 def replace_file(path: Path, write: Callable[[Path], object]) -> None:
-    """Replace `path` by the file that `write` writes to a temporary name.
+    """Replace the file at `path` by the file that `write` writes to a temporary name.
 
     Raises:
         OSError: the file could not be written; the old file is unchanged.
@@ -171,7 +171,8 @@ def temporary(path: Path) -> Iterator[Path]:
 def sync(path: Path) -> None:
     """Wait until a file's or a folder's contents are on the disk.
 
-    Some file systems over object stores and networks do not support fsync of a folder; it is then skipped.
+    Some file systems over object stores and networks do not support fsync of a folder. On these, this
+    function does nothing for a folder.
     """
     descriptor = os.open(path, os.O_RDONLY)
     try:

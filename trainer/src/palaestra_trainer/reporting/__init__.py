@@ -1,1 +1,1 @@
-"""The report of runs, as one HTML file: what was asked, what happened, and how to repeat it."""
+"""Write the report of runs as one HTML file: the settings, the results, and commands to repeat them."""

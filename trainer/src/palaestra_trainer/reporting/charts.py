@@ -1,4 +1,4 @@
-"""Curves as SVG, in the colors of the page's style; a browser draws them without a script."""
+"""Draw curves as SVG in the colors of the page's style; a browser shows them without a script."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from palaestra_trainer.reporting.run_data import Points
 
 WIDTH, HEIGHT = 360.0, 210.0
 LEFT, RIGHT, TOP, BOTTOM = 46.0, 8.0, 10.0, 26.0
-SIZES = ((1e6, 1e6, "M"), (1e4, 1e3, "k"))  # a number of at least this size is shown in this unit
-COLORS = 8  # the style has so many colors of series
-MOST_POINTS = 240  # of one curve; a screen shows no more
+SIZES = ((1e6, 1e6, "M"), (1e4, 1e3, "k"))  # smallest number for a unit, the unit, and its letter
+COLORS = 8  # number of colors for series in the style
+MOST_POINTS = 240  # most points of one curve; a screen cannot show more
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,11 +21,11 @@ class Series:
     """One curve.
 
     Attributes:
-        label: its name.
-        points: step and value.
-        band: step, lower and upper bound of an interval around it.
+        label: name of the curve.
+        points: step and value of each point.
+        band: step, lower bound and upper bound of an interval around the curve.
         dots: whether each point is drawn as a dot with its value.
-        color: which color of the style.
+        color: number of the color in the style.
     """
 
     label: str
@@ -47,7 +47,7 @@ class _Scale:
 
 
 def thinned(points: Points, most: int = MOST_POINTS) -> Points:
-    """Return at most `most` points: the mean of each group of neighbors."""
+    """Return at most `most` points, each the mean of a group of neighboring points."""
     if len(points) <= most:
         return points
     size = math.ceil(len(points) / most)
@@ -56,7 +56,7 @@ def thinned(points: Points, most: int = MOST_POINTS) -> Points:
 
 
 def shown(value: float) -> str:
-    """Return a number for an axis or a tooltip."""
+    """Return a number as text for an axis or a tooltip."""
     for size, unit, letter in SIZES:
         if abs(value) >= size:
             return f"{value / unit:.4g}{letter}"
@@ -64,7 +64,7 @@ def shown(value: float) -> str:
 
 
 def as_share(value: float) -> str:
-    """Return a share of 1 in percent."""
+    """Return a share from 0 to 1 as text in percent."""
     return f"{100 * value:.0f} %"
 
 
@@ -75,12 +75,12 @@ def chart(
     share: bool = False,
     marks: Sequence[tuple[float, str]] = (),
 ) -> Markup:
-    """Return curves over the steps as a figure.
+    """Return a figure with curves over the steps of a run.
 
     Args:
-        title: its caption.
-        series: the curves; those without points are left out.
-        share: whether the values are shares of 1; the axis is then 0 to 100 %.
+        title: caption of the figure.
+        series: the curves; curves without points are omitted.
+        share: whether the values are shares from 0 to 1; the axis then ranges from 0 to 100 %.
         marks: steps to mark on the axis, with a text for each.
     """
     drawn = [one for one in series if one.points]
@@ -124,8 +124,8 @@ def _scales(series: Sequence[Series], *, share: bool) -> tuple[_Scale, _Scale]:
 
 
 def _padded(low: float, high: float) -> tuple[float, float]:
-    """Return bounds around values, with a distance above 0 that their digits can hold."""
-    least = max(abs(low), abs(high), 1e-9) * (0.1 if low == high else 1e-3)  # ticks show four digits
+    """Return bounds around values; the bounds differ by enough for distinct ticks."""
+    least = max(abs(low), abs(high), 1e-9) * (0.1 if low == high else 1e-3)  # ticks show only four digits
     pad = max(0.06 * (high - low), least)
     return low - pad, high + pad
 
@@ -194,7 +194,7 @@ def _within(y: _Scale, value: float) -> float:
 
 
 def _legend(series: Sequence[Series]) -> Markup:
-    if not series[1:]:  # the title names a single curve
+    if not series[1:]:  # the title is enough for a single curve
         return joined()
     names = [
         element("span", element("i", class_=f"key c{one.color % COLORS}"), one.label, class_="series")

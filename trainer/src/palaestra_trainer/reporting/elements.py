@@ -1,4 +1,4 @@
-"""HTML elements as text. Every text inside them is escaped, because no function takes HTML as plain text."""
+"""Build HTML elements as text; every function escapes plain text."""
 
 from __future__ import annotations
 
@@ -7,31 +7,31 @@ import json
 import re
 from typing import Any
 
-# Not allowed in HTML, or not in UTF-8: control characters and surrogates.
+# These control characters and surrogates are not allowed in HTML or in UTF-8.
 _REFUSED = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufdd0-\ufdef\ufffe\uffff]")
 _VOID = frozenset({"input", "meta"})
 
 
 class Markup(str):
-    """Text that is HTML already; only this module makes it from other text."""
+    """Text that is already HTML; only this module converts plain text to this type."""
 
     __slots__ = ()
 
 
 def escaped(text: str) -> Markup:
-    """Return text as HTML, also for an attribute in double quotes."""
+    """Return text as HTML, for an element or for an attribute in double quotes."""
     return Markup(html.escape(_REFUSED.sub("\ufffd", text)))
 
 
 def joined(*children: str) -> Markup:
-    """Return texts and elements one after the other."""
+    """Return texts and elements as one text; escape plain texts."""
     return Markup("".join(child if isinstance(child, Markup) else escaped(child) for child in children))
 
 
 def element(name: str, /, *children: str, **attributes: str | float | None) -> Markup:
-    """Return an element; its children are texts, which are escaped, and elements.
+    """Return an element; its children are elements and plain texts, which are escaped.
 
-    An attribute that is None is left out. In the name of an attribute `_` stands for `-`, and a last `_` is
+    An attribute that is None is omitted. In the name of an attribute, `_` stands for `-`, and a last `_` is
     dropped, as in `class_`.
     """
     words = [name]
@@ -44,7 +44,7 @@ def element(name: str, /, *children: str, **attributes: str | float | None) -> M
 
 
 def json_script(content: Any) -> Markup:
-    """Return data for a script of the page; nothing in it can end the element."""
+    """Return a script element with JSON data for the page; the data cannot end the element."""
     text = json.dumps(content, separators=(",", ":"), allow_nan=False)  # ASCII only
     for character in "<>&":
         text = text.replace(character, f"\\u{ord(character):04x}")
@@ -52,7 +52,7 @@ def json_script(content: Any) -> Markup:
 
 
 def own_code(name: str, text: str) -> Markup:
-    """Return an element with a script or a style of this package, which is not escaped.
+    """Return an element with a script or a style of this package, without escaping it.
 
     Raises:
         ValueError: the text could end the element.

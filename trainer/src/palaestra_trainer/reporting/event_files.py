@@ -1,8 +1,8 @@
-"""Scalars from TensorBoard's event files, as bytes.
+"""Read scalars from the bytes of TensorBoard's event files.
 
-A reader of our own, because that of TensorBoard takes a second to import. An incomplete record at the end,
-as after a kill, is left out. Source of the format: tensorflow/core/util/event.proto and summary.proto,
-tensorflow/core/lib/io/record_writer.h.
+Palaestra has its own reader, because TensorBoard's reader takes a second to import. The reader skips an
+incomplete record at the end of a file, as a kill leaves it. Source of the format:
+tensorflow/core/util/event.proto and summary.proto, tensorflow/core/lib/io/record_writer.h.
 """
 
 from __future__ import annotations
@@ -10,12 +10,12 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterator
 
-_HEADER, _CHECKSUM = 12, 4  # length with its checksum; checksum of the content, which are not compared
+_HEADER, _CHECKSUM = 12, 4  # length and its checksum; checksum of the content; neither is compared
 _VARINT, _FIXED64, _BYTES, _FIXED32 = 0, 1, 2, 5
-_STEP, _SUMMARY, _SESSION = 2, 5, 7  # of Event
-_VALUE = 1  # of Summary
-_TAG, _SIMPLE = 1, 2  # of Summary.Value
-_STATUS, _START = 1, 1  # of SessionLog, and its value
+_STEP, _SUMMARY, _SESSION = 2, 5, 7  # fields of Event
+_VALUE = 1  # field of Summary
+_TAG, _SIMPLE = 1, 2  # fields of Summary.Value
+_STATUS, _START = 1, 1  # field of SessionLog, and its value for a start
 
 LONGEST_BITS = 63  # an integer has at most 10 bytes of 7 bits
 
@@ -23,9 +23,9 @@ Scalars = dict[str, dict[int, float]]
 
 
 def add_scalars(content: bytes, found: Scalars) -> None:
-    """Add the scalars of one event file to those of earlier files, by name and step.
+    """Add the scalars of one event file to `found`, which has those of earlier files by name and step.
 
-    A file may begin with a session that hides the later steps of earlier files.
+    A file may begin with a session. Then scalars of earlier files at the same or later steps are removed.
     """
     for record in _records(content):
         try:
@@ -66,7 +66,7 @@ def _add(record: bytes, found: Scalars) -> None:
 
 
 def _fields(message: bytes) -> Iterator[tuple[int, int | float | bytes]]:
-    """Yield number and value of each field of a protobuf message; 64-bit values are left out."""
+    """Yield number and value of each field of a protobuf message, except for 64-bit values."""
     at = 0
     while at < len(message):
         key, at = _varint(message, at)
@@ -91,7 +91,7 @@ def _fields(message: bytes) -> Iterator[tuple[int, int | float | bytes]]:
 
 
 def _varint(message: bytes, at: int) -> tuple[int, int]:
-    """Return an integer and the position after it."""
+    """Return the integer at a position, and the position after the integer."""
     value = shift = 0
     while True:
         byte = message[at]

@@ -1,4 +1,4 @@
-"""A recorded episode from above in pictures: floor, obstacles, target, and the robot with its way."""
+"""Draw a recorded episode from above: floor, obstacles, target, the robot and its path."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from palaestra_protocol.scene import TARGET_M
 from palaestra_trainer.reporting.replay import view_of
 from palaestra_trainer.reporting.run_data import Replay
 
-GIF_PX = 360  # the longer side
+GIF_PX = 360  # pixels of the longer side
 MOST_PICTURES = 60
 MOST_BYTES = 200_000
-LONGEST_MS, SHORTEST_MS = 150, 20  # of a picture; browsers show shorter ones too long
+LONGEST_MS, SHORTEST_MS = 150, 20  # time of a picture; browsers show a shorter picture for too long
 LAST_MS = 1500
 _COLORS = 32
-_SMOOTH = 2  # pictures are drawn so much larger and then reduced, which smooths their edges
+_SMOOTH = 2  # pictures are drawn larger by this factor and then reduced, to smooth edges
 
-# The colors of a report (page.css) on a bright page.
+# The colors that page.css has for a bright page.
 _PAGE, _FLOOR, _OBSTACLE = (246, 247, 249), (238, 241, 245), (135, 148, 166)
 _ROBOT, _WAY, _TARGET, _START = (31, 95, 191), (116, 156, 214), (23, 121, 74), (91, 102, 117)
 
@@ -29,10 +29,10 @@ Position = tuple[float, float]
 
 
 def animated(replay: Replay) -> bytes:
-    """Return an episode as a GIF of at most 200 kB, which plays for at most 11 s, again and again.
+    """Return an episode as a GIF of at most 200 kB that repeats; it lasts at most 11 s.
 
-    Its longer side has 360 pixels. It plays as fast as the robot drove, or faster: a picture lasts at most
-    0.15 s.
+    The longer side of the GIF has 360 pixels. It plays in real time or faster, because each picture lasts at
+    most 0.15 s.
 
     Args:
         replay: the episode, with at least one pose.
@@ -46,7 +46,7 @@ def animated(replay: Replay) -> bytes:
 def _gif(replay: Replay, most: int) -> bytes:
     every = math.ceil(len(replay.poses) / most)
     drawn = list(pictures(replay, GIF_PX, every))
-    palette = drawn[-1].quantize(_COLORS)  # the last picture has all of the way, and so all colors
+    palette = drawn[-1].quantize(_COLORS)  # the last picture has the whole path, and so all colors
     first, *others = (each.quantize(palette=palette, dither=Image.Dither.NONE) for each in drawn)
     picture_ms = min(max(round(1000 * every * replay.frame_s), SHORTEST_MS), LONGEST_MS)
     file = BytesIO()
@@ -62,12 +62,12 @@ def _gif(replay: Replay, most: int) -> bytes:
 
 
 def pictures(replay: Replay, size_px: int, every: int = 1) -> Iterator[Image.Image]:
-    """Yield a picture for each `every`-th pose, and one for the last.
+    """Yield a picture for each `every`-th pose, and a picture for the last pose.
 
     Args:
         replay: the episode, with at least one pose.
-        size_px: width or height of a picture, whichever is larger; an even number, and so is the other.
-        every: 1: each pose has a picture.
+        size_px: larger one of width and height of a picture, an even number; the other is even too.
+        every: number of poses per picture; with 1, each pose has a picture.
     """
     canvas = _Canvas.blank(replay, size_px)
     canvas.ground(replay)
@@ -87,13 +87,13 @@ def pictures(replay: Replay, size_px: int, every: int = 1) -> Iterator[Image.Ima
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Canvas:
-    """A picture whose coordinates are meters on the floor, with y up.
+    """A picture that is drawn in meters on the floor, with the y axis upward.
 
     Attributes:
-        image: the picture, larger than it will be.
-        low_x: x of its left side.
-        high_y: y of its upper side.
-        scale: pixels in a meter.
+        image: the picture, larger than the final picture by the factor `_SMOOTH`.
+        low_x: x of the picture's left side.
+        high_y: y of the picture's upper side.
+        scale: pixels per meter.
     """
 
     image: Image.Image
@@ -103,7 +103,7 @@ class _Canvas:
 
     @classmethod
     def blank(cls, replay: Replay, size_px: int) -> _Canvas:
-        """Return an empty canvas for all that an episode shows."""
+        """Return an empty canvas that is large enough for the floor and the path of an episode."""
         low_x, low_y, width, height = view_of(replay)
         scale = _SMOOTH * size_px / max(width, height)
         even = 2 * _SMOOTH
@@ -120,7 +120,7 @@ class _Canvas:
         return self.image.reduce(_SMOOTH)
 
     def ground(self, replay: Replay) -> None:
-        """Draw what does not move: the floor, the obstacles and the start."""
+        """Draw the objects that do not move: the floor, the obstacles and the start."""
         if replay.low is not None and replay.high is not None:
             (low_x, low_y), (high_x, high_y) = replay.low, replay.high
             corners = [(low_x, low_y), (high_x, low_y), (high_x, high_y), (low_x, high_y)]
@@ -130,7 +130,7 @@ class _Canvas:
         self.disc(replay.poses[0][:2], 4 * _SMOOTH / self.scale, _START)
 
     def line(self, start: Position, end: Position) -> None:
-        """Draw a part of the way."""
+        """Draw a part of the robot's path."""
         ImageDraw.Draw(self.image).line([self._at(start), self._at(end)], fill=_WAY, width=2 * _SMOOTH)
 
     def disc(self, center: Position, radius_m: float, color: tuple[int, int, int]) -> None:
@@ -138,13 +138,13 @@ class _Canvas:
         ImageDraw.Draw(self.image).circle(self._at(center), radius_m * self.scale, fill=color)
 
     def ring(self, center: Position, radius_m: float, color: tuple[int, int, int]) -> None:
-        """Draw a circle."""
+        """Draw the outline of a circle."""
         ImageDraw.Draw(self.image).circle(
             self._at(center), radius_m * self.scale, outline=color, width=_SMOOTH
         )
 
     def robot(self, center: Position, heading_rad: float, radius_m: float) -> None:
-        """Draw the robot, with a wedge that shows where it looks."""
+        """Draw the robot, with a wedge that shows its heading."""
         self.disc(center, radius_m, _ROBOT)
         nose = [(radius_m, 0.0), (-radius_m / 3, radius_m / 2), (-radius_m / 3, -radius_m / 2)]
         self._polygon(_placed(nose, center, heading_rad), _PAGE)
@@ -168,11 +168,11 @@ class _Canvas:
         )
 
     def _at(self, place: Position) -> Position:
-        """Return a place on the floor in pixels, from the upper left corner."""
+        """Return a position on the floor in pixels, from the upper left corner."""
         return (place[0] - self.low_x) * self.scale, (self.high_y - place[1]) * self.scale
 
 
 def _placed(corners: Sequence[Position], center: Position, heading_rad: float) -> list[Position]:
-    """Return corners around the origin, turned by a heading and moved to a place."""
+    """Return corners that are given around the origin, rotated by a heading and moved to a center."""
     cosine, sine = math.cos(heading_rad), math.sin(heading_rad)
     return [(center[0] + x * cosine - y * sine, center[1] + x * sine + y * cosine) for x, y in corners]

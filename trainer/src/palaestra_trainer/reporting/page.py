@@ -1,7 +1,7 @@
-"""A report as one HTML page of a bounded size, for one run or for several side by side.
+"""Build a report as one HTML page of a bounded size, for one run or for several runs side by side.
 
-Pure: the same data give the same page. It has no address of any kind: style, script and pictures are inside,
-and its policy for browsers (Content-Security-Policy) refuses every request.
+The functions are pure: the same data give the same page. The page has no links: it contains its style, script
+and pictures. Its Content-Security-Policy makes a browser refuse every request.
 """
 
 from __future__ import annotations
@@ -25,26 +25,27 @@ from palaestra_trainer.reporting.sections import (
 MOST_BYTES = 2_500_000
 MOST_RUNS = 200
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
-NAME = 120  # characters of a run's name
-# Points of a curve and characters of a cell in the comparison of runs.
+NAME = 120  # most characters of a run's name
+# Each pair limits the comparison of runs: points of a curve, and characters of a cell.
 COMPARISONS = ((120, 120), (20, 40), (4, 12))
-# The first that fits into the size is used.
+# A page uses the first of these with which its size is within the limit.
 DETAILS: tuple[Detail | None, ...] = (
     Detail(curves=24, points=240, replays=3, faults=300, rows=100, text=60_000),
     Detail(curves=24, points=120, replays=3, faults=60, rows=40, text=8_000),
     Detail(curves=8, points=60, replays=1, faults=20, rows=30, text=0),
     Detail(curves=0, points=30, replays=0, faults=5, rows=15, text=0),
-    None,  # the comparison only
+    None,  # only the comparison of runs
 )
 
 
 def page(runs: Sequence[RunData], most_bytes: int = MOST_BYTES) -> str:
-    """Return the report of runs with as many details as fit into `most_bytes` of UTF-8.
+    """Return the report of runs, with the most details for which the page has at most `most_bytes`.
 
     Only the first `MOST_RUNS` runs are shown.
 
     Raises:
-        ValueError: not even the page without details fits; the default always fits.
+        ValueError: even the page without details is larger than `most_bytes`; this cannot happen with the
+            default.
     """
     shown = runs[:MOST_RUNS]
     for detail in DETAILS:
@@ -57,7 +58,7 @@ def page(runs: Sequence[RunData], most_bytes: int = MOST_BYTES) -> str:
 
 
 def _sections(runs: Sequence[RunData], detail: Detail | None, most_bytes: int) -> list[Markup] | None:
-    """Return the sections of each run; None as soon as they are too large together."""
+    """Return the sections of each run; None if their total size exceeds `most_bytes`."""
     sections: list[Markup] = []
     if detail is None:
         return sections
@@ -127,7 +128,7 @@ def _results(runs: Sequence[RunData], width: int) -> Markup:
 
 
 def _comparison(runs: Sequence[RunData], points: int) -> Markup:
-    """Return the curves of all runs in common charts; more runs than colors share colors."""
+    """Return charts with the curves of all runs; if there are more runs than colors, runs share colors."""
 
     def drawn(of: Callable[[RunData, int], Series]) -> list[Series]:
         return [of(run, index) for index, run in enumerate(runs)]
@@ -135,7 +136,7 @@ def _comparison(runs: Sequence[RunData], points: int) -> Markup:
     def label(run: RunData) -> str:
         return cut(run.name, 40)
 
-    banded = len(runs) <= COLORS  # more bands than that hide each other
+    banded = len(runs) <= COLORS  # more bands would hide each other
     rates = drawn(lambda run, index: success_series(run.evaluations, label(run), index, points, line=banded))
     returns = drawn(lambda run, index: return_series(run.evaluations, label(run), index, points))
     charts = [
@@ -166,7 +167,7 @@ def _bare(series: Sequence[Series], points: int, *, banded: bool) -> list[Series
 
 
 def _differences(runs: Sequence[RunData], width: int) -> Markup:
-    """Return what was asked of the runs where they differ."""
+    """Return a table of the settings and versions in which the runs differ."""
     names = dict.fromkeys(name for run in runs for name in (*run.asked, *run.versions))
     rows = []
     for name in names:

@@ -1,4 +1,4 @@
-"""Values of files that another release wrote, or a crash damaged: the expected type, or nothing."""
+"""Convert values of files that another release wrote or a crash damaged to the expected type."""
 
 from __future__ import annotations
 
@@ -8,36 +8,36 @@ from typing import Any
 
 from palaestra_protocol.masking import masked
 
-GREATEST = 1e15  # of a number in a chart
+GREATEST = 1e15  # the largest number that a chart shows
 
 
 def number(value: object) -> float | None:
-    """Return a number that a chart can show; None for anything else."""
+    """Return a value as a float if a chart can show it; None for other values."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return None
     return float(value) if abs(value) <= GREATEST and math.isfinite(value) else None
 
 
 def numbers(value: object) -> tuple[float, ...]:
-    """Return a list of numbers; empty if one of them is not a number."""
+    """Return the numbers of a list; an empty tuple if any member is not a number."""
     found = tuple(map(number, value)) if isinstance(value, list) else ()
     return tuple(one for one in found if one is not None) if None not in found else ()
 
 
 def text(value: object) -> str:
-    """Return a value as text, without the passwords of addresses; "" for None."""
+    """Return a value as text, with masked passwords in addresses; "" for None."""
     if isinstance(value, list):
         return ", ".join(map(text, value))
     return "" if value is None else masked(str(value))
 
 
 def record(value: object) -> Mapping[str, Any]:
-    """Return a JSON object; empty for anything else."""
+    """Return a value if it is a JSON object; an empty object for other values."""
     return {str(key): part for key, part in value.items()} if isinstance(value, Mapping) else {}
 
 
 def records(value: object) -> list[Mapping[str, Any]]:
-    """Return a list of JSON objects, without its other members."""
+    """Return the JSON objects in a list, without its other members."""
     return [record(part) for part in value if isinstance(part, Mapping)] if isinstance(value, list) else []
 
 
@@ -51,7 +51,7 @@ def flat(value: object, path: str = "") -> Iterator[tuple[str, str]]:
 
 
 def without_values_of_env(value: Any) -> Any:
-    """Return a copy of a job in which no variable of a container has its value, which may be a secret."""
+    """Return a copy of a job without the values of its containers' variables, which may be secrets."""
     if isinstance(value, Mapping):
         return {
             key: [_without_value(variable) for variable in part]

@@ -1,4 +1,4 @@
-"""The recorded episodes of a run, from the content of replays.json."""
+"""Read the recorded episodes of a run from the content of replays.json."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def replays_of(content: Mapping[str, Any]) -> Iterator[Replay]:
 
 
 def _rows(value: object, length: int, most: int) -> list[tuple[float, ...]]:
-    """Return the first lists of `length` numbers in a list; its other members are left out."""
+    """Return the lists of `length` numbers among the first `most` members of a list."""
     lists = value[:most] if isinstance(value, list) else []
     return [row for one in lists if len(row := numbers(one)) == length]
 
@@ -60,6 +60,6 @@ def _facts(episode: Mapping[str, Any]) -> str:
 
 
 def _number_or(value: object, otherwise: float) -> float:
-    """Return a number, or another one."""
+    """Return a value if it is a number, or else `otherwise`."""
     known = number(value)
     return otherwise if known is None else known

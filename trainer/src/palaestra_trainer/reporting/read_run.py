@@ -1,4 +1,4 @@
-"""Read a run directory into the data of its report; a file that is missing or damaged leaves its part out."""
+"""Read the data of a report from a run directory; omit the data of missing or damaged files."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from palaestra_trainer.reporting.read_replays import replays_of
 from palaestra_trainer.reporting.run_data import Evaluated, Points, ReportedFault, RunData
 from palaestra_trainer.reporting.tolerant_files import head, json_file, lines, yaml_file
 
-MOST_CURVES_BYTES = 64 * 2**20  # of all event files, which take 5 s to read
+MOST_CURVES_BYTES = 64 * 2**20  # limit for all event files together, which take 5 s to read
 _INTERRUPTED = 75
 _TRAINING_FIRST = ("rollout/", "reward/", "train/")
 
@@ -70,7 +70,7 @@ def read_run(directory: RunDirectory) -> RunData:
 
 
 def _end(summary: Mapping[str, Any], end: Mapping[str, Any], outcome: Mapping[str, Any]) -> tuple[str, str]:
-    """Return the kind of end, and the end in words."""
+    """Return a key of `sections.ENDED`, and the end of the run in words."""
     if summary:
         return "good", text(end.get("reason") or "Completed: the training is complete")
     code = end.get("exit_code", outcome.get("exit_code"))
@@ -167,9 +167,9 @@ def _evaluated(path: Path) -> tuple[Evaluated, ...]:
 
 
 def _faults(path: Path) -> tuple[ReportedFault, ...]:
-    """Return the faults; a line about a restart has the seconds of each fault of its simulator before."""
+    """Return the faults; a later line about the restart has the downtimes of its simulator's faults."""
     found: list[ReportedFault] = []
-    open_: dict[tuple[str, str], list[int]] = {}  # places in `found`, by attempt and simulator
+    open_: dict[tuple[str, str], list[int]] = {}  # indices in `found`, by attempt and simulator
     for line in lines(path):
         key = text(line.get("attempt")), text(line.get("simulator"))
         if "up_after_s" in line:
@@ -208,7 +208,7 @@ def _curves(folder: Path) -> dict[str, Points]:
     found: Scalars = {}
     left = MOST_CURVES_BYTES
     for path in sorted(folder.glob("events.out.tfevents.*"), key=_written):
-        content = head(path, left)  # a record in the middle has no beginning
+        content = head(path, left)  # a file is readable only from its start
         left -= len(content)
         add_scalars(content, found)
     curves = {
@@ -225,7 +225,7 @@ def _place(name: str) -> tuple[int, str]:
 
 
 def _written(path: Path) -> tuple[float, str]:
-    """Return the time in the name of an event file, and the name."""
+    """Return the time that the name of an event file contains, and the name."""
     stamp = path.name.split(".")[3:4]
     return (float(stamp[0]) if stamp and stamp[0].isdigit() else 0.0, path.name)
 
@@ -244,7 +244,7 @@ def _checkpoints(folder: Path) -> tuple[tuple[str, str, str], ...]:
 
 
 def _repeat(folder: Path, job: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
-    """Return commands, each after a sentence about it; paths are those of the run directory."""
+    """Return pairs of a sentence and the command that it describes, with the paths of the run directory."""
     train = f"palaestra run job.yaml --replica {shlex.quote(text(job.get('replica', folder.name)))}"
     if (folder / "job.yaml").exists():
         again = ("Save the job below as job.yaml, and train it again on one machine:", train)

@@ -1,6 +1,6 @@
-"""A recorded episode from above, as SVG: floor, obstacles, target, and the way of the robot.
+"""Draw a recorded episode from above as SVG: floor, obstacles, target, and the path of the robot.
 
-The picture is complete without a script. The script of the page moves the robot along the way.
+The picture is complete without a script. The script of the page moves the robot along its path.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def replay_figure(replay: Replay) -> Markup:
 
 
 def view_of(replay: Replay) -> tuple[float, float, float, float]:
-    """Return the smallest x and y of the picture, its width and its height, in meters."""
+    """Return the smallest x, the smallest y, the width and the height of the picture, in meters."""
     xs = [pose[0] for pose in replay.poses] + [x for _, x, _ in replay.targets]
     ys = [pose[1] for pose in replay.poses] + [y for _, _, y in replay.targets]
     for corner in (replay.low, replay.high):
@@ -139,7 +139,7 @@ def _controls(replay: Replay) -> Markup:
 
 
 def _for_script(replay: Replay) -> dict[str, object]:
-    """Return the poses as whole millimeters and degrees, which are short."""
+    """Return the data for the page's script; whole millimeters and degrees keep it short."""
     return {
         "s": replay.frame_s,
         "poses": [

@@ -1,4 +1,4 @@
-"""The contents of a report, as data. All texts may be any text, and every number is finite."""
+"""The data of a report. A text may contain any characters, and every number is finite."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ class Evaluated:
     """One evaluation or confirmation.
 
     Attributes:
-        step: the step of its policy.
-        success_rate: 0 to 1; None: the environment reports no success.
-        low: lower bound of the rate's 95 % interval; None as the rate.
-        high: upper bound.
+        step: the step of the run at which the policy was evaluated.
+        success_rate: share of successful episodes, 0 to 1; None: the environment does not report success.
+        low: lower bound of the rate's 95 % interval; None if the rate is None.
+        high: upper bound of the rate's 95 % interval; None if the rate is None.
         returns: return of each episode.
         mean_length: mean number of steps of an episode.
     """
@@ -35,13 +35,14 @@ class ReportedFault:
     """One fault of a simulator.
 
     Attributes:
-        time: when it was noticed.
+        time: time at which the trainer detected the fault.
         step: step of the run at that time.
-        simulator: its name.
-        kind: dead, hung or wrong_data.
-        fact: the message.
-        steps_lost: steps of the episode that it truncated.
-        seconds: from the fault until the simulator was up again; None: it did not come up in that attempt.
+        simulator: name of the simulator.
+        kind: kind of the fault: dead, hung or wrong_data.
+        fact: message of the fault.
+        steps_lost: steps of the episode that the fault truncated.
+        seconds: seconds from the fault until the simulator was up again; None: the simulator did not come up
+            in that attempt.
     """
 
     time: str
@@ -58,11 +59,11 @@ class Replay:
     """One recorded episode of an evaluation.
 
     Attributes:
-        title: why it was chosen: best, median or failed.
-        facts: its return, length, outcome and seed, as texts.
+        title: why the episode was chosen: best, median or failed.
+        facts: return, length, outcome and seed of the episode, as one text.
         poses: x and y in meters and heading in radians, for each frame.
         frame_s: seconds of simulated time from one frame to the next.
-        targets: the frame from which on the target is at x, y.
+        targets: for each position of the target the first frame, x and y.
         low: smallest x and y of the floor; None: unknown.
         high: greatest x and y of the floor.
         outlines: obstacles as x, y, half length, half width, radius of the rounding, heading.
@@ -82,27 +83,27 @@ class Replay:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunData:
-    """One run.
+    """The data of one run.
 
     Attributes:
-        name: job and replica.
-        ended: good, interrupted, failed, or open while the end is not known.
-        end: the end in words.
+        name: name of the job and number of the replica.
+        ended: good, interrupted, failed, or open if the end is not known.
+        end: the end of the run in words.
         figures: name and value of the main results, in order.
-        asked: name and value of what the job asked for, in order.
-        versions: name and version of programs and machine.
-        evaluations: in the order of steps.
-        confirmations: in the order of steps.
-        curves: the other curves by name.
-        faults: in the order of time.
+        asked: name and value of the job's settings, in order.
+        versions: name and version of the programs and the machine.
+        evaluations: the evaluations in the order of steps.
+        confirmations: the confirmations in the order of steps.
+        curves: curves of the training by name.
+        faults: the faults in the order of time.
         fault_count: number of all faults of the run; `faults` may have fewer.
-        goodput: seconds by cause.
+        goodput: seconds of the run by cause.
         checkpoints: step, size and time of each checkpoint, as texts.
         attempts: start and reason of each attempt, as texts.
         replays: recorded episodes.
-        replayed: which evaluation they are from, in words.
-        repeat: commands that repeat the run.
-        files: the name and text of files to show.
+        replayed: the evaluation that recorded the episodes, in words.
+        repeat: sentences and commands to repeat the run.
+        files: name and text of the files in the report.
     """
 
     name: str

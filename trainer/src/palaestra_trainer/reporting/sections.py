@@ -1,4 +1,4 @@
-"""The sections of a report about one run: results, episodes, curves, faults, time, checkpoints, the job."""
+"""Build the sections of a report about one run, from its results and curves to the job."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from palaestra_trainer.reporting.replay import replay_figure
 from palaestra_trainer.reporting.run_data import Evaluated, ReportedFault, RunData
 
 NUMBER = re.compile(r"-?[0-9][0-9,]*(\.[0-9]+)?%?")
-DEVIATIONS = 1.96  # of a mean, for an interval of 95 %
-MOST_TEXT = 400  # characters of one message
+DEVIATIONS = 1.96  # half width of a 95 % interval, in standard deviations of a mean
+MOST_TEXT = 400  # most characters of one message
 NEVER = "\u2013"  # the simulator did not come up in that attempt
 ENDED = {"good": "complete", "interrupted": "interrupted", "failed": "failed", "open": "not ended"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Detail:
-    """How much of a run a page shows.
+    """Limits for the details of a run on a page.
 
     Attributes:
-        curves: number of curves of training.
-        points: points of one curve.
+        curves: number of training curves.
+        points: number of points of one curve.
         replays: number of recorded episodes.
-        faults: rows of faults.
-        rows: rows of other tables, and names in lists.
-        text: characters of each file.
+        faults: number of rows in the table of faults.
+        rows: number of rows in other tables, and of names in lists.
+        text: number of characters of each file.
     """
 
     curves: int
@@ -42,7 +42,7 @@ class Detail:
 
 
 def run_sections(run: RunData, detail: Detail) -> Markup:
-    """Return everything about one run, below its name."""
+    """Return all sections about one run, which follow its name."""
     return joined(
         figures(run),
         *_section(f"Episodes of {run.replayed}", _replays(run, detail)),
@@ -72,14 +72,14 @@ def figures(run: RunData) -> Markup:
 
 
 def cut(text: str, most: int) -> str:
-    """Return at most `most` characters of a text."""
+    """Return a text, cut after `most` characters."""
     return text if len(text) <= most else text[:most] + " \u2026"
 
 
 def success_series(
     evaluated: Sequence[Evaluated], label: str, color: int, points: int, *, line: bool = True
 ) -> Series:
-    """Return the success rates with their intervals."""
+    """Return a curve of the success rates, with their intervals as a band."""
     known = [one for one in evaluated if one.success_rate is not None][-points:]
     rates = tuple((one.step, one.success_rate or 0.0) for one in known)
     band = tuple(
@@ -89,7 +89,7 @@ def success_series(
 
 
 def return_series(evaluated: Sequence[Evaluated], label: str, color: int, points: int) -> Series:
-    """Return the mean returns; the band is the 95 % interval of each mean."""
+    """Return a curve of the mean returns; the band is the 95 % interval of each mean."""
     known = [one for one in evaluated if one.returns][-points:]
     return Series(
         label=label,
@@ -205,7 +205,7 @@ def _names(values: Mapping[str, str], most: int) -> Markup:
 
 
 def table(names: Sequence[str], rows: Iterable[Sequence[str]]) -> Markup:
-    """Return a table in a frame that scrolls by itself; columns of numbers are flush right."""
+    """Return a table in a frame that scrolls separately; columns of numbers are aligned right."""
     body = list(rows)
     if not body:
         return joined()

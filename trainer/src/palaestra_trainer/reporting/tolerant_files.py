@@ -1,4 +1,4 @@
-"""Files of a run that may be missing, damaged or still written: their content, or nothing; never an error."""
+"""Read files of a run that may be missing, damaged or incomplete; the functions do not raise for these."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ import yaml
 
 from palaestra_trainer.reporting.plain_values import record
 
-MOST_LINES_BYTES = 32 * 2**20  # of a file of lines; only its end is read
-MOST_FILE_BYTES = 2**20  # of a file that is read whole
+MOST_LINES_BYTES = 32 * 2**20  # limit for a file of lines, of which only the end is read
+MOST_FILE_BYTES = 2**20  # limit for a file that is read whole
 
 
 def lines(path: Path) -> Iterator[Mapping[str, Any]]:
-    """Yield the JSON objects of a file of lines, without damaged ones; of a large file only its end."""
+    """Yield the JSON objects in the lines of a file, or of the end of a large file; skip damaged lines."""
     for line in tail(path, MOST_LINES_BYTES).splitlines():
         with suppress(ValueError, RecursionError):
             content = json.loads(line)
@@ -26,7 +26,7 @@ def lines(path: Path) -> Iterator[Mapping[str, Any]]:
 
 
 def json_file(path: Path) -> Mapping[str, Any]:
-    """Return the JSON object in a file; an empty one if it is missing, larger than expected, or damaged."""
+    """Return the JSON object in a file; an empty object if the file is missing, too large or damaged."""
     try:
         return record(json.loads(tail(path, MOST_FILE_BYTES)))
     except (ValueError, RecursionError):
@@ -42,7 +42,7 @@ def yaml_file(path: Path) -> Any:
 
 
 def head(path: Path, most: int) -> bytes:
-    """Return the first bytes of a file; empty if it cannot be read."""
+    """Return the first `most` bytes of a file; no bytes if the file cannot be read."""
     try:
         with path.open("rb") as file:
             return file.read(max(most, 0))
@@ -51,7 +51,7 @@ def head(path: Path, most: int) -> bytes:
 
 
 def tail(path: Path, most: int) -> bytes:
-    """Return the last bytes of a file; empty if it cannot be read."""
+    """Return the last `most` bytes of a file; no bytes if the file cannot be read."""
     try:
         with path.open("rb") as file:
             size = file.seek(0, 2)

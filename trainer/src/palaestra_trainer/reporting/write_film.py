@@ -1,4 +1,4 @@
-"""Write the best recorded episode of a run from above as a film, an animated GIF or an MP4."""
+"""Write the best recorded episode of a run as a film from above, an animated GIF or an MP4."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ _LEAST_HZ, _MOST_HZ = 1, 60
 
 
 def write_film(run: RunDirectory, to: Path) -> None:
-    """Write the best recorded episode of a run, whole or not at all.
+    """Write the best recorded episode of a run; after an error, an old file is unchanged.
 
     Args:
         run: the run directory.
         to: the file; its name ends in .gif or .mp4.
 
     Raises:
-        OSError: the file could not be written; an old one is unchanged.
-        ValueError: the name of the file has another ending, the run has no recorded episode, or PyAV is not
-            installed, which writes MP4.
+        OSError: the file could not be written.
+        ValueError: the name of the file has another ending, the run has no recorded episode, or PyAV, which
+            writes MP4, is not installed.
     """
     if (write := WRITERS.get(to.suffix.lower())) is None:
         raise ValueError(f"{to}: a film is a GIF or an MP4; give a name that ends in .gif or .mp4")
@@ -48,12 +48,12 @@ def _write_gif(replay: Replay, path: Path) -> None:
 
 
 def _write_mp4(replay: Replay, path: Path) -> None:
-    """Write a picture for each pose, which play as fast as the robot drove, as H.264."""
+    """Write an H.264 video in real time, with a picture for each pose."""
     av = _library()
     rate = min(max(Fraction(1 / replay.frame_s).limit_denominator(1000), _LEAST_HZ), _MOST_HZ)
     with path.open("wb") as file, av.open(file, "w", format="mp4") as container:
         stream = container.add_stream("libx264", rate=rate)
-        stream.pix_fmt = "yuv420p"  # others do not play in every browser
+        stream.pix_fmt = "yuv420p"  # not every browser plays other formats
         for number, picture in enumerate(pictures(replay, VIDEO_PX)):
             if number == 0:
                 stream.width, stream.height = picture.size

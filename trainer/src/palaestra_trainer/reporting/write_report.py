@@ -1,4 +1,4 @@
-"""Write a report: read run directories, make the page, and replace the file as a whole."""
+"""Write a report: read the run directories, build the page, and replace the file atomically."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from palaestra_trainer.reporting.read_run import read_run
 
 log = structlog.get_logger(__name__)
 
-END_S = 20.0  # the most time for the report at the end of a run
+END_S = 20.0  # longest time for the report at the end of a run
 
 
 def write_report(runs: Sequence[RunDirectory], to: Path) -> None:
-    """Write the report of one run, or of several side by side.
+    """Write the report of one run, or of several runs side by side.
 
     Raises:
-        OSError: the file could not be written; an old one is unchanged.
+        OSError: the file could not be written; an old file is unchanged.
         ValueError: there are too many runs for one file.
     """
     text = page([read_run(run) for run in runs])
@@ -33,8 +33,8 @@ def write_report(runs: Sequence[RunDirectory], to: Path) -> None:
 def report_end(directory: RunDirectory, end: Callable[[], Mapping[str, Any]], wait_s: float = END_S) -> None:
     """Write the end of an attempt and its report into the run directory, in at most `wait_s` seconds.
 
-    A run has ended whether or not its report can be written, so an error is only logged. A disk that does not
-    answer delays the end of the process by no more than that time.
+    The run has ended even if its report cannot be written, so an error is only logged. If the disk does not
+    respond, the end of the process is delayed by at most `wait_s` seconds.
     """
     writer = threading.Thread(target=_write, args=(directory, end), name="report", daemon=True)
     writer.start()
@@ -48,7 +48,7 @@ def _write(directory: RunDirectory, end: Callable[[], Mapping[str, Any]]) -> Non
         text = json.dumps(end(), indent=1) + "\n"
         replace_file(directory.end, lambda name: name.write_text(text, encoding="utf-8"))
         write_report([directory], directory.report)
-    except Exception as error:  # no mistake in a report may change how a run ends
+    except Exception as error:  # an error in a report must not change how the run ends
         log.warning("report not written", path=str(directory.report), fact=str(error), exc_info=error)
     else:
         log.info("report", path=str(directory.report))

@@ -1,4 +1,4 @@
-"""The interface of robots for environments: sensors, motion, and the passing of time."""
+"""The interfaces through which an environment uses a robot: sensors, motion, and control periods."""
 
 from palaestra_trainer.robots.base import RobotAbc, RobotinoAbc, Scene, SceneWrapper
 from palaestra_trainer.robots.capabilities import (

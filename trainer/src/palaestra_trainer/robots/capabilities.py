@@ -1,9 +1,10 @@
-"""The capabilities of robots, one class each, and a check that a robot has those that a task needs.
+"""The capabilities of robots as classes, and a check that a robot has the capabilities of a task.
 
-A robot inherits each capability that it has. An environment lists in `needs` the capabilities that its task
-needs. So a task names no robot and a robot names no task, and a pair that does not fit is refused before a
-simulator starts. Readings change only in `RobotAbc.advance`: between two calls of it, all readings describe
-the same moment. This module does not depend on the connection to a robot.
+A robot's class inherits the class of each capability that it has. An environment lists in `needs` the
+capabilities that its task needs. So the code of a task does not depend on a robot, nor a robot on a task. A
+robot without a needed capability is refused before a simulator starts. Readings change only in
+`RobotAbc.advance`, so between two calls of `advance` all readings describe the same moment. This module does
+not depend on the connection to a robot.
 """
 
 from __future__ import annotations
@@ -23,9 +24,9 @@ class Steering(ABC):
     """A robot that drives forward and turns.
 
     Attributes:
-        radius_m: meters from its center to the farthest point of its outline.
-        speed_m_s: its greatest speed.
-        turn_rad_s: its greatest rate of turning.
+        radius_m: meters from the robot's center to the farthest point of its outline.
+        speed_m_s: the robot's greatest speed.
+        turn_rad_s: the robot's greatest rate of turning.
     """
 
     radius_m: ClassVar[float]
@@ -34,7 +35,7 @@ class Steering(ABC):
 
     @abstractmethod
     def steer(self, forward: float, turn: float) -> None:
-        """Set the wanted velocity: forward in m/s, counter-clockwise in rad/s, until changed."""
+        """Set the wanted velocity until the next command: forward in m/s, counter-clockwise in rad/s."""
 
 
 class Omnidrive(Steering):
@@ -42,10 +43,10 @@ class Omnidrive(Steering):
 
     @abstractmethod
     def drive(self, vx: float, vy: float, omega: float) -> None:
-        """Set the wanted velocity: forward, left (m/s) and counter-clockwise (rad/s), until changed."""
+        """Set the velocity until the next command: forward, left (m/s) and counter-clockwise (rad/s)."""
 
     def steer(self, forward: float, turn: float) -> None:
-        """Set the wanted velocity, without motion to the side, until changed."""
+        """Set the wanted velocity without motion to the side, until the next command."""
         self.drive(forward, 0.0, turn)
 
     def move(self, movement: Movement) -> None:
@@ -54,11 +55,11 @@ class Omnidrive(Steering):
 
 
 class Localization(ABC):
-    """A robot that knows its pose."""
+    """A robot that can return its pose."""
 
     @abstractmethod
     def pose(self) -> Pose:
-        """Return the true pose in a simulation, odometry (which drifts) on a real robot."""
+        """Return the true pose in a simulation; on a real robot, return the odometry, which drifts."""
 
 
 class Distances(ABC):
@@ -66,7 +67,8 @@ class Distances(ABC):
 
     Attributes:
         bearings_rad: the direction of each sensor, counter-clockwise from forward.
-        distance_range_m: smallest and greatest distance that they measure; others count as the nearer end.
+        distance_range_m: smallest and greatest distance that the sensors measure; for other distances they
+            return the nearer bound.
     """
 
     bearings_rad: ClassVar[tuple[float, ...]]
@@ -74,7 +76,7 @@ class Distances(ABC):
 
     @abstractmethod
     def distances(self) -> NDArray[np.float32]:
-        """Return meters to the nearest obstacle, one number for each of `bearings_rad`."""
+        """Return the meters to the nearest obstacle in each direction of `bearings_rad`."""
 
 
 class Bumper(ABC):
@@ -90,12 +92,12 @@ class Cameras(ABC):
 
     @abstractmethod
     def use_cameras(self, *, color: bool = False, depth: bool = False) -> None:
-        """Make the chosen cameras render an image in each later `advance`; they stay in use.
+        """Make the chosen cameras render an image in each `advance` from now on.
 
-        A camera that is not in use costs no time.
+        A camera that is not in use does not slow the simulation.
 
         Raises:
-            NoSuchSensor: the robot lacks one of them. A simulated robot that is not connected yet raises
+            NoSuchSensor: the robot lacks a chosen camera. A simulated robot that is not connected yet raises
                 `WorldMisfit` when it connects.
         """
 
@@ -110,9 +112,9 @@ class Cameras(ABC):
 
     @abstractmethod
     def depth_image(self) -> NDArray[np.float32]:
-        """Return meters for each pixel, shape (height, width); valid until the next `advance`.
+        """Return the distance of each pixel in meters, shape (height, width); valid until the next `advance`.
 
-        Meters are measured parallel to the optical axis; pixels without an object in range are infinite.
+        Distances are measured parallel to the optical axis. Pixels without an object in range are infinite.
 
         Raises:
             NoSuchSensor: no depth camera is in use.
@@ -124,8 +126,9 @@ class Scanner(ABC):
     """A robot with a laser scanner of one layer.
 
     Attributes:
-        scan_view_rad: the angle that it covers, half of it on either side of forward.
-        scan_range_m: smallest and greatest distance that it measures; others count as the nearer end.
+        scan_view_rad: the angle that the scanner covers, with forward in its middle.
+        scan_range_m: smallest and greatest distance that the scanner measures; for other distances it returns
+            the nearer bound.
     """
 
     scan_view_rad: ClassVar[float]
@@ -133,9 +136,9 @@ class Scanner(ABC):
 
     @abstractmethod
     def use_scanner(self) -> None:
-        """Make the scanner measure in each later `advance`; it stays in use.
+        """Make the scanner measure in each `advance` from now on.
 
-        A scanner that is not in use costs no time.
+        A scanner that is not in use does not slow the simulation.
 
         Raises:
             NoSuchSensor: as `Cameras.use_cameras`.
@@ -143,7 +146,7 @@ class Scanner(ABC):
 
     @abstractmethod
     def scan(self) -> NDArray[np.float32]:
-        """Return meters from the scanner, shape (rays,), counter-clockwise from the rightmost ray.
+        """Return the distance of each ray in meters, shape (rays,), counter-clockwise from the rightmost ray.
 
         Raises:
             NoSuchSensor: the scanner is not in use.
@@ -152,11 +155,11 @@ class Scanner(ABC):
 
 
 class Joints(ABC):
-    """A robot with joints that it moves and measures.
+    """A robot with joints, motors that move them, and sensors that measure them.
 
     Attributes:
-        motors: names of its motors.
-        sensors: names of the sensors of its joints.
+        motors: names of the robot's motors.
+        sensors: names of the sensors of the robot's joints.
         greatest: the greatest command of each motor, in the unit of `command`.
     """
 
@@ -166,11 +169,11 @@ class Joints(ABC):
 
     @abstractmethod
     def joints(self) -> NDArray[np.float64]:
-        """Return the readings of `sensors`, shape (sensors,): radians, meters, and their rates."""
+        """Return the readings of `sensors`, shape (sensors,), in radians, meters, or their rates."""
 
     @abstractmethod
     def command(self, values: Iterable[float]) -> None:
-        """Set the command of each motor, until changed: a force, a torque, a velocity or a position."""
+        """Set each motor's force, torque, velocity or position until the next command."""
 
 
 class Gripper(ABC):
@@ -178,7 +181,7 @@ class Gripper(ABC):
 
     @abstractmethod
     def use_gripper(self) -> None:
-        """Start to use the gripper's motors; before that they cost no time.
+        """Start to use the gripper's motors, which do not slow the simulation before.
 
         Raises:
             NoSuchSensor: as `Cameras.use_cameras`.
@@ -186,11 +189,11 @@ class Gripper(ABC):
 
     @abstractmethod
     def grip(self, opening: float) -> None:
-        """Open the gripper to a share of its width, from 0 (closed) to 1, from the next period on."""
+        """Open the gripper in the next period to a share of its width, from 0 (closed) to 1."""
 
 
 class Forklift(ABC):
-    """A robot with a fork that lifts.
+    """A robot with a fork that it can lift.
 
     Attributes:
         lift_range_m: least and greatest height of the fork.
@@ -200,7 +203,7 @@ class Forklift(ABC):
 
     @abstractmethod
     def use_forklift(self) -> None:
-        """Start to use the fork's motor; before that it costs no time.
+        """Start to use the fork's motor, which does not slow the simulation before.
 
         Raises:
             NoSuchSensor: as `Cameras.use_cameras`.
@@ -208,7 +211,7 @@ class Forklift(ABC):
 
     @abstractmethod
     def lift(self, height_m: float) -> None:
-        """Move the fork to a height in `lift_range_m`, from the next period on."""
+        """Move the fork in the next period to a height in `lift_range_m`."""
 
 
 CAPABILITIES: tuple[type, ...] = (
@@ -226,10 +229,10 @@ CAPABILITIES: tuple[type, ...] = (
 
 
 def require(robot: object, needs: Iterable[type], by: str) -> None:
-    """Check that a robot has every capability in `needs`; `by` is the name of the task in the error.
+    """Check that a robot has every capability in `needs`; `by` names the task in the error.
 
     Raises:
-        MissingCapability: it lacks some.
+        MissingCapability: the robot lacks a capability.
     """
     if missing := [need.__name__ for need in needs if not isinstance(robot, need)]:
         has = [known.__name__ for known in CAPABILITIES if isinstance(robot, known)]

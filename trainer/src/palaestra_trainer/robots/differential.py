@@ -15,7 +15,7 @@ from palaestra_trainer.webots import DistanceSensor, Lidar, Motor, set_velocitie
 
 
 class DifferentialDrive(MobileRobot, Steering):
-    """A robot that drives by two wheels on one axle. The arguments are those of `SimulatedRobot`.
+    """A robot with two driven wheels on one axle; the arguments are those of `SimulatedRobot`.
 
     A subclass sets the DEF name of its robot, and the names and sizes of its wheels.
 
@@ -37,9 +37,10 @@ class DifferentialDrive(MobileRobot, Steering):
         self.simulation.add((), self._wheels)
 
     def steer(self, forward: float, turn: float) -> None:
-        """Set the wanted velocity: forward in m/s, counter-clockwise in rad/s, until changed.
+        """Set the wanted velocity until the next command: forward in m/s, counter-clockwise in rad/s.
 
-        If a wheel would have to turn faster than it can, both turn slower, so that the curve stays the same.
+        If a wheel would exceed its greatest speed, both wheels turn slower by the same factor, so the robot
+        drives the same curve.
         """
         side = 0.5 * turn * self.axle_m
         wanted = (forward - side) / self.wheel_radius_m, (forward + side) / self.wheel_radius_m
@@ -51,7 +52,7 @@ class TurtleBot3Burger(DifferentialDrive, Scanner):
     """The TurtleBot3 Burger of Robotis, with its laser scanner.
 
     Attributes:
-        laser: name of its Lidar.
+        laser: name of the robot's Lidar.
     """
 
     definition = "BURGER"
@@ -59,7 +60,7 @@ class TurtleBot3Burger(DifferentialDrive, Scanner):
     wheel_radius_m = 0.033
     axle_m = 0.16
     wheel_rad_s = 6.67
-    radius_m = 0.111  # distance from the center between the wheels to the corners at the rear
+    radius_m = 0.111  # from the middle of the axle to the corners at the rear
     speed_m_s = 0.22
     turn_rad_s = 2.75
     laser: ClassVar[str] = "LDS-01"
@@ -67,7 +68,7 @@ class TurtleBot3Burger(DifferentialDrive, Scanner):
     scan_range_m = (0.12, 3.5)
 
     def equip(self) -> None:
-        """Add the wheels; the scanner is optional."""
+        """Add the wheels; the scanner is added on first use."""
         super().equip()
         self._laser = Lidar(self.node_name, self.laser)
 
@@ -76,9 +77,9 @@ class TurtleBot3Burger(DifferentialDrive, Scanner):
         self._use(self._laser)
 
     def scan(self) -> NDArray[np.float32]:
-        """Return meters, shape (360,), counter-clockwise from behind; a new array.
+        """Return a new array of distances in meters, shape (360,), counter-clockwise from behind.
 
-        An object nearer than 0.12 m is not detected: its ray measures the greatest distance.
+        The scanner does not detect an object nearer than 0.12 m; its ray then measures the greatest distance.
         """
         self._require_use(self._laser, "scanner", "use_scanner()")
         if self._laser.value is None:
@@ -90,7 +91,7 @@ class EPuck(DifferentialDrive, Distances):
     """The e-puck of GCtronic, with its eight infrared sensors.
 
     Attributes:
-        infrared: names of its distance sensors, from the front counter-clockwise.
+        infrared: names of the robot's distance sensors, counter-clockwise from the front.
     """
 
     definition = "EPUCK"
@@ -121,6 +122,6 @@ class EPuck(DifferentialDrive, Distances):
         return np.array(np.interp(counts, _COUNTS, _METERS), np.float32)
 
 
-# The lookup table of its sensors. Source: E-puckDistanceSensor of Webots R2022a.
+# The lookup table of the e-puck's distance sensors. Source: E-puckDistanceSensor of Webots R2022a.
 _METERS = (0.07, 0.06, 0.05, 0.04, 0.03, 0.02, 0.015, 0.01, 0.005, 0.0)
 _COUNTS = (67.19, 104.09, 120.0, 158.03, 234.93, 383.84, 601.46, 1465.73, 2133.33, 4095.0)

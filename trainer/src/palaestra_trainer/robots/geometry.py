@@ -1,4 +1,4 @@
-"""Poses and movements on a floor: meters in the world's frame, radians counter-clockwise from x."""
+"""Poses and movements on a floor, in meters of the world's frame and radians counter-clockwise from x."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """A position and heading of a robot: meters in the world's frame, heading in (-pi, pi], 0 along x."""
+    """Position of a robot in meters of the world's frame, and heading in (-pi, pi], 0 along x."""
 
     x_m: float
     y_m: float
@@ -22,7 +22,7 @@ class Pose:
 
 
 class Movement(IntEnum):
-    """The movements of a Robotino for one control period."""
+    """The discrete movements of a Robotino, each for one control period."""
 
     STOP = 0
     FORWARD = 1
@@ -34,7 +34,7 @@ class Movement(IntEnum):
 
     @property
     def twist(self) -> Twist:
-        """Forward and left in m/s, counter-clockwise in rad/s, as arguments of `Omnidrive.drive`."""
+        """The velocities of the movement, as arguments of `Omnidrive.drive`."""
         return _TWISTS[self]
 
 

@@ -1,4 +1,4 @@
-"""Simulated robots with joints: arms, cart-poles, models of MuJoCo."""
+"""Simulated robots with joints, such as arms, cart-poles and models of MuJoCo."""
 
 from __future__ import annotations
 
@@ -15,17 +15,18 @@ from palaestra_trainer.webots import Command, JointMotor, PositionSensor, set_co
 
 
 class JointRobot(SimulatedRobot, Joints):
-    """A robot that moves by its joints. The arguments are those of `SimulatedRobot`.
+    """A robot that moves its joints; the arguments are those of `SimulatedRobot`.
 
-    A subclass names the motors and sensors of its robot. In a model of MuJoCo every sensor with one number is
-    a PositionSensor, so `sensors` may contain rates too.
+    A subclass names the motors and sensors of its robot. In a model of MuJoCo, every sensor with one number
+    is a PositionSensor, so `sensors` may also name sensors of rates.
 
     Attributes:
-        motors: names of its motors.
-        sensors: names of its PositionSensors.
+        motors: names of the robot's motors.
+        sensors: names of the robot's PositionSensors.
         greatest: the greatest command of each motor.
         commanded: the quantity that `command` sets: position (rad, m), velocity, force (N) or torque (N m).
-            "control" is for actuators of MuJoCo without a motor in Webots, such as "mujoco/biceps".
+            The value "control" is for actuators of MuJoCo that have no equivalent motor in Webots, such as
+            "mujoco/biceps".
 
     Raises:
         ConfigurationError: the class names no motors, or `greatest` does not have one number for each motor.
@@ -52,14 +53,14 @@ class JointRobot(SimulatedRobot, Joints):
         self.simulation.add(self._sensors, self._motors)
 
     def joints(self) -> NDArray[np.float64]:
-        """Return the readings of `sensors`, shape (sensors,); a new array."""
+        """Return a new array with the readings of `sensors`, shape (sensors,)."""
         values = [sensor.value for sensor in self._sensors]
         if None in values:
             raise self._no_reading()
         return np.array(values, np.float64)
 
     def command(self, values: Iterable[float]) -> None:
-        """Set the command of each motor, within `greatest`, until changed."""
+        """Set the command of each motor, clipped to `greatest`, until the next command."""
         set_commands(
             (motor, min(max(float(value), -most), most))
             for motor, value, most in zip(self._motors, values, self.greatest, strict=True)

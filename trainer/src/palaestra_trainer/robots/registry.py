@@ -1,4 +1,4 @@
-"""The class that `trainer.robot` of a job names."""
+"""Find the robot class that `trainer.robot` of a job names."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SHIPPED: dict[str, str] = {
 
 
 def robot_class(name: str) -> type[SimulatedRobot]:
-    """Return the class of a robot: one in `SHIPPED`, or a class of your own as `module:Class`.
+    """Return the class of a robot, from `SHIPPED` or from a job's author as `module:Class`.
 
     Raises:
         ConfigurationError: the class does not exist, or is not a complete `SimulatedRobot`.

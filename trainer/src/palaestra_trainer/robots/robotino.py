@@ -1,4 +1,4 @@
-"""The simulated Robotino: devices of Webots behind `RobotinoAbc`."""
+"""The simulated Robotino, which implements `RobotinoAbc` with devices of Webots."""
 
 from __future__ import annotations
 
@@ -29,28 +29,28 @@ _WHEEL_RADIUS_M = 0.063
 _WHEEL_DISTANCE_M = 0.1826
 _SIN_60 = math.sqrt(0.75)
 
-# Meters from volts for the GP2Y0A41, the default sensor of the model: a * V**b + c.
-# Source: the sample controller of that model, R2023b.
+# The distance in meters is a * V**b + c for V volts of the GP2Y0A41, the default sensor of the model. Source:
+# the sample controller of that model, R2023b.
 _RANGE_SCALE, _RANGE_EXPONENT, _RANGE_OFFSET_M = 0.1594, -0.8533, -0.02916
-_LEAST_VOLTS = 0.05  # below the sensor's range; keeps the power finite
+_LEAST_VOLTS = 0.05  # below the sensor's range; avoids an infinite result
 
 
 class Robotino(MobileRobot, RobotinoAbc, Cameras, Scanner, Gripper, Forklift):
     """A Robotino in Webots, or in any simulator with the same ROS interface.
 
-    Cameras, laser scanner, gripper and forklift are optional: the world may lack them, and each costs no time
-    until it is used. The arguments are those of `SimulatedRobot`.
+    Cameras, laser scanner, gripper and forklift are optional. The world may lack them, and they do not slow
+    the simulation until they are used. The arguments are those of `SimulatedRobot`.
 
     Attributes:
-        wheels: names of the motors of its wheels: rear, front right, front left.
-        infrared: names of its distance sensors, from the front counter-clockwise.
-        bumper: name of its touch sensor.
-        color_camera: name of its Camera.
-        depth_camera: name of its RangeFinder.
-        laser: name of its Lidar.
-        fingers: names of the linear motors of its gripper, which are closed at 0.
+        wheels: names of the wheels' motors: rear, front right, front left.
+        infrared: names of the robot's distance sensors, counter-clockwise from the front.
+        bumper: name of the robot's touch sensor.
+        color_camera: name of the robot's Camera.
+        depth_camera: name of the robot's RangeFinder.
+        laser: name of the robot's Lidar.
+        fingers: names of the gripper's linear motors; at position 0 the gripper is closed.
         grip_m: position of the fingers when the gripper is open.
-        fork: name of the linear motor of its fork.
+        fork: name of the fork's linear motor.
     """
 
     definition = "ROBOTINO"
@@ -69,7 +69,7 @@ class Robotino(MobileRobot, RobotinoAbc, Cameras, Scanner, Gripper, Forklift):
     scan_range_m: ClassVar[tuple[float, float]] = (0.02, 20.0)
 
     def equip(self) -> None:
-        """Add the wheels, distance sensors and bumper; the rest is optional."""
+        """Add the wheels, the distance sensors and the bumper; other devices are added on first use."""
         name = self.node_name
         self._wheels = tuple(Motor(name, wheel) for wheel in self.wheels)
         self._infrared = tuple(DistanceSensor(name, sensor) for sensor in self.infrared)
@@ -95,14 +95,14 @@ class Robotino(MobileRobot, RobotinoAbc, Cameras, Scanner, Gripper, Forklift):
         return bool(self._bumper.value)
 
     def drive(self, vx: float, vy: float, omega: float) -> None:
-        """Set the wanted velocity: forward, left (m/s) and counter-clockwise (rad/s), until changed."""
+        """Set the velocity until the next command: forward, left (m/s) and counter-clockwise (rad/s)."""
         set_velocities(zip(self._wheels, wheel_speeds(vx, vy, omega), strict=True))
 
     def use_cameras(self, *, color: bool = False, depth: bool = False) -> None:
         """Enable the Camera, the RangeFinder, or both; they stay enabled.
 
         Raises:
-            NoSuchSensor: the robot is connected and lacks one of them, or the simulator renders no images.
+            NoSuchSensor: the connected robot lacks a chosen camera, or the simulator does not render images.
             SimulatorDead, SimulatorHung, WrongData
         """
         if color:
@@ -111,12 +111,12 @@ class Robotino(MobileRobot, RobotinoAbc, Cameras, Scanner, Gripper, Forklift):
             self._use(self._depth_camera)
 
     def color_image(self) -> NDArray[np.uint8]:
-        """Return the camera's image, shape (height, width, 3), RGB; a view, valid until the next step."""
+        """Return a view of the camera's RGB image, shape (height, width, 3), valid until the next step."""
         self._require_use(self._camera, "color camera", "use_cameras(color=True)")
         return self._camera.rgb
 
     def depth_image(self) -> NDArray[np.float32]:
-        """Return meters for each pixel, shape (height, width); a view, valid until the next step."""
+        """Return a view of the meters for each pixel, shape (height, width), valid until the next step."""
         self._require_use(self._depth_camera, "depth camera", "use_cameras(depth=True)")
         return self._depth_camera.depths
 
@@ -125,35 +125,35 @@ class Robotino(MobileRobot, RobotinoAbc, Cameras, Scanner, Gripper, Forklift):
         self._use(self._laser)
 
     def scan(self) -> NDArray[np.float32]:
-        """Return meters, counter-clockwise from the rightmost ray; a new array."""
+        """Return a new array of distances in meters, counter-clockwise from the rightmost ray."""
         self._require_use(self._laser, "scanner", "use_scanner()")
         if self._laser.value is None:
             raise self._no_reading()
         return scan_of(self._laser.value, self.scan_range_m)
 
     def use_gripper(self) -> None:
-        """Start to use the gripper's motors; the gripper closes."""
+        """Start to use the gripper's motors, which close the gripper."""
         self._use(*self._fingers)
 
     def grip(self, opening: float) -> None:
-        """Open the gripper to a share of its width, from 0 (closed) to 1, from the next period on."""
+        """Open the gripper in the next period to a share of its width, from 0 (closed) to 1."""
         for finger in self._fingers:
             self._require_use(finger, "gripper", "use_gripper()")
             finger.set(self.grip_m * min(max(opening, 0.0), 1.0))
 
     def use_forklift(self) -> None:
-        """Start to use the fork's motor; the fork goes down."""
+        """Start to use the fork's motor, which lowers the fork."""
         self._use(self._fork)
 
     def lift(self, height_m: float) -> None:
-        """Move the fork to a height in `lift_range_m`, from the next period on."""
+        """Move the fork in the next period to a height in `lift_range_m`."""
         self._require_use(self._fork, "fork", "use_forklift()")
         least, most = self.lift_range_m
         self._fork.set(min(max(height_m, least), most))
 
 
 def wheel_speeds(vx: float, vy: float, omega: float) -> Sequence[float]:
-    """Return the speeds in rad/s of rear, front-right and front-left wheel for a twist in m/s and rad/s."""
+    """Return the speeds (rad/s) of rear, front-right and front-left wheel for a twist in m/s and rad/s."""
     turn = omega * _WHEEL_DISTANCE_M
     return (
         (vy - turn) / _WHEEL_RADIUS_M,

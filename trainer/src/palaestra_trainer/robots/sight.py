@@ -1,4 +1,4 @@
-"""Where robot and target are on their floor: what a recording of an episode keeps of each step."""
+"""The positions of robot and target on their floor after a step, for the recording of an episode."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from palaestra_trainer.robots.layout import FloorLayout
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sight:
-    """The state after a step, seen from above.
+    """The positions of robot and target after a step, seen from above.
 
     Attributes:
         pose: the robot's pose.
-        target: x and y of the target in meters; None: the episode has none that its scene placed.
-        floor: the floor and the objects on it as the episode began; None: nothing has read them.
+        target: x and y of the target in meters; None: the scene has not placed a target in this episode.
+        floor: the floor and the objects on it at the start of the episode; None: the layout was not read.
         radius_m: radius of the robot's outline.
         period_s: seconds of simulated time in one step.
     """

@@ -1,7 +1,7 @@
-"""A robot in Webots, or in any simulator with the same ROS interface, and the scene around it.
+"""A robot and its scene in Webots, or in any simulator with the same ROS interface.
 
 The names of a robot's devices and nodes are attributes of its class. So a robot with other names needs only a
-subclass of a few lines, which `trainer.robot` of a job names.
+short subclass, which `trainer.robot` of a job names.
 """
 
 from __future__ import annotations
@@ -27,27 +27,30 @@ from palaestra_trainer.webots import (
 )
 
 PERIOD_MS = 192  # six basic steps of 32 ms
-DOT_M = 0.1  # radius in a recording of a robot whose class has no radius
+DOT_M = 0.1  # radius of a robot in a recording if its class has no radius
 
 
 class SimulatedRobot(RobotAbc):
-    """A robot whose devices a simulator offers; `trainer.robot` names a subclass.
+    """A robot whose devices a simulator provides; `trainer.robot` names a subclass.
 
-    Its constructor calls `equip`, where a subclass adds its devices.
+    The constructor calls `equip`, in which a subclass adds its devices.
 
     Args:
-        webots: the simulator. Each of its starts connects this robot, unless a newer one has the same name.
-            If the simulator runs already, call `connect`.
-        node_name: the ROS name that the world gives the robot; by default the robot is its own supervisor.
-        definition: the DEF name of the robot in the world; by default that of its class.
-        period_ms: simulated milliseconds in one `advance`; by default that of its class.
-        robots: the ROS names of all robots in the world; they step together. By default robot and supervisor.
+        webots: the simulator. Each start of the simulator connects this robot, unless a newer robot has the
+            same name. If the simulator already runs, call `connect`.
+        node_name: the ROS name of the robot in the world; by default the name of the supervisor, if the robot
+            is its own supervisor.
+        definition: the DEF name of the robot in the world; by default the DEF name of its class.
+        period_ms: simulated milliseconds in one `advance`; by default the period of its class.
+        robots: the ROS names of all robots in the world, which step together; by default only this robot and
+            the supervisor.
 
     Attributes:
-        definition: see above; "": its pose is not read.
+        definition: see above; "": the pose of the robot is not read.
         period_ms: see above; a multiple of the world's basicTimeStep.
-        target: the DEF name of the mark that its scene moves to the target; None: the world needs no mark.
-        node_name: the ROS name of the robot's controller, as it runs; for sensors and motors of your own.
+        target: the DEF name of the mark that the scene moves to the target; None: the world does not need a
+            mark.
+        node_name: the actual ROS name of the robot's controller, for sensors and motors that a subclass adds.
     """
 
     definition: str = ""
@@ -77,7 +80,7 @@ class SimulatedRobot(RobotAbc):
         webots.at_start(name, self.connect)
 
     def equip(self) -> None:
-        """Add sensors and motors to `simulation`; a subclass with devices overrides it."""
+        """Add sensors and motors to `simulation`; a subclass with devices overrides this method."""
 
     @property
     def period_s(self) -> float:
@@ -87,13 +90,14 @@ class SimulatedRobot(RobotAbc):
     def connect(self) -> None:
         """Enable the sensors and release the motors; each start of the simulator calls this method.
 
-        Call it yourself if the simulator already runs when the robot is created, and after a world reload.
+        Your program must call this method if the simulator already runs when the robot is created, and after
+        a world reload.
 
         Raises:
-            WorldMisfit: the world lacks the robot's node, or the robot a device of its class.
+            WorldMisfit: the world lacks the robot's node, or the robot lacks a device of its class.
             SimulatorDead, SimulatorHung, WrongData
         """
-        self.close()  # connections to the simulator before this one
+        self.close()  # connections to the previous simulator process
         self._observer.forget_handles()
         self.simulation.connect()
 
@@ -101,20 +105,20 @@ class SimulatedRobot(RobotAbc):
         """Simulate one control period; return the number of extra periods, normally 0.
 
         Raises:
-            Paused: the simulation is paused; nothing was sent.
+            Paused: the simulation is paused; no request was sent.
             SimulatorDead, SimulatorHung, WrongData: as `Stepper.step`.
         """
         return self.simulation.step()
 
     def close(self) -> None:
-        """Drop all connections."""
+        """Close all connections."""
         self.simulation.close()
 
     def _use(self, *parts: Sensor | Actuator) -> None:
         """Start to use optional devices.
 
         Raises:
-            NoSuchSensor: the robot is connected and lacks one of them, or cannot enable it.
+            NoSuchSensor: the connected robot lacks a device, or cannot enable it.
             SimulatorDead, SimulatorHung, WrongData
         """
         for part in parts:
@@ -147,22 +151,22 @@ class MobileRobot(SimulatedRobot, Localization):
         return Pose(*self.simulation.pose(self.definition))
 
     def last_pose(self) -> Pose | None:
-        """Return the pose that the last step read, without a request; None before the first step."""
+        """Return the pose that the last step read, without a new request; None before the first step."""
         known = self.simulation.known_pose(self.definition) if self.definition else None
         return None if known is None else Pose(*known)
 
 
 class SimulatedScene(Scene, JointScene):
-    """The scene around a simulated robot. Each start of the simulator looks for the mark.
+    """The scene around a simulated robot; each start of the simulator checks that the mark exists.
 
     Args:
         webots: the simulator.
-        robot: the robot that is placed.
-        target: the DEF name of the mark on the floor; by default that of the robot's class.
+        robot: the robot that the scene places.
+        target: the DEF name of the mark on the floor; by default the `target` of the robot's class.
 
     Attributes:
-        supervisor: changes other parts of the world, such as fields of nodes.
-        observer: reads the state of the world.
+        supervisor: the supervisor, which changes other parts of the world, such as fields of nodes.
+        observer: the observer, which reads the state of the world.
         resets: number of resets since the simulator was last started.
     """
 
@@ -171,7 +175,7 @@ class SimulatedScene(Scene, JointScene):
         self.observer = webots.observer
         self._robot = robot
         self._target = target or robot.target
-        self._put: dict[str, tuple[float, float, float]] = {}  # since the last begin
+        self._put: dict[str, tuple[float, float, float]] = {}  # by `put` since the last `begin`
         self._floor: FloorLayout | None = None
         self._aim: Point | None = None
         self.resets = 0
@@ -180,10 +184,10 @@ class SimulatedScene(Scene, JointScene):
             webots.at_start(f"mark {mark}", lambda: require_node(webots.observer, mark))
 
     def begin(self, seed: int) -> None:
-        """Reset the simulation: all objects are at their initial positions and at rest.
+        """Reset the simulation: move all objects to their initial positions, at rest.
 
         Raises:
-            Paused: the simulation is paused; nothing was changed.
+            Paused: the simulation is paused; the world was not changed.
             SimulatorDead, SimulatorHung, WrongData
         """
         self.resets += 1
@@ -192,7 +196,7 @@ class SimulatedScene(Scene, JointScene):
         self._robot.simulation.reset(seed)
 
     def layout(self) -> FloorLayout:
-        """Return the floor and the objects on it now; `webots.obstacles` describes which objects are read.
+        """Return the floor and the current objects on it; `webots.obstacles` lists the kinds of objects.
 
         Raises:
             WorldMisfit: the world has no floor.
@@ -209,13 +213,13 @@ class SimulatedScene(Scene, JointScene):
         return self._floor
 
     def place(self, start: Pose, target: Point) -> None:
-        """Put the robot at rest at `start` and the mark at `target` (x, y in meters); update all readings.
+        """Put the robot at `start`, at rest, and the mark at `target` (x, y in meters); update all readings.
 
         Raises:
             MissingCapability: the robot's class has no DEF name.
             Paused: the simulation is paused.
             SimulatorDead, SimulatorHung
-            WrongData: also when the world lacks the robot's node or the mark's.
+            WrongData: also if the world lacks the node of the robot or of the mark.
         """
         name = self._robot.definition
         if not name:
@@ -226,18 +230,18 @@ class SimulatedScene(Scene, JointScene):
         self._robot.advance()
 
     def mark(self, target: Point) -> None:
-        """Put the mark, if the world has one, at `target` (x, y in meters) with the next period.
+        """Move the mark, if the robot's world has a mark, to `target` (x, y in meters) in the next period.
 
         Raises:
             SimulatorDead, SimulatorHung
-            WrongData: also when the world lacks the mark's node.
+            WrongData: also if the world lacks the node of the mark.
         """
         self._aim = target
         if self._target:
             self.supervisor.place(self._target, *target)
 
     def put(self, name: str, place: tuple[float, float, float]) -> None:
-        """Put the node with DEF `name` to x, y, z (meters) with the next period; `begin` undoes it.
+        """Move the node with DEF `name` to x, y, z (meters) in the next period; `begin` undoes this.
 
         Raises:
             SimulatorDead, SimulatorHung
@@ -247,7 +251,7 @@ class SimulatedScene(Scene, JointScene):
         self._put[name] = place
 
     def sight(self) -> Sight | None:
-        """Return where robot and target are, without a request; None: the robot does not drive on a floor."""
+        """Return the known positions of robot and target; None: the robot does not drive on a floor."""
         robot = self._robot
         pose = robot.last_pose() if isinstance(robot, MobileRobot) else None
         if pose is None:
@@ -258,7 +262,7 @@ class SimulatedScene(Scene, JointScene):
         )
 
     def set_joint(self, name: str, position: float) -> None:
-        """Move the joint with DEF `name` to radians or meters, at rest; `begin` undoes it.
+        """Set the position of the joint with DEF `name` (radians or meters), at rest; `begin` undoes it.
 
         Raises:
             SimulatorDead, SimulatorHung

@@ -19,10 +19,10 @@ _NODE_TIMEOUT_S = 1.0
 
 
 class Master:
-    """The master at ROS_MASTER_URI, called with the node name `caller`.
+    """A client of the master at ROS_MASTER_URI, which calls it with the node name `caller`.
 
-    Every method but `ping` raises MasterLost if no master responds or the master refuses the request, and
-    UnreadableAnswer if its response is invalid.
+    Every method except `ping` raises MasterLost if no master responds or the master refuses the request. It
+    raises UnreadableAnswer if the response of the master is invalid.
     """
 
     def __init__(self, caller: str, timeout_s: float = _TIMEOUT_S) -> None:
@@ -34,7 +34,7 @@ class Master:
         """Check that the master responds.
 
         Raises:
-            MasterLost: it does not respond, or another program does.
+            MasterLost: the master does not respond, or another program responds at its address.
         """
         try:
             self._call("getPid")
@@ -42,7 +42,7 @@ class Master:
             raise MasterLost(f"no ROS master at {self.uri}: {error}; is another program there?") from error
 
     def service_address(self, service: str) -> tuple[str, int] | None:
-        """Return host and port of the node that serves `service`; None if no node does."""
+        """Return host and port of the node that serves `service`; None if no node serves it."""
         answer = self._answer("lookupService", service)
         if answer.code != OK:
             return None
@@ -72,21 +72,21 @@ class Master:
             raise self._unreadable("names of nodes", answer) from error
 
     def runs(self, node: str) -> bool:
-        """Return whether a node of that full name is running; the name of a killed node stays registered."""
+        """Return whether a node of that full name runs; a killed node stays registered, but does not run."""
         answer = self._answer("lookupNode", node)
         return answer.code == OK and self._is_node(str(answer.value))
 
     def _is_node(self, uri: str) -> bool:
-        """Return whether a node of this master has that address; the port may be another program's now."""
+        """Return whether a node of this master has that address; another program may have its port."""
         try:
             answer = client.call(uri, _NODE_TIMEOUT_S, "getMasterUri", self._caller)
         except TimeoutError:
-            return True  # a node may hang
+            return True  # a node that hangs still runs
         except (OSError, UnreadableDocument):
             return False
         except xmlrpc.client.Fault:
-            return True  # a node without this method
-        # Nodes may write the host of one master in several ways.
+            return True  # a node that does not have this method
+        # Nodes may write the host of the same master in different ways, so only the port is compared.
         return _port(answer[-1] if isinstance(answer, list) and answer else None) in {None, _port(self.uri)}
 
     def _call(self, method: str, *arguments: Any) -> RpcResponse:

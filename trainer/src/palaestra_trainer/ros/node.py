@@ -1,7 +1,7 @@
-"""This process as a ROS node: rospy's where rospy is installed, otherwise one of our own.
+"""The ROS node of this process: rospy's node if rospy is installed, otherwise our own.
 
-A process has one node. A program of a user may have one through rospy, with publishers and services of its
-own, so rospy is used wherever it can be imported.
+A process has only one node. A user's program may create its node by rospy, with its own publishers and
+services. So the trainer uses rospy if it can be imported.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
-"""The name of a ROS node, with the arguments that rename it, as rospy reads them.
+"""Compute the name of a ROS node from the arguments that rename it, as rospy does.
 
 `__name:=NAME` and `__ns:=NAMESPACE` rename the node. The other forms, `TOPIC:=OTHER` and `_PARAMETER:=VALUE`,
-have no effect: topics and services of simulators have full names, and the trainer reads no parameter.
+have no effect, because the topics and services of simulators have full names, and the trainer does not read
+parameters.
 """
 
 from __future__ import annotations
@@ -19,12 +20,12 @@ def full_name(name: str, arguments: Sequence[str], environment: Mapping[str, str
     """Return the full name of the node that a program calls `name`.
 
     Args:
-        name: the program's own choice.
-        arguments: of the program. The last name counts, and the first namespace.
-        environment: of the process; a namespace in ROS_NAMESPACE counts if no argument has one.
+        name: the name that the program chooses.
+        arguments: the arguments of the program; the last name and the first namespace among them count.
+        environment: the environment variables; ROS_NAMESPACE counts if no argument sets a namespace.
 
     Raises:
-        ConfigurationError: an argument has a name that no node can have.
+        ConfigurationError: an argument sets a name that is invalid for a node.
     """
     chosen = _values(arguments, _NAME)
     namespaces = [*_values(arguments, _NAMESPACE), environment.get("ROS_NAMESPACE", "")]
@@ -35,10 +36,10 @@ def full_name(name: str, arguments: Sequence[str], environment: Mapping[str, str
 
 
 def _values(arguments: Sequence[str], option: str) -> list[str]:
-    """Return the values of an option.
+    """Return the values of an option among the arguments.
 
     Raises:
-        ConfigurationError: a value is not a name.
+        ConfigurationError: a value is not a valid name.
     """
     values = [word.removeprefix(option) for word in arguments if word.startswith(option)]
     for value in values:

@@ -1,8 +1,8 @@
-"""This process as a ROS node, without rospy: a name, and an address at which the master and tools reach it.
+"""The ROS node of this process without rospy: a name, and an address for the master and for ROS tools.
 
-It registers nothing by itself. `RosSubscriber` registers in its name and connects by itself, so an update of
-a topic's publishers needs no action. `rosnode kill`, and the master if another node takes the name, end the
-process as SIGTERM does: a training saves a checkpoint first.
+The node does not register topics or services. `RosSubscriber` registers under the node's name and connects by
+itself, so the node ignores updates of a topic's publishers. `rosnode kill` ends the process as SIGTERM does,
+and so does the master if another node takes the name. A training saves a checkpoint before it ends.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.ros.master import Master
 from palaestra_trainer.ros.node_name import full_name
 
-_RESPONDING_S = 0.2  # the time to send the response to `shutdown`, before a signal ends the process
+_RESPONDING_S = 0.2  # time to send the response to `shutdown` before the signal
 
 log = structlog.get_logger(__name__)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Node:
-    """The node of this process.
+    """A node of this process, or of the process that forked it.
 
     Attributes:
-        name: its full name.
-        uri: at which it answers.
-        pid: the process ID of the process; a fork is another node.
+        name: full name of the node.
+        uri: URI at which the node responds.
+        pid: process ID of the process that created the node; a forked process needs another node.
     """
 
     name: str
@@ -44,25 +44,25 @@ class _Node:
 
 
 _lock = threading.Lock()
-_nodes: list[_Node] = []  # one, once there is a node; after a fork also those of the parents
+_nodes: list[_Node] = []  # the node of this process is last; after a fork, nodes of the parents come first
 
 
 def ensure_node(name: str = "palaestra_trainer") -> str:
-    """Return the full name of this process's node; create the node unless there is one already.
+    """Return the full name of this process's node; create the node if it does not exist.
 
     Args:
-        name: the node's name; a number is added so that several programs may share a master. As with rospy,
-            `__name:=` and `__ns:=` among the program's arguments replace it.
+        name: the node's name; the process ID is appended, so that several programs may share a master. As
+            with rospy, `__name:=` and `__ns:=` among the program's arguments replace the name.
 
     Raises:
-        MasterLost: no master answers.
-        ConfigurationError: the process cannot listen, or an argument has an impossible name.
+        MasterLost: no master responds.
+        ConfigurationError: the process cannot listen, or an argument sets an invalid name.
     """
     return _ensured(name).name
 
 
 def node_uri() -> str:
-    """Return the URI at which this process's node answers other nodes."""
+    """Return the URI at which this process's node responds to other nodes."""
     return _ensured("palaestra_trainer").uri
 
 
@@ -88,7 +88,7 @@ def _made(name: str) -> _Node:
 
 
 def _answers(master_uri: str) -> dict[str, Method]:
-    """Return the calls of the Slave API; the source is http://wiki.ros.org/ROS/Slave_API."""
+    """Return the methods of the Slave API; the source is http://wiki.ros.org/ROS/Slave_API."""
     return {
         "getPid": _constant(os.getpid),
         "getMasterUri": _constant(lambda: master_uri),
@@ -104,18 +104,18 @@ def _answers(master_uri: str) -> dict[str, Method]:
 
 
 def _constant(value: Callable[[], Any]) -> Method:
-    """Return a call whose value does not depend on its parameters."""
+    """Return a method whose result does not depend on its parameters."""
     return lambda _: [OK, "", value()]
 
 
 class _Shutdown:
-    """The call `shutdown`: the first one ends this process as SIGTERM does."""
+    """The method `shutdown`; its first call ends this process as SIGTERM does."""
 
     def __init__(self) -> None:
         self._first = threading.Lock()
 
     def __call__(self, parameters: tuple[Any, ...]) -> list[Any]:
-        """Return the response, and let the signal follow it."""
+        """Return the response, and send the signal a moment later."""
         if self._first.acquire(blocking=False):  # a second signal would end a training without its checkpoint
             log.warning("the ROS node was asked to end", asked=parameters)
             timer = threading.Timer(_RESPONDING_S, os.kill, (os.getpid(), signal.SIGTERM))

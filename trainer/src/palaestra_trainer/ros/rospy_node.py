@@ -1,4 +1,4 @@
-"""This process as a ROS node, through rospy; it cannot be imported where rospy is not installed."""
+"""The ROS node of this process by rospy; this module needs an installed rospy."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ _lock = threading.Lock()
 
 
 def ensure_node(name: str = "palaestra_trainer") -> str:
-    """Return the full name of this process's node; create the node unless the program has one already.
+    """Return the full name of this process's node; create the node if it does not exist.
 
     Args:
-        name: the node's name; a number is added so that several programs may share a master.
+        name: the node's name; the process ID is appended, so that several programs may share a master.
 
     Raises:
-        MasterLost: no master answers; rospy alone would wait forever.
+        MasterLost: no master responds; rospy alone would wait forever.
     """
     with _lock:
         if not rospy.core.is_initialized():
@@ -33,5 +33,5 @@ def ensure_node(name: str = "palaestra_trainer") -> str:
 
 
 def node_uri() -> str:
-    """Return the URI at which this process's node answers other nodes."""
+    """Return the URI at which this process's node responds to other nodes."""
     return str(rospy.core.get_node_uri())

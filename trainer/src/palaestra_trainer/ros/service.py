@@ -1,4 +1,4 @@
-"""A ROS service as a function with a deadline."""
+"""Call a ROS service like a function, with a deadline."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ _OK_BYTE = 1
 
 
 class RosService:
-    """One service over one persistent connection, opened at the first call and again after a failure.
+    """One service with a persistent connection that opens at the first call, and again after a failure.
 
     Args:
         name: the full name, e.g. /robotino/robot/time_step
         type_name: e.g. webots_ros/set_int
-        deadline_s: the longest wait for a response.
+        deadline_s: the longest time to wait for a response.
     """
 
     __slots__ = ("_deadline_s", "_type", "_wire", "name", "simulator")
@@ -35,10 +35,10 @@ class RosService:
         self._wire: TcprosClient | None = None
 
     def __call__(self, **fields: Any) -> Any:
-        """Return the response, an object with the fields of the type.
+        """Send a request with `fields`, and return the response, an object with the fields of its type.
 
         Raises:
-            SimulatorDead: no node serves it, or the connection broke.
+            SimulatorDead: no node serves the service, or the connection was lost.
             SimulatorHung: no response arrived within the deadline.
             WrongData: the service failed, or its response is invalid.
         """
@@ -54,7 +54,7 @@ class RosService:
         data = self._type.request.frame(fields)
         try:
             (self._wire or self._connect()).send(data)
-        except BaseException:  # also Ctrl-C: the next call would read the response to this request
+        except BaseException:  # after Ctrl-C too, the next call would read the response to this request
             self.close()
             raise
 
@@ -67,15 +67,15 @@ class RosService:
         wire = self._asked()
         try:
             return self._read_answer(wire)
-        except BaseException:  # also Ctrl-C: the next call would read the response to this request
+        except BaseException:  # after Ctrl-C too, the next call would read the response to this request
             self.close()
             raise
 
     def fileno(self) -> int:
-        """Return the descriptor that is readable once the response arrives or the connection breaks.
+        """Return the descriptor, which becomes readable when the response arrives or the connection is lost.
 
         Raises:
-            SimulatorDead: no request was sent by `begin`.
+            SimulatorDead: `begin` has not sent a request.
         """
         return self._asked().fileno()
 
@@ -121,7 +121,7 @@ class RosService:
 
 
 def is_served(name: str) -> bool:
-    """Return whether a node serves a service, given its full name.
+    """Return whether a node serves the service with this full name.
 
     Raises:
         MasterLost: no master responds.
@@ -132,15 +132,15 @@ def is_served(name: str) -> bool:
 def call_together(
     calls: Iterable[tuple[RosService, dict[str, Any]]], meanwhile: Callable[[RosService], None] | None = None
 ) -> list[Any]:
-    """Send all requests before the first wait, then return all responses.
+    """Send all requests, then wait for the responses and return them.
 
     Args:
-        calls: services and the fields of their requests.
-        meanwhile: called before the wait for responses, with the service of the last request.
+        calls: pairs of a service and the fields of its request.
+        meanwhile: called with the service of the last request, before the wait for responses.
 
     Raises:
-        SimulatorDead, SimulatorHung, WrongData: from the first call that fails; the connections of the
-            others are closed, because later requests would read their responses.
+        SimulatorDead, SimulatorHung, WrongData: the first error of a call. All connections are then closed,
+            because later requests would read the responses to these requests.
     """
     sent: list[RosService] = []
     try:
@@ -150,7 +150,7 @@ def call_together(
         if meanwhile is not None and sent:
             meanwhile(sent[-1])
         return [service.finish() for service in sent]
-    except BaseException:  # also Ctrl-C: the next calls would read the responses to these requests
+    except BaseException:  # after Ctrl-C too, the next calls would read the responses to these requests
         for service in sent:
             service.close()
         raise

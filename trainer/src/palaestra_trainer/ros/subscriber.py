@@ -1,4 +1,4 @@
-"""A ROS topic whose messages are read on demand."""
+"""Subscribe to a ROS topic, and read its messages on demand."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ _CONNECT_S = 5.0
 
 
 class RosSubscriber:
-    """One topic of one publisher over one connection, opened by `connect` and closed after a failure.
+    """One topic of one publisher, with a connection that `connect` opens and a failure closes.
 
     Args:
         name: the full name, e.g. /robotino/ir1/value
         type_name: e.g. sensor_msgs/Range
-        decode: reads the value out of a message's bytes; by default the whole message is decoded.
-        deadline_s: the longest wait for a message.
+        decode: returns the value in the bytes of a message; None: the whole message is decoded.
+        deadline_s: the longest time to wait for a message.
     """
 
     __slots__ = ("_deadline_s", "_decode", "_registered", "_type", "_wire", "name", "simulator")
@@ -55,11 +55,11 @@ class RosSubscriber:
 
     @property
     def connected(self) -> bool:
-        """Whether a publisher is connected; messages sent before that are lost."""
+        """Whether a publisher is connected; earlier messages are lost."""
         return self._wire is not None
 
     def connect(self) -> None:
-        """Connect to the publisher; it knows this subscriber when `connect` returns.
+        """Connect to the publisher, and wait until it has registered this subscriber.
 
         Raises:
             SimulatorDead: no node publishes the topic, or the publisher cannot be reached.
@@ -88,11 +88,11 @@ class RosSubscriber:
         self._wire.acknowledge_late()
 
     def next(self) -> Any:
-        """Return the value of the next message, waiting for it.
+        """Wait for the next message and return its value.
 
         Raises:
             SimulatorHung: no message arrived within the deadline; the connection stays open.
-            SimulatorDead: the connection broke, or `connect` was never called.
+            SimulatorDead: the connection was lost, or `connect` was never called.
             WrongData: the message cannot be read.
         """
         if self._wire is None:
@@ -108,7 +108,7 @@ class RosSubscriber:
             raise WrongData(self.simulator, f"{self.name} sent {error}") from error
 
     def newest(self, default: Any) -> Any:
-        """Return the value of the last message that has arrived; `default` if no message has.
+        """Return the value of the last message that has arrived; `default` without a new message.
 
         Raises:
             SimulatorDead, WrongData: as `next`.
@@ -123,7 +123,8 @@ class RosSubscriber:
         self._drop()
         if self._registered:
             self._registered = False
-            # A lost master has lost the registration too; a master that sends garbage cannot unregister.
+            # If the master is gone, so is the registration. A master that sends invalid responses cannot
+            # unregister the subscriber.
             with contextlib.suppress(MasterLost, UnreadableAnswer):
                 Master(ensure_node()).unregister_subscriber(self.name, node_uri())
 

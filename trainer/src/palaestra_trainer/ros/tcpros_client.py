@@ -1,7 +1,7 @@
-"""One persistent TCPROS connection of a client, with a deadline on every wait.
+"""A persistent TCPROS connection of a client, with a deadline for every wait.
 
-The kernel enforces the deadlines (SO_RCVTIMEO), which needs one system call per read. A selector or Python's
-own timeout would need two.
+The kernel enforces the deadlines (SO_RCVTIMEO), so a read needs only one system call. A selector or Python's
+own timeout would need two system calls.
 """
 
 from __future__ import annotations
@@ -20,27 +20,27 @@ from palaestra_trainer.waiting.wait_time import count_wait
 
 _TIMEVAL = struct.Struct("@ll")
 _BUFFER_BYTES = 8192
-_MOST_KEPT_BYTES = 4 << 20  # large enough to reuse the buffer for images, which arrive at each step
+_MOST_KEPT_BYTES = 4 << 20  # large enough to keep the buffer for images, which arrive at each step
 
-# A wake-up costs 30 us on a virtual machine, more than a stub needs for its response. So if the last wait was
-# short, the next one first polls a few times and yields the processor in between.
+# A wake-up costs 30 us on a virtual machine, more than the stub needs for its response. So if the last wait
+# was short, the next wait first polls a few times, and yields the processor between the polls.
 _QUICK_S = 200e-6
 _LOOKS = 30
 
 
 class TcprosClient:
-    """A connection after its handshake.
+    """A connection; the constructor does the handshake.
 
     Args:
         address: host and port of the peer.
         header: the connection header to send, e.g. service, md5sum and callerid.
         simulator: the simulator's name in faults.
-        deadline_s: the longest wait for anything from the peer.
+        deadline_s: the longest time to wait for the peer.
 
     Raises:
         SimulatorDead: the connection was refused or closed.
         SimulatorHung: the handshake did not end in time.
-        WrongData: the peer refused the header or sent an invalid one.
+        WrongData: the peer refused the header, or sent an invalid header.
     """
 
     __slots__ = ("_buffer", "_deadline_s", "_filled", "_quick", "_simulator", "_socket", "_view")
@@ -83,15 +83,15 @@ class TcprosClient:
             raise self._fault("does not accept requests", error) from error
 
     def receive(self, ahead: int = 0) -> bytes | memoryview:
-        """Return the next frame, with the `ahead` bytes before its length; it is valid until the next call.
+        """Return the next frame, with the `ahead` bytes before its length; valid until the next call.
 
         Raises:
             SimulatorDead, SimulatorHung: see the class.
             WrongData: the announced length is impossible.
         """
         if self._quick and not self._filled:
-            # Nearly always exactly one whole frame has arrived. `recv` reuses a small block that is still
-            # in the processor's cache; a buffer per connection would not be in that cache.
+            # Usually exactly one whole frame has arrived. `recv` then reuses a small block of memory that is
+            # still in the processor's cache. A buffer per connection would not be in the cache.
             try:
                 data = self._socket.recv(sockets.FIRST_BYTES, socket.MSG_DONTWAIT)
             except OSError:
@@ -118,8 +118,8 @@ class TcprosClient:
     def acknowledge_late(self) -> None:
         """Let the kernel acknowledge two messages with one packet.
 
-        A packet for each message costs half as much as reading it. Use this only for a peer with TCP_NODELAY:
-        other peers wait for each acknowledgment before the next message.
+        An acknowledgment for each message takes half as long as reading the message. Use this method only for
+        a peer with TCP_NODELAY: other peers wait for each acknowledgment before the next message.
         """
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_QUICKACK, 0)
 
@@ -144,7 +144,7 @@ class TcprosClient:
         self._socket.close()
 
     def _frame_end(self, ahead: int) -> int:
-        """Return the end of the frame at the start of the buffer; 0 while its length is unknown."""
+        """Return the position after the first frame in the buffer; 0 while its length is unknown."""
         if self._filled < ahead + LENGTH.size:
             return 0
         (length,) = LENGTH.unpack_from(self._buffer, ahead)
@@ -166,7 +166,7 @@ class TcprosClient:
         return frame if ahead else frame[LENGTH.size :]
 
     def _make_room(self, end: int) -> None:
-        """Enlarge a full buffer at most to twice its size, because the announced length may be wrong."""
+        """Enlarge a full buffer, but at most to twice its size, because the announced length may be wrong."""
         if self._filled == len(self._buffer):
             larger = bytearray(min(2 * self._filled, end + _BUFFER_BYTES))
             larger[: self._filled] = self._view
@@ -188,7 +188,7 @@ class TcprosClient:
         self._filled += count
 
     def _spin(self, room: memoryview) -> int | None:
-        """Return the number of bytes that arrived during polling; None if none arrived."""
+        """Return the number of bytes that arrived during polling; None if no bytes arrived."""
         for _ in range(_LOOKS):
             try:
                 return self._socket.recv_into(room, 0, socket.MSG_DONTWAIT)

@@ -1,6 +1,6 @@
-"""One XML-RPC call to the ROS master or to a node, with a deadline and a checked response.
+"""Make an XML-RPC call to the ROS master or a node, with a deadline and a check of the response.
 
-rosgraph's own client would wait forever. The peer may send any bytes; an invalid response raises
+The client of rosgraph would wait forever. The peer may send any bytes, and an invalid response raises
 `UnreadableAnswer`.
 """
 
@@ -16,11 +16,11 @@ from palaestra_trainer.errors import UnreadableAnswer
 
 
 def call(uri: str, timeout_s: float, method: str, *arguments: Any) -> RpcResponse:
-    """Return the response of the server at `uri`.
+    """Call a method of the server at `uri` and return the response.
 
     Raises:
-        OSError: the server cannot be reached; a TimeoutError if it does not respond in time.
-        UnreadableAnswer: it sent an invalid ROS response.
+        OSError: the server cannot be reached; TimeoutError, a subclass, if it does not respond in time.
+        UnreadableAnswer: the server sent an invalid ROS response.
     """
     try:
         answer: Any = client.call(uri, timeout_s, method, *arguments)

@@ -1,16 +1,16 @@
-"""A ROS master without ROS: where nodes find each other, and the parameters that they share.
+"""A ROS master without ROS, by which nodes find each other and share parameters.
 
 - `names`: names of ROS, relative to a node or not
-- `registrations`: which node publishes, subscribes and serves what
+- `registrations`: the topics and services of each node
 - `parameters`: the tree of parameters
 - `arguments`: the checks of the arguments of calls
-- `api`: the calls of the Master API and the Parameter Server API, and the updates that they cause
-- `updates`: sends these updates to the nodes
-- `serving`: the master on a port
+- `api`: the methods of the Master API and the Parameter Server API, and the updates that they cause
+- `updates`: the sender of these updates to the nodes
+- `serving`: the server that listens on a port
 - `cli`: the program `palaestra-ros-master`
-- `__main__`: the same for `python -m`
+- `__main__`: the same program for `python -m`
 
-The first five are pure: no thread, socket or clock. Responses are those of rosmaster, which a contract test
-compares, except that no caller can shut this master down.
-Source: http://wiki.ros.org/ROS/Master_API and http://wiki.ros.org/ROS/Parameter%20Server%20API
+The first five modules are pure: they use no thread, socket or clock. The responses are those of rosmaster, as
+a contract test checks, except that a caller cannot shut this master down. Source:
+http://wiki.ros.org/ROS/Master_API and http://wiki.ros.org/ROS/Parameter%20Server%20API
 """

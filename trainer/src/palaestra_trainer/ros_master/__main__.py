@@ -1,4 +1,4 @@
-"""`python -m palaestra_trainer.ros_master`: as `palaestra-ros-master`."""
+"""`python -m palaestra_trainer.ros_master` runs the program `palaestra-ros-master`."""
 
 from palaestra_trainer.ros_master.cli import main
 

@@ -1,8 +1,8 @@
-"""The calls of the Master API and the Parameter Server API, and the updates that they cause.
+"""The methods of the Master API and the Parameter Server API, and the updates that they cause.
 
-Pure: a call changes registrations and parameters and returns the response; it sends nothing. Make only one
-call at a time.
-Source: http://wiki.ros.org/ROS/Master_API and http://wiki.ros.org/ROS/Parameter%20Server%20API
+A call only changes registrations and parameters, and returns the response and the updates. It does not send
+them. Make only one call at a time. Source: http://wiki.ros.org/ROS/Master_API and
+http://wiki.ros.org/ROS/Parameter%20Server%20API
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from palaestra_trainer.ros_master.names import parts, resolved
 from palaestra_trainer.ros_master.parameters import Parameters, as_subscribed, changes
 from palaestra_trainer.ros_master.registrations import Kind, Registrations
 
-MASTER = "/master"  # the name in which the master calls nodes
-_REPLACED = "new node registered with same name"  # rosmaster's words, which people search for
+MASTER = "/master"  # the caller's name when the master calls nodes
+_REPLACED = "new node registered with same name"  # the message of rosmaster, because people search for it
 
 
 class Update(NamedTuple):
@@ -35,9 +35,10 @@ class Update(NamedTuple):
     Attributes:
         uri: the URI of the node.
         method: the method of the Slave API.
-        subject: what it is about; a newer update of the same method and subject replaces it.
+        subject: the topic, parameter or node that changed; a newer update of the same method and subject
+            replaces an older update.
         value: the new value, or the reason of a shutdown.
-        node: the node's full name.
+        node: full name of the node.
     """
 
     uri: str
@@ -48,7 +49,7 @@ class Update(NamedTuple):
 
 
 class _Call:
-    """A call of the API: its function, and the value of a response that refuses its arguments."""
+    """A method of the API: its function, and the value in the response if its arguments are wrong."""
 
     def __init__(self, function: Callable[..., RpcResponse], nothing: Any) -> None:
         self.nothing = nothing
@@ -56,10 +57,10 @@ class _Call:
         self._names = tuple(inspect.signature(function).parameters)
 
     def respond(self, arguments: tuple[Any, ...]) -> RpcResponse:
-        """Return the response.
+        """Check the arguments, call the function and return its response.
 
         Raises:
-            WrongArgument: there are too few or too many, or one of them is wrong.
+            WrongArgument: there are too few or too many arguments, or an argument is wrong.
         """
         if len(arguments) != len(self._names):
             names = ", ".join(name.removeprefix("_") for name in self._names)
@@ -70,10 +71,10 @@ class _Call:
 
 
 class MasterApi:
-    """The master's calls, by their names on the wire.
+    """The methods of the master, by their names in XML-RPC.
 
     Args:
-        uri: at which the master answers.
+        uri: URI at which the master responds.
         pid: the process ID of the master's process.
     """
 
@@ -88,14 +89,14 @@ class MasterApi:
         }
 
     def knows(self, method: str) -> bool:
-        """Return whether the master has such a call."""
+        """Return whether the master has this method."""
         return method in self._calls
 
     def call(self, method: str, arguments: tuple[Any, ...]) -> tuple[RpcResponse, list[Update]]:
         """Return the response to a call, and the updates to send, in their order.
 
         Raises:
-            KeyError: the master has no such call.
+            KeyError: the master does not have this method.
         """
         made = self._calls[method]
         self._updates = []
@@ -106,7 +107,7 @@ class MasterApi:
         return response, self._updates
 
     def stop_updates(self, update: Update) -> None:
-        """Unsubscribe a node that has refused an update of a parameter."""
+        """Unsubscribe a node that refused an update of a parameter."""
         self._nodes.unregister(Kind.PARAMETER, update.subject, update.node, update.uri)
 
     def _get_uri(self, _caller: str) -> RpcResponse:
@@ -251,7 +252,7 @@ class MasterApi:
             self._updates.append(Update(uri, "publisherUpdate", topic, publishers, node))
 
     def _report_changes(self, name: str, value: Any, *, but: str | None) -> None:
-        """Add an update for each subscriber, except `but` if it subscribes to what it has set."""
+        """Add an update for each subscriber; skip `but` if it changed a parameter to which it subscribes."""
         for change in changes(name, value, self._nodes.names(Kind.PARAMETER)):
             for node, uri in self._nodes.members(Kind.PARAMETER, change.subscribed):
                 if not (change.by_caller and node == but):
@@ -264,7 +265,7 @@ def _removed(node: str, name: str, *, removed: bool) -> RpcResponse:
     return RpcResponse(OK, f"{node} was not registered for {name} at this address", 0)
 
 
-# By the name on the wire: the method, and the value of a response that refuses its arguments.
+# By the name in XML-RPC: the Python method, and the value in the response if the arguments are wrong.
 _CALLS: dict[str, tuple[str, Any]] = {
     "getUri": ("_get_uri", ""),
     "getPid": ("_get_pid", -1),

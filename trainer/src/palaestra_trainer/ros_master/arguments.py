@@ -1,4 +1,4 @@
-"""The checks of the arguments of calls."""
+"""Check the arguments of calls to the master."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ class WrongArgument(ValueError):
 
 
 def text_of(argument: str, value: Any) -> str:
-    """Return a text that is not empty.
+    """Check that an argument is a text and not empty; return it.
 
     Raises:
-        WrongArgument: it is.
+        WrongArgument: the argument is empty or not a text.
     """
     if not isinstance(value, str) or not value:
         raise WrongArgument(f"{argument}: {value!r} is not a text with characters; give a name")
@@ -27,10 +27,10 @@ def text_of(argument: str, value: Any) -> str:
 
 
 def name_of(argument: str, value: Any, caller: str) -> str:
-    """Return the global name that the caller means.
+    """Check that an argument is a name; return the global name that the caller means.
 
     Raises:
-        WrongArgument: it is not a name.
+        WrongArgument: the argument is not a name.
     """
     name = text_of(argument, value)
     if any(character in name for character in _ILLEGAL):
@@ -39,10 +39,10 @@ def name_of(argument: str, value: Any, caller: str) -> str:
 
 
 def topic_or_service(argument: str, value: Any, caller: str) -> str:
-    """Return the global name of a topic or service.
+    """Check that an argument names a topic or service; return the global name.
 
     Raises:
-        WrongArgument: it is not a name, or it is the root.
+        WrongArgument: the argument is not a name, or is the root.
     """
     name = name_of(argument, value, caller)
     if name == SEPARATOR:
@@ -51,10 +51,10 @@ def topic_or_service(argument: str, value: Any, caller: str) -> str:
 
 
 def uri_of(argument: str, value: Any) -> str:
-    """Return the URI of a node or service.
+    """Check that an argument is the URI of a node or service; return it.
 
     Raises:
-        WrongArgument: it is not such a URI.
+        WrongArgument: the argument is not such a URI.
     """
     uri = text_of(argument, value)
     if not uri.startswith(_SCHEMES):
@@ -63,10 +63,10 @@ def uri_of(argument: str, value: Any) -> str:
 
 
 def type_name_of(argument: str, value: Any) -> str:
-    """Return the type of a topic, `package/Name` or ANY_TYPE.
+    """Check that an argument is the type of a topic, `package/Name` or ANY_TYPE; return it.
 
     Raises:
-        WrongArgument: it is neither.
+        WrongArgument: the argument is neither.
     """
     name = text_of(argument, value)
     if name != ANY_TYPE and name.count(SEPARATOR) != 1:

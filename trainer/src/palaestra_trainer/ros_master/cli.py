@@ -1,4 +1,4 @@
-"""`palaestra-ros-master`: a ROS master as a program."""
+"""`palaestra-ros-master` runs a ROS master."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ exit codes: 0 after a signal, or when standard input has closed; 2 a wrong optio
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the program."""
+    """Run `palaestra-ros-master` until a signal ends it."""
     options = _options(arguments)
     logging.basicConfig(level=logging.INFO, format="%(message)s")
     ended = threading.Event()
@@ -49,10 +49,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _end_with_owner() -> None:
-    """End this process when its standard input closes; the kernel closes it when the owner is killed."""
+    """End this process when its standard input closes, which the kernel does when the owner is killed."""
     while os.read(sys.stdin.fileno(), 1024):
         pass
-    os._exit(0)  # the connections' threads are not waited for
+    os._exit(0)  # without waiting for the threads of connections
 
 
 def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
@@ -76,7 +76,7 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
 
 
 def _name(host: str) -> str:
-    """Return the name under which nodes reach the master; they choose theirs in the same way."""
+    """Return the host name by which nodes reach the master; nodes choose their own names in the same way."""
     if host == LOOPBACK:
         return LOOPBACK
     chosen = os.environ.get("ROS_HOSTNAME") or os.environ.get("ROS_IP")

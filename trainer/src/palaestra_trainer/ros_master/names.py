@@ -1,4 +1,4 @@
-"""Names of ROS 1: `/a/b` is global, `~b` is private to a node, `b` is relative to the node's namespace.
+"""Resolve names of ROS 1: `/a/b` is global, `~b` is private to a node, `b` is relative to its namespace.
 
 Source: http://wiki.ros.org/Names
 """
@@ -10,7 +10,7 @@ _PRIVATE = "~"
 
 
 def parts(name: str) -> tuple[str, ...]:
-    """Return the parts of a name between its slashes; `/` has none."""
+    """Return the parts of a name between its slashes; an empty tuple for `/`."""
     return tuple(part for part in name.split(SEPARATOR) if part)
 
 
@@ -20,7 +20,7 @@ def is_global(name: str) -> bool:
 
 
 def is_private(name: str) -> bool:
-    """Return whether a name is below that of its node."""
+    """Return whether a name is private, which means below the name of its node."""
     return name.startswith(_PRIVATE)
 
 
@@ -30,17 +30,17 @@ def joined(names: tuple[str, ...]) -> str:
 
 
 def below(namespace: str, name: str) -> str:
-    """Return a name inside a namespace; a global or private one stays as it is."""
+    """Return a relative name inside a namespace; return a global or private name unchanged."""
     if is_global(name) or is_private(name):
         return name
     return f"{namespace.removesuffix(SEPARATOR)}{SEPARATOR}{name}"
 
 
 def resolved(name: str, node: str) -> str:
-    """Return the global name that a node means, without double slashes or one at its end.
+    """Return the global name that a node means, without double slashes or a slash at its end.
 
     Args:
-        name: not empty.
+        name: the name that the node uses, not empty.
         node: the full name of the node, e.g. /robots/robotino
     """
     if is_global(name):

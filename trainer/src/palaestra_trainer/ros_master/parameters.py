@@ -1,7 +1,7 @@
-"""The tree of parameters: a namespace is a dictionary, a parameter is any other value.
+"""The tree of parameters, in which a namespace is a dictionary and a parameter is any other value.
 
-Pure, and no dictionary is ever changed: a change makes new ones on the way to the root. So a tree that was
-returned, or is on its way to a node, stays as it was.
+The functions are pure, and no dictionary is ever changed: a change creates new dictionaries from the
+parameter up to the root. So a tree that was returned, or is being sent to a node, stays the same.
 """
 
 from __future__ import annotations
@@ -15,13 +15,14 @@ Tree = dict[str, Any]
 
 
 class Change(NamedTuple):
-    """A change for the subscribers of a name: a parameter and its value; `{}` if it was deleted.
+    """A change that subscribers of a name must learn: a parameter and its new value; `{}` if it was deleted.
 
     Attributes:
-        subscribed: the name for which they are registered; it ends with a slash.
+        subscribed: the name to which the nodes subscribe; it ends with a slash.
         name: the name of the parameter or namespace that has changed; it ends with a slash.
-        value: its new value.
-        by_caller: whether the change is at or below the subscribed name; its author gets no update of it.
+        value: the new value of that parameter or namespace.
+        by_caller: whether the change is at or below the subscribed name; then the node that made the change
+            does not get an update.
     """
 
     subscribed: str
@@ -31,16 +32,16 @@ class Change(NamedTuple):
 
 
 class Parameters:
-    """The parameters of one master; every name is global unless a method says otherwise."""
+    """The parameters of one master; all names are global, except for the key of `search`."""
 
     def __init__(self) -> None:
         self._root: Tree = {}
 
     def get(self, name: str) -> Any:
-        """Return a parameter, or the tree of a namespace.
+        """Return the value of a parameter, or the tree of a namespace.
 
         Raises:
-            KeyError: it is not set.
+            KeyError: the name is not set.
         """
         value: Any = self._root
         for part in parts(name):
@@ -60,10 +61,10 @@ class Parameters:
     def set(self, name: str, value: Any) -> None:
         """Set a parameter; a dictionary replaces the whole namespace.
 
-        A parameter on the way becomes a namespace.
+        If a part of the name is a parameter, it becomes a namespace.
 
         Raises:
-            TypeError: the root can only be a dictionary.
+            TypeError: `name` is the root, and `value` is not a dictionary.
         """
         path = parts(name)
         if not path and not isinstance(value, dict):
@@ -74,7 +75,7 @@ class Parameters:
         """Delete a parameter or namespace.
 
         Raises:
-            KeyError: it is not set, or it is the root.
+            KeyError: the name is not set, or is the root.
         """
         path = parts(name)
         if not path or not self.has(name):
@@ -82,12 +83,13 @@ class Parameters:
         self._root = _without(self._root, path)
 
     def search(self, key: str, node: str) -> str | None:
-        """Return the name of the parameter nearest to a node, None if no parameter matches.
+        """Return the global name of the parameter nearest to a node; None if no parameter matches.
 
-        The search goes from the node's own name up to the root, until it finds the first part of `key`.
+        The search goes from the node's own name up to the root, until a namespace has the first part of
+        `key`.
 
         Args:
-            key: relative; a global one is only looked up.
+            key: a relative name; a global name is only looked up.
             node: the full name of the node.
 
         Raises:
@@ -110,12 +112,12 @@ class Parameters:
 
 
 def changes(name: str, value: Any, subscribed: list[str]) -> Iterator[Change]:
-    """Yield the change of each subscribed name after `name` was set, or deleted with `{}`.
+    """Yield the change for each subscribed name after `name` was set, or was deleted (`value` is `{}`).
 
     Args:
         name: the name of the parameter or namespace.
-        value: its new value.
-        subscribed: names of parameters; each ends with a slash.
+        value: the new value of that parameter or namespace.
+        subscribed: names to which nodes subscribe; each ends with a slash.
     """
     top = as_subscribed(name)
     inside = dict(_values(top, value)) if isinstance(value, dict) else None
@@ -127,7 +129,7 @@ def changes(name: str, value: Any, subscribed: list[str]) -> Iterator[Change]:
 
 
 def as_subscribed(name: str) -> str:
-    """Return a global name that ends with a slash: then A is below B if A begins with B."""
+    """Return a global name with a slash at its end; name A is then below B if A begins with B."""
     return SEPARATOR.join(("", *parts(name), ""))
 
 
@@ -156,7 +158,7 @@ def _names(namespace: str, tree: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _values(namespace: str, tree: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    """Yield each name inside a namespace, with a slash at its end, and its value."""
+    """Yield the name, with a slash at its end, and the value of each entry inside a namespace."""
     for part, value in tree.items():
         name = f"{below(namespace, part)}{SEPARATOR}"
         yield name, value

@@ -1,8 +1,8 @@
-"""The registrations of nodes: their topics, services and addresses.
+"""Keep the registrations of nodes: their topics, services and addresses.
 
-Pure: no thread, socket or clock. A node is known from its first registration to the end of its last one.
-A node that registers with another address is a new one of the same name: everything of the old one is
-dropped.
+This module is pure: it uses no thread, socket or clock. A node is known from its first registration until its
+last registration ends. If a node registers with another address, it is a new node of the same name, and all
+registrations of the old node are dropped.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class Kind(Enum):
 
 @dataclass(slots=True)
 class _Node:
-    """A node: the URI at which it answers, and its registrations."""
+    """A node: the URI at which it responds, and its registrations."""
 
     uri: str
     registered: set[tuple[Kind, str]] = field(default_factory=set)
@@ -33,44 +33,45 @@ class _Node:
 class Registrations:
     """All registrations of one master, by the names of topics, services and parameters.
 
-    Every name is global, and everything is returned in the order of registration.
+    Every name is global. All results are in the order of registration.
     """
 
     def __init__(self) -> None:
         self._nodes: dict[str, _Node] = {}
-        # By kind, and then by the name of topic, service or parameter, the URIs of nodes by their names.
+        # URIs of nodes, by the kind of registration, the name of the topic, service or parameter, and the
+        # node's name.
         self._members: dict[Kind, dict[str, dict[str, str]]] = {kind: {} for kind in Kind}
         self._service_uris: dict[str, tuple[str, str]] = {}  # the node and address of each service
         self._types: dict[str, str] = {}
 
     def register(self, kind: Kind, name: str, node: str, uri: str) -> str | None:
-        """Register a node, and return the URI of an older node of its name, None if no node had it.
+        """Register a node; return the URI of an older node of the same name, or None.
 
         Args:
-            kind: not SERVICE, which `register_service` is for.
+            kind: any kind except SERVICE; use `register_service` for services.
             name: the name of the topic or parameter.
-            node: its full name.
-            uri: at which the node answers.
+            node: full name of the node.
+            uri: URI at which the node responds.
         """
         replaced = self._entered(kind, name, node, uri)
         self._members[kind].setdefault(name, {})[node] = uri
         return replaced
 
     def register_service(self, service: str, node: str, uri: str, address: str) -> str | None:
-        """Register the only node that serves `service`; return as `register`."""
+        """Register the only node that serves `service`; return the same as `register`."""
         replaced = self._entered(Kind.SERVICE, service, node, uri)
         self._members[Kind.SERVICE][service] = {node: uri}
         self._service_uris[service] = (node, address)
         return replaced
 
     def unregister(self, kind: Kind, name: str, node: str, uri: str) -> bool:
-        """Remove a registration; return whether that node had it.
+        """Remove a registration; return whether that node had this registration.
 
         Args:
             kind: not SERVICE.
             name: the name of the topic or parameter.
-            node: its full name.
-            uri: at which the node answers; a registration with another URI stays.
+            node: full name of the node.
+            uri: URI at which the node responds; a registration with another URI stays.
         """
         members = self._members[kind].get(name, {})
         if members.get(node) != uri:
@@ -117,32 +118,32 @@ class Registrations:
         return list(self._members[kind])
 
     def listed(self, kind: Kind) -> list[tuple[str, list[str]]]:
-        """Return each topic or service with the names of its nodes."""
+        """Return each topic, service or parameter with the names of its nodes."""
         return [(name, list(members)) for name, members in self._members[kind].items()]
 
     def type_of(self, topic: str) -> str:
         """Return the type of a topic that a node publishes.
 
         Raises:
-            KeyError: no node has ever registered for it with a type.
+            KeyError: no node has ever registered for the topic with a type.
         """
         return self._types[topic]
 
     def types(self) -> list[tuple[str, str]]:
-        """Return each topic that ever had a type, with this type."""
+        """Return each topic that ever had a type, with that type."""
         return list(self._types.items())
 
     def declare_type(self, topic: str, type_name: str, *, published: bool) -> None:
-        """Set the type of a topic: that of its newest publisher, else that of its first subscriber.
+        """Set the type of a topic to that of its newest publisher, or else of its first subscriber.
 
-        ANY_TYPE replaces no type, and only a publisher can declare it.
+        ANY_TYPE does not replace another type, and only a publisher can declare it.
         """
         absent = topic not in self._types
         if (published and (absent or type_name != ANY_TYPE)) or (absent and type_name != ANY_TYPE):
             self._types[topic] = type_name
 
     def _entered(self, kind: Kind, name: str, node: str, uri: str) -> str | None:
-        """Note a registration; drop an older node of that name, and return its URI."""
+        """Record a registration; drop an older node of the same name, and return its URI."""
         known = self._nodes.get(node)
         if known is not None and known.uri == uri:
             known.registered.add((kind, name))

@@ -1,4 +1,4 @@
-"""The master on a port: calls come in several threads, and are made one after another."""
+"""Serve the master on a port; calls arrive in several threads, and a lock orders them."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from palaestra_trainer.ros_master.updates import Updates
 
 
 class MasterServer:
-    """A ROS master, answering from `start` until `close`.
+    """A ROS master that responds from `start` until `close`.
 
     Args:
-        host: the address on which it listens.
-        port: 0 takes one that is free.
-        name: under which nodes reach it; by default `host`.
+        host: the address on which the master listens.
+        port: the port; 0 takes a free port.
+        name: the host name by which nodes reach the master; by default `host`.
 
     Raises:
-        OSError: the port is in use, or the address is not one of this machine.
+        OSError: the port is in use, or the machine does not have this address.
     """
 
     def __init__(self, host: str = "127.0.0.1", port: int = 0, name: str = "") -> None:
@@ -32,16 +32,16 @@ class MasterServer:
         self._updates = Updates(self._stop_updates)
 
     def start(self) -> Self:
-        """Begin to answer, in threads of its own."""
+        """Begin to respond to calls, in new threads."""
         self._server.start()
         return self
 
     def close(self) -> None:
-        """Stop answering and free the port; updates that are on their way are not awaited."""
+        """Stop responding and free the port, without waiting for updates that are being sent."""
         self._server.close()
 
     def __enter__(self) -> Self:
-        """Begin to answer."""
+        """Begin to respond to calls."""
         return self.start()
 
     def __exit__(
@@ -50,7 +50,7 @@ class MasterServer:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Stop answering."""
+        """Stop responding."""
         self.close()
 
     def _find(self, method: str) -> Method | None:
@@ -62,7 +62,7 @@ class MasterServer:
         with self._lock:
             response, updates = self._api.call(method, arguments)
             if updates:
-                self._updates.add(updates)  # now, because the updates of the next call must come after these
+                self._updates.add(updates)  # in the lock, to keep the order of updates
         return tuple(response)  # XML-RPC has no named tuples
 
     def _stop_updates(self, update: Update) -> None:

@@ -1,7 +1,7 @@
-"""Sends updates to nodes, each in a thread of its own while it has some.
+"""Send updates to nodes, in one thread per node that has updates.
 
-A node gets its updates in their order, and each is tried once. While one is on its way, a newer update of
-the same subject replaces the one that waits. A node that does not answer delays only its own updates.
+A node gets its updates in order, and each update is sent once. While an update waits to be sent, a newer
+update of the same subject replaces it. A node that does not respond delays only its own updates.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from palaestra_protocol.xmlrpc.responses import WRONG
 from palaestra_trainer.ros_master.api import MASTER, Update
 
 DEADLINE_S = 5.0
-MOST_THREADS = 128  # nodes beyond these wait for their turn
+MOST_THREADS = 128  # further nodes wait until a thread is free
 
 log = logging.getLogger(__name__)
 
@@ -27,11 +27,11 @@ _Queue = dict[tuple[str, str], Update]
 
 
 class Updates:
-    """The updates of one master that are not sent yet.
+    """The updates of one master that are not yet sent.
 
     Args:
-        refused: called, in any thread, with an update of a parameter that its node does not want.
-        deadline_s: for one update.
+        refused: called, in any thread, with an update of a parameter that the node refused.
+        deadline_s: deadline for one update.
     """
 
     def __init__(self, refused: Callable[[Update], None], deadline_s: float = DEADLINE_S) -> None:
@@ -43,7 +43,7 @@ class Updates:
         self._threads = 0
 
     def add(self, updates: list[Update]) -> None:
-        """Send these updates, each after those that its node has to get before; returns at once."""
+        """Send these updates after the earlier updates of each node; return at once."""
         with self._lock:
             for update in updates:
                 self._put(update)
@@ -58,7 +58,7 @@ class Updates:
             self._turns.append(update.uri)
         queue, about = self._queues[update.uri], (update.method, update.subject)
         queue.pop(about, None)
-        queue[about] = update  # behind all others: a change inside another one must not be undone by it
+        queue[about] = update  # at the end, so that no older update follows and undoes a newer change
 
     def _work(self) -> None:
         while True:

@@ -1,1 +1,1 @@
-"""One attempt of a run: trains, evaluates, saves, resumes after a restart, and ends with an exit code."""
+"""Run one attempt: train, evaluate, save, resume after a restart, and end with an exit code."""

@@ -1,6 +1,6 @@
-"""One attempt of a run, from a configuration to an exit code.
+"""Run one attempt, from a configuration to an exit code.
 
-Errors that can be found without a simulator are reported before a simulator starts.
+The attempt reports every error that it can find without a simulator before a simulator starts.
 """
 
 from __future__ import annotations
@@ -65,9 +65,9 @@ NOTHING_LEARNED = End(
     "Completed",
     "the training is complete, but nothing was learned: no update was made",
 )
-_FAR_BEYOND = 1.5  # times the steps of the job; the last rollout usually exceeds them a little
-STOPPED_S = 60.0  # the most time for closing environments and stopping simulators
-# Code of the job's author may end the program, for example by sys.exit.
+_FAR_BEYOND = 1.5  # factor for the job's steps; the last rollout usually exceeds the steps a little
+STOPPED_S = 60.0  # longest time for closing environments and stopping simulators
+# Code of the job's author may try to end the program, for example by sys.exit.
 ENDING = (Exception, SystemExit, KeyboardInterrupt, GeneratorExit)
 
 
@@ -76,8 +76,8 @@ class AttemptDependencies:
     """The dependencies of an attempt.
 
     Attributes:
-        make_members: creates the simulators of a configuration, not yet started.
-        must_resume: whether a new run must not begin.
+        make_members: a function that creates the members of a configuration without starting them.
+        must_resume: whether the attempt may only resume an existing run.
         environment: the environment variables of the process.
     """
 
@@ -93,10 +93,10 @@ def run(
     *,
     must_resume: bool = False,
 ) -> int:
-    """Train until done and return the exit code; resume if the directory has a checkpoint.
+    """Train to the end and return the exit code; resume if the directory has a checkpoint.
 
-    If the run is finished, its result is reported and training is not repeated. Call it in the main thread,
-    which receives the signals. With `must_resume` it never begins a new run.
+    If the run is already finished, report its result without training. Call this function in the main thread,
+    because that thread receives signals. With `must_resume`, never begin a new run.
     """
     around = AttemptDependencies(
         make_members=make_members,
@@ -135,14 +135,14 @@ def _logged(error: BaseException) -> End:
 
 
 class Learning(NamedTuple):
-    """A model and its environment."""
+    """A model and the environment in which it learns."""
 
     env: SimulatorsVecEnv
     model: BaseAlgorithm
 
 
 class Attempt:
-    """One attempt; call `play` once."""
+    """One attempt of a run; call `play` once."""
 
     def __init__(
         self,
@@ -159,10 +159,10 @@ class Attempt:
         self._callbacks = JobCallbacks([])
 
     def play(self) -> End:
-        """Train, stop everything that was started, and return the end of the run.
+        """Train, stop all simulators and servers, and return the end of the attempt.
 
-        The first cause decides: a later error during the stop is only logged. If the stop takes too long, the
-        process ends.
+        The first error decides the end; a later error during the stop is only logged. If the stop takes too
+        long, the process ends.
         """
         with ExitStack() as stack:
             end = self._trained(stack)
@@ -178,21 +178,22 @@ class Attempt:
     def _trained(self, stack: ExitStack) -> End:
         try:
             self._directory.path.mkdir(parents=True, exist_ok=True)
-            with self._watchdog():  # it does not watch the stop, which has its own deadline
+            with self._watchdog():  # the stop has its own deadline
                 learned = self._train(*self._prepare(stack))
-        except ENDING as error:  # this is the edge of the process, and every end has an exit code
+        except ENDING as error:  # the outermost handler of the process, because every end needs an exit code
             return _logged(error)
         return DONE if learned else NOTHING_LEARNED
 
     def write_end(self, end: End) -> None:
-        """Write the termination message of an attempt that ends now, and the report of the run."""
+        """Write the termination message of this attempt, which ends now, and the report of the run."""
         write_end(self._directory, self._progress, end)
 
     def _prepare(self, stack: ExitStack) -> tuple[RunContext, Learning, SavedCheckpoint | None]:
-        """Return a run whose simulators are up, its model and environment, and the checkpoint to resume from.
+        """Start the simulators; return the run, its model and environment, and the checkpoint to resume from.
 
-        The model is created before simulators start, because it refuses wrong values and spaces. The attempt
-        is recorded before they start too, so that it counts if they fail. `stack` closes everything.
+        The model is created before the simulators start, because its constructor refuses wrong values and
+        spaces. The attempt is also recorded before the simulators start, so it counts even if they fail.
+        `stack` stops and closes everything that this method starts.
         """
         configuration, progress = self._configuration, self._progress
         algorithms.check(configuration.algorithm)
@@ -201,7 +202,7 @@ class Attempt:
         found = self._newest()
         before = RunDirectory(found.path.parent.parent) if found else None
         self._algorithm = algorithms.begin_with(configuration, self._directory, before)
-        self._take_over(found)  # before the server starts: Prometheus would read a later jump as an increase
+        self._take_over(found)  # before the server starts: Prometheus would count a later jump
         known = constants(configuration)
         stack.enter_context(status_server(configuration.status_address, progress, known))
         self._begin(found)
@@ -227,7 +228,7 @@ class Attempt:
     def _make_model(
         self, fleet: Fleet, interruption: Interruption, stack: ExitStack, found: SavedCheckpoint | None
     ) -> Learning:
-        """Return a new model with its environment; the simulators need not be up."""
+        """Return a new model with its environment; the simulators need not have started."""
         use_threads(self._around.environment)
         wanted = self._configuration
         task = fleet.collecting[0].member.env
@@ -248,7 +249,7 @@ class Attempt:
         return Learning(env, model)
 
     def _take_over(self, found: SavedCheckpoint | None) -> None:
-        """Set the progress to that of the previous attempts."""
+        """Set the progress to the progress of the previous attempts."""
         journal = Journal(self._directory.journal)
         if found is None:
             self._progress.counters = journal.regained(0, Counters())
@@ -268,7 +269,7 @@ class Attempt:
         return found
 
     def _of_another_run(self) -> SavedCheckpoint | None:
-        """Return the newest checkpoint of the run in `resumeFrom`; None: the field is not set."""
+        """Return the newest checkpoint of the run that `resumeFrom` names; None: the field is not set."""
         another = self._configuration.resume_from
         if another is None:
             return None
@@ -278,7 +279,7 @@ class Attempt:
         return found
 
     def _train(self, run: RunContext, learning: Learning, found: SavedCheckpoint | None) -> bool:
-        """Train to the end; return whether the policy was updated, or True for an algorithm of the user."""
+        """Train to the end; return whether the policy was updated, always True for a user's algorithm."""
         env, model = learning
         self._forget_what_is_played_again()
         resumed = self._resume(model, env, found) if found else None
@@ -291,13 +292,13 @@ class Attempt:
         return self._algorithm.name not in algorithms.ALGORITHMS or conductor.updates_so_far() > 0
 
     def _tell_if_it_took_longer(self) -> None:
-        """Log a warning if the run took many more steps, because an update waited for whole episodes."""
+        """Log a warning if the run took many more steps than set, because an update waited for episodes."""
         wanted, taken = self._configuration.steps, self._progress.step
         if taken > _FAR_BEYOND * wanted:
             log.warning("the run took more steps, because an update is due later", wanted=wanted, taken=taken)
 
     def _forget_what_is_played_again(self) -> None:
-        """Remove the evaluations and curves that a previous attempt wrote after the resumed step."""
+        """Remove evaluations and curves that a previous attempt recorded after the resumed step."""
         step, curves = self._progress.step, self._directory.tensorboard
         forget_after(self._directory, step)
         if curves.exists():
@@ -318,7 +319,7 @@ class Attempt:
         text = dump(self._configuration)
         replace_file(self._directory.configuration, lambda path: _write_text(path, text))
         self._directory.end.unlink(missing_ok=True)
-        self._directory.summary.unlink(missing_ok=True)  # a finished run may continue with more steps
+        self._directory.summary.unlink(missing_ok=True)  # for a finished run that now has more steps
         algorithms.keep(self._algorithm, self._directory)
         pod = self._around.environment.get("PALAESTRA_POD_UID", "")
         self._progress.attempt = attempt = self._directory.begin_attempt(pod, reason, versions())
@@ -360,7 +361,8 @@ class Attempt:
             conductor.save()
             raise
         except ValueError:
-            # PyTorch's distributions raise a ValueError for NaN; the check reports divergence instead.
+            # PyTorch's distributions raise a ValueError for NaN. In that case the check raises Diverged
+            # instead.
             Learner(model).check(model.num_timesteps)
             raise
 
@@ -373,9 +375,9 @@ class Attempt:
 
 
 def use_threads(environment: Mapping[str, str] = os.environ) -> None:
-    """Let PyTorch use as many threads as OMP_NUM_THREADS sets, one by default.
+    """Set the number of PyTorch's threads to OMP_NUM_THREADS, by default to 1.
 
-    Networks of this size are slower on two threads than on one.
+    Networks of the usual size are slower with two threads than with one.
     """
     threads = environment.get("OMP_NUM_THREADS", "1")
     torch.set_num_threads(int(threads) if threads.isdigit() and int(threads) else 1)

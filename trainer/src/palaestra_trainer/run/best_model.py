@@ -1,9 +1,9 @@
 """Select the best policy of a run, and decide whether it is good enough to stop.
 
-The best of many evaluations on the same few episodes looks better than it is. So does the first evaluation
-that reaches a goal. Therefore both are confirmed: evaluated once more, on episodes of another stream. Each
-confirmation plays the next episodes of that stream; if many confirmations played the same episodes, these
-would select the policy.
+The best of many evaluations on the same few episodes overestimates the policy, and so does the first
+evaluation that reaches the goal. Therefore both policies are confirmed, which means evaluated once more on
+episodes of another stream. Each confirmation plays the next episodes of that stream. If many confirmations
+played the same episodes, these episodes would select the policy too.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ BEST = "evaluation.json"  # a member of model.zip
 
 
 class Enough(TrainerError):
-    """The policy has reached the wanted success rate; the run is done."""
+    """The policy has reached the wanted success rate, so the run is complete."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,8 +53,8 @@ class Best:
     """The evaluation of the policy in model.zip.
 
     Attributes:
-        step: valid environment steps that the policy had learned from.
-        success_rate: 0 to 1; None: the environment reports no success.
+        step: number of valid environment steps from which the policy had learned.
+        success_rate: share of successful episodes, 0 to 1; None: the environment does not report success.
         mean_return: mean return of the evaluation's episodes.
     """
 
@@ -64,7 +64,7 @@ class Best:
 
     @property
     def score(self) -> tuple[float, float]:
-        """The rank, as in `EvaluationResult.score`; the best evaluation has the highest."""
+        """The rank as in `EvaluationResult.score`; the best evaluation has the highest rank."""
         return (self.success_rate or 0.0, self.mean_return)
 
 
@@ -72,7 +72,7 @@ class Selection:
     """Evaluates the model of a run, keeps the best policy in model.zip, and confirms its success rate.
 
     Args:
-        run: the run; its evaluating simulators play while its collecting ones are paused.
+        run: the run; its collecting simulators are paused while the evaluating simulators play.
         model: the model to evaluate; its logger must be set.
     """
 
@@ -85,18 +85,18 @@ class Selection:
 
     @property
     def measures(self) -> bool:
-        """Whether this run has evaluations."""
+        """Whether this run evaluates its policy."""
         return self._run.configuration.evaluation.every_steps > 0 and bool(self._run.fleet.evaluating)
 
     def evaluate(self, step: int) -> None:
-        """Evaluate the current policy, and keep it if it is the best so far; `step` is the current step.
+        """Evaluate the current policy at `step`, and save the policy if it is the best so far.
 
-        The evaluation's line is written last. So an evaluation is repeated if it or its confirmation is
-        interrupted.
+        The evaluation's line in evaluations.jsonl is written last. So a resumed attempt repeats an evaluation
+        that was interrupted, or whose confirmation was interrupted.
 
         Raises:
-            Enough: the goal of the run is reached, and confirmed unless that is turned off.
-            ConfigurationError: the run has a goal, but the environment reports no success.
+            Enough: the policy reaches the goal of the run, also in the confirmation if there is one.
+            ConfigurationError: the run has a goal, but the environment does not report success.
             Interrupted: a signal has arrived.
         """
         wanted = self._run.configuration.evaluation
@@ -111,16 +111,16 @@ class Selection:
             raise Enough(f"{_in_words(self._run.progress)} at step {step}")
 
     def recycle_resting(self) -> None:
-        """Begin to recycle the evaluating simulators that are due before the next evaluation ends.
+        """Begin to restart the evaluating simulators that would reach a recycle limit in the next evaluation.
 
-        They restart while the others collect.
+        They restart while the collecting simulators work.
         """
         restarters = [restarter for restarter in self._run.fleet.evaluating if not restarter.lost]
         for restarter in restarters:
             restarter.recycle_resting(ceil(self._run.configuration.evaluation.episodes / len(restarters)))
 
     def finish(self, step: int) -> None:
-        """Confirm the best policy at the end of training; without evaluations, save the last policy.
+        """Confirm the best policy at the end of training; without evaluations, save the last policy instead.
 
         Raises:
             Interrupted: a signal has arrived.
@@ -148,7 +148,7 @@ class Selection:
         return confirmation.success_rate is not None and confirmation.success_rate >= goal
 
     def _confirm(self, step: int, now: int) -> EvaluationResult:
-        """Evaluate the model, whose policy is that of `step`, on the next episodes of the stream."""
+        """Confirm the model, with the policy of `step`, on the next episodes of the stream."""
         before = sum(int(line["episodes"]) for line in read_lines(self._directory.confirmations))
         evaluation = self._measure(CONFIRM, self._run.configuration.evaluation.confirming, before)
         self._log("confirm", now, evaluation, of_step=step)
@@ -195,9 +195,9 @@ class Selection:
         self._keep_replays(evaluation, step)
 
     def _keep_replays(self, evaluation: EvaluationResult, now: int) -> None:
-        """Keep recorded episodes of the best policy, and show them in TensorBoard.
+        """Save recorded episodes of the best policy, and show them in TensorBoard.
 
-        They are those of its confirmation, else of its evaluation.
+        The episodes come from the confirmation of the policy, or else from its evaluation.
         """
         if self._best is None:
             return
@@ -207,12 +207,12 @@ class Selection:
         else:
             kept = keep_replays(self._directory, evaluation, f"the evaluation at step {self._best.step:,}")
         logger = self._model.logger
-        if isinstance(logger, CurvesLogger):  # a callback may have set another one
+        if isinstance(logger, CurvesLogger):  # a callback may have set another logger
             logger.show({f"episodes/{title}": film for title, film in films_of(kept).items()}, now)
 
     @contextmanager
     def _acting_as_best(self, best: Best, step: int) -> Iterator[None]:
-        """Load the policy of model.zip into the model inside the context; restore the model at its end."""
+        """Load the policy of model.zip into the model for the context; restore the model afterwards."""
         if best.step == step:
             yield
             return
@@ -228,7 +228,7 @@ class Selection:
 
 
 def best_of(directory: RunDirectory) -> Best | None:
-    """Return the evaluation of the policy in model.zip; None: model.zip is missing, or was not evaluated."""
+    """Return the evaluation of model.zip; None if model.zip is missing or was not evaluated."""
     if not directory.model.exists():
         return None
     with zipfile.ZipFile(directory.model) as archive:
@@ -236,22 +236,22 @@ def best_of(directory: RunDirectory) -> Best | None:
 
 
 def confirmation_of(directory: RunDirectory, step: int) -> dict[str, Any] | None:
-    """Return the confirmation of the policy of `step`; None: that policy was not confirmed."""
+    """Return the confirmation of the policy of `step`; None if that policy was not confirmed."""
     found = (line for line in read_lines(directory.confirmations) if line["step"] == step)
     return next(found, None)
 
 
 def last_evaluated(directory: RunDirectory, step: int) -> int:
-    """Return the step of the last evaluation up to `step`; 0 before the first.
+    """Return the step of the last evaluation up to `step`; 0 if there is no evaluation.
 
-    An evaluation that was interrupted is not in the file, so a resumed attempt repeats it.
+    The file does not have an interrupted evaluation, so a resumed attempt repeats that evaluation.
     """
     steps = (int(line["step"]) for line in read_lines(directory.evaluations))
     return max((each for each in steps if each <= step), default=0)
 
 
 def forget_after(directory: RunDirectory, step: int) -> None:
-    """Drop evaluations after `step`, from which the run resumes, and confirmations without an evaluation."""
+    """Drop evaluations after the resumed `step`, and confirmations whose evaluation is not recorded."""
     drop_lines(directory.evaluations, lambda line: line["step"] > step)
     evaluated = last_evaluated(directory, step)
     drop_lines(directory.confirmations, lambda line: line["confirmed_at"] > evaluated)

@@ -1,8 +1,8 @@
-"""Values of a model.zip that hold byte code, which only the version of Python that wrote it can run.
+"""Find byte code in a model.zip, which only the version of Python that wrote it can run.
 
 Stable-Baselines3 pickles each value that JSON cannot write. A function or class that cannot be imported by
-name is stored as byte code. If another Python executes it, it raises SystemError or ends the process.
-The trainer's own values are names and numbers, but a class of a job's author may be one that cannot be
+name is stored as byte code. If another version of Python executes this code, it raises SystemError or
+crashes. The trainer's own values are names and numbers, but a job's author may use a class that cannot be
 imported by name.
 """
 
@@ -19,14 +19,14 @@ from pathlib import Path
 from palaestra_trainer.errors import ConfigurationError
 
 _SERIALIZED = ":serialized:"
-_PICKLER = "cloudpickle"  # a pickle refers to cloudpickle only if it creates functions or classes
+_PICKLER = "cloudpickle"  # a pickle names cloudpickle only if it creates functions or classes
 
 
 def refuse_another_python(model: Path) -> None:
-    """Return if this Python can run all values of a model.zip.
+    """Check that this version of Python can run all values of a model.zip.
 
     Raises:
-        ConfigurationError: another Python wrote byte code into it.
+        ConfigurationError: another version of Python wrote byte code into the file.
     """
     with zipfile.ZipFile(model) as archive:
         written_by = _python(archive)
@@ -43,7 +43,7 @@ def _this_python() -> str:
 
 
 def _python(archive: zipfile.ZipFile) -> str:
-    """Return the version of Python that wrote a file, as Stable-Baselines3 stored it; "" if it is missing."""
+    """Return the version of Python that wrote a file, as Stable-Baselines3 stored it; "" if not stored."""
     name = "system_info.txt"
     text = archive.read(name).decode() if name in archive.namelist() else ""
     found = re.search(r"Python: (\d+\.\d+)", text)
@@ -60,6 +60,6 @@ def _with_code(archive: zipfile.ZipFile) -> list[str]:
 
 
 def _is_code(pickled: bytes) -> bool:
-    """Return whether a pickle creates a function or class; nothing is unpickled."""
+    """Return whether a pickle creates a function or class, without unpickling it."""
     texts = (argument for _, argument, _ in pickletools.genops(pickled) if isinstance(argument, str))
     return any(text.partition(".")[0] == _PICKLER for text in texts)

@@ -1,8 +1,9 @@
-"""The callbacks of a job: Stable-Baselines3 callbacks of its author, in addition to `TrainingCallback`.
+"""Run the Stable-Baselines3 callbacks of a job's author, in addition to `TrainingCallback`.
 
-A mistake in their list is found before a simulator starts. They are called after `TrainingCallback`, in the
-order of the job. An exception of a callback ends the run with an error that names the callback. The state of
-a callback is not saved, because that would need pickling: each attempt creates new callbacks.
+A mistake in the job's list of callbacks is found before a simulator starts. The callbacks are called after
+`TrainingCallback`, in the order of the job. An exception of a callback ends the run with an error that names
+the callback. The state of a callback is not saved, because that would need pickling. So each attempt creates
+new callbacks.
 """
 
 from __future__ import annotations
@@ -30,7 +31,8 @@ from palaestra_trainer.job.user_code.kwargs import AcceptedArguments
 log = structlog.get_logger(__name__)
 
 FIELD = "algorithm.callbacks"
-# These callbacks of Stable-Baselines3 evaluate or need an EvalCallback; fields of a job replace them.
+# These callbacks of Stable-Baselines3 evaluate or need an EvalCallback. The texts name the fields of a job
+# that replace them.
 _OF_EVALUATION: Mapping[type[BaseCallback], str] = {
     EvalCallback: "a run evaluates on simulators of its own; set trainer.evaluation",
     StopTrainingOnRewardThreshold: "a run ends at a success rate; set trainer.evaluation.stopAtSuccessRate",
@@ -43,8 +45,8 @@ def make_callbacks(wanted: Sequence[Callback]) -> JobCallbacks:
     """Create the callbacks of a job.
 
     Raises:
-        ConfigurationError: one line for each that cannot be imported, is not a callback, or refuses its
-            options.
+        ConfigurationError: a class cannot be imported, is not a callback, or refuses its options; the message
+            has one line for each.
     """
     mistakes: list[str] = []
     made: list[_Named] = []
@@ -63,11 +65,13 @@ def make_callbacks(wanted: Sequence[Callback]) -> JobCallbacks:
 class JobCallbacks(CallbackList):
     """The callbacks of a job as one callback.
 
-    `end` calls their `_on_training_end`, after the last evaluation and checkpoint, not at the end of `learn`.
-    So a callback gets every scalar that is logged, and also the end of an interrupted attempt.
+    `end` calls `_on_training_end` of each callback after the last evaluation and checkpoint, not at the end
+    of `learn`. So a callback gets every logged scalar, and is also called at the end of an interrupted
+    attempt.
 
     Attributes:
-        stopped_by: name of the callback that ended training by returning False; None: no callback did.
+        stopped_by: name of the callback that ended training by returning False; None: no callback returned
+            False.
     """
 
     def __init__(self, callbacks: Sequence[_Named]) -> None:
@@ -84,7 +88,8 @@ class JobCallbacks(CallbackList):
         """Call `_on_training_end` of each callback, if training has begun.
 
         Raises:
-            TrainerError: the first error of a callback. All others are called too; their errors are logged.
+            TrainerError: the first error of a callback. The other callbacks are called too, and their errors
+                are logged.
         """
         failed = self._end_each()
         _log(failed[1:])
@@ -92,11 +97,11 @@ class JobCallbacks(CallbackList):
             raise failed[0]
 
     def end_after_error(self) -> None:
-        """Do the same after another error; only log errors of callbacks, so that they do not hide it."""
+        """Call `_on_training_end` of each callback after another error; only log errors of the callbacks."""
         _log(self._end_each())
 
     def _end_each(self) -> Sequence[TrainerError]:
-        """Return the errors in the order in which the callbacks raised them."""
+        """Call `_on_training_end` of each callback; return their errors in order."""
         failed: list[TrainerError] = []
         for callback in self._named if self._begun else ():
             try:
@@ -114,11 +119,11 @@ class JobCallbacks(CallbackList):
 
 
 class _Named(CallbackList):
-    """One callback; its exceptions become errors with its name.
+    """A wrapper around one callback that adds the callback's name to its errors.
 
     Attributes:
-        name: its class, as the job names it.
-        stopped: whether it has returned False.
+        name: class of the callback, as the job names it.
+        stopped: whether the callback has returned False.
     """
 
     def __init__(self, name: str, callback: BaseCallback) -> None:
@@ -161,7 +166,7 @@ def _naming(name: str) -> Iterator[None]:
     try:
         yield
     except TrainerError:
-        raise  # such as a fault or a signal, which the callback did not cause
+        raise  # for example a fault or a signal, which the callback did not cause
     except (Exception, SystemExit) as error:  # code of the job's author may raise anything
         raise CallbackFailed(f"callback {name}: raised {fact_of(error)}") from error
 

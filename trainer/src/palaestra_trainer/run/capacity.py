@@ -1,8 +1,8 @@
-"""The memory and disk space that a run may use, and a check that its replay buffer fits.
+"""Measure the available memory and disk space, and check that a run's replay buffer fits.
 
-A container's memory limit is that of its control group, so `limits.memory` of a job need not be passed to
-the trainer. Without a limit, the machine's available memory counts. The file system reports the free space of
-a volume.
+The trainer reads the memory limit of its container from the control group, so the job need not pass
+`limits.memory` to the trainer. Without a limit, the machine's available memory counts. The file system
+reports the free space of a volume.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.job.configuration import Checkpoint
 from palaestra_trainer.job.run_directory import RunDirectory
 
-# The reserve is for an update with its batches, evaluations, and the write of a checkpoint. It is far more
-# than they need.
+# The reserve is for the batches of an update, for evaluations, and for writing a checkpoint. They need far
+# less.
 RESERVE_BYTES = 128 << 20
 CONTROL_GROUPS = Path("/sys/fs/cgroup")
 _KIB = 1024
@@ -31,8 +31,10 @@ class Capacity:
 
     Attributes:
         memory_bytes: memory that this process may still allocate; None: unknown.
-        memory_limit: whether a limit of the container, or of another control group, determines it.
-        disk_bytes: space for checkpoints on the volume of the run directory, including existing ones.
+        memory_limit: whether `memory_bytes` follows from a limit of the container or of another control
+            group.
+        disk_bytes: space for checkpoints on the volume of the run directory, including the space of existing
+            checkpoints.
     """
 
     memory_bytes: int | None
@@ -46,9 +48,10 @@ def capacity_now(
     """Return the space that is available now.
 
     Args:
-        directory: the run directory; it exists.
-        groups: the folder where the control groups are mounted.
-        processes: the folder where the kernel reports memory, and the control group of this process.
+        directory: the run directory, which must exist.
+        groups: the folder at which the control groups are mounted.
+        processes: the folder of the proc file system, with the machine's memory and the control group of this
+            process.
     """
     machine = _available(processes / "meminfo")
     limited = min(_left_in_groups(groups, processes / "self" / "cgroup"), default=None)
@@ -61,10 +64,11 @@ def capacity_now(
 
 
 def refuse_what_does_not_fit(replay: ReplaySize | None, wanted: Checkpoint, capacity: Capacity) -> None:
-    """Check that the replay buffer fits into memory, and its checkpoints on the volume.
+    """Check that the replay buffer fits into memory, and that its checkpoints fit on the volume.
 
     Raises:
-        ConfigurationError: they do not fit; the message has both numbers and the largest buffer that fits.
+        ConfigurationError: the buffer or its checkpoints do not fit; the message has the needed size, the
+            available size and the largest possible buffer.
     """
     if replay is None:
         return
@@ -89,7 +93,7 @@ def refuse_what_does_not_fit(replay: ReplaySize | None, wanted: Checkpoint, capa
 
 
 def _available(meminfo: Path) -> int | None:
-    """Return the available memory of the machine in bytes; None: unknown."""
+    """Return the available memory of the machine in bytes; None if the kernel does not report it."""
     for name, value in _pairs(meminfo):
         if name == "MemAvailable:":
             return value * _KIB
@@ -97,9 +101,9 @@ def _available(meminfo: Path) -> int | None:
 
 
 def _left_in_groups(groups: Path, own: Path) -> Iterator[int]:
-    """Yield the free memory below the limit of each control group that this process is in.
+    """Yield the memory that is left below the limit of each control group of this process.
 
-    The file cache does not count as used, because the kernel frees it first.
+    Memory of the file cache counts as free, because the kernel can free it.
     """
     for line in _lines(own):
         _, controllers, path = line.split(":", 2)
@@ -130,7 +134,7 @@ def _pairs(path: Path) -> Iterator[tuple[str, int]]:
 
 
 def _number(path: Path) -> int | None:
-    """Return the number in a file; None: the file is missing, or holds no number because no limit is set."""
+    """Return the number in a file; None if the file is missing, or holds a word that means no limit."""
     lines = _lines(path)
     return int(lines[0]) if lines and lines[0].isdigit() else None
 

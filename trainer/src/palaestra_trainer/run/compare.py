@@ -1,7 +1,8 @@
 """Play the policies of two runs on the same fresh episodes until their difference is known.
 
-Both policies play in the simulator that evaluates A's: the same world, program and seeds, so that an episode
-is as hard for one as for the other. Each sees and acts through the environment of its own job.
+Both policies play in simulators like the one that evaluates A's policy, with the same world, program and
+seeds. So an episode is equally hard for both policies. Each policy plays through the environment of its own
+job.
 """
 
 from __future__ import annotations
@@ -28,19 +29,19 @@ from palaestra_trainer.waiting.at_once import at_once
 from palaestra_trainer.waiting.check import Check, go_on
 from palaestra_trainer.waiting.exit import leave_after
 
-MakeHere = Callable[[Path], MakeMembers]  # the simulators of a run directory
+MakeHere = Callable[[Path], MakeMembers]  # returns a function that creates the simulators of a run directory
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rules:
-    """How two policies are compared.
+    """The rules of a comparison of two policies.
 
     Attributes:
-        episodes: each policy plays at most this many.
-        batch: episodes between two looks at the difference.
-        margin: two success rates that differ by no more than this count as equal.
+        episodes: the most episodes that each policy plays.
+        batch: number of episodes between two computations of the difference.
+        margin: two success rates that differ by at most this number count as equal.
         stream: name of the seed stream.
-        driver: the program of both simulators; None: that of A.
+        driver: the program of both simulators; None: the program of A's simulator.
     """
 
     episodes: int = 1000
@@ -52,13 +53,13 @@ class Rules:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Comparison:
-    """The comparison after some episodes.
+    """The state of a comparison after some episodes.
 
     Attributes:
-        pairs: the results so far.
+        pairs: counts of the results so far.
         verdict: the verdict of these results.
-        faults: episodes that a fault truncated and that were played again.
-        ended: whether no more episodes are played.
+        faults: how often a fault truncated an episode, which was then played again.
+        ended: whether the comparison is over.
     """
 
     pairs: Pairs
@@ -68,11 +69,11 @@ class Comparison:
 
 
 def contestants(a: Path, b: Path, driver: str | None = None) -> tuple[Configuration, Configuration]:
-    """Return the configurations with which two policies play, each with one simulator; both are like A's.
+    """Return the configurations with which A and B play, each with one simulator like A's.
 
     Raises:
-        ConfigurationError: a run directory has no model, or the policies have different tasks; one line for
-            each reason.
+        ConfigurationError: a run directory has no model, or the policies have different tasks; the message
+            has one line for each reason.
     """
     configurations = tuple(load_run(run) for run in (a, b))
     mistakes = [
@@ -85,7 +86,8 @@ def contestants(a: Path, b: Path, driver: str | None = None) -> tuple[Configurat
     first, second = configurations
     entry = evaluating(first)[0].model_copy(update={"min_simulators": None, "standby": False})
     entry = entry if driver is None else in_driver(entry, driver)
-    # The ROS name of a simulator is made from its name and index, so the second one gets others.
+    # The ROS name of a simulator follows from its name and index. So the second simulator gets another name
+    # and index.
     other = entry.model_copy(update={"name": f"{entry.name}-b", "index": entry.index + 1})
     names = {field: getattr(first, field) for field in ("job", "namespace", "uid", "replica")}
     return (
@@ -95,7 +97,7 @@ def contestants(a: Path, b: Path, driver: str | None = None) -> tuple[Configurat
 
 
 def _differences(a: Configuration, b: Configuration) -> Iterator[str]:
-    """Yield the reasons why success would not mean the same for two policies."""
+    """Yield the reasons why the success rates of two policies cannot be compared."""
     if a.environment.id != b.environment.id:
         yield (
             f"environment.id: A learned {a.environment.id}, and B {b.environment.id}; "
@@ -107,7 +109,7 @@ def _differences(a: Configuration, b: Configuration) -> Iterator[str]:
 
 
 def notes(a: Path, b: Path) -> Iterator[str]:
-    """Yield the differences of two jobs that may make an episode harder for one of the policies."""
+    """Yield the differences between two jobs that may make an episode harder for one of the policies."""
     first, second = (load_run(run) for run in (a, b))
     ours, theirs = first.environment.options, second.environment.options
     names = [name for name in sorted({*ours, *theirs}) if ours.get(name) != theirs.get(name)]
@@ -117,7 +119,7 @@ def notes(a: Path, b: Path) -> Iterator[str]:
         yield f"no simulator of A has role Evaluate: both play in the world of {evaluating(first)[0].name}"
     worlds = [Path(evaluating(each)[0].world).name for each in (first, second)]
     if worlds[0] != worlds[1]:
-        yield f"B was evaluated in the world {worlds[1]}; both play in A's, {worlds[0]}"
+        yield f"B was evaluated in the world {worlds[1]}; both play in A's world, {worlds[0]}"
 
 
 def compare(
@@ -128,21 +130,21 @@ def compare(
     report: Callable[[Comparison], object],
     check: Check = go_on,
 ) -> Comparison:
-    """Return the comparison of the policies of two run directories, once it is decided or too long.
+    """Compare the policies of two run directories until the verdict is clear or all episodes are played.
 
     Args:
-        a: the run directory whose simulator both play in.
+        a: the run directory in whose simulator both policies play.
         b: the other run directory.
-        make_here: returns a function that creates the simulators of a run directory.
-        rules: how to play, and when to end.
-        report: called after each batch; the last time before simulators are stopped, which takes at most a
-            minute.
+        make_here: a function that returns a function that creates the simulators of a run directory.
+        rules: the rules of the comparison.
+        report: called after each batch; the last call comes before the stop of the simulators, which takes at
+            most a minute.
         check: called often; it raises to cancel the comparison.
 
     Raises:
         ConfigurationError: a run directory is wrong, the policies have different tasks, or no episode
             reports its success.
-        FaultBudgetSpent: a simulator broke more often than its budget allows.
+        FaultBudgetSpent: a simulator failed more often than its restart budget allows.
     """
     first, second = contestants(a, b, rules.driver)
     members = make_here(a)
@@ -169,7 +171,7 @@ def _play(player: Playing, seeds: tuple[int, ...], check: Check) -> EvaluationRe
 
 
 def _successes(played: list[EvaluationResult], environment: str) -> Iterator[tuple[bool, bool]]:
-    """Yield the results of A and B in each episode; an episode that reports nothing has failed.
+    """Yield the results of A and B in each episode; an episode without a report counts as failed.
 
     Raises:
         ConfigurationError: no episode reports its success.
@@ -191,7 +193,7 @@ def _comparison(results: list[tuple[bool, bool]], faults: int, rules: Rules) -> 
 
 
 def as_json(comparison: Comparison, rules: Rules) -> dict[str, Any]:
-    """Return a comparison for programs."""
+    """Return a comparison as JSON data."""
     pairs = comparison.pairs
     rates = [successes / pairs.episodes for successes in pairs.successes]
     return {
@@ -211,7 +213,7 @@ def as_json(comparison: Comparison, rules: Rules) -> dict[str, Any]:
 
 
 def line_of(comparison: Comparison) -> str:
-    """Return the comparison so far as a line for a person."""
+    """Return the comparison so far as a line of text."""
     pairs = comparison.pairs
     ours, theirs = (successes / pairs.episodes for successes in pairs.successes)
     low, high = interval(pairs)
@@ -222,7 +224,7 @@ def line_of(comparison: Comparison) -> str:
 
 
 def sentence_of(comparison: Comparison, rules: Rules) -> str:
-    """Return the result as a sentence for a person."""
+    """Return the result of the comparison as a sentence."""
     pairs, (low, high) = comparison.pairs, interval(comparison.pairs)
     after = f"after {pairs.episodes:,} episodes"
     bounds = f"{_points(low)} to {_points(high)} points"

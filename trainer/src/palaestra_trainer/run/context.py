@@ -1,4 +1,4 @@
-"""The objects of one attempt of a run that the parts of the training loop share."""
+"""The objects of one attempt that the modules of the training loop share."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from palaestra_trainer.simulators.fleet import Fleet
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunContext:
-    """One attempt of a run, whose simulators are up.
+    """The objects of one attempt, whose simulators are up.
 
     Attributes:
         configuration: the configuration of the run.
         directory: the run directory.
         fleet: the simulators.
         progress: the progress of the run.
-        interruption: raises after a signal has arrived.
+        interruption: the check that raises Interrupted after a signal has arrived.
     """
 
     configuration: Configuration

@@ -1,7 +1,8 @@
-"""Reports of a user's own training program (`trainer.command`), for /status, /metrics and the operator.
+"""Serve the reports of a user's own training program (`trainer.command`) in /status and /metrics.
 
-The built-in loop reports by itself. Without reports the operator does not know a program's steps. It then
-cannot detect progress between preempted attempts, and ends the replica as `NoProgress`.
+The built-in training loop does not need these reports. If a user's program does not report, the operator does
+not know its steps. The operator then cannot detect progress between preempted attempts, and ends the replica
+as `NoProgress`.
 """
 
 from __future__ import annotations
@@ -25,44 +26,44 @@ from palaestra_trainer.run.telemetry.status_server import status_server
 from palaestra_trainer.run.termination import write_last_word
 
 _lock = threading.Lock()
-_EVALUATING_S = 60.0  # no step of an environment takes longer
+_EVALUATING_S = 60.0  # longer than any step of an environment takes
 
 
 class ProgramReport(Progress):
-    """The progress of a user's own program; its time by cause is unknown.
+    """The progress of a user's own program, without its time by cause.
 
-    Its step is the one that the program reports. Before the first report, it is the number of steps of its
-    fault-tolerant environments in this attempt.
+    The step is the step that the program reports. Before the first report, the step is the number of steps in
+    the program's fault-tolerant environments in this attempt.
     """
 
     _reports = _evaluates = False
 
     @property
     def phase(self) -> str:
-        """The phase: evaluating if the last step was recent and of an evaluating environment, else training.
+        """The phase: "evaluating" if an evaluating environment made the last step recently, else "training".
 
-        So the operator does not mistake an evaluation for stalled training.
+        By this phase the operator can distinguish an evaluation from stalled training.
         """
         return "evaluating" if self._evaluates and self.idle_s() < _EVALUATING_S else "training"
 
     def spending(self, cause: Cause) -> AbstractContextManager[None]:
-        """Ignore it, because any thread of the program may wait for simulators."""
+        """Do not measure time, because any thread of the program may wait for simulators."""
         del cause
         return nullcontext()
 
     def counted(self, kept: int | None = None) -> Counters:
-        """Return the counters as they are now, without the time spent."""
+        """Return the current counters, without the time by cause."""
         return replace(super().counted(kept), goodput={})
 
     def reports(self, step: int, success_rate: float | None) -> None:
-        """Set the step, and the success rate if the program reports one."""
+        """Set the step, and the success rate unless it is None."""
         self._reports, self.step = True, step
         self.stepped(1)
         if success_rate is not None:
             self.success_rate = success_rate
 
     def played(self, role: Role, infos: Sequence[Mapping[str, Any]]) -> None:
-        """Count a step of environments by the infos of their rows; evaluating ones add no steps."""
+        """Count a step of collecting environments by the infos of their rows; not of evaluating ones."""
         valid = sum("sim_fault" not in ours(info) for info in infos)
         if valid:
             self.stepped(valid)
@@ -72,7 +73,7 @@ class ProgramReport(Progress):
 
 
 def report(step: int, success_rate: float | None) -> None:
-    """Report as `palaestra_trainer.report` describes."""
+    """Implement `palaestra_trainer.report`."""
     if step < 0:
         raise ValueError(f"step: {step} is negative; give the number of environment steps learned from")
     if success_rate is not None and not 0 <= success_rate <= 1:
@@ -88,9 +89,9 @@ def report(step: int, success_rate: float | None) -> None:
 
 
 def reported(configuration: Configuration) -> ProgramReport:
-    """Return the progress in which environments of this process count their steps.
+    """Return the progress to which the environments of this process add their steps.
 
-    Each worker process of a program counts separately, and /status does not show these counts.
+    A worker process of the program counts separately, and /status does not show its counts.
     """
     if multiprocessing.parent_process() is None:
         with _lock:
@@ -100,7 +101,7 @@ def reported(configuration: Configuration) -> ProgramReport:
 
 @cache
 def _served() -> ProgramReport:
-    """Return the progress of this process; the first call starts the status server."""
+    """Return the progress of this process; the first call also starts the status server."""
     configuration = load()
     progress = ProgramReport(configuration.steps, [])
     status_server(configuration.status_address, progress, constants(configuration)).start()

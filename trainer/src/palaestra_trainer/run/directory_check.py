@@ -1,8 +1,8 @@
-"""Check a run directory before anything is started, written or deleted.
+"""Check a run directory before the attempt starts, writes or deletes anything.
 
-A disk, a copy or a person may have damaged any file. Without the check, a run would end in a traceback hours
-later, or would lose the content of the file without a message. `journal.json` is not checked, because a run
-does not need it.
+A disk, a copy or a person may have damaged a file. Without this check, a run could end with a traceback hours
+later, or lose the content of the file without a message. `journal.json` is not checked, because a run does
+not need that file.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _Rate = Annotated[float, Field(ge=0.0, le=1.0)] | None
 
 
 class _Content(BaseModel):
-    """The fields that a run relies on; others are ignored."""
+    """The fields that a run needs; other fields are ignored."""
 
     model_config = ConfigDict(strict=True, extra="ignore")
 
@@ -61,17 +61,17 @@ class _Summary(_Content):
 
 
 def inspect(directory: RunDirectory) -> None:
-    """Check that every file in a run directory can be read; files and the directory may be missing.
+    """Check that every existing file of a run directory can be read; the directory may be missing.
 
     Raises:
-        ConfigurationError: one line for each damaged file.
+        ConfigurationError: a file is damaged; the message has one line for each damaged file.
     """
     if lines := [f"{path}: {fact}; {REMEDY}" for path, fact in _damages(directory)]:
         raise ConfigurationError("\n".join(lines))
 
 
 class _Damaged(Exception):
-    """A file is damaged; the text is the fact."""
+    """A file is damaged; the message is the fact."""
 
 
 def _damages(directory: RunDirectory) -> Iterator[tuple[Path, str]]:
@@ -94,7 +94,7 @@ def _damages(directory: RunDirectory) -> Iterator[tuple[Path, str]]:
                 check(path)
         except _Damaged as damage:
             yield path, str(damage)
-        except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:  # also a number of 5,000 digits
+        except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:  # e.g. a number of 5,000 digits
             yield path, f"cannot be read ({error})"
 
 
@@ -109,7 +109,7 @@ def _check_file(path: Path) -> None:
 
 
 def _check_lines(path: Path, kind: type[_Content]) -> None:
-    """Check a file of JSON lines; a line that a crash has truncated is ignored, as by all readers."""
+    """Check a file of JSON lines; ignore a line that a crash truncated, as all readers of the file do."""
     for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
         try:
             content = json.loads(line)
@@ -126,7 +126,7 @@ def _check_model(path: Path) -> None:
     with zipfile.ZipFile(path) as archive:
         if damaged := archive.testzip():
             raise _Damaged(f"{damaged} in it is damaged")
-        # A truncated file may end with the index of a zip that it contains, and so seem to be complete.
+        # A truncated file may end with the index of a zip inside it, and then looks complete.
         if _DATA not in archive.namelist():
             raise _Damaged(f"has no {_DATA}, as models of Stable-Baselines3 have")
         if BEST in archive.namelist():
@@ -134,7 +134,7 @@ def _check_model(path: Path) -> None:
 
 
 def _check(content: Any, kind: Any, where: str = "") -> None:
-    """Raise an error with the first reason if content does not match a type."""
+    """Check that content has a type; raise `_Damaged` with the first mistake."""
     try:
         TypeAdapter(kind).validate_python(content, strict=True)
     except ValidationError as error:

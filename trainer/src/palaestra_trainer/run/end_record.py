@@ -1,7 +1,8 @@
-"""The end of an attempt as it is kept: the termination message, end.json and the report.
+"""Record the end of an attempt: the termination message, end.json and the report.
 
-The message is first, because the operator needs it and a report may take a second. An attempt that was never
-recorded leaves no report: its folder may belong to another run.
+The message is written first, because the operator needs the message and a report may take a second. If the
+attempt was never recorded in the run directory, no report is written, because the folder may belong to
+another run.
 """
 
 from __future__ import annotations
@@ -17,14 +18,14 @@ from palaestra_trainer.run.termination import End, write_last_word
 
 
 def write_end(directory: RunDirectory, progress: Progress, end: End) -> None:
-    """Write the termination message and, if the attempt was recorded, the report; return in bounded time."""
+    """Write the termination message; if the attempt was recorded, write end.json and the report too."""
     write_last_word(last_word(progress, end))
     if progress.attempt is not None:
         report_end(directory, lambda: _record_of(progress, end))
 
 
 def last_word(progress: Progress, end: End) -> Termination:
-    """Return the termination message of an attempt that ends now; never blocks."""
+    """Return the termination message of an attempt that ends now; this function never blocks."""
     return Termination(
         step=progress.step,
         success_rate=progress.success_rate,
@@ -39,7 +40,7 @@ def last_word(progress: Progress, end: End) -> Termination:
 
 
 def _record_of(progress: Progress, end: End) -> dict[str, Any]:
-    """Return the content of end.json; it may block, if the thread that holds a lock hangs."""
+    """Return the content of end.json; this may block if a thread that holds a lock hangs."""
     interval, counters = progress.success_interval, progress.counted()
     return {
         "exit_code": int(end.code),

@@ -36,7 +36,7 @@ def _nobody(result: dict[str, Any]) -> None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Playing:
-    """The policy of a run, and started simulators for its episodes."""
+    """The policy of a run, and the started simulators in which it plays."""
 
     policy: ActingPolicy
     restarters: Sequence[Restarter]
@@ -46,17 +46,17 @@ class Playing:
 def playing(
     configuration: Configuration, model: Path, make_members: MakeMembers, check: Check = go_on
 ) -> Iterator[Playing]:
-    """Yield the policy in a model.zip with started simulators; stop the simulators at the end.
+    """Start simulators; yield the policy of a model.zip with them; stop the simulators at the end.
 
     Args:
-        configuration: of the run, with the simulators to start; all of them evaluate.
+        configuration: the configuration of the run; its simulators are started, and all must evaluate.
         model: the model.zip of the run directory.
-        make_members: creates the simulators.
-        check: called while the simulators start; it raises to cancel that.
+        make_members: a function that creates the simulators.
+        check: called while the simulators start; it raises to cancel the start.
 
     Raises:
         ConfigurationError: the model is missing, or does not fit the configuration.
-        FaultBudgetSpent: a simulator broke more often than its budget allows.
+        FaultBudgetSpent: a simulator failed more often than its restart budget allows.
     """
     if not model.exists():
         raise ConfigurationError(f"{model}: does not exist; train first, or give another run directory")
@@ -83,18 +83,18 @@ def measure(
     stream: str,
     report: Callable[[dict[str, Any]], object] = _nobody,
 ) -> dict[str, Any]:
-    """Return the evaluation of a run directory's model, in the first `episodes` episodes of a seed stream.
+    """Evaluate the model of a run directory in the first `episodes` episodes of a seed stream.
 
-    Only the evaluating simulators of the configuration are created and started; if it has none, the first
-    collecting one is.
+    Only the evaluating simulators of the configuration are started. If the configuration does not have any,
+    the first collecting simulator is started.
 
     Args:
         configuration: the configuration of the run.
         model: the model.zip of the run directory.
-        make_members: creates the simulators.
+        make_members: a function that creates the simulators.
         episodes: number of episodes.
         stream: name of the seed stream.
-        report: called with the result, before simulators are stopped; if they do not stop within a minute,
+        report: called with the result before the simulators are stopped. If they do not stop within a minute,
             the process ends.
 
     Raises:
@@ -123,12 +123,13 @@ def in_each(
     make_members: MakeMembers,
     **wanted: Any,
 ) -> Iterator[dict[str, Any]]:
-    """Yield the results of `measure` for the same episodes in each of several simulator programs, one by one.
+    """Yield the results of `measure` on the same episodes in several simulator programs, one by one.
 
-    Each result has the name of the program as `simulator`.
+    In each result, `simulator` is the name of the program.
 
     Raises:
-        ConfigurationError: before any simulator starts: one of them cannot run here; or as `measure`.
+        ConfigurationError: as `measure`; also before a simulator starts, if one of the programs cannot run on
+            this machine.
         FaultBudgetSpent: as `measure`.
     """
     entries = _warned(configuration)
@@ -139,17 +140,18 @@ def in_each(
 
 
 def evaluating(configuration: Configuration) -> tuple[SimulatorConfiguration, ...]:
-    """Return the simulators with role Evaluate; if none has that role, the first collecting one."""
+    """Return the simulators with role Evaluate; without any, the first collecting simulator."""
     if found := configuration.with_role(Role.EVALUATE):
         return found
     return (configuration.with_role(Role.COLLECT)[0].model_copy(update={"role": Role.EVALUATE}),)
 
 
 def _warned(configuration: Configuration) -> tuple[SimulatorConfiguration, ...]:
-    """Return the simulators that evaluate; log a warning if their world is not made for it."""
+    """Return the simulators that evaluate; log a warning if it is a collecting simulator."""
     found = evaluating(configuration)
     if not configuration.with_role(Role.EVALUATE):
         log.warning(
-            "no simulator has role Evaluate: the world is that of a collecting one", name=found[0].name
+            "no simulator has role Evaluate: a collecting simulator evaluates in its world",
+            name=found[0].name,
         )
     return found

@@ -1,4 +1,4 @@
-"""Evaluations of one policy in several simulators, as a table for a person."""
+"""Format evaluations of one policy in several simulators as a table."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ HEAD = f"{'simulator':<10}{'success':>8}  {'95 % interval':<14}{'return':>9}{'st
 
 
 def row(result: Mapping[str, Any]) -> str:
-    """Return the row of one evaluation, as `run.evaluate.measure` returns it with its `simulator`."""
+    """Return the row of one result of `run.evaluate.in_each`."""
     rate, interval = result["success_rate"], result["success_interval"]
     bounds = "" if interval is None else f"{interval['low']:.0%} to {interval['high']:.0%}"
     success = "unknown" if rate is None else f"{rate:.0%}"

@@ -1,8 +1,9 @@
-"""The counters of a run since its last checkpoint, for the attempt after a kill.
+"""Write the counters of a run every few seconds, for the attempt after a kill.
 
-A killed process saves nothing. Its steps are played again, but its time and its faults still count, so they
-are written to a file every few seconds. The write does not wait for the disk: a kill loses nothing by that,
-and a crash of the machine loses only data that a resume does not need.
+A killed process cannot save a checkpoint. The next attempt plays its steps again, but the time and the faults
+of the killed process still count. So the counters are also written to this file. The write does not wait for
+the disk. A kill does not lose the written data, and a crash of the machine loses only data that a resume does
+not need.
 """
 
 from __future__ import annotations
@@ -23,11 +24,11 @@ EVERY_S = 5.0
 
 
 class Journal:
-    """One file in a run directory.
+    """The file journal.json of a run directory.
 
     Args:
         path: the file; it may be missing.
-        clock: returns seconds from any starting point.
+        clock: a function that returns seconds from any starting point.
     """
 
     def __init__(self, path: Path, clock: Callable[[], float] = time.monotonic) -> None:
@@ -51,7 +52,8 @@ class Journal:
     def regained(self, step: int, saved: Counters) -> Counters:
         """Return the counters of a run that resumes from `step`.
 
-        They are the `saved` ones of that step, unless the run continued after it without a new checkpoint.
+        These are the `saved` counters of that step, unless the run continued after the step without a new
+        checkpoint.
         """
         try:
             content = json.loads(self._path.read_text(encoding="utf-8"))

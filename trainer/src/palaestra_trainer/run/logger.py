@@ -1,4 +1,4 @@
-"""The curves of a run: Stable-Baselines3's logger, with the scalars of the run in each of its points."""
+"""Log the curves of a run: a logger of Stable-Baselines3 that adds the scalars of the run."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ _RGB = 3  # Summary.Image.colorspace; source: tensorflow/core/framework/summary.
 
 
 class CurvesLogger(Logger):
-    """Writes to TensorBoard, and to the values of /metrics.
+    """A logger that writes to TensorBoard and to the values of /metrics.
 
     Args:
         folder: the folder of TensorBoard's event files.
-        progress: the run; its scalars are recorded at each dump, which is less frequent than a rollout.
+        progress: the progress of the run; its scalars are recorded at each dump.
     """
 
     def __init__(self, folder: Path, progress: Progress) -> None:
@@ -36,21 +36,21 @@ class CurvesLogger(Logger):
     def show(self, films: Mapping[str, bytes], step: int) -> None:
         """Write animated GIFs by name, as images of TensorBoard.
 
-        SummaryWriter writes each picture as a PNG, so the summaries are made here.
+        SummaryWriter would write each picture as a PNG, so this method creates the summaries.
         """
         summary = import_module("tensorboard.compat.proto.summary_pb2").Summary  # slow to import
         images = {
             name: summary.Image(encoded_image_string=film, colorspace=_RGB) for name, film in films.items()
         }
         values = [summary.Value(tag=name, image=image) for name, image in images.items()]
-        writer = self._curves.writer.file_writer  # None once the logger is closed
+        writer = self._curves.writer.file_writer  # None after the logger was closed
         if values and writer is not None:
             writer.add_summary(summary(value=values), step)
             writer.flush()
 
 
 def hide_points(folder: Path, *, after: int) -> None:
-    """Write the event by which TensorBoard hides points of earlier files with a step larger than `after`."""
+    """Make TensorBoard hide the points of earlier files after the step `after`."""
     from torch.utils.tensorboard.writer import SummaryWriter  # noqa: PLC0415 - most programs write no curves
 
     with SummaryWriter(str(folder), purge_step=after + 1):

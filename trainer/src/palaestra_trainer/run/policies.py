@@ -1,4 +1,4 @@
-"""A trained policy that takes unnormalized observations, and the settings of its environment."""
+"""Load a trained policy that takes raw observations, with the settings of its environment."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from palaestra_trainer.run.checkpoint.tensors import NORMALIZE
 
 
 class Scale(NamedTuple):
-    """The numbers by which a part of an observation is normalized."""
+    """The statistics and limits that normalize a part of an observation."""
 
     mean: np.ndarray
     variance: np.ndarray
@@ -38,12 +38,12 @@ class TrainedPolicy:
     """A policy with its normalizer.
 
     Attributes:
-        model: the Stable-Baselines3 model, which learned from normalized observations.
-        environment_id: name of the environment that it learned in.
+        model: the Stable-Baselines3 model, which needs normalized observations if the run normalized them.
+        environment_id: name of the environment in which the policy learned.
         environment_options: keyword arguments of that environment, without robot and scene.
-        environment: that environment as the job sets it, with its wrappers.
+        environment: that environment in the job, with its wrappers.
         scales: mean, variance, clip and epsilon by the key of the observation, or by "" if it is not a Dict;
-            missing keys are not normalized.
+            keys that are missing here are not normalized.
     """
 
     model: BaseAlgorithm
@@ -58,13 +58,13 @@ class TrainedPolicy:
         return takes_masks(self.model)
 
     def make_env(self, robot: RobotAbc, scene: Scene) -> gymnasium.Env[Any, Any]:
-        """Return the environment that the policy learned in, with its wrappers, a robot and its scene.
+        """Return the environment in which the policy learned, with its wrappers, for a robot and its scene.
 
-        The environment gets robot and scene if its signature accepts them, as in a run.
+        As in a run, the environment gets robot and scene only if its signature accepts them.
 
         Raises:
-            ConfigurationError: it is not registered, or its signature does not fit.
-            MissingCapability: the robot lacks one of its `needs`.
+            ConfigurationError: the environment is not registered, or its signature does not fit.
+            MissingCapability: the robot lacks a capability in the environment's `needs`.
         """
         return make_environment(self.environment, robot, scene)
 
@@ -76,13 +76,14 @@ class TrainedPolicy:
         deterministic: bool = True,  # noqa: FBT001, FBT002 - as in Stable-Baselines3
         action_masks: Any = None,
     ) -> tuple[Any, Any]:
-        """Return an action for an observation as the environment returned it, and the policy's next state.
+        """Return an action for a raw observation of the environment, and the policy's next state.
 
-        A policy of MaskablePPO needs the masks that the environment's `action_masks` returns; other policies
-        take no masks.
+        A policy of MaskablePPO needs the masks that the environment's `action_masks` returns. Other policies
+        do not take masks.
 
         Raises:
-            ValueError: a policy that needs masks got none or wrong ones, or another policy got masks.
+            ValueError: masks are missing or wrong for a policy that needs masks, or were given to another
+                policy.
         """
         seen = (self._seen(observation), state, episode_start)
         if self.takes_masks:
@@ -117,13 +118,13 @@ class TrainedPolicy:
 
 
 def load_policy(run_or_zip: str | Path) -> TrainedPolicy:
-    """Return the policy of a run directory, or of a model zip inside one.
+    """Return the trained policy of a run directory or of its model.zip.
 
     Stable-Baselines3 unpickles the zip, so load only files that you trust.
 
     Raises:
-        ConfigurationError: the model is missing, or training.yaml in its folder is; or the model has byte
-            code of another Python.
+        ConfigurationError: the model, or training.yaml in its folder, is missing; or the model has byte code
+            of another version of Python.
     """
     path = Path(run_or_zip)
     model = RunDirectory(path).model if path.is_dir() else path

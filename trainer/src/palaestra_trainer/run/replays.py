@@ -1,4 +1,4 @@
-"""Recorded episodes of the best policy, a best, a median and a failed one, in one file."""
+"""Save three recorded episodes of the best policy in one file: the best, the median and a failed one."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from palaestra_trainer.reporting.read_replays import replays_of
 
 
 def keep_replays(directory: RunDirectory, evaluation: EvaluationResult, name: str) -> dict[str, Any]:
-    """Write replays.json with the chosen episodes of an evaluation, and return its content.
+    """Choose episodes of an evaluation, write them to replays.json, and return its content.
 
-    Without recordings nothing is written, and the content is empty.
+    If the evaluation has no recordings, the file is not written, and the content is empty.
 
     Args:
         directory: the run directory.
         evaluation: the evaluation.
-        name: what the evaluation is, for people.
+        name: description of the evaluation for people.
     """
     episodes = [
         episode.record() | {"title": title, "film": episode.film.to_json()}
@@ -39,16 +39,16 @@ def keep_replays(directory: RunDirectory, evaluation: EvaluationResult, name: st
 
 
 def films_of(content: Mapping[str, Any]) -> dict[str, bytes]:
-    """Return the episodes of replays.json from above, as animated GIFs by their titles."""
+    """Return the episodes in the content of replays.json as animated GIFs by title."""
     from palaestra_trainer.reporting.film import animated  # noqa: PLC0415 - a run without recordings draws none
 
     return {replay.title: animated(replay) for replay in replays_of(content)}
 
 
 def chosen(episodes: Sequence[Episode]) -> list[tuple[str, Episode]]:
-    """Return the best, the median and the worst failed episode by return, with their titles; none twice.
+    """Return the best, the median and the worst failed episode by return, each once, with their titles.
 
-    If the environment reports no success, or no episode failed, the third is the worst one.
+    If the environment does not report success, or no episode failed, the third episode is the worst episode.
     """
     recorded = sorted(
         (episode for episode in episodes if episode.film is not None),

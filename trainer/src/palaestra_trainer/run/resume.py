@@ -1,7 +1,8 @@
 """Bring simulators back to the state of a checkpoint.
 
-A simulator cannot be saved. Instead its episode is played again: a reset with the same seed, then the same
-actions. The last observation is compared; a mismatch is logged and training continues from it.
+The state of a simulator cannot be saved. Instead, its episode is played again: a reset with the same seed,
+then the same actions. The last observation is compared with the saved observation. If they differ, the
+difference is logged, and training continues from the new observation.
 """
 
 from __future__ import annotations
@@ -21,10 +22,10 @@ log = structlog.get_logger(__name__)
 
 
 def rejoin(env: SimulatorsVecEnv, saved: TrainingState, *, masked: bool = False) -> TrainingState:
-    """Bring each simulator back to the saved state, or as near as possible; return the resulting state.
+    """Bring each simulator back to the saved state if possible; return the resulting state.
 
-    A simulator that was broken at the save, breaks now, or is new in the run begins its next episode. If
-    `masked`, so does a simulator whose mask now forbids an action of its episode.
+    A simulator begins its next episode if it was down at the save, fails now, or is new in the run. If
+    `masked` is set, it also begins its next episode if its mask now forbids a saved action.
     """
     before = [*saved.members, *[EpisodeState(0, None)] * env.num_envs][: env.num_envs]
     observation = cast("Observations", env.resume(before, masked=masked))
@@ -48,7 +49,7 @@ def rejoin(env: SimulatorsVecEnv, saved: TrainingState, *, masked: bool = False)
 
 
 def _tell(begun: np.ndarray, same: np.ndarray) -> None:
-    """Log a warning if simulators replayed their episode and reached another observation."""
+    """Log a warning if simulators replayed their episode but reached another observation."""
     different = sum(not new and not equal for new, equal in zip(begun, same, strict=False))
     if different:
         log.warning(
@@ -60,17 +61,17 @@ def _tell(begun: np.ndarray, same: np.ndarray) -> None:
 
 
 def _resized(values: np.ndarray, length: int) -> np.ndarray:
-    """Return `length` values; missing ones are 0."""
+    """Return the first `length` values; add zeros if there are fewer."""
     return np.concatenate([values, np.zeros(length, dtype=values.dtype)])[:length]
 
 
 def _returns_left(saved: TrainingState, begun: np.ndarray) -> np.ndarray | None:
-    """Return the discounted rewards of the episodes that continue; None: the run does not normalize."""
+    """Return the discounted rewards of continued episodes, 0 for new ones; None without normalization."""
     known = saved.running_returns
     return None if known is None else np.where(begun, 0.0, _resized(known, len(begun)))
 
 
 def _terms_left(saved: TrainingState, begun: np.ndarray) -> list[dict[str, float]]:
-    """Return the sums of reward terms of the episodes that continue."""
+    """Return the sums of reward terms of continued episodes, empty for new ones."""
     known = [*saved.rollout["terms"], *[{}] * len(begun)]
     return [{} if new else terms for new, terms in zip(begun, known, strict=False)]

@@ -1,14 +1,11 @@
 """Handle SIGTERM and SIGINT.
 
-The first signal is recorded, and the run ends at its next check for signals.
-During training it then saves a checkpoint of the last rollout boundary. While
-simulators start, it saves no checkpoint, because there is nothing to save. The
-handler itself raises nothing, because it may run while a lock is released.
-Waits may continue for `shutdown_deadline.LEFT_S` seconds. A second signal ends
-the process at once, and so does a signal that arrives before the run listens.
-After the run's end, while Python exits, signals are ignored. A SIGINT that was
-ignored when the program started, as in the background of a script, stays
-ignored.
+The handler records the first signal, and the run ends at its next check for signals. During training, the run
+then saves a checkpoint of the last boundary between rollouts. While simulators start, the run does not save a
+checkpoint, because it has no progress yet. The handler does not raise, because it may run while a lock is
+released. Waits may continue for `shutdown_deadline.LEFT_S` seconds. A second signal ends the process at once,
+and so does a signal that arrives before the run listens. After the run's end, while Python exits, signals are
+ignored. If SIGINT was ignored when the program started, as in the background of a script, it stays ignored.
 """
 
 from __future__ import annotations
@@ -31,16 +28,16 @@ HURRY = "a second signal ends at once"
 
 
 class Interrupted(TrainerError):
-    """A signal interrupted the run; it can be resumed later."""
+    """A signal interrupted the run, which can be resumed later."""
 
 
 @contextmanager
 def leaving_when_asked() -> Iterator[None]:
-    """Let a signal end the process at once as interrupted, except while an `Interruption` listens.
+    """Let a signal end the process at once as interrupted, unless an `Interruption` listens.
 
-    It covers the seconds of imports, when there is nothing to save yet. Without it the signal would kill the
-    process, or have no effect if the process is the first of a container. While Python exits, a signal has no
-    effect, because it would replace the exit code of the run.
+    The context covers the seconds of imports, before the run has progress to save. Without the context, a
+    signal would kill the process, or have no effect if the process is the first of a container. While Python
+    exits, signals are ignored, because a signal would replace the exit code of the run.
     """
     atexit.register(end_undisturbed)
     before = {number: signal.signal(number, _leave) for number in obeyed(SIGNALS)}
@@ -52,7 +49,7 @@ def leaving_when_asked() -> Iterator[None]:
 
 
 def end_undisturbed() -> None:
-    """Ignore the signals from now on, because the end of the run is decided."""
+    """Ignore the signals from now on, because the run has ended."""
     for number in SIGNALS:
         signal.signal(number, signal.SIG_IGN)
 
@@ -64,10 +61,10 @@ def _leave(number: int, frame: FrameType | None) -> None:
 
 
 class Interruption:
-    """Listens to the signals while it is entered; use it only in the main thread.
+    """A context manager that listens to the signals; use it only in the main thread.
 
     Attributes:
-        requested: the signal that arrived; None until then.
+        requested: the signal that arrived; None before a signal arrives.
     """
 
     def __init__(self) -> None:
@@ -101,5 +98,5 @@ class Interruption:
         shutdown_deadline.end()
         for later in self._before:
             signal.signal(later, signal.SIG_DFL)
-        # A logger is not used here, because the handler may run while the logger writes a line.
+        # The handler does not use a logger, because it may run while the logger writes a line.
         os.write(2, f"{self.requested.name}: ending; {HURRY}\n".encode())

@@ -1,4 +1,4 @@
-"""The result of a run, as written to summary.json and printed by `palaestra run`."""
+"""Write the result of a run to summary.json, which `palaestra run` prints."""
 
 from __future__ import annotations
 
@@ -18,14 +18,13 @@ _NEEDED = frozenset({"target", "steps", "success_rate", "success_interval"})  # 
 
 
 def summarise(directory: RunDirectory, progress: Progress) -> dict[str, Any]:
-    """Return the summary of a run that has ended.
+    """Return the summary of a run that has completed its training.
 
-    `success_rate`, its `success_interval` and `mean_return` belong to the policy
-    in model.zip, which learned for `best_step` steps. They come from its
-    confirmation, else from its evaluation; without an evaluation they are null.
-    Faults and restarts are those of all attempts. So are `duration_s`, the speed
-    derived from it, and `goodput`, its seconds by cause. `trained_share` is the
-    share of these seconds that was spent on training.
+    `success_rate`, `success_interval` and `mean_return` are results of the policy in model.zip, which learned
+    for `best_step` steps. The values come from the confirmation of that policy, or else from its evaluation;
+    without an evaluation they are null. Faults and restarts are those of all attempts. `duration_s` and the
+    speed count all attempts too, and so does `goodput`, the seconds by cause. `trained_share` is the share of
+    these seconds that was spent on training.
     """
     best = measured(directory)
     counters = progress.counted()
@@ -60,7 +59,7 @@ def write_summary(directory: RunDirectory, content: dict[str, Any]) -> None:
 
 
 def finished(directory: RunDirectory, configuration: Configuration) -> dict[str, Any] | None:
-    """Return the summary of a finished run; None: it is not finished, or its `steps` were raised later."""
+    """Return the summary of a finished run; None if it is not finished, or the job now has more steps."""
     try:
         content = json.loads(directory.summary.read_text(encoding="utf-8"))
     except (OSError, json.JSONDecodeError):
@@ -69,11 +68,11 @@ def finished(directory: RunDirectory, configuration: Configuration) -> dict[str,
         return None
     if content["target"] < configuration.steps:
         return None
-    return {name: value for name, value in content.items() if name != "event"}  # structlog uses this key
+    return {name: value for name, value in content.items() if name != "event"}  # structlog's key
 
 
 def last_word_of(summary: dict[str, Any]) -> Termination:
-    """Return the termination message of an attempt that finds its run finished."""
+    """Return the termination message of an attempt whose run is already finished."""
     interval = summary["success_interval"]
     return Termination(
         step=summary["steps"],
@@ -84,7 +83,7 @@ def last_word_of(summary: dict[str, Any]) -> Termination:
 
 
 def measured(directory: RunDirectory) -> dict[str, Any]:
-    """Return the most reliable measurement of model.zip; empty if it was never evaluated."""
+    """Return the most reliable evaluation of model.zip; empty if model.zip was never evaluated."""
     best = best_of(directory)
     if best is None:
         return {}

@@ -1,11 +1,11 @@
-"""The link that gives a run on a claim a readable name in TensorBoard.
+"""Create the link that gives a run on a claim a readable name in TensorBoard.
 
-On a claim, a run is at `<uid>/<replica>`, and TensorBoard names a run by its path. A reader does not
-recognize a UID. So a link `tensorboard/<job>-<first 8 of the UID>/<replica>` at the top of the claim points
-to the run's curves. The run itself is not moved: resumes, warm starts and `palaestra fetch` find it by its
-UID.
+On a claim, the folder of a run is `<uid>/<replica>`, and TensorBoard names a run by its path. A person does
+not recognize a UID. So a link `tensorboard/<job>-<first 8 of the UID>/<replica>` at the top of the claim
+points to the run's curves. The folder of the run keeps its path, because resumes, warm starts and `palaestra
+fetch` find the run by its UID.
 
-Training does not need the link. An error is logged once and does not end the run.
+Training does not need the link, so an error is only logged.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ FOLDER = "tensorboard"  # the chart's value tensorboard.folder has the same defa
 
 
 def link_curves(directory: RunDirectory, configuration: Configuration) -> None:
-    """Create the link, unless it exists or the run is not on a claim.
+    """Create the link if it is missing and the run is on a claim.
 
-    `palaestra run` keeps a run at `<dir>/<job>/<replica>`, which has the job's name without a link.
+    Runs of `palaestra run` need no link, because their path `<dir>/<job>/<replica>` contains the job's name.
     """
     run, uid = directory.path, configuration.uid
     if not uid or (run.parent.name, run.name) != (uid, str(configuration.replica)):
@@ -46,8 +46,8 @@ def link_curves(directory: RunDirectory, configuration: Configuration) -> None:
 def _folder(name: str, parent: int, stack: ExitStack) -> int:
     """Return a descriptor of a folder in an open folder; create the folder if it is missing.
 
-    Other jobs write to the claim too. A job could replace a folder by a link, so that this process writes
-    into another folder. So links are refused; a descriptor always refers to the folder that was opened.
+    Other jobs write to the claim too. A job could replace a folder by a link, to make this process write into
+    another folder. So this function refuses links. A descriptor always refers to the folder that was opened.
     """
     with suppress(FileExistsError):
         os.mkdir(name, dir_fd=parent)
@@ -57,9 +57,9 @@ def _folder(name: str, parent: int, stack: ExitStack) -> int:
 
 
 def _link(name: str, target: str, folder: int) -> None:
-    """Make `name` in an open folder a link to `target`; replace a link with another target.
+    """Create a link `name` to `target` in an open folder; replace an existing link with another target.
 
-    The link is created atomically, without a temporary name, which TensorBoard could show as a run.
+    The link has no temporary name during its creation, because TensorBoard could show that name as a run.
 
     Raises:
         OSError: the file system does not support links, or the name exists and is not a link.

@@ -1,6 +1,6 @@
-"""The end of a run: its exit code, and its termination message.
+"""Determine the exit code of a run, and write its termination message.
 
-Once the container is gone, the operator can read only these two.
+After the container has ended, the operator can read only these two values.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ class End:
 
     Attributes:
         code: exit code of the process.
-        reason: one word for programs.
-        message: a sentence for people.
+        reason: the reason as one word, for programs.
+        message: the reason as a sentence, for people.
     """
 
     code: int
@@ -48,7 +48,7 @@ class End:
     message: str
 
 
-# The first row that matches decides.
+# The first row whose class matches the error decides.
 ENDS: tuple[tuple[type[BaseException], int, str], ...] = (
     (Interrupted, ExitCode.INTERRUPTED, "Interrupted"),
     (MasterLost, ExitCode.INTERRUPTED, "MasterLost"),
@@ -62,7 +62,7 @@ ENDS: tuple[tuple[type[BaseException], int, str], ...] = (
 
 
 def end_of(error: BaseException) -> End:
-    """Return the end of a run that an error ended."""
+    """Return exit code, reason and message of a run that an error ended."""
     for kind, code, reason in ENDS:
         if isinstance(error, kind):
             return End(code, reason, str(error))
@@ -78,9 +78,9 @@ def end_of(error: BaseException) -> End:
 def write_last_word(
     word: Termination, environment: Mapping[str, str] = os.environ, default: Path = KUBERNETES_LOG
 ) -> None:
-    """Write the termination message to the file of PALAESTRA_TERMINATION_LOG or of Kubernetes.
+    """Write the termination message to the file PALAESTRA_TERMINATION_LOG, or to that of Kubernetes.
 
-    The default file does not exist outside Kubernetes, and is not created.
+    Outside Kubernetes the default file does not exist, and this function does not create it.
     """
     chosen = environment.get(TERMINATION_VARIABLE)
     if chosen is None and not default.exists():

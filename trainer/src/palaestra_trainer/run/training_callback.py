@@ -1,9 +1,8 @@
-"""The callback that works between rollouts: it evaluates, saves, pauses simulators and ends the run.
+"""The callback that evaluates, saves, pauses simulators and ends the run between two rollouts.
 
-The model's state is complete only at a rollout boundary, where no collected data
-waits to be learned from. So the model is evaluated and saved only there. If a
-run is interrupted during a rollout, that rollout is played again after the
-resume, with the same seeds and the same random numbers.
+The model's state is complete only at a boundary between rollouts, because the algorithm has then learned from
+all collected data. So the model is evaluated and saved only at a boundary. If a run is interrupted during a
+rollout, the resumed attempt plays that rollout again with the same seeds and random numbers.
 """
 
 from __future__ import annotations
@@ -30,15 +29,15 @@ from palaestra_trainer.waiting import shutdown_deadline
 
 log = structlog.get_logger(__name__)
 
-# A pause costs two service calls per simulator, and a copy of the model; a shorter learning phase is not
-# worth that.
+# A pause costs two service calls per simulator and a copy of the model, which is too much for a shorter
+# learning phase.
 LONG_LEARNING_S = 0.5
 COUNTED_BY_STEP = ("episodes", "extra_steps")
 
 
 @dataclass(frozen=True, slots=True)
 class Resumed:
-    """The checkpoint that an attempt resumes from, and its state."""
+    """The checkpoint from which an attempt resumes, and its state."""
 
     checkpoint: SavedCheckpoint
     state: TrainingState
@@ -72,7 +71,7 @@ class TrainingCallback(BaseCallback):
         self._cut = False
 
     def drop_rollout(self) -> None:
-        """Set the model back to the last boundary after a callback ended the rollout; call `finish` next."""
+        """Set the model back to the last boundary, after a callback ended the rollout; then call `finish`."""
         if self._boundary is not None:
             self._boundary.put_back(self.model)
         self._cut = True
@@ -90,7 +89,7 @@ class TrainingCallback(BaseCallback):
         self._selection.finish(self._step)
 
     def save(self) -> None:
-        """Set the model back to the last boundary and save it; before the first boundary do nothing."""
+        """Set the model back to the last boundary and save it; do nothing before the first boundary."""
         run, state = self._run, self._boundary
         if state is None:
             return
@@ -99,7 +98,8 @@ class TrainingCallback(BaseCallback):
             self._before_update.put_back(self.model)
         started = time.monotonic()
         with run.progress.spending(Cause.CHECKPOINTING):
-            # Steps after the boundary are played again, so their counts are dropped; faults and time remain.
+            # A resume plays the steps after the boundary again, so their counts are dropped. Faults and time
+            # still count.
             counters = run.progress.counted(kept=step).to_json() | state.rollout["counters"]
             manifest = checkpoint.describe(run.configuration, step, counters)
             if self._saver.save(self.model, state, manifest):
@@ -112,10 +112,10 @@ class TrainingCallback(BaseCallback):
         self._saved = step
 
     def leave_update(self, *_step: object) -> None:
-        """Raise Interrupted before a gradient step if a signal has arrived and the update takes too long.
+        """Raise Interrupted before a gradient step if a signal has arrived and the deadline is over.
 
-        It raises only if a copy of the tensors from before the update exists. A resume collects the update's
-        data again.
+        This method raises only if a copy of the tensors before the update exists. A resume collects the data
+        of the update again.
         """
         if self._before_update is not None and shutdown_deadline.is_over():
             self._run.interruption.check()
@@ -128,7 +128,7 @@ class TrainingCallback(BaseCallback):
         if self._rollout_ended is not None and self.updates_so_far() != self._updates:
             self._learning_s = time.monotonic() - self._rollout_ended
         if self._resumed:
-            # State-dependent exploration has drawn its noise for this rollout a second time.
+            # State-dependent exploration has drawn new noise for this rollout, but must use the saved noise.
             self._resumed.put_back(self.model)
             self._resumed = None
         self._learner.check(self.model.num_timesteps)
@@ -151,7 +151,8 @@ class TrainingCallback(BaseCallback):
         self._record_rewards(infos, self.locals["dones"])
         if self._log.due:
             self._log.write(self._run.progress.status())
-        # A rollout may take longer than the grace period, so a signal ends it here, and it is played again.
+        # A rollout may take longer than the grace period. So a signal ends the rollout here, and a resume
+        # plays it again.
         self._run.interruption.check()
         return True
 
@@ -161,7 +162,7 @@ class TrainingCallback(BaseCallback):
             self._env.pause()
             self._resting = True
         first = self._learning_s is None and self._step > getattr(self.model, "learning_starts", -1)
-        if first or self._resting:  # the first update may be long, and so may an update after a long one
+        if first or self._resting:  # the first update may be long, and so may an update after a long update
             self._before_update = Tensors.of(self.model)
 
     def updates_so_far(self) -> int:
@@ -199,5 +200,5 @@ class TrainingCallback(BaseCallback):
 
 
 def _passed(before: int, now: int, every: int) -> bool:
-    """Return whether a multiple of `every` lies after `before` and up to `now`; False if `every` is 0."""
+    """Return whether a multiple of `every` lies in (before, now]; False if `every` is 0."""
     return every > 0 and now // every > before // every

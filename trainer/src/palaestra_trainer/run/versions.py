@@ -1,4 +1,4 @@
-"""The versions with which an attempt runs, for the record of attempts."""
+"""Determine the versions of the software with which an attempt runs."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ PACKAGES = ("palaestra-trainer", "torch", "stable-baselines3", "sb3-contrib", "g
 
 
 def versions() -> dict[str, str]:
-    """Return the version of each program that a result may depend on, and the machine."""
+    """Return the version of each program that may affect a result, and a description of the machine."""
     found = {name: known for name in PACKAGES if (known := _version(name))}
     gpu = {"GPU": torch.cuda.get_device_name()} if torch.cuda.is_available() else {}
     machine = f"{platform.machine()}, {os.cpu_count()} processors"

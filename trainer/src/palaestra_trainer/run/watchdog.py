@@ -1,6 +1,6 @@
 """End a run that makes no progress.
 
-The watchdog has its own thread, because it must detect that other threads hang.
+The watchdog has its own thread, because other threads may hang.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ log = structlog.get_logger(__name__)
 
 
 class Watchdog:
-    """Ends the process when `idle_s()` reaches `deadline_s` while it is entered.
+    """A context manager that ends the process if `idle_s()` reaches `deadline_s` inside the context.
 
     Args:
-        idle_s: returns the seconds since the last progress.
+        idle_s: a function that returns the seconds since the last progress.
         deadline_s: the longest time without progress.
-        last_word: called before the process ends, to write the termination message.
-        leave: ends the process; takes the exit code.
+        last_word: a function that writes the termination message, called before the process ends.
+        leave: a function that ends the process with an exit code.
     """
 
     def __init__(
@@ -47,7 +47,7 @@ class Watchdog:
         self._thread = threading.Thread(target=self._watch, name="watchdog", daemon=True)
 
     def __enter__(self) -> Self:
-        """Begin to watch."""
+        """Start the thread of the watchdog."""
         self._thread.start()
         return self
 
@@ -57,7 +57,7 @@ class Watchdog:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Stop watching."""
+        """Stop the thread of the watchdog."""
         self._over.set()
 
     def _watch(self) -> None:
@@ -71,7 +71,7 @@ class Watchdog:
 
 
 def stalled(progress: Progress) -> End:
-    """Return the end of a run whose environments have not stepped within the deadline; never blocks."""
+    """Return the end of a run that made no step within the deadline; this function never blocks."""
     fact = f"no environment step for {progress.idle_s():.0f} s while {progress.phase}"
     if down := progress.down():
         return End(ExitCode.STALLED, "SimulatorHung", f"{fact}; not ready: {', '.join(down)}")

@@ -1,1 +1,1 @@
-"""The simulators of a run: started through their sidecars, and restarted after faults."""
+"""Start the simulators of a run through their sidecars, and restart them after faults."""

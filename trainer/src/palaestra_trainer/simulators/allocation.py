@@ -1,4 +1,4 @@
-"""Allocate simulators to environments of any process, by one lock file each in the scratch folder."""
+"""Allocate simulators to environments of any process, by a lock file per simulator."""
 
 from __future__ import annotations
 
@@ -25,7 +25,8 @@ def allocate(configuration: Configuration, role: Role) -> Allocation:
     """Allocate the first simulator with this role that no environment of any process uses.
 
     Raises:
-        ConfigurationError: all are in use, or the lock file cannot be written and locked.
+        ConfigurationError: all simulators with this role are in use, or the lock file cannot be written and
+            locked.
     """
     simulators = configuration.with_role(role)
     for simulator in simulators:
@@ -35,9 +36,10 @@ def allocate(configuration: Configuration, role: Role) -> Allocation:
 
 
 def _path(configuration: Configuration, simulator: SimulatorConfiguration) -> Path:
-    """Return the path of the lock file; ROS_LOG_DIR is the scratch folder in every container of the plan.
+    """Return the path of the lock file, in the scratch folder ROS_LOG_DIR of the containers.
 
-    The file name contains the address too, because jobs and users may share the folder outside a container.
+    The file name also contains the address of the sidecar, because outside a container several jobs and users
+    may share the folder.
     """
     address = simulator.control or f"{configuration.job}-{configuration.replica}"
     words = re.sub(r"\W+", "-", f"{os.getuid()} {address} {simulator.name}")

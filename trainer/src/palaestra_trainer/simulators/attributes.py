@@ -1,4 +1,4 @@
-"""Attributes that a program sets on an environment, as curricula do."""
+"""Keep the attributes that a program sets on an environment, for example for a curriculum."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from palaestra_trainer.simulators.interface import Environment
 
 
 class Attributes:
-    """The attributes that a program has set on a member's environment; a standby gets them too.
+    """The attributes that a program has set on a member's environment; a standby's environment gets the same.
 
-    Each environment gets each value once, so a value that the environment changes later is not overwritten.
+    Each environment gets each value once. So a value that the environment changes later is not overwritten.
     """
 
     def __init__(self) -> None:
@@ -20,7 +20,7 @@ class Attributes:
         self._given_to: Environment | None = None
 
     def set(self, name: str, value: Any, env: Environment | None) -> None:
-        """Set an attribute now; without an environment, once the next episode begins."""
+        """Set an attribute now; if `env` is None, set it when the next episode begins."""
         self._values[name] = copied(value)
         self._waiting.add(name)
         if env is not None:
@@ -35,6 +35,6 @@ class Attributes:
 
 
 def _put(env: Environment, name: str, value: Any) -> None:
-    """Set an attribute on the wrapper or environment that defines it; on the environment if none does."""
+    """Set an attribute on the wrapper that has it, or else on the innermost environment."""
     if not env.set_wrapper_attr(name, value, force=False):
         setattr(env.unwrapped, name, value)

@@ -1,4 +1,4 @@
-"""The base of all Stable-Baselines3 VecEnvs of members: access to their environments."""
+"""The base of all Stable-Baselines3 VecEnvs of this package: access to the members' environments."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from palaestra_trainer.simulators.restarter import Restarter
 
 
 class MembersVecEnv(VecEnv):
-    """A VecEnv of members; a subclass defines how they step.
+    """A VecEnv of members; a subclass defines how the members step.
 
     Args:
-        restarters: the restarter of each member; rows are in their order.
+        restarters: the restarter of each member; rows have the same order.
     """
 
     def __init__(self, restarters: Sequence[Restarter]) -> None:
@@ -31,18 +31,19 @@ class MembersVecEnv(VecEnv):
         self._actions = np.empty(0)
 
     def step_async(self, actions: np.ndarray) -> None:
-        """Keep `actions`, one for each member, for `step_wait`."""
+        """Store `actions`, one for each member, until `step_wait`."""
         self._actions = actions
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
-        """Return an attribute of the chosen environments, even if an inner wrapper defines it."""
+        """Return an attribute of each chosen environment, even if an inner wrapper defines it."""
         return [env.get_wrapper_attr(attr_name) for env in self._targets(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
-        """Set an attribute on the wrapper that defines it, else on the environment itself.
+        """Set an attribute on the wrapper that has it, or else on the innermost environment.
 
-        Stable-Baselines3's own vectors set it on the outermost wrapper, where the environment cannot read it.
-        A restarted simulator keeps it, and a standby gets it.
+        The VecEnvs of Stable-Baselines3 set attributes on the outermost wrapper, where the environment cannot
+        read them. The attribute stays set after a restart of the simulator, and a standby gets the same
+        value.
         """
         for index in self._get_indices(indices):
             self._restarters[index].set_attribute(attr_name, value)
@@ -62,7 +63,7 @@ class MembersVecEnv(VecEnv):
         return [is_wrapped(env, wrapper_class) for env in self._targets(indices)]
 
     def get_images(self) -> Sequence[np.ndarray | None]:
-        """Return an image of each environment; warn and return None for each if they render no arrays."""
+        """Return an image of each environment; warn and return None for each without such images."""
         if self.render_mode != "rgb_array":
             warnings.warn(f"render_mode: is {self.render_mode}; only rgb_array gives images", stacklevel=2)
             return [None] * self.num_envs

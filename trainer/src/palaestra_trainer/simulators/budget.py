@@ -1,4 +1,4 @@
-"""Limits on faults: restarts of one simulator in a time window, and the smallest size of a group."""
+"""Limits for faults: restarts of a simulator in a time window, and the smallest size of a group."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from dataclasses import dataclass, field
 
 from palaestra_trainer.errors import FaultBudgetSpent, FaultKind, SimulatorFault
 
-# So many restarts within a short time show a permanent fault.
+# This number of restarts within the window suggests a permanent fault.
 FLAPPING = 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RestartLimit:
-    """How often a member may be restarted.
+    """The limit for restarts of a member.
 
     Attributes:
-        restarts: the most restarts after faults within any `within_s` seconds.
+        restarts: the largest number of restarts after faults within any `within_s` seconds.
     """
 
     restarts: int = 10
@@ -28,7 +28,7 @@ class RestartLimit:
 
 @dataclass(slots=True)
 class RestartBudget:
-    """The restarts that one simulator has left, counted in a sliding window of time."""
+    """The restart budget of one simulator, in a sliding window of time."""
 
     simulator: str
     limit: RestartLimit
@@ -37,14 +37,14 @@ class RestartBudget:
 
     @property
     def flapping(self) -> bool:
-        """Whether it was restarted `FLAPPING` times or more within `within_s`."""
+        """Whether the simulator was restarted at least `FLAPPING` times within `within_s`."""
         return len(self._spent) >= FLAPPING
 
     @property
     def spent_share(self) -> float:
-        """Share of `limit.restarts` spent within `within_s`, 0 to 1; callable from any thread.
+        """The share of `limit.restarts` spent within `within_s`, 0 to 1; any thread may read it.
 
-        It is always 0 for a limit of 0, because the first fault is final and cannot be predicted.
+        For a limit of 0 the share is always 0, because the first fault is final.
         """
         now, limit = self.clock(), self.limit.restarts
         recent = sum(now - at < self.limit.within_s for at, _ in tuple(self._spent))
@@ -75,11 +75,11 @@ class RestartBudget:
 
 
 class Group:
-    """The simulators of one group, and how many of them the run needs.
+    """The number of simulators left in a group, and the number that the run needs.
 
     Args:
         left: number of simulators in the group.
-        least: the smallest number that the run needs, at least 1; None: all of them.
+        least: the smallest number of simulators that the run needs, at least 1; None: all of them.
     """
 
     def __init__(self, left: int = 1, least: int | None = None) -> None:
@@ -88,7 +88,7 @@ class Group:
         self._lock = threading.Lock()
 
     def lose_one(self) -> bool:
-        """Return whether the run can continue without one more simulator; if so, count it as lost."""
+        """Count one more simulator as lost and return True; return False if the run needs all of them."""
         with self._lock:
             if self._left <= self.least:
                 return False

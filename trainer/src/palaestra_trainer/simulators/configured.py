@@ -1,6 +1,7 @@
-"""Simulators for environments that were created without one; each environment gets its own.
+"""Find or start a simulator for an environment that was created without one.
 
-The simulator is that of a `Webots` facade of the program, one of PALAESTRA_CONFIG, or a new one.
+Each environment gets its own simulator: the simulator of a `Webots` facade of the program, a simulator of
+PALAESTRA_CONFIG, or a new simulator.
 """
 
 from __future__ import annotations
@@ -22,14 +23,15 @@ from palaestra_trainer.simulators.notebook_simulator import offered_simulator
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Configured:
-    """A started simulator that belongs to one environment of this process until it is released.
+    """A started simulator that belongs to one environment of this process until `release`.
 
     Attributes:
-        name: as in the configuration.
-        robot: the robot in it.
-        scene: arranges its episodes.
-        release: closes the connections and frees the simulator for another environment of any process. The
-            simulator keeps running. Safe to repeat, and without effect in a forked process.
+        name: name of the simulator in the configuration.
+        robot: the robot in the simulator.
+        scene: the scene of the robot.
+        release: closes the connections and frees the simulator for another environment of any process. A
+            simulator that was not started for this environment keeps running. Further calls, and calls in a
+            forked process, have no effect.
     """
 
     name: str
@@ -41,9 +43,9 @@ class Configured:
 def simulator_for(role: Role, world: str = "arena", driver: str = "stub") -> Configured:
     """Return a started simulator for an environment that was created without one.
 
-    It is the simulator of a `Webots` facade of this process, else one of PALAESTRA_CONFIG. If that variable
-    is not set, as in a notebook, a new simulator with this world and driver is started. The new one ends when
-    it is released, or with this process.
+    If this process has a `Webots` facade that no environment uses, return its simulator, or else a simulator
+    of PALAESTRA_CONFIG. If that variable is not set, as in a notebook, start a new simulator with this world
+    and driver. The new simulator ends when it is released, or with this process.
 
     Raises:
         ConfigurationError: each simulator with this role has an environment, or MuJoCo is not installed.
@@ -57,11 +59,11 @@ def simulator_for(role: Role, world: str = "arena", driver: str = "stub") -> Con
 
 
 def own_simulator(world: str = "arena", driver: str = "stub") -> Configured:
-    """Return a simulator that is started for this environment alone.
+    """Start a new simulator for one environment and return it.
 
     Raises:
         ConfigurationError: the driver is mujoco, which is not installed.
-        SimulatorFault: it does not start.
+        SimulatorFault: the simulator does not start.
     """
     require_driver(driver)
     own = OwnSimulator(world, driver)
@@ -69,7 +71,7 @@ def own_simulator(world: str = "arena", driver: str = "stub") -> Configured:
 
 
 def require_driver(driver: str) -> None:
-    """Return if simulators of this driver can be started here.
+    """Check that simulators of this driver can be started on this machine.
 
     Raises:
         ConfigurationError: the driver is mujoco, which is not installed.
@@ -105,6 +107,6 @@ def configured_simulator(role: Role) -> Configured:
 
 
 def _alone(configuration: Configuration, name: str) -> Configuration:
-    """Return a copy with this simulator only; not validated, because validation requires a collector."""
+    """Return an unvalidated copy with only this simulator; validation would require a collecting one."""
     chosen = tuple(simulator for simulator in configuration.simulators if simulator.name == name)
     return configuration.model_copy(update={"simulators": chosen})

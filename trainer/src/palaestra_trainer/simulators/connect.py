@@ -1,4 +1,4 @@
-"""Create the simulators of a configuration with their environments, not yet started.
+"""Create the simulators of a configuration with their environments, without starting them.
 
 `connect` uses the sidecars of a pod, `connect_members` adds the standbys, and `connect_here` starts new
 sidecars as processes of this program.
@@ -38,9 +38,9 @@ from palaestra_trainer.webots.launching.sidecar import Sidecar
 
 
 def connect(configuration: Configuration | None = None) -> list[Simulator]:
-    """Return the simulators of a configuration, by default of PALAESTRA_CONFIG, not started.
+    """Return the simulators of a configuration, by default of PALAESTRA_CONFIG, without starting them.
 
-    Standbys are left out, because the caller keeps using the same simulators.
+    Standbys are not created, because the caller always uses the same simulators.
 
     Raises:
         ConfigurationError: the configuration cannot be read, or its environment or robot is unknown.
@@ -53,7 +53,7 @@ def connect(configuration: Configuration | None = None) -> list[Simulator]:
 
 
 def connect_members(configuration: Configuration) -> list[Member]:
-    """Return the simulators of a configuration, not started, for a caller that restarts them.
+    """Return the members of a configuration, without starting them, for a caller that restarts them.
 
     Raises:
         As `connect`.
@@ -68,10 +68,10 @@ def connect_members(configuration: Configuration) -> list[Member]:
 
 
 def connect_here(configuration: Configuration, run: Path) -> list[Simulator]:
-    """Return the simulators of a run directory as processes of this program, not started; needs no pod.
+    """Return the simulators of a run directory as processes of this program, without starting them.
 
     Raises:
-        ConfigurationError: the run directory lacks a world, or a simulator cannot be started here.
+        ConfigurationError: the run directory lacks a world, or a simulator cannot be started on this machine.
     """
     return [
         simulator_at(_process(configuration, entry, run), configuration, entry)
@@ -79,7 +79,7 @@ def connect_here(configuration: Configuration, run: Path) -> list[Simulator]:
     ]
 
 
-# Worlds that ship: the ROS name of the supervisor in each, and its robot as `trainer.robot` names it.
+# For each shipped world: the ROS name of its supervisor, and its robot as `trainer.robot` names it.
 _WORLDS: dict[str, tuple[str, str]] = {
     "arena": ("robotino", DEFAULT_ROBOT),
     "seeing": ("robotino", DEFAULT_ROBOT),
@@ -89,16 +89,16 @@ _WORLDS: dict[str, tuple[str, str]] = {
 
 
 def robot_of(world: str) -> str:
-    """Return the robot in a world that ships, as `trainer.robot` names it."""
+    """Return the robot in a shipped world, as `trainer.robot` names it."""
     _, robot = _WORLDS[world]
     return robot
 
 
 def robot_for(world: str) -> type[SimulatedRobot]:
-    """Return the robot class of PALAESTRA_CONFIG; if it is not set, that of the robot in a world that ships.
+    """Return the robot class of PALAESTRA_CONFIG, or of the shipped `world` if that variable is not set.
 
     Raises:
-        ConfigurationError: the configuration cannot be read, or names no such class.
+        ConfigurationError: the configuration cannot be read, or its robot class does not exist.
     """
     if os.environ.get(CONFIG_VARIABLE):
         return robot_class(load().robot or DEFAULT_ROBOT)
@@ -106,14 +106,14 @@ def robot_for(world: str) -> type[SimulatedRobot]:
 
 
 class OwnSimulator:
-    """A started simulator with a world that ships, as a process of this program; `close` ends it.
+    """A new simulator with a shipped world, as a process of this program; `close` ends it.
 
     Args:
         world: the name of the world.
         driver: stub or mujoco.
 
     Raises:
-        SimulatorDead, SimulatorHung, WrongData: it does not start in time.
+        SimulatorDead, SimulatorHung, WrongData: the simulator does not start in time.
     """
 
     def __init__(self, world: str = "arena", driver: str = "stub") -> None:
@@ -124,12 +124,12 @@ class OwnSimulator:
         self.scene = SimulatedScene(self.webots, self.robot)
         with ExitStack() as undo:
             undo.callback(self.close)
-            self.webots.start()  # connects the robot too
+            self.webots.start()  # this also connects the robot
             self.webots.supervisor.set_mode(Mode.FAST)
             undo.pop_all()
 
     def close(self) -> None:
-        """End it; safe to repeat."""
+        """End the simulator; further calls have no effect."""
         self.robot.close()
         self.webots.close()
 
@@ -170,7 +170,8 @@ def new_simulator(
 
 
 def _process(configuration: Configuration, entry: SimulatorConfiguration, run: Path) -> ProcessLauncher:
-    # A run directory may have been moved; worlds that ship in the image are outside of it.
+    # The run directory may have been moved, so its worlds are searched for in it. Worlds that the image ships
+    # are outside of the run directory.
     inside = run / "worlds" / Path(entry.world).name
     world = inside if inside.exists() else Path(entry.world)
     if not world.exists() or entry.driver == "command":
@@ -191,7 +192,7 @@ def _process(configuration: Configuration, entry: SimulatorConfiguration, run: P
 
 
 def simulator_at(sidecar: Sidecar, configuration: Configuration, entry: SimulatorConfiguration) -> Simulator:
-    """Return the simulator behind a sidecar, with the environment of a configuration, not started.
+    """Return the simulator behind a sidecar with the configured environment, without starting it.
 
     Raises:
         ConfigurationError: the environment is unknown, or it does not accept its options or this robot.

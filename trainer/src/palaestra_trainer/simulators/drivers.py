@@ -1,4 +1,4 @@
-"""The same simulator of a run in another program: the stub, MuJoCo or Webots of this machine."""
+"""Change the simulator program of a configuration: the stub, MuJoCo or Webots."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _MJCF = ".xml"
 
 
 def in_driver(entry: SimulatorConfiguration, driver: str) -> SimulatorConfiguration:
-    """Return a simulator with the same world in another program; options of its own program are left out.
+    """Return the simulator with the same world in another program, without options of the old program.
 
     Raises:
         ConfigurationError: the program is not installed, or cannot load the world.

@@ -1,4 +1,4 @@
-"""Entry points for `gymnasium.make`: environments with a given robot, or with one that this module finds."""
+"""Entry points for `gymnasium.make`, which create environments with a given robot or find a simulator."""
 
 from __future__ import annotations
 
@@ -31,17 +31,17 @@ _WORLDS = {"SeeTarget-v0": ("seeing", "mujoco"), "Navigate-v0": ("court", "stub"
 
 
 def own_world(environment: str) -> tuple[str, str]:
-    """Return world and driver of the simulator that an environment with this id starts for itself."""
+    """Return world and driver of the simulator that an environment with this id starts if it needs one."""
     return _WORLDS.get(environment.rpartition(":")[2], _ARENA)
 
 
 class EntryPoint(Generic[_Made]):
-    """Creates the environments of one id for `gymnasium.make`.
+    """Creates environments with one id for `gymnasium.make`.
 
     Args:
-        environment: the id.
+        environment: the id of the environment.
         kind: the class of the environment.
-        options: the class of its options.
+        options: the class of the environment's options.
 
     Attributes:
         environment_class: the class of the environment, whose docstring describes the task.
@@ -60,25 +60,26 @@ class EntryPoint(Generic[_Made]):
         role: str = Role.COLLECT,
         **options: Any,
     ) -> _Made:
-        """Return an environment.
+        """Create and return an environment.
 
         Args:
-            robot: the robot to drive, given together with its `scene`; it has the capabilities that the
-                environment needs.
+            robot: the robot to drive, with the capabilities that the environment needs; give it together with
+                `scene`.
             scene: arranges episodes.
-            simulator: called for robot and scene if they are not given, once for each environment of
-                `make_vec`. `palaestra_trainer.testing.fake_arena`, `fake_court` and `fake_seeing` need no
-                simulator.
-            role: without `robot` and `simulator`, the environment takes the newest `Webots` facade of this
-                process, else the first simulator of PALAESTRA_CONFIG with this role that no environment of
-                any process uses. Without PALAESTRA_CONFIG it starts a simulator with the world of
-                `own_world`, which ends with `close()` or with this process.
-            options: fields of the class of options; names of movements and parts are text.
+            simulator: a function that returns robot and scene, called if these are not given; once for each
+                environment of `make_vec`. `palaestra_trainer.testing.fake_arena`, `fake_court` and
+                `fake_seeing` need no simulator.
+            role: role of the simulator in PALAESTRA_CONFIG. Without `robot` and `simulator`, the environment
+                takes the newest free `Webots` facade of this process. Without such a facade, it takes the
+                first simulator of PALAESTRA_CONFIG with this role that no environment of any process uses.
+                Without PALAESTRA_CONFIG, it starts a simulator with the world of `own_world`, which ends with
+                `close()` or with this process.
+            options: fields of the class of options; movements and observation parts are given as text.
 
         Raises:
-            ConfigurationError: an option is wrong, no simulator with this role is left, or its program is
-                missing.
-            MissingCapability: the robot does not fit.
+            ConfigurationError: an option is wrong, all simulators with this role are in use, or the simulator
+                program is missing.
+            MissingCapability: the robot lacks a capability that the environment needs.
             NoSuchSensor: the robot lacks a sensor that the environment needs.
         """
         chosen = parse_as(self._options, options)
@@ -101,7 +102,7 @@ make_navigating = EntryPoint("Navigate-v0", NavigateEnv, NavigateOptions)
 class _Place(NamedTuple):
     """The robot and scene of an environment, and the function that releases their simulator."""
 
-    robot: Any  # the environment checks that the robot has the capabilities that it needs
+    robot: Any  # the environment checks the robot's capabilities
     scene: Scene
     release: Callable[[], None] | None = None
 
@@ -113,7 +114,7 @@ def _place(
     role: str,
     own: tuple[str, str],
 ) -> _Place:
-    """Return robot and scene: those given, those of `simulator()`, else those of `simulator_for`."""
+    """Return the given robot and scene, or those of `simulator()`, or else those of `simulator_for`."""
     if (robot is None) != (scene is None):
         raise ConfigurationError("robot, scene: only one of them was given; give both or neither")
     if robot is not None and scene is not None:
@@ -127,7 +128,7 @@ def _place(
 
 
 def role_of(name: str) -> Role:
-    """Return the role of that name.
+    """Return the role with this name.
 
     Raises:
         ConfigurationError: no role has this name.

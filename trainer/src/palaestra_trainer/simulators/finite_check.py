@@ -1,4 +1,4 @@
-"""Refuse NaN and infinite observations and rewards as soon as they occur; they cannot be learned from."""
+"""Refuse observations and rewards that are NaN or infinite as soon as they occur."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from palaestra_trainer.simulators.interface import Environment
 
 
 def check_observation(simulator: str, env: Environment, observation: Any) -> None:
-    """Check that every number of an observation, or of each observation in a mapping, is finite.
+    """Check that every number of an observation, or of each part of a Dict, is finite.
 
     The robot has already checked its sensors, so a wrong number here comes from the environment's own code.
 
@@ -31,7 +31,8 @@ def check_reward(simulator: str, env: Environment, reward: Any, info: Mapping[st
     """Check that a reward is finite.
 
     Raises:
-        Diverged: it is not finite; the message names the environment and the wrong terms of `info`.
+        Diverged: the reward is not finite; the message names the environment and the wrong reward terms in
+            `info`.
     """
     if math.isfinite(reward):
         return

@@ -1,4 +1,4 @@
-"""All simulators of a run, by role: started and stopped together, paused in turns."""
+"""Start, stop and pause all simulators of a run, by role."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from palaestra_trainer.simulators.stats import SimulatorStats
 from palaestra_trainer.simulators.threads import in_background
 from palaestra_trainer.waiting.check import Check, go_on
 
-# A start that takes longer is logged with the missing simulators, and again each time its duration doubles.
+# If the start takes longer, the missing simulators are logged, and again each time the duration doubles.
 LONG_S = 5.0
 
 log = structlog.get_logger(__name__)
@@ -30,13 +30,13 @@ class Fleet:
     """The restarters of all members of a configuration.
 
     Args:
-        configuration: has the settings of each member under its name.
-        members: one for each simulator of the configuration.
+        configuration: the configuration, with the settings of each member under its name.
+        members: the member for each simulator of the configuration.
         watcher: receives every fault and restart.
 
     Attributes:
-        collecting: restarters of the members that gather experience, in the configuration's order.
-        evaluating: restarters of the members that evaluate the policy; empty if nothing is evaluated.
+        collecting: restarters of the members that collect experience, in the configuration's order.
+        evaluating: restarters of the members that evaluate the policy; empty without such members.
     """
 
     def __init__(self, configuration: Configuration, members: Sequence[Member], watcher: Watcher) -> None:
@@ -56,21 +56,23 @@ class Fleet:
         self._all = [*self.collecting, *self.evaluating]
 
     def meters(self) -> dict[str, SimulatorStats]:
-        """Return the counts of each member, by its name."""
+        """Return the statistics of each member, by its name."""
         return {restarter.name: restarter.meter for restarter in self._all}
 
     def start(self, check: Check = go_on, *, stepped: bool = False) -> None:
-        """Start all members at once; return when each was tried once and enough of each group are up.
+        """Start all members at the same time; return when enough members of each group are up.
 
-        The start of the other members continues in the background.
+        Also wait until the first start of every member has ended. The start of further members continues in
+        the background.
 
         Args:
-            check: called every tenth of a second. If it raises, e.g. `Interrupted`, this method raises at
-                once: a running start may continue in its thread, and no other begins.
-            stepped: whether the run has taken steps before, which shows that its worlds were right.
+            check: called every tenth of a second. If it raises, for example `Interrupted`, this method raises
+                at once. A running start may then continue in its thread, but no new start begins.
+            stepped: whether the run has already taken steps, which proves that its worlds are right.
 
         Raises:
-            FaultBudgetSpent: too many simulators of a group failed to start, within their budgets.
+            FaultBudgetSpent: too many simulators of a group failed to start, and their restart budgets are
+                spent.
             ConfigurationError: two processes in a row showed that a world lacks a device or node that the
                 environment needs.
         """
@@ -86,8 +88,8 @@ class Fleet:
                 if (waited_s := time.monotonic() - began) >= report_at_s:
                     report_at_s = 2 * waited_s
                     log.info("waiting for simulators", names=self._down(), waited_s=round(waited_s))
-                # Any start that finishes ends the wait, even a failed one: the group may still be large
-                # enough.
+                # Every start that finishes ends the wait, even if it failed, because the group may still be
+                # large enough.
                 wait(
                     [work for restarter in self._all if (work := restarter.under_way)],
                     LOOK_EVERY_S,
@@ -95,10 +97,10 @@ class Fleet:
                 )
             undo.pop_all()
         for restarter in self._all:
-            restarter.stepped = True  # other members may step from now on, even while this one still starts
+            restarter.stepped = True  # the run may step from now on, even while this member still starts
 
     def stop(self) -> None:
-        """Stop all members at once, in any state, also during a restart."""
+        """Stop all members at the same time, in any state, even during a restart."""
         stops = [in_background(restarter.stop, f"stop-{restarter.name}") for restarter in self._all]
         wait(stops)
         for stop in stops:
@@ -120,7 +122,7 @@ class Fleet:
 
 @contextmanager
 def running(restarters: Sequence[Restarter], check: Check = go_on) -> Iterator[None]:
-    """Unpause the members inside the context, after any recycling; pause them again at its end."""
+    """Unpause the members for the context, after a pending recycling; pause them again afterwards."""
     for restarter in restarters:
         restarter.unpause(check)
     try:
@@ -131,7 +133,7 @@ def running(restarters: Sequence[Restarter], check: Check = go_on) -> Iterator[N
 
 @contextmanager
 def resting(restarters: Sequence[Restarter]) -> Iterator[None]:
-    """Pause the members inside the context; unpause them at its end."""
+    """Pause the members for the context; unpause them afterwards."""
     rest(restarters)
     try:
         yield

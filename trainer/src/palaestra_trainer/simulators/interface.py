@@ -1,6 +1,6 @@
-"""The interface of a simulator for the training loop, and of an observer of simulators.
+"""The interface of a simulator for the training loop, and of an object that receives its events.
 
-A `Member` is one simulator with its environment; a `Watcher` receives its faults.
+A `Member` is a simulator with its environment. A `Watcher` receives the faults and restarts of members.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ class Member(Protocol):
 
     @property
     def env(self) -> Environment:
-        """The environment; its `step` and `reset` may raise `SimulatorFault`."""
+        """The environment, whose `step` and `reset` may raise `SimulatorFault`."""
         ...
 
     def due(self, episodes: int = 1) -> str | None:
-        """Return the reason to recycle it before the next `episodes`, as text; None: no reason."""
+        """Return the reason to recycle the simulator before the next `episodes`, as text; None: no reason."""
         ...
 
     def start(self) -> None:
@@ -48,11 +48,11 @@ class Member(Protocol):
         ...
 
     def abandon(self) -> None:
-        """Make a start or restart in another thread fail soon; without one, do nothing."""
+        """Make a start or restart in another thread fail soon; do nothing if no start is running."""
         ...
 
     def pause(self) -> None:
-        """Pause the simulator: it uses no processor time until `unpause`."""
+        """Pause the simulator, which then uses no processor time until `unpause`."""
         ...
 
     def unpause(self) -> None:
@@ -62,70 +62,70 @@ class Member(Protocol):
 
 @runtime_checkable
 class Spared(Protocol):
-    """A member with a standby: a second simulator that can take the place of the first."""
+    """A member with a standby, which is a second simulator that can take over."""
 
     def spare(self) -> str | None:
-        """Return one of `StandbyState`; None: no simulator can take over, now or soon."""
+        """Return a value of `StandbyState`; None if no standby can take over, now or soon."""
         ...
 
 
 @runtime_checkable
 class ReportsLeftOut(Protocol):
-    """A member whose simulator reports what it leaves out of its world."""
+    """A member whose simulator reports the parts of its world that it does not simulate."""
 
     def left_out(self) -> tuple[str, ...]:
-        """Return the parts of its world that the simulator left out at its last start, in lines for people.
+        """Return the parts of its world that the simulator left out at its last start, as lines of text.
 
-        It is empty before the first start. Never blocks.
+        The result is empty before the first start. This method never blocks.
         """
         ...
 
 
 @runtime_checkable
 class Located(Protocol):
-    """A member whose robot can be recorded from above."""
+    """A member whose robot and target can be recorded from above."""
 
     def sight(self) -> Sight | None:
-        """Return where robot and target are after the last step, without a request to the simulator.
+        """Return the positions of robot and target after the last step, without a request to the simulator.
 
-        None: the robot does not drive on a floor.
+        The result is None if the robot does not drive on a floor.
         """
         ...
 
 
 class Watcher(Protocol):
-    """Receives the events of simulators; called from the thread in which they happen."""
+    """Receives the events of simulators, in the thread in which they occur."""
 
     def stepped(self, steps: int) -> None:
-        """`steps` environment steps were taken."""
+        """Receive that `steps` environment steps were taken."""
         ...
 
     def fault(self, simulator: str, fault: SimulatorFault, steps_lost: int) -> None:
-        """A simulator broke; its episode of `steps_lost` steps is truncated."""
+        """Receive the fault of a simulator, which truncates an episode after `steps_lost` steps."""
         ...
 
     def started(self, simulator: str) -> None:
-        """A simulator is up for the first time."""
+        """Receive that a simulator is up for the first time."""
         ...
 
     def restarted(self, simulator: str, *, recycled: bool) -> None:
-        """A simulator is up again, after a fault or after recycling."""
+        """Receive that a simulator is up again, after a fault or after recycling."""
         ...
 
     def slow(self, simulator: str, seconds: float) -> None:
-        """A step took much longer than the simulator's usual steps; that is not a fault."""
+        """Receive that a step took much longer than the simulator's usual steps, which is not a fault."""
         ...
 
     def flapping(self, simulator: str) -> None:
-        """A simulator is being restarted, and has been restarted repeatedly for some time."""
+        """Receive that a simulator is being restarted again, after several restarts in a short time."""
         ...
 
     def given_up(self, simulator: str) -> None:
-        """A simulator broke too often and is not restarted; the others of its group are enough."""
+        """Receive that a simulator failed too often and is not restarted; its group is still large enough."""
         ...
 
     def spending(self, cause: Cause) -> AbstractContextManager[None]:
-        """Count the training thread's time inside the context under `cause`; no turn may end inside."""
+        """Count the training thread's time inside the context under `cause`; do not switch turns inside."""
         ...
 
 

@@ -1,6 +1,6 @@
-"""The simulator of a facade that a program created before its environment, as in the paper.
+"""Use the simulator of a facade that a program created before its environment, as in the paper.
 
-The program starts, pauses and stops the simulator: it steps inside `with webots:` and `webots.run`.
+The program starts, pauses and stops the simulator, and steps it inside `with webots:` and `webots.run`.
 """
 
 from __future__ import annotations
@@ -20,16 +20,17 @@ from palaestra_trainer.webots.facade import open_facades
 
 
 class NotebookSimulator:
-    """Robot and scene in the simulator of a facade, which no other environment uses until `release`.
+    """Robot and scene in the simulator of a facade, reserved for one environment until `release`.
 
-    The robot connects when the facade starts its simulator, or at once if it runs.
+    The robot connects when the facade starts its simulator. If the simulator already runs, the robot connects
+    at once.
 
     Args:
         webots: the facade.
-        robot: the class of the robot in its world.
+        robot: the class of the robot in the facade's world.
 
     Raises:
-        SimulatorDead, SimulatorHung, WrongData: it runs, and the robot cannot connect.
+        SimulatorDead, SimulatorHung, WrongData: the simulator runs, but the robot cannot connect.
     """
 
     def __init__(self, webots: Webots, robot: type[SimulatedRobot]) -> None:
@@ -41,22 +42,23 @@ class NotebookSimulator:
         open_facades.take(webots)
 
     def release(self) -> None:
-        """Close the robot's connections and offer the facade again; safe to repeat."""
+        """Close the robot's connections and offer the facade again; further calls have no effect."""
         self.robot.close()
         open_facades.give_back(self.webots)
 
 
 def offered_simulator(world: str) -> NotebookSimulator | None:
-    """Return the simulator of the newest facade that no environment uses; None if there is no such facade.
+    """Return the simulator of the newest facade that no environment uses; None without such a facade.
 
-    Its robot has the class in PALAESTRA_CONFIG. If that is not set, it is the robot of `world`, which ships.
+    The robot has the class in PALAESTRA_CONFIG, or if that variable is not set, the class of the robot in the
+    shipped `world`.
     """
     webots = open_facades.offered()
     return None if webots is None else NotebookSimulator(webots, robot_for(world))
 
 
 class NotebookMember:
-    """A member in a facade's simulator: the program starts and pauses it, the trainer restarts it.
+    """A member in a facade's simulator, which the program starts and pauses, and the trainer restarts.
 
     Args:
         place: the simulator.
@@ -75,34 +77,34 @@ class NotebookMember:
         place.webots.at_start(f"environment of {self.name}", self._one_life.end)
 
     def due(self, episodes: int = 1) -> None:
-        """Return None: only the program recycles it, by `webots.run(..., restart=True)`."""
+        """Return None; only the program recycles the simulator, by `webots.run(..., restart=True)`."""
         del episodes
 
     def start(self) -> None:
-        """Leave the start to the program."""
+        """Do nothing, because the program starts the simulator."""
 
     def stop(self) -> None:
-        """Leave the simulator to the program, for another environment."""
+        """Release the simulator for another environment, without stopping it."""
         self._place.release()
 
     def restart(self) -> None:
-        """Restart the simulator, unless the program has restarted it; it is then running or paused as before.
+        """Restart the simulator, unless the program has already restarted it.
 
         Raises:
-            SimulatorDead, SimulatorHung, WrongData: it does not start in time.
+            SimulatorDead, SimulatorHung, WrongData: the simulator does not start in time.
             ConfigurationError: the facade is attached to a simulator that it did not start.
         """
         if not (self._one_life.ended and self._webots.available()):
             self._webots()
 
     def abandon(self) -> None:
-        """Do nothing: the start's own deadline ends it."""
+        """Do nothing, because a start has its own deadline."""
 
     def pause(self) -> None:
-        """Leave it to the program."""
+        """Do nothing, because the program pauses its simulator itself."""
 
     def unpause(self) -> None:
-        """Leave it to the program."""
+        """Do nothing, because the program pauses its simulator itself."""
 
 
 class _OneLife(gymnasium.Wrapper[Any, Any, Any, Any]):
@@ -118,7 +120,7 @@ class _OneLife(gymnasium.Wrapper[Any, Any, Any, Any]):
         self.ended = False
 
     def end(self) -> None:
-        """Record a start of the simulator."""
+        """Record that the simulator was started."""
         self.ended = True
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Any:

@@ -1,4 +1,4 @@
-"""The limits after which a healthy simulator is restarted between two episodes."""
+"""Decide when a healthy simulator is restarted between two episodes."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ from collections.abc import Callable
 
 from palaestra_trainer.job.configuration import Recycle
 
-ASK_MEMORY_EVERY_S = 1.0  # the sidecar adds it up over all processes of the simulator
+ASK_MEMORY_EVERY_S = 1.0  # the sidecar must sum the memory of all processes of the simulator
 
 _MINUTE_S = 60.0
 _MIB = 2**20
 
 
 class RecyclePolicy:
-    """Compares one simulator with its limits, counted since it was last taken into use.
+    """Compares the use of one simulator, since it was last taken into use, with its limits.
 
     Args:
-        limits: the limits of its use; None: it is never due.
-        memory: returns the bytes that its processes use, or None if that is unknown.
-        clock: returns seconds from any starting point.
+        limits: the limits of the simulator; None: no limits.
+        memory: a function that returns the memory of the simulator's processes in bytes; None: unknown.
+        clock: a function that returns seconds from any starting point.
     """
 
     def __init__(
@@ -34,13 +34,14 @@ class RecyclePolicy:
         self._since = self._asked = clock()
 
     def begin(self) -> None:
-        """Count from now on, because the simulator was started or has taken over."""
+        """Count from now on; call this method after the simulator was started or has taken over."""
         self._since = self._clock()
 
     def due(self, resets: int, episodes: int = 1) -> str | None:
-        """Return the reason to restart it after `resets`, before the next `episodes`; None: no reason.
+        """Return the reason to restart the simulator after `resets`, before the next `episodes`; else None.
 
-        Before several episodes, the limit of resets is a reason only if a restart now avoids one among them.
+        Before several episodes, the limit of resets is a reason only if a restart now avoids a restart
+        between these episodes.
         """
         checks = (self._by_resets(resets, episodes), self._by_age(), self._by_memory())
         return next((reason for reason in checks if reason is not None), None)

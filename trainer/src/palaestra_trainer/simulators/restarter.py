@@ -1,10 +1,9 @@
 """Start one simulator and restart it after faults.
 
-A `Restarter` owns one member: it starts it, restarts it after a fault within its
-budget, recycles it between episodes and pauses it. A start or restart takes
-seconds, so it runs in a thread of the restarter. While that thread works, the
-restarter is `busy`, and no other code may use the member. Other modules decide
-which seed an episode gets and what a fault means for learning.
+A `Restarter` owns one member. It starts the member, restarts it after a fault if its budget allows, recycles
+it between episodes, and pauses it. A start or restart takes seconds, so it runs in a thread of the restarter.
+While that thread works, the restarter is `busy`, and other code must not use the member. Other modules decide
+the seed of an episode and the effect of a fault on learning.
 """
 
 from __future__ import annotations
@@ -43,9 +42,10 @@ from palaestra_trainer.waiting.greenlets import away_s, let_others
 log = structlog.get_logger(__name__)
 
 LOOK_EVERY_S = 0.1
-# A canceled start ends at once, unless it waits for a program that does not respond.
+# A canceled start ends at once, except if it waits for a program that does not respond.
 SETTLE_S = 10.0
-# A simulator that dies after two dozen resets is recycled every few seconds, which would fill the log.
+# A simulator that must be recycled after two dozen resets is recycled every few seconds. Logging each time
+# would fill the log.
 LOG_RECYCLING_EVERY_S = 60.0
 
 
@@ -54,12 +54,12 @@ class Restarter:
 
     Attributes:
         member: the member; do not use it while the restarter is `busy`.
-        watcher: notified of every fault and restart.
-        group: the group of simulators that the member belongs to.
-        tried: whether the first start of the member has ended, with or without a fault.
-        lost: whether the member was given up, because the others of its group are enough.
-        stepped: whether the run has taken a step, which shows that its worlds were right.
-        meter: counts steps and resets of the member.
+        watcher: receives every fault and restart.
+        group: the member's group of simulators.
+        tried: whether the first start of the member has ended, successfully or not.
+        lost: whether the member was given up, because its group is large enough without it.
+        stepped: whether the run has taken a step, which proves that its worlds are right.
+        meter: statistics of the member's steps and resets.
     """
 
     def __init__(
@@ -74,7 +74,7 @@ class Restarter:
         self.watcher: Watcher = watcher or NullWatcher()
         self.group = group or Group()
         self.tried = self.lost = self.stepped = False
-        self._refusal = ""  # the fault of the last process, if it shows a mistake in the configuration
+        self._refusal = ""  # the last process's mistake, if its fault shows a wrong configuration
         self._budget = RestartBudget(member.name, limit or RestartLimit(), clock)
         self._clock = clock
         self._recycled, self._log_next = 0, -math.inf
@@ -91,23 +91,23 @@ class Restarter:
 
     @property
     def under_way(self) -> Future[None] | None:
-        """The work on the member that runs in the restarter's thread; None: no work runs."""
+        """The running start, restart or recycling of the member; None if the restarter's thread is idle."""
         return None if self._work is None or self._work.done() else self._work
 
     @property
     def busy(self) -> bool:
-        """Whether the restarter's thread starts, restarts or recycles the member; do not use it meanwhile."""
+        """Whether the restarter's thread uses the member; do not use the member meanwhile."""
         return self.under_way is not None
 
     def up(self) -> bool:
-        """Return whether the member is up: it is neither lost nor being restarted, and no fault is known.
+        """Return whether the member is up, which means neither lost nor being restarted.
 
         Raises:
-            FaultBudgetSpent: it broke more often than its budget allows.
-            ConfigurationError: before any step, two processes in a row lacked a device that the environment
-                needs, or failed with the same message.
-            MasterLost: it could not be restarted without a ROS master.
-            SimulatorFault: it could not be recycled; call `begin_restart`.
+            FaultBudgetSpent: the member failed more often than its restart budget allows.
+            ConfigurationError: before the first step, two processes in a row lacked a device that the
+                environment needs, or failed with the same message.
+            MasterLost: the member could not be restarted, because no ROS master responds.
+            SimulatorFault: the recycling of the member failed; call `begin_restart`.
         """
         if self.busy:
             return False
@@ -117,25 +117,25 @@ class Restarter:
         return not self.lost
 
     def begin_start(self) -> None:
-        """Begin to start the member, again after each fault, until it is up or lost."""
+        """Begin to start the member; repeat the start after each fault until the member is up or lost."""
         self._begin(self._start)
 
     def begin_restart(self, fault: SimulatorFault, steps_lost: int = 0) -> None:
-        """Begin to restart the broken member, again after each fault, until it is up or lost.
+        """Begin to restart the member after a fault; repeat the restart until the member is up or lost.
 
         Args:
-            fault: the fault that broke it.
+            fault: the fault of the member.
             steps_lost: environment steps of the episode that the fault truncated.
         """
         self._report(fault, steps_lost)
         self._begin(partial(self._restart, fault))
 
     def abandon(self) -> None:
-        """Begin no further restart after the current one; callable from any thread."""
+        """Do not begin another restart after the current restart; any thread may call this method."""
         self._abandoned = True
 
     def stop(self) -> None:
-        """Stop the member in any state; first cancel a restart that is running."""
+        """Stop the member in any state; first cancel a running restart."""
         settle([self])
         if self.busy:
             log.warning("simulator not stopped: its restart has not ended", simulator=self.name)
@@ -145,13 +145,13 @@ class Restarter:
     def reset(
         self, seed: int, options: dict[str, Any] | None = None, check: Check = go_on
     ) -> tuple[Any, dict[str, Any]]:
-        """Return first observation and info of a new episode; recycle the member before it if that is due.
+        """Recycle the member if that is due; return first observation and info of a new episode.
 
-        Both are copies, as those of `step`, because the environment may write into its own objects later.
-        `check` is called every tenth of a second while the member is recycled; it raises to end the wait.
+        Observation and info are copies, as in `step`, because the environment may write into its own objects
+        later. `check` is called every tenth of a second during a recycling; it raises to end the wait.
 
         Raises:
-            SimulatorFault: it broke; call `begin_restart`.
+            SimulatorFault: the member failed; call `begin_restart`.
             Diverged: the observation is not finite.
         """
         self._recycle_when_due(check)
@@ -163,12 +163,12 @@ class Restarter:
         return copied(observation), copied(info)
 
     def step(self, action: Any) -> Step:
-        """Return the result of the environment's step, with finite observation and reward.
+        """Return the result of the environment's step, and check that observation and reward are finite.
 
         Observation and info are copies, and the environment gets a copy of the action.
 
         Raises:
-            SimulatorFault: it broke; call `begin_restart`.
+            SimulatorFault: the member failed; call `begin_restart`.
             Diverged: observation or reward is not finite.
         """
         began = time.perf_counter() - away_s()
@@ -181,37 +181,37 @@ class Restarter:
         return copied(observation), reward, terminated, truncated, copied(info)
 
     def action_mask(self) -> np.ndarray:
-        """Return a mask of the actions that the environment allows in the next step; shape (choices,), bool.
+        """Return the mask of allowed actions for the next step; shape (choices,), bool.
 
         Raises:
-            SimulatorFault: it broke; call `begin_restart`.
-            ConfigurationError: the environment returned no mask of its actions.
+            SimulatorFault: the member failed; call `begin_restart`.
+            ConfigurationError: the environment returned a value that is not a mask of its actions.
         """
         return mask_of(self.member.env)
 
     def set_attribute(self, name: str, value: Any) -> None:
-        """Set an attribute of the member's environment, and of each environment that replaces it.
+        """Set an attribute of the member's environment and of each later environment of the member.
 
-        While the restarter is busy, the attribute is set when the next episode begins.
+        If the restarter is busy, the attribute is set when the next episode begins.
         """
         self._attributes.set(name, value, None if self.busy else self.member.env)
 
     def pause(self) -> None:
-        """Pause the member; the next step reports a fault if it is broken."""
+        """Pause the member; if that fails, the next step reports the fault."""
         self._switch(self.member.pause)
 
     def recycle_resting(self, episodes: int) -> None:
-        """Begin to recycle the paused member if it is due before or during the next `episodes`."""
+        """Begin to recycle the paused member if that would be due by the end of the next `episodes`."""
         if self.up() and (reason := self.member.due(episodes)):
             self._log_recycling(reason)
             self._recycles_resting = True
             self._begin(self._recycle_resting)
 
     def unpause(self, check: Check = go_on) -> None:
-        """End the pause; the next step reports a fault if the member is broken.
+        """End the pause; if that fails, the next step reports the fault.
 
-        Waits for a recycling that began during the pause. If that recycling fails, a restart begins.
-        `check` is called every tenth of a second meanwhile; it raises to end the wait.
+        If a recycling began during the pause, wait for its end. If the recycling fails, a restart begins.
+        `check` is called every tenth of a second during the wait; it raises to end the wait.
         """
         if self._recycles_resting:
             self._recycles_resting = False
@@ -263,15 +263,15 @@ class Restarter:
         return True
 
     def _judge(self, fault: SimulatorFault) -> None:
-        """Raise ConfigurationError if two processes in a row show the same mistake before any step."""
+        """Raise ConfigurationError if two processes in a row show the same mistake before the first step."""
         before, self._refusal = self._refusal, self._refusal_of(fault)
         if before and before == self._refusal:
             raise ConfigurationError(f"{self.name}: {fault}") from fault
 
     def _refusal_of(self, fault: SimulatorFault) -> str:
-        """Return the mistake that a fault shows, to compare it with that of the next process.
+        """Return the mistake that a fault shows, for a comparison with the mistake of the next process.
 
-        It is "" if the fault shows no mistake of the configuration.
+        The result is "" if the fault does not show a mistake in the configuration.
         """
         if isinstance(fault, WorldMisfit):
             return "" if self.stepped else WorldMisfit.__name__
@@ -312,7 +312,7 @@ class Restarter:
                 await_one([self], check)
 
     def _log_recycling(self, reason: str) -> None:
-        """Log the first recycling, then at most one line a minute with the number of all recyclings."""
+        """Log the first recycling, and then at most one line per minute with the number of recyclings."""
         self._recycled += 1
         if self._clock() >= self._log_next:
             log.info("simulator recycled", simulator=self.name, times=self._recycled, reason=reason)
@@ -328,11 +328,11 @@ class Restarter:
 
 
 def await_one(restarters: Sequence[Restarter], check: Check = go_on) -> None:
-    """Wait until one of the busy restarters is no longer busy; return at once if none is busy.
+    """Wait until one of the busy restarters is no longer busy; return at once if all are idle.
 
     Args:
-        restarters: some of them may be ready or lost.
-        check: called every tenth of a second; it raises to end the wait.
+        restarters: the restarters; some may be idle or lost.
+        check: a function that is called every tenth of a second, and raises to end the wait.
     """
     works = _under_way(restarters)
     while works and not wait(works, LOOK_EVERY_S, FIRST_COMPLETED).done:
@@ -340,9 +340,10 @@ def await_one(restarters: Sequence[Restarter], check: Check = go_on) -> None:
 
 
 def settle(restarters: Sequence[Restarter]) -> None:
-    """End the work in the restarters' threads: running starts fail, and no others begin.
+    """End the work of the restarters' threads: make running starts fail, and begin no new start.
 
-    Waits at most `SETTLE_S` seconds, plus the timeout of one request to a program that does not respond.
+    This function waits at most `SETTLE_S` seconds, plus the timeout of one request to a program that does not
+    respond.
     """
     for restarter in restarters:
         restarter.abandon()

@@ -1,4 +1,4 @@
-"""One simulator of a training run: its facade, its robot, its scene, and its environment."""
+"""A simulator of a run, with its facade, robot, scene and environment."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ MakeEnvironment = Callable[[RobotAbc, Scene], gymnasium.Env[Any, Any]]
 
 
 def driven_robot(robots: Sequence[RobotName], definition: str) -> RobotName | None:
-    """Return the robot of a world that a class with this DEF name drives.
+    """Return the robot of a world that a robot class with this DEF name controls.
 
-    It is the first robot with that name. If no robot has it, it is the first one that is not a supervisor.
-    None: all robots are supervisors.
+    Return the first robot with that DEF name, or else the first robot that is not a supervisor. Return None
+    if all robots are supervisors and none has the name.
     """
     of_class = (each for each in robots if definition and each.definition == definition)
     others = (each for each in robots if not each.supervisor)
@@ -39,15 +39,15 @@ def driven_robot(robots: Sequence[RobotName], definition: str) -> RobotName | No
 
 
 class Simulator:
-    """A simulator behind a sidecar; robot, scene and environment stay the same objects over restarts.
+    """A simulator behind a sidecar; its robot, scene and environment stay the same objects after a restart.
 
     Args:
         name: `<group>-<index>`, as in the configuration.
-        sidecar: starts and stops the simulator.
-        make_environment: creates the environment from robot and scene.
-        start_deadline_s: the longest wait in seconds for the sidecar's first response, and for each start.
-        recycle: limits at which it is restarted between two episodes; by default never.
-        robot: the class of the robot in its world.
+        sidecar: the sidecar, which starts and stops the simulator.
+        make_environment: a function that creates the environment from robot and scene.
+        start_deadline_s: the longest time to wait for the sidecar's first response, and for each start.
+        recycle: limits after which the simulator is restarted between two episodes; None: no limits.
+        robot: the class of the robot in the world.
 
     Raises:
         SimulatorDead, SimulatorHung: the sidecar does not report the robots' names.
@@ -92,24 +92,24 @@ class Simulator:
         return self.robot.simulation.simulated_s
 
     def left_out(self) -> tuple[str, ...]:
-        """Return the parts of its world that the simulator left out at its last start, as text lines."""
+        """Return the parts of its world that the simulator left out at its last start, as lines of text."""
         return self.sidecar.left_out
 
     def sight(self) -> Sight | None:
-        """Return where robot and target are after the last step; None: not on a floor."""
+        """Return the positions of robot and target after the last step; None without a floor."""
         return self.scene.sight()
 
     def due(self, episodes: int = 1) -> str | None:
-        """Return the reason to recycle it before the next `episodes`, as text; None: no reason."""
+        """Return the reason to recycle the simulator before the next `episodes`, as text; None: no reason."""
         return self.wear.due(self.resets, episodes)
 
     def start(self) -> None:
-        """Start the simulator and connect to it, ready to step.
+        """Start the simulator and connect to it, so that it can step.
 
         Raises:
-            SimulatorDead, SimulatorHung, WrongData: it does not start in time.
+            SimulatorDead, SimulatorHung, WrongData: the simulator does not start in time.
         """
-        self.webots.start()  # connects the robot too
+        self.webots.start()  # this also connects the robot
         self.unpause()
         self.scene.resets = 0
         self.wear.begin()
@@ -118,17 +118,17 @@ class Simulator:
         """Wait for the sidecar, stop the simulator in any state, and start it.
 
         Raises:
-            SimulatorDead, SimulatorHung, WrongData: it, or its sidecar, does not start in time.
+            SimulatorDead, SimulatorHung, WrongData: the simulator or its sidecar does not start in time.
         """
         self.await_sidecar()
         self.stop()
         self.start()
 
     def await_sidecar(self) -> None:
-        """Wait until the sidecar responds; a kubelet needs some time to restart a container.
+        """Wait until the sidecar responds, because a kubelet needs some time to restart its container.
 
         Raises:
-            SimulatorDead, SimulatorHung: it did not respond within `start_deadline_s` seconds.
+            SimulatorDead, SimulatorHung: the sidecar did not respond within `start_deadline_s` seconds.
         """
         self._abandoned.clear()
         give_up = time.monotonic() + self.start_deadline_s
@@ -152,13 +152,13 @@ class Simulator:
         self.webots.close()
 
     def abandon(self) -> None:
-        """Make a start or restart in another thread fail soon, by killing the simulator."""
+        """Kill the simulator, so that a start or restart in another thread fails soon."""
         self._abandoned.set()
         with contextlib.suppress(SimulatorFault):
             self.sidecar.expect_stop(0.0)
 
     def pause(self) -> None:
-        """Pause the simulator: it uses no processor time until `unpause`."""
+        """Pause the simulator, which then uses no processor time until `unpause`."""
         self.webots.supervisor.set_mode(Mode.PAUSE)
 
     def unpause(self) -> None:

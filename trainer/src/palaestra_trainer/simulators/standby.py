@@ -1,15 +1,15 @@
-"""A member with a spare: a second simulator that takes over when the active one must be restarted.
+"""A member with a spare, which is a second simulator that takes over when the first must be restarted.
 
 Both simulators belong to one sidecar and differ in their ROS names. A restart swaps their roles: the spare
-takes over at once if it is ready. The other one is restarted in its own thread and becomes the spare. If it
-does not start, it is started again, within a budget like that of the active one. When that budget is spent,
-it stays down.
+takes over at once if it is ready. The other simulator is restarted in its own thread and becomes the spare.
+If this restart fails, it is repeated, within a budget like that of the active simulator. When that budget is
+spent, the spare stays down.
 
-If the spare breaks while it stands by, its fault is found and reported when it must take over. The restart
-after that waits for the other simulator, which is already being started. So a fault never waits for more than
-one start.
+If the spare fails while it stands by, its fault is detected and reported when it must take over. The restart
+after that fault waits for the other simulator, which is already starting. So a restart never waits for more
+than one start.
 
-The environment belongs to the active simulator, so read `env` again after a restart.
+Each simulator has its own environment, so read `env` again after a restart.
 """
 
 from __future__ import annotations
@@ -42,9 +42,9 @@ class Standby:
     """Two simulators as one member.
 
     Args:
-        first: the active one at the beginning.
-        second: the standby.
-        limit: restart limit of a spare that does not start.
+        first: the simulator that is active at the beginning.
+        second: the simulator that is the spare at the beginning.
+        limit: limit for repeated starts of a spare that does not start.
     """
 
     def __init__(self, first: Simulator, second: Simulator, limit: RestartLimit | None = None) -> None:
@@ -60,7 +60,7 @@ class Standby:
 
     @property
     def env(self) -> Environment:
-        """The environment of the active simulator; another object after a restart."""
+        """The environment of the active simulator; after a restart it is another object."""
         return self._active.simulator.env
 
     @property
@@ -70,19 +70,19 @@ class Standby:
 
     @property
     def simulated_s(self) -> float:
-        """Seconds of simulated time of both simulators since they were created, over all restarts."""
+        """The sum of both simulators' simulated seconds since their creation, over all restarts."""
         return sum(each.simulated_s for each in self._both)
 
     def spare(self) -> StandbyState | None:
-        """Return the state of the spare; None: it is neither ready nor being started."""
+        """Return the state of the spare; None if the spare is neither ready nor starting."""
         return self._spare.state
 
     def left_out(self) -> tuple[str, ...]:
-        """Return the parts that the first simulator left out; the other one has the same world."""
+        """Return the parts that the first simulator left out; the second has the same world."""
         return self._both[0].left_out()
 
     def sight(self) -> Sight | None:
-        """Return where robot and target are in the active simulator; None: not on a floor."""
+        """Return the positions of robot and target in the active simulator; None: not on a floor."""
         return self._active.simulator.sight()
 
     def due(self, episodes: int = 1) -> str | None:
@@ -90,10 +90,10 @@ class Standby:
         return self._active.simulator.due(episodes)
 
     def start(self) -> None:
-        """Start the first simulator; the spare follows in the background.
+        """Start the active simulator; begin to start the spare in the background.
 
         Raises:
-            SimulatorDead, SimulatorHung, WrongData: the first one does not start in time.
+            SimulatorDead, SimulatorHung, WrongData: the active simulator does not start in time.
         """
         for side in (self._active, self._spare):
             side.wanted = True
@@ -114,7 +114,7 @@ class Standby:
         )
 
     def stop(self) -> None:
-        """Stop both simulators, in any state; no thread works on them when this returns."""
+        """Stop both simulators, in any state, and wait until no thread works on them."""
         with contextlib.ExitStack() as stack:
             for side in (self._active, self._spare):
                 stack.callback(side.stop)
@@ -133,11 +133,11 @@ class Standby:
 
 
 class Side:
-    """One of the two simulators, and the thread that may be preparing it.
+    """One of the two simulators, and the thread that prepares it as the spare.
 
     Attributes:
-        simulator: while the thread prepares it, only that thread may use it.
-        wanted: whether it may be started again.
+        simulator: the simulator; while the thread prepares it, only that thread may use it.
+        wanted: whether the simulator may be started again.
     """
 
     def __init__(self, simulator: Simulator, limit: RestartLimit) -> None:
@@ -149,8 +149,8 @@ class Side:
 
     @property
     def state(self) -> StandbyState | None:
-        """Its state; None: it is neither ready nor being started."""
-        preparation = self._preparation  # another thread may set it
+        """The state of this simulator as a spare; None if it is neither ready nor starting."""
+        preparation = self._preparation  # read once, because another thread may set it
         if preparation is None:
             return None
         if not preparation.done():
@@ -158,16 +158,16 @@ class Side:
         return None if preparation.exception() else StandbyState.READY
 
     def prepare(self) -> Future[None]:
-        """Begin to restart it, in any state, again until it is up; do nothing if that already runs."""
+        """Begin to restart the simulator until it is up; do nothing if such a restart already runs."""
         if self._preparation is None or self._preparation.done():
             self._preparation = in_background(self._restart, f"standby-{self.simulator.name}")
         return self._preparation
 
     def take_over(self) -> None:
-        """Wait until it is up, then unpause it; the wait ends at the start deadline of a simulator.
+        """Wait until the simulator is up, at most for its start deadline; then unpause it.
 
         Raises:
-            SimulatorDead, SimulatorHung, WrongData: it did not start, or broke while it stood by.
+            SimulatorDead, SimulatorHung, WrongData: the simulator did not start, or failed while it stood by.
         """
         simulator, deadline_s = self.simulator, self.simulator.start_deadline_s
         preparation = self._preparation or self.prepare()
@@ -180,17 +180,17 @@ class Side:
         simulator.wear.begin()
 
     def abandon(self) -> None:
-        """Make a running start fail soon, and begin no other."""
+        """Make a running start fail soon, and do not begin another start."""
         self.wanted = False
         self.simulator.abandon()
 
     def stop(self) -> None:
-        """Stop it, in any state; no thread works on it when this returns."""
+        """Stop the simulator, in any state, and wait until no thread works on it."""
         self.wanted = False
         preparation, self._preparation = self._preparation, None
         while preparation is not None and not preparation.done():
-            # The kill makes the start fail and so ends its thread. It may be needed twice, because a process
-            # that is about to be started cannot be killed yet.
+            # The kill makes the start fail, which ends its thread. A second kill may be needed, because a
+            # process that has not started yet cannot be killed.
             self.abandon()
             wait([preparation], _ASK_AGAIN_S)
         self.simulator.stop()

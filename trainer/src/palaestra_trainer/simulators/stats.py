@@ -1,4 +1,4 @@
-"""The counts of one simulator: steps, slow steps, resets, simulated time and spent restarts."""
+"""Count steps, slow steps, resets, simulated time and spent restarts of one simulator."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ _FEWEST = 10
 
 
 class Pace:
-    """The usual duration of one simulator's steps: the median of the last hundred."""
+    """The usual duration of one simulator's steps, which is the median of the last hundred steps."""
 
     def __init__(self) -> None:
         self._recent: deque[float] = deque(maxlen=_REMEMBERED)
 
     def slow(self, seconds: float) -> bool:
-        """Return whether a step that took `seconds` was slow, and remember its duration.
+        """Return whether a step that took `seconds` was slow, and record its duration.
 
-        A step is slow if it takes more than 10 times the median and more than 50 ms. None of the first ten
-        steps is slow.
+        A step is slow if it takes more than 10 times the median and more than 50 ms. The first ten steps
+        never count as slow.
         """
         slow = seconds > SLOW_S and len(self._recent) >= _FEWEST and seconds > SLOW_TIMES * self._median()
         self._recent.append(seconds)
@@ -48,16 +48,16 @@ class Timed(Protocol):
 
 
 class SimulatorStats:
-    """Counts for one member; written by the thread that steps it, read by any thread.
+    """The statistics of one member, which its thread writes and any thread may read.
 
     Attributes:
-        steps: seconds that each environment step took.
-        resets: episodes begun.
+        steps: histogram of the seconds that environment steps took.
+        resets: number of episodes begun.
         stepped: whether an environment step was taken.
 
     Args:
         member: the member whose steps are counted.
-        budget: its restart budget.
+        budget: restart budget of the member.
     """
 
     def __init__(self, member: Member, budget: RestartBudget) -> None:
@@ -75,10 +75,10 @@ class SimulatorStats:
 
     @property
     def simulated_s(self) -> float | None:
-        """Seconds of simulated time; None: the member does not count it."""
+        """Seconds of simulated time; None if the member does not count it."""
         return self._member.simulated_s if isinstance(self._member, Timed) else None
 
     @property
     def budget_spent(self) -> float:
-        """Share of its restart budget that is spent now, 0 to 1."""
+        """The share of the member's restart budget that is spent now, 0 to 1."""
         return self._budget.spent_share

@@ -8,7 +8,7 @@ from concurrent.futures import Future
 
 
 def in_background(work: Callable[[], None], name: str) -> Future[None]:
-    """Start `work` in a thread of that name; the returned future raises what `work` raised."""
+    """Start `work` in a thread with this name; the returned future raises the error of `work`."""
     future: Future[None] = Future()
 
     def run() -> None:

@@ -1,6 +1,6 @@
-"""Robots and a task that need no simulator, and the checks that every robot must pass.
+"""Fake robots and a fake task that need no simulator, and the checks that every robot must pass.
 
-They ship with the package, because authors of environments, robots and algorithms need them.
+The fakes and checks ship with the package, because authors of environments, robots and algorithms need them.
 """
 
 from palaestra_trainer.testing.conformance import NotConforming, check_robot, check_scene

@@ -1,9 +1,8 @@
-"""The definition of a robot and of each capability, as checks for any implementation.
+"""Check an implementation of a robot or a scene against the rules of its interfaces.
 
-A fake, a simulated and a real robot of one class pass the same checks, so an environment
-can be moved from one to the other. Each rule is a constant, a sentence that is also the
-error message for a robot that fails it. The checks move the robot, so give it half a meter
-of free floor on every side.
+A fake, a simulated and a real robot of the same class pass the same checks, so an environment works with each
+of them. Each rule is a constant; its sentence is also the error message for a robot that breaks the rule. The
+checks move the robot, so it needs half a meter of free floor on every side.
 """
 
 from __future__ import annotations
@@ -52,18 +51,18 @@ MOTORS_ARE_NAMED = "motors has a name and greatest a positive number for each mo
 RESET_PLACES = "Scene.reset() leaves the robot at rest at the start, with fresh readings"
 RESET_DECIDES = "the same seed, start and commands give the same readings"
 
-PERIODS = 3  # periods of each movement: enough for the constant speed to outweigh the acceleration
-STILL_M = 0.002  # apparent motion of a standing robot: odometry has steps
-RESET_M = 0.01  # a simulator may let the robot settle on its wheels
-SHARE = 0.5  # share of the robot's greatest speeds at which steering is checked
+PERIODS = 3  # periods of each movement, long enough to make the acceleration unimportant
+STILL_M = 0.002  # largest apparent motion of a standing robot, because odometry has steps
+RESET_M = 0.01  # tolerance, because a robot in a simulator settles on its wheels
+SHARE = 0.5  # share of the robot's greatest speeds with which steering is checked
 
 
 class NotConforming(TrainerError, AssertionError):
-    """A robot broke one of the rules."""
+    """A robot breaks a rule of the interface."""
 
 
 def check_robot(robot: RobotAbc) -> None:
-    """Check a robot, standing on free floor, against the rules of all robots and of its capabilities.
+    """Check a robot that stands on free floor against the rules for robots and for its capabilities.
 
     Raises:
         NotConforming: with the broken rule and the observed value.
@@ -143,7 +142,7 @@ def _knows_where_it_is(robot: object) -> bool:
 
 
 def _check_motion(robot: Any, drive: Callable[[Twist], None], wanted: Twist, rule: str) -> None:
-    """Compare the driven distance (m, m, rad) with the commanded one, then stop."""
+    """Compare the driven distance (m, m, rad) with the commanded distance, then stop the robot."""
     before = robot.pose()
     drive(wanted)
     elapsed_s = sum(robot.period_s * (1 + robot.advance()) for _ in range(PERIODS))
@@ -237,7 +236,7 @@ def _check_readings_stand_still(robot: RobotAbc) -> None:
 
 
 def _readings(robot: object) -> list[Any]:
-    """Return the readings of the robot as a list, except those of optional devices."""
+    """Return the readings of the robot as a list, without the readings of optional devices."""
     return [
         *(robot.distances().tolist() if isinstance(robot, Distances) else ()),
         *(robot.joints().tolist() if isinstance(robot, Joints) else ()),
@@ -249,7 +248,7 @@ def _readings(robot: object) -> list[Any]:
 def _drive_after_reset(
     robot: Any, scene: Scene, start: Pose, target: tuple[float, float]
 ) -> list[NDArray[np.float64]]:
-    """Return the readings of a short drive that begins with a reset."""
+    """Reset the scene and drive a short distance; return the readings."""
     scene.reset(7, start, target)
     off = moved(start, robot.pose())
     _require(max(map(abs, off)) <= RESET_M and not _feels_contact(robot), RESET_PLACES, robot.pose())
@@ -273,7 +272,7 @@ def _numbers(robot: Any) -> NDArray[np.float64]:
 
 
 def moved(before: Pose, after: Pose) -> Twist:
-    """Return a robot's motion in the frame of its first pose: meters forward and left, radians turned."""
+    """Return the motion between two poses in the frame of the first: meters forward and left, radians."""
     dx, dy = after.x_m - before.x_m, after.y_m - before.y_m
     c, s = math.cos(before.heading_rad), math.sin(before.heading_rad)
     turned_rad = math.remainder(after.heading_rad - before.heading_rad, 2.0 * math.pi)

@@ -1,4 +1,4 @@
-"""A base class for fakes that crash at given steps, as a simulator does."""
+"""A base class for fakes that crash at given steps, as a simulator may do."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ from palaestra_trainer.errors import SimulatorDead
 
 
 class Crashing:
-    """A fake that crashes at some of its steps, and works again after `restart`.
+    """A fake that crashes at given steps, and works again after `restart`.
 
     Args:
-        deaths: numbers of the steps at which it crashes, counted from 1 and over restarts.
-        name: its name in faults.
+        deaths: numbers of the steps at which the fake crashes, counted from 1; a restart does not reset the
+            count.
+        name: name of the fake in faults.
     """
 
     def __init__(self, deaths: Collection[int], name: str) -> None:
@@ -22,14 +23,14 @@ class Crashing:
         self._dead = False
 
     def restart(self) -> None:
-        """Make it work again after a crash."""
+        """Make the fake work again after a crash."""
         self._dead = False
 
     def _live_a_step(self) -> None:
-        """Count a step, and crash if it is one of `deaths`.
+        """Count a step, and crash if its number is in `deaths`.
 
         Raises:
-            SimulatorDead: it has crashed, in this step or before.
+            SimulatorDead: the fake has crashed in this step, or earlier without a restart.
         """
         self._live()
         self._steps += 1
@@ -37,10 +38,10 @@ class Crashing:
         self._live()
 
     def _live(self) -> None:
-        """Check that it has not crashed.
+        """Check that the fake has not crashed.
 
         Raises:
-            SimulatorDead: it has crashed.
+            SimulatorDead: the fake has crashed.
         """
         if self._dead:
             raise SimulatorDead(self._name, f"died at step {self._steps}; restart it")

@@ -1,8 +1,8 @@
-"""A TurtleBot3 Burger on the floor of the world `court`, computed in this process.
+"""A fake TurtleBot3 Burger on the floor of the world `court`, computed in this process.
 
-`fake_court()` returns a robot and a scene for `NavigateEnv` that run at some thousand steps a second. The
-robot drives as `FakeWheels` does; its scanner has the rays, the range and the noise of the real one. It can
-crash at given steps, as simulators do.
+`fake_court()` returns a robot and a scene for `NavigateEnv`, with some thousand steps per second. The robot
+drives as `FakeWheels` does. Its scanner has the rays, the range and the noise of the scanner in Webots. The
+robot can crash at given steps, as simulators may do.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from palaestra_trainer.testing.fake_wheels import FakeWheels
 from palaestra_trainer.testing.rays import nearest
 
 RAYS = 360
-SCANNER_M = -0.03  # position of the scanner from the robot's center, along its heading
-NOISE_M = 0.015  # 0.0043 of the greatest distance. Source: RobotisLds01 of Webots
+SCANNER_M = -0.03  # position of the scanner, relative to the robot's center and along its heading
+NOISE_M = 0.015  # deviation, 0.0043 of the greatest distance. Source: RobotisLds01 of Webots
 ROWS = (np.arange(RAYS) + 0.5) * (2.0 * math.pi / RAYS) - math.pi
 TOP_M = 0.3
 
@@ -43,7 +43,7 @@ COURT = FloorLayout(
 
 
 class FakeBurger(FakeWheels, Scanner):
-    """A TurtleBot3 Burger, computed in this process. The arguments are those of `FakeWheels`."""
+    """A fake TurtleBot3 Burger; the arguments are those of `FakeWheels`."""
 
     floor = COURT
     axle_m = 0.16
@@ -55,11 +55,11 @@ class FakeBurger(FakeWheels, Scanner):
     _scans = False
 
     def use_scanner(self) -> None:
-        """Make the scanner measure."""
+        """Make the scanner measure from now on."""
         self._scans = True
 
     def scan(self) -> NDArray[np.float32]:
-        """Return meters, shape (360,), counter-clockwise from behind; a new array."""
+        """Return a new array of distances in meters, shape (360,), counter-clockwise from behind."""
         self._live()
         if not self._scans:
             raise NoSuchSensor(f"{self._name}: its scanner is not in use; call use_scanner(), then advance()")
@@ -72,7 +72,7 @@ class FakeBurger(FakeWheels, Scanner):
         )
         least, most = self.scan_range_m
         seen = nearest(self.layout, origin, self._heading_rad + ROWS)
-        seen[seen < least] = most  # an object that is too near is not detected
+        seen[seen < least] = most  # the scanner does not detect an object that is too near
         noise = NOISE_M * self._random.standard_normal(RAYS)
         self._scan = np.clip(seen + noise, least, most).astype(np.float32)
 

@@ -1,10 +1,9 @@
-"""Camera images of a `FakeRobotino`, computed by geometry: the target's pole, cylinders, walls and floor.
+"""Compute camera images of a `FakeRobotino`, with the target's pole, cylinders, walls and floor.
 
-All objects stand upright on the floor. So each column of pixels has one direction over the floor, and the
-distance to each object is computed once per column. A pixel shows the nearest object that its ray meets
-between foot and top. Colors are flat, without light, shadow and noise, unlike in a simulator that renders.
-
-Camera, pole and colors are those of the shipped world `seeing`.
+All objects stand upright on the floor. So each column of pixels looks in one direction over the floor, and
+the distance to each object is computed once per column. A pixel shows the nearest object that its ray hits
+between foot and top. Unlike in a simulator that renders, colors have neither light, shadow nor noise. Camera,
+pole and colors are those of the shipped world `seeing`.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from palaestra_trainer.testing.fake_scene import CYLINDER_HEIGHT_M, CYLINDER_RAD
 
 HEIGHT, WIDTH = 48, 64  # pixels
 FIELD_OF_VIEW_RAD = 1.0472  # horizontal
-FORWARD_M, ABOVE_M = 0.23, 0.3  # position of the camera from the robot's center, and from the floor
+FORWARD_M, ABOVE_M = 0.23, 0.3  # position of the camera, relative to the robot's center and above the floor
 RANGE_M = (0.05, 6.0)  # range of the depth camera
 POLE_HEIGHT_M, POLE_RADIUS_M = 0.5, 0.05
 WALL_HEIGHT_M = 0.3
@@ -34,7 +33,7 @@ Colors = NDArray[np.uint8]
 Depths = NDArray[np.float32]
 _Row = NDArray[np.floating[Any]]
 
-# These give the ray of a pixel, per meter forward: meters to the left by column, meters up by row.
+# The ray of a pixel per meter forward: meters to the left by column, and meters up by row.
 _FOCAL = 0.5 * WIDTH / math.tan(0.5 * FIELD_OF_VIEW_RAD)  # pixels
 _LEFT: _Row = (0.5 * WIDTH - 0.5 - np.arange(WIDTH)) / _FOCAL
 _UP: _Row = (0.5 * HEIGHT - 0.5 - np.arange(HEIGHT))[:, None] / _FOCAL
@@ -43,7 +42,7 @@ _FLOOR_M: _Row = np.where(_UP < 0.0, ABOVE_M / np.maximum(-_UP, 1e-9), math.inf)
 
 @dataclass(frozen=True, slots=True)
 class _Thing:
-    """An object in an image: meters forward to it by column, its height and its color."""
+    """An object in an image: the meters forward to it by column, its height and its color."""
 
     forward_m: _Row
     height_m: float
@@ -51,15 +50,16 @@ class _Thing:
 
 
 def look(pose: Pose, target: Point, cylinders: Sequence[Point]) -> tuple[Colors, Depths]:
-    """Return the color and the depth image of a robot at `pose`, both new.
+    """Return new arrays with the color image and the depth image of a robot at `pose`.
 
-    Colors: shape (48, 64, 3), RGB. Depths: shape (48, 64), meters forward, infinite out of range.
+    The color image is RGB of shape (48, 64, 3). The depth image has shape (48, 64) and holds meters forward,
+    infinite out of range.
     """
     depths = np.repeat(_FLOOR_M, WIDTH, axis=1)
     colors = np.empty((HEIGHT, WIDTH, 3), np.uint8)
     colors[:] = np.where(_UP < 0.0, np.array(FLOOR, np.uint8), np.array(SKY, np.uint8))[:, None]
     for thing in _things(pose, target, cylinders):
-        top_m = ABOVE_M + _UP * thing.forward_m  # infinite, and so not seen, in columns beside the object
+        top_m = ABOVE_M + _UP * thing.forward_m  # infinite, and so invisible, in columns next to the object
         seen = (thing.forward_m < depths) & (top_m >= 0.0) & (top_m <= thing.height_m)
         np.copyto(depths, thing.forward_m, where=seen)
         colors[seen] = thing.color
@@ -70,7 +70,7 @@ def look(pose: Pose, target: Point, cylinders: Sequence[Point]) -> tuple[Colors,
 def _things(pose: Pose, target: Point, cylinders: Sequence[Point]) -> Iterator[_Thing]:
     c, s = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
     origin = pose.x_m + FORWARD_M * c, pose.y_m + FORWARD_M * s
-    ways = c - s * _LEFT, s + c * _LEFT  # for each column, x and y of its rays per meter forward
+    ways = c - s * _LEFT, s + c * _LEFT  # x and y of the rays of each column, per meter forward
     walls = np.minimum(_to_wall(origin[0], ways[0]), _to_wall(origin[1], ways[1]))
     yield _Thing(walls, WALL_HEIGHT_M, WALL)
     for x, y in cylinders:
@@ -82,14 +82,14 @@ def _things(pose: Pose, target: Point, cylinders: Sequence[Point]) -> Iterator[_
 
 
 def _to_wall(position_m: float, way: _Row) -> _Row:
-    """Return meters forward to the wall that each column faces."""
+    """Return for each column the meters forward to the wall that it faces."""
     away = np.copysign(np.maximum(np.abs(way), 1e-9), way)
     wall: _Row = (np.copysign(HALF_SIDE_M, way) - position_m) / away
     return wall
 
 
 def _to_circle(middle: Point, ways: tuple[_Row, _Row], radius_m: float) -> _Row:
-    """Return meters forward to a circle on the floor, by column; infinite beside it and behind the camera."""
+    """Return meters forward to a circle on the floor by column; infinite if the column misses it."""
     x, y = ways
     squared = x**2 + y**2
     along = (middle[0] * x + middle[1] * y) / squared

@@ -1,8 +1,8 @@
-"""An e-puck on the floor of the world `pen`, computed in this process.
+"""A fake e-puck on the floor of the world `pen`, computed in this process.
 
-`fake_pen()` returns a robot and a scene that run at some ten thousand steps a second. The robot drives as
-`FakeWheels` does; its infrared sensors have the positions and the range of the real ones. It can crash at
-given steps, as simulators do.
+`fake_pen()` returns a robot and a scene, with some ten thousand steps per second. The robot drives as
+`FakeWheels` does. Its infrared sensors have the positions and the range of the sensors in Webots. The robot
+can crash at given steps, as simulators may do.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ SENSORS_M = np.array(
         (0.03, -0.01),
     ]
 )
-NOISE_M = 0.001  # the mean over the range. Source: E-puckDistanceSensor of Webots
+NOISE_M = 0.001  # mean deviation over the range. Source: E-puckDistanceSensor of Webots
 TOP_M = 0.1
 
 PEN = FloorLayout(
@@ -46,7 +46,7 @@ PEN = FloorLayout(
 
 
 class FakeEPuck(FakeWheels, Distances):
-    """An e-puck, computed in this process. The arguments are those of `FakeWheels`."""
+    """A fake e-puck; the arguments are those of `FakeWheels`."""
 
     floor = PEN
     axle_m = 0.052

@@ -1,11 +1,10 @@
-"""The arena and a Robotino in it, computed in this process.
+"""A fake Robotino in the arena, computed in this process.
 
-`fake_arena()` returns a robot and a scene for `MoveToTargetEnv` that run at some
-twenty thousand steps a second, for notebooks, tests and experiments with rewards.
-`fake_seeing()` is the same for `SeeTarget`: its robot has cameras. Only the physics
-that the task needs are computed: acceleration takes time, walls and cylinders stop the
-robot and let it slide, infrared has a range of 40 cm. The robot can crash at given
-steps, as simulators do.
+`fake_arena()` returns a robot and a scene for `MoveToTargetEnv`, with some twenty thousand steps per second,
+for notebooks, tests and experiments with rewards. `fake_seeing()` returns a robot with cameras and a scene
+for `SeeTarget`. The fake computes only the physics that the task needs. The robot accelerates over some time,
+walls and cylinders stop it and let it slide, and its infrared sensors have a range of 40 cm. The robot can
+crash at given steps, as simulators may do.
 """
 
 from __future__ import annotations
@@ -39,16 +38,16 @@ NOISE = 0.005  # deviation as a share of the reading. Source: GP2Y0A41 in Webots
 
 
 class FakeRobotino(Crashing, RobotinoAbc):
-    """A Robotino on the arena's floor, computed in this process.
+    """A fake Robotino on the floor of the arena.
 
     Args:
-        deaths: numbers of the `advance` calls at which it crashes, counted from 1 and over
-            restarts; every call raises `SimulatorDead` from then until `restart`.
-        name: its name in faults.
+        deaths: numbers of the `advance` calls at which the robot crashes, counted from 1; a restart does not
+            reset the count. After a crash, every call raises `SimulatorDead` until `restart`.
+        name: name of the robot in faults.
 
     Attributes:
         cylinders: x, y in meters of the cylinders that stand on the floor.
-        target: x, y in meters of the mark, which is a pole for cameras.
+        target: x, y in meters of the mark; cameras see a pole there.
     """
 
     def __init__(self, deaths: Collection[int] = (), name: str = "fake") -> None:
@@ -62,12 +61,12 @@ class FakeRobotino(Crashing, RobotinoAbc):
 
     @property
     def period_s(self) -> float:
-        """Six basic steps of 32 ms, as in the shipped example."""
+        """The duration of six basic steps of 32 ms, as in the shipped example."""
         return BASIC_STEP_S * BASIC_STEPS
 
     @property
     def layout(self) -> FloorLayout:
-        """The arena with its obstacles; only its cylinders are simulated."""
+        """The arena with its obstacles; the fake simulates only the cylinders."""
         return self._layout
 
     @layout.setter
@@ -76,7 +75,7 @@ class FakeRobotino(Crashing, RobotinoAbc):
         self.cylinders = tuple((thing.x_m, thing.y_m) for thing in layout.obstacles if thing.standing)
 
     def distances(self) -> NDArray[np.float32]:
-        """Return the nine distances after the last step."""
+        """Return the readings of the nine distance sensors after the last step."""
         self._live()
         return self._distances.copy()
 
@@ -96,7 +95,7 @@ class FakeRobotino(Crashing, RobotinoAbc):
         self._wanted = (vx, vy, omega)
 
     def advance(self) -> int:
-        """Simulate one control period; return 0, because extra periods are never needed."""
+        """Simulate one control period; return 0, because the fake never needs extra periods."""
         self._live_a_step()
         self._bumped = False
         for _ in range(BASIC_STEPS):
@@ -107,7 +106,7 @@ class FakeRobotino(Crashing, RobotinoAbc):
         return 0
 
     def place(self, pose: Pose, seed: int) -> None:
-        """Put the robot at rest at `pose` and update all readings; `seed` decides the noise."""
+        """Put the robot at `pose`, at rest, and update all readings; `seed` decides the noise."""
         self._live()
         self._x_m, self._y_m, self._heading_rad = pose.x_m, pose.y_m, pose.heading_rad
         self._wanted = self._velocity = (0.0, 0.0, 0.0)
@@ -130,7 +129,7 @@ class FakeRobotino(Crashing, RobotinoAbc):
         self._heading_rad = wrapped(self._heading_rad + omega * BASIC_STEP_S)
 
     def _slide(self) -> None:
-        """Push the robot out of an obstacle that it hit, so that it slides along it."""
+        """Move the robot out of an obstacle that it hit, so that the robot slides along the obstacle."""
         for x, y in self.cylinders:
             reach = CYLINDER_RADIUS_M + RADIUS_M
             distance = math.hypot(self._x_m - x, self._y_m - y)
@@ -150,7 +149,7 @@ class FakeRobotino(Crashing, RobotinoAbc):
         self._distances = np.clip(seen * noise, *SENSOR_RANGE_M).astype(np.float32)
 
     def _ray(self, bearing_rad: float) -> float:
-        """Return meters from the robot's body to the nearest obstacle in this direction in the world."""
+        """Return meters from the robot's body to the nearest obstacle in a direction of the world's frame."""
         ux, uy = math.cos(bearing_rad), math.sin(bearing_rad)
         nearest = min(_to_wall(self._x_m, ux), _to_wall(self._y_m, uy))
         for x, y in self.cylinders:
@@ -169,16 +168,16 @@ class FakeSeeingRobotino(FakeRobotino, Cameras):
         self._in_use: set[str] = set()
 
     def use_cameras(self, *, color: bool = False, depth: bool = False) -> None:
-        """Make the chosen cameras render an image in each later `advance`."""
+        """Make the chosen cameras render an image in each `advance` from now on."""
         self._live()
         self._in_use |= {name for name, wanted in (("color", color), ("depth", depth)) if wanted}
 
     def color_image(self) -> NDArray[np.uint8]:
-        """Return the camera's image from the pose after the last step, a new array."""
+        """Return a new array with the color image at the pose after the last step."""
         return self._look("color")[0]
 
     def depth_image(self) -> NDArray[np.float32]:
-        """Return meters for each pixel from the pose after the last step, a new array."""
+        """Return a new array with the meters for each pixel, at the pose after the last step."""
         return self._look("depth")[1]
 
     def _look(self, camera: str) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
@@ -198,7 +197,7 @@ def fake_arena(deaths: Collection[int] = ()) -> tuple[FakeRobotino, FakeScene]:
 
 
 def fake_seeing(deaths: Collection[int] = ()) -> tuple[FakeSeeingRobotino, FakeScene]:
-    """Return a robot with cameras and its scene, without cylinders; see `FakeRobotino` for `deaths`.
+    """Return a robot with cameras and its scene without cylinders; see `FakeRobotino` for `deaths`.
 
     The cylinders are stored under the floor, as in the world `seeing`.
     """
@@ -207,7 +206,7 @@ def fake_seeing(deaths: Collection[int] = ()) -> tuple[FakeSeeingRobotino, FakeS
 
 
 def wrapped(angle_rad: float) -> float:
-    """Return the same direction in (-pi, pi]."""
+    """Return an angle in (-pi, pi] with the same direction."""
     angle_rad = math.remainder(angle_rad, 2.0 * math.pi)
     return math.pi if angle_rad == -math.pi else angle_rad
 

@@ -1,4 +1,4 @@
-"""The floors of the fakes, and the scene that arranges episodes on them."""
+"""The arena's floor, and the scene of the fake robots."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from palaestra_trainer.robots.base import Scene
 from palaestra_trainer.robots.geometry import Point, Pose
 from palaestra_trainer.robots.layout import FloorLayout, Obstacle
 
-HALF_SIDE_M = 2.0  # distance from the center of the arena to the inner faces of the walls
+HALF_SIDE_M = 2.0  # from the center of the arena to the inner faces of the walls
 CYLINDERS = ((0.8, 0.8), (-0.8, 0.8), (-0.8, -0.8), (0.8, -0.8))
-CYLINDER_RADIUS_M = 0.25  # wide enough not to fit between two of the robot's infrared rays
+CYLINDER_RADIUS_M = 0.25  # too wide to stand undetected between two infrared rays of the robot
 CYLINDER_HEIGHT_M = 0.4
-STORED_M = -0.7  # height of a cylinder that is stored under the floor of the world `seeing`
+STORED_M = -0.7  # height of the center of a cylinder that is stored under the floor of the world `seeing`
 
 
 def arena(cylinders: Iterable[Point] = CYLINDERS, height_m: float = 0.5 * CYLINDER_HEIGHT_M) -> FloorLayout:
@@ -38,7 +38,7 @@ def arena(cylinders: Iterable[Point] = CYLINDERS, height_m: float = 0.5 * CYLIND
 
 
 class Placed(Protocol):
-    """The interface of a fake robot for its scene."""
+    """The interface of a fake robot that its scene uses."""
 
     target: Point
 
@@ -51,7 +51,7 @@ class Placed(Protocol):
     def layout(self, layout: FloorLayout) -> None: ...
 
     def place(self, pose: Pose, seed: int) -> None:
-        """Put the robot at rest at `pose` and update all readings; `seed` decides the noise."""
+        """Put the robot at `pose`, at rest, and update all readings; `seed` decides the noise."""
         ...
 
 
@@ -60,7 +60,7 @@ class FakeScene(Scene):
 
     Args:
         robot: the robot.
-        layout: the floor and the obstacles on it when an episode begins.
+        layout: the floor and the obstacles on it at the start of each episode.
     """
 
     def __init__(self, robot: Placed, layout: FloorLayout | None = None) -> None:
@@ -82,11 +82,11 @@ class FakeScene(Scene):
         self._robot.layout = self._first
 
     def layout(self) -> FloorLayout:
-        """Return the floor and the obstacles on it now."""
+        """Return the floor and the current obstacles on it."""
         return self._robot.layout
 
     def place(self, start: Pose, target: Point) -> None:
-        """Put the robot at rest at `start`, and the mark at `target`."""
+        """Put the robot at `start`, at rest, and the mark at `target`."""
         self.mark(target)
         self._robot.place(start, self._seed)
 

@@ -1,7 +1,7 @@
-"""A task with any pair of spaces, computed in this process, to try algorithms on.
+"""A fake task with any pair of spaces, computed in this process, to test algorithms.
 
-Its observations and rewards depend only on the seed of the episode and on every action since. So a run is
-repeatable, and a resumed run that lost a part of its state differs from the original.
+Observations and rewards depend only on the seed of the episode and on all its actions so far. So a run is
+repeatable, and a resumed run that lost some of its state differs from the original run.
 """
 
 from __future__ import annotations
@@ -44,12 +44,13 @@ ACTIONS: Mapping[str, spaces.Space[Any]] = MappingProxyType(
 
 
 class FakeTask(Crashing, gymnasium.Env[Any, Any]):
-    """Episodes of at most `max_steps` steps; each step draws a new observation.
+    """An environment with episodes of at most `max_steps` steps; each step draws a new observation.
 
     Args:
         observation_space: the space of observations; the task uses a copy.
         action_space: the space of actions; the task uses a copy.
-        deaths: numbers of the steps at which it crashes, counted from 1 and over restarts; see `restart`.
+        deaths: numbers of the steps at which the task crashes, counted from 1; a restart does not reset the
+            count.
         max_steps: steps after which an episode is truncated.
     """
 
@@ -77,7 +78,7 @@ class FakeTask(Crashing, gymnasium.Env[Any, Any]):
         return self._observe(), {}
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
-        """Take a step; on average one of nine terminates the episode."""
+        """Take a step; on average, one of nine steps terminates the episode."""
         self._live_a_step()
         self._length += 1
         self._past = zlib.crc32(np.ascontiguousarray(action).tobytes(), self._past)
@@ -91,19 +92,19 @@ class FakeTask(Crashing, gymnasium.Env[Any, Any]):
 
 
 class MaskedTask(FakeTask):
-    """A fake task that forbids actions; the previous actions of the episode decide which ones.
+    """A fake task that forbids some actions, depending on the previous actions of the episode.
 
     Raises:
-        AssertionError: a step has a forbidden action.
+        AssertionError: a forbidden action was given to `step`.
     """
 
     def action_masks(self) -> np.ndarray:
-        """Return a mask of the choices that the next step allows, at least one per number of the action."""
+        """Return the mask of allowed choices for the next step, at least one per number of the action."""
         self._live()
         return self._allowed()
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
-        """Take a step, unless the action is forbidden."""
+        """Take a step; raise an error if the action is forbidden."""
         if not allows(self._allowed(), self.action_space, action):
             raise AssertionError(f"action {action} is forbidden in step {self._length + 1}")
         return super().step(action)

@@ -1,7 +1,7 @@
-"""A robot on two wheels, computed in this process.
+"""A fake robot on two wheels, computed in this process.
 
-It drives without slip and follows commands at once; walls and obstacles stop it and let it slide. A subclass
-adds sensors.
+The robot drives without slip, and follows commands without delay. Walls and obstacles stop the robot and let
+it slide. A subclass adds sensors.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ PERIOD_S = 0.192
 
 
 class FakeWheels(Crashing, RobotAbc, Steering, Localization):
-    """A robot on two wheels; a subclass sets `floor`, sizes and speeds, and implements `_look`.
+    """A fake robot on two wheels; a subclass sets `floor`, sizes and speeds, and implements `_look`.
 
     Args:
-        deaths: numbers of the `advance` calls at which it crashes, counted from 1 and over restarts; every
-            call raises `SimulatorDead` from then until `restart`.
-        name: its name in faults.
+        deaths: numbers of the `advance` calls at which the robot crashes, counted from 1; a restart does not
+            reset the count. After a crash, every call raises `SimulatorDead` until `restart`.
+        name: name of the robot in faults.
 
     Attributes:
         floor: the initial layout.
@@ -50,11 +50,11 @@ class FakeWheels(Crashing, RobotAbc, Steering, Localization):
 
     @property
     def period_s(self) -> float:
-        """Six basic steps of 32 ms."""
+        """The duration of six basic steps of 32 ms."""
         return PERIOD_S
 
     def steer(self, forward: float, turn: float) -> None:
-        """Set the wanted velocity; reduce it along the same curve if a wheel cannot turn so fast."""
+        """Set the wanted velocity; if a wheel cannot turn that fast, drive the same curve slower."""
         self._live()
         rim = abs(forward) + 0.5 * abs(turn) * self.axle_m
         slower = min(1.0, self.speed_m_s / max(rim, self.speed_m_s))
@@ -66,7 +66,7 @@ class FakeWheels(Crashing, RobotAbc, Steering, Localization):
         return Pose(self._x_m, self._y_m, self._heading_rad)
 
     def advance(self) -> int:
-        """Simulate one control period; return 0, because extra periods are never needed."""
+        """Simulate one control period; return 0, because the fake never needs extra periods."""
         self._live_a_step()
         forward, turn = self._wanted
         middle = self._heading_rad + 0.5 * turn * PERIOD_S
@@ -78,7 +78,7 @@ class FakeWheels(Crashing, RobotAbc, Steering, Localization):
         return 0
 
     def place(self, pose: Pose, seed: int) -> None:
-        """Put the robot at rest at `pose` and update all readings; `seed` decides the noise."""
+        """Put the robot at `pose`, at rest, and update all readings; `seed` decides the noise."""
         self._live()
         self._x_m, self._y_m, self._heading_rad = pose.x_m, pose.y_m, pose.heading_rad
         self._wanted = (0.0, 0.0)
@@ -90,7 +90,7 @@ class FakeWheels(Crashing, RobotAbc, Steering, Localization):
         """Update the readings of the sensors from the current pose."""
 
     def _slide(self) -> None:
-        """Push the robot out of walls and obstacles that it hit."""
+        """Move the robot out of walls and obstacles that it hit."""
         (low_x, low_y), (high_x, high_y) = self.layout.low, self.layout.high
         for thing in self.layout.obstacles:
             inside = self.radius_m - thing.gap(self._x_m, self._y_m)

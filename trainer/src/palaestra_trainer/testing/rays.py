@@ -1,4 +1,4 @@
-"""Rays of the fakes: meters to the nearest object on a floor of walls, rectangles and circles."""
+"""Compute the distances along rays to walls, rectangles and circles, for the sensors of the fakes."""
 
 from __future__ import annotations
 
@@ -16,11 +16,12 @@ Eye = tuple[float, float] | tuple[Rays, Rays]
 
 
 def nearest(layout: FloorLayout, origin: Eye, angles: NDArray[np.floating[Any]]) -> Rays:
-    """Return meters along each ray to the walls and to the obstacles on the floor.
+    """Return the meters along each ray to the nearest wall or obstacle.
 
     Args:
-        layout: the floor; its walls are at its edges.
-        origin: x, y in meters of the origin of the rays; one for all, or arrays of one for each.
+        layout: the floor with its obstacles; walls stand at the edges of the floor.
+        origin: x, y in meters of the origin of the rays; two numbers for all rays, or two arrays with a
+            number for each ray.
         angles: directions of the rays in the world, in radians.
     """
     way = np.cos(angles), np.sin(angles)
@@ -42,7 +43,7 @@ def _to_edges(layout: FloorLayout, origin: Eye, way: tuple[Rays, Rays]) -> Rays:
 
 
 def _to_thing(thing: Obstacle, origin: Eye, way: tuple[Rays, Rays]) -> Rays:
-    """Return meters along each ray to a circle or a rectangle; infinite beside it."""
+    """Return the meters along each ray to a circle or a rectangle; infinite if the ray misses it."""
     c, s = math.cos(thing.heading_rad), math.sin(thing.heading_rad)
     dx, dy = origin[0] - thing.x_m, origin[1] - thing.y_m
     x, y = dx * c + dy * s, dy * c - dx * s
@@ -60,5 +61,5 @@ def _to_thing(thing: Obstacle, origin: Eye, way: tuple[Rays, Rays]) -> Rays:
 
 
 def _sloping(slope: Rays) -> Rays:
-    """Return slopes that are not 0, because they are used as divisors."""
+    """Replace slopes of 0 by tiny slopes, because slopes are used as divisors."""
     return np.copysign(np.maximum(np.abs(slope), _LEAST_SLOPE), slope)

@@ -1,4 +1,4 @@
-"""MLflow: a run on a tracking server; the client is that of `mlflow-skinny`, which has no local store."""
+"""Send curves to an MLflow server, by the client of `mlflow-skinny`, which has no local store."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ log = structlog.get_logger(__name__)
 
 NAME = "mlflow"
 URI_VARIABLE = "MLFLOW_TRACKING_URI"
-# With the client's own limits, a server that does not respond would block training for minutes.
+# With the client's default timeouts, a server that does not respond would block training for minutes.
 PATIENCE = {"MLFLOW_HTTP_REQUEST_TIMEOUT": "10", "MLFLOW_HTTP_REQUEST_MAX_RETRIES": "2"}
 MOST_PARAMETERS = 100  # the server's limit for one request
 LONGEST_PARAMETER = 6000
@@ -30,12 +30,12 @@ LONGEST_PARAMETER = 6000
 class MLflow(Tracker):
     """Sends the curves of a run to an MLflow server.
 
-    The server must respond when an attempt begins. If it does not respond later, points are lost and training
-    continues.
+    The server must respond when an attempt begins. If the server does not respond later, points of the curves
+    are lost and training continues.
 
     Args:
         uri: address of the server; None: the value of the variable MLFLOW_TRACKING_URI.
-        experiment: experiment of the run; it is created if it is missing.
+        experiment: experiment of the run; the tracker creates a missing experiment.
     """
 
     def __init__(self, uri: str | None = None, experiment: str = "palaestra") -> None:
@@ -49,7 +49,7 @@ class MLflow(Tracker):
         self._lost = 0
 
     def begin(self, directory: RunDirectory, configuration: Mapping[str, Any]) -> None:
-        """Create the run with its parameters, or continue it."""
+        """Create the run with its parameters, or continue the run of an earlier attempt."""
         for name, value in PATIENCE.items():
             os.environ.setdefault(name, value)
         self._client = MlflowClient(tracking_uri=self._uri)
@@ -59,7 +59,7 @@ class MLflow(Tracker):
         self._client.update_run(self._run, status="RUNNING")
 
     def log_scalars(self, step: int, scalars: Mapping[str, float]) -> None:
-        """Send the scalars; a failure is logged once, and these points are lost."""
+        """Send the scalars; if that fails, they are lost, and the first failure is logged."""
         now_ms = int(time.time() * 1000)
         metrics = [Metric(name, value, now_ms, step) for name, value in scalars.items()]
         try:
@@ -70,7 +70,7 @@ class MLflow(Tracker):
             self._lost += len(metrics)
 
     def end(self) -> None:
-        """Mark the run as finished; the next attempt marks it as running again."""
+        """Mark the run as finished; a next attempt marks the run as running again."""
         if self._lost:
             log.warning("points are missing in MLflow", points=self._lost)
         try:
@@ -89,7 +89,7 @@ class MLflow(Tracker):
 
 
 def flat(configuration: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
-    """Yield path and text of each value; a path has dots, and a list is one value."""
+    """Yield path and text of each value, such as `algorithm.name`; a list is one value."""
     for name, value in configuration.items():
         if isinstance(value, Mapping):
             yield from flat(value, f"{prefix}{name}.")

@@ -1,7 +1,7 @@
-"""The base of all trackers: it selects the values to send, and the tracker's run to continue.
+"""The base of all trackers; it selects the scalars to send, and stores the id of the tracker's run.
 
-A tracker gets each scalar that TensorBoard gets, at the same step. The id of the tracker's run is kept in
-`trackers.json` of the run directory, so that every attempt continues the same run of the tracker.
+A tracker gets each scalar that TensorBoard gets, at the same step. The file `trackers.json` of the run
+directory holds the id of the tracker's run. So every attempt continues the same run of the tracker.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from stable_baselines3.common.logger import KVWriter
 
 from palaestra_trainer.job.run_directory import RunDirectory, replace_file
 
-TENSORBOARD = "tensorboard"  # a record with this name in its exclusions is not for TensorBoard
+TENSORBOARD = "tensorboard"  # TensorBoard does not get a record whose exclusions have this name
 
 
 class Tracker(BaseCallback):
@@ -31,11 +31,11 @@ class Tracker(BaseCallback):
 
     @abstractmethod
     def begin(self, directory: RunDirectory, configuration: Mapping[str, Any]) -> None:
-        """Begin the tracker's run, or continue it if it is known in `directory`."""
+        """Begin the tracker's run; if `directory` has the id of a run, continue that run."""
 
     @abstractmethod
     def log_scalars(self, step: int, scalars: Mapping[str, float]) -> None:
-        """Send the scalars of one step, by their names in TensorBoard."""
+        """Send the scalars of one step, under their names in TensorBoard."""
 
     @abstractmethod
     def end(self) -> None:
@@ -56,7 +56,7 @@ class Tracker(BaseCallback):
 
 
 class Scalars(KVWriter):
-    """An output of Stable-Baselines3's logger: calls `send` with the scalars of each dump."""
+    """An output of Stable-Baselines3's logger that calls `send` with the scalars of each dump."""
 
     def __init__(self, send: Callable[[int, Mapping[str, float]], None]) -> None:
         self._send = send
@@ -86,18 +86,18 @@ def configuration_of(directory: RunDirectory) -> dict[str, Any]:
 
 
 def title_of(configuration: Mapping[str, Any]) -> str:
-    """Return a name for people for the run of a configuration: its job and the replica's number."""
+    """Return a readable name for a run: the job and the number of the replica."""
     return f"{configuration['job']}-{configuration['replica']}"
 
 
 def known_run(directory: RunDirectory, tracker: str) -> str | None:
-    """Return the id of the run that a tracker has for a run directory; None: the tracker has no run yet."""
+    """Return the id of the tracker's run for a run directory; None if the tracker has no run yet."""
     known = _known(directory)
     return known.get(tracker)
 
 
 def remember_run(directory: RunDirectory, tracker: str, run: str) -> None:
-    """Keep the id of the run that a tracker has for a run directory."""
+    """Store the id of the tracker's run in a run directory."""
     text = json.dumps(_known(directory) | {tracker: run}) + "\n"
     replace_file(directory.trackers, lambda path: path.write_text(text, encoding="utf-8"))
 

@@ -1,4 +1,4 @@
-"""Weights & Biases, by default offline: its files are in the run directory, and `wandb sync` uploads them."""
+"""Log curves with Weights & Biases, by default offline to files that `wandb sync` uploads later."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ log = structlog.get_logger(__name__)
 
 NAME = "wandb"
 MODES = ("offline", "online")
-# The default grace period, less the time for the simulators and the checkpoint; see
+# This time is the default grace period minus the time for the simulators and the checkpoint, see
 # `waiting.shutdown_deadline`.
 FINISH_S = 5
 
@@ -27,7 +27,8 @@ class Wandb(Tracker):
 
     Args:
         project: project of the run.
-        mode: `offline` writes files only; `online` also uploads and needs WANDB_API_KEY and network access.
+        mode: `offline` only writes files in the run directory; `online` also uploads, and needs WANDB_API_KEY
+            and network access.
         entity: user or team of the project; None: the default of the account.
     """
 
@@ -39,7 +40,7 @@ class Wandb(Tracker):
         self._step = 0
 
     def begin(self, directory: RunDirectory, configuration: Mapping[str, Any]) -> None:
-        """Begin the run, or continue it: attempts with the same id are uploaded as one run."""
+        """Begin the run, or continue it with the same id; attempts with one id are uploaded as one run."""
         run = known_run(directory, NAME)
         if run is None:
             run = secrets.token_hex(4)
@@ -55,7 +56,8 @@ class Wandb(Tracker):
             group=configuration["job"],
             config=dict(configuration),
             dir=str(directory.path),
-            # The console is off because the pod's log has the output; git may not be installed.
+            # The console is off, because the pod's log has the output. Git is disabled, because it may not be
+            # installed.
             settings=wandb.Settings(
                 console="off",
                 disable_git=True,
@@ -68,12 +70,12 @@ class Wandb(Tracker):
         self._run.define_metric("*", step_metric="step")
 
     def log_scalars(self, step: int, scalars: Mapping[str, float]) -> None:
-        """Log the scalars with `step` as the x axis, because W&B ignores a step below its last one."""
+        """Log the scalars with `step` as the x axis; W&B ignores values at a step below its last step."""
         self._step = max(self._step, step)
         self._run.log({**scalars, "step": step}, step=self._step)
 
     def end(self) -> None:
-        """Write what is still buffered, upload it for some seconds, and end W&B's process."""
+        """Write the buffered data, upload for some seconds, and end W&B's process."""
         try:
             self._run.finish()
         except TimeoutError:

@@ -1,1 +1,1 @@
-"""Waiting with a deadline: turns in one thread, time waited, time left, and signals that end a wait."""
+"""Wait for simulators with a deadline, take turns in one thread, and handle signals."""

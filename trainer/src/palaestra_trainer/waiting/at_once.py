@@ -1,4 +1,4 @@
-"""Run functions at the same time, each in a thread, until all have returned or one has raised."""
+"""Run functions at the same time, each in its own thread, until all have returned or one has raised."""
 
 from __future__ import annotations
 
@@ -15,11 +15,13 @@ Result = TypeVar("Result")
 
 
 def at_once(works: Sequence[Callable[[Check], Result]], check: Check, name: str) -> list[Result]:
-    """Return the results in order; if one raises, raise its error once all have ended.
+    """Return the results in order; if a function raises, raise its error after all have ended.
 
     Args:
-        works: each is called with a check, which it calls often; it raises once another one has failed.
-        check: called in this thread every tenth of a second; if it raises, all end, and this raises too.
+        works: the functions. Each gets a check and must call it often; the check raises after another
+            function has failed.
+        check: called in this thread every tenth of a second; if it raises, all functions end and its error is
+            raised.
         name: prefix of the names of the threads.
     """
     over = threading.Event()

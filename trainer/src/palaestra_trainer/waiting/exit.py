@@ -1,7 +1,7 @@
 """End the process in time, even if code of the job's author still runs.
 
-A `close` method that hangs, a thread that does not end, or an exit function that waits would each keep a
-complete run and its pod alive forever.
+Without this module, a complete run and its pod could stay alive forever. The cause could be a `close` method
+that hangs, a thread that does not end, or an exit function that waits.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ log = structlog.get_logger(__name__)
 
 
 def nothing() -> None:
-    """Do nothing."""
+    """Do nothing, as the default of `before`."""
 
 
 def leave_after(
@@ -27,13 +27,13 @@ def leave_after(
     before: Callable[[], None] = nothing,
     leave: Callable[[int], object] = os._exit,
 ) -> threading.Timer:
-    """Return a running timer that ends the process unless it is canceled.
+    """Start and return a timer that ends the process, unless the caller cancels it.
 
     Args:
-        seconds: from now.
+        seconds: time from now until the process ends.
         code: the exit code.
         before: called before the process ends.
-        leave: ends the process.
+        leave: a function that ends the process with an exit code.
     """
 
     def end() -> None:

@@ -1,10 +1,10 @@
-"""Step several simulators in one thread: while one computes a step, the others get their turn.
+"""Step several simulators in one thread; while a simulator computes, the thread serves the others.
 
 A step of an environment is one function that sends, waits and reads. Each step runs in its own greenlet, so
-that the waits of many environments overlap. After a greenlet has sent a long request to its simulator, it
-lets the others run before it waits for the response. `take_turns` runs the greenlets, and a turn may end
-only in `let_others`. The response of one simulator is read while the others still compute. Threads needed
-twice the processor time for this: see docs/decisions/0006-turns-instead-of-threads.md.
+the waits of many environments overlap. After a greenlet has sent a long request to its simulator, it lets the
+other greenlets run before it waits for the response. `take_turns` runs the greenlets, and a greenlet's turn
+ends only in `let_others`. The response of one simulator is read while the other simulators still compute.
+Threads needed twice the processor time, see docs/decisions/0006-turns-instead-of-threads.md.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from greenlet import getcurrent, greenlet
 from palaestra_trainer.waiting import shutdown_deadline
 from palaestra_trainer.waiting.wait_time import count_wait
 
-# After this time the first greenlet waits alone, with its own deadline, and a fault is attributed to it.
-# The time is longer than a step, because waiting alone counts as this greenlet's turn. It is short compared
-# with the deadline, which begins only then.
+# After this time the first greenlet waits alone, with its own deadline, so a fault is attributed to its
+# simulator. The time is longer than a step, because the time of waiting alone counts as this greenlet's turn.
+# The time is short compared with the deadline, which begins only then.
 _SOON_MS = 500
 
 
@@ -35,15 +35,16 @@ class PendingResponse(Protocol):
 
 
 class _Turn(greenlet):
-    """A greenlet for the works of `take_turns`; it is reused, because a new one makes Python map memory.
+    """A greenlet that does works of `take_turns`; it is reused, because a new greenlet maps memory.
 
     Attributes:
-        work: the current or last work.
-        done: whether it has finished.
+        work: the current work, or the last work.
+        done: whether the work has finished.
         result: the return value of `work`.
-        failure: the exception that `work` raised, if any.
-        away_s: seconds that others' turns took during this work, without the time in which all turns wait.
-        until: the descriptor of the response that it waits for; None: it can run.
+        failure: the exception that `work` raised; None: it did not raise.
+        away_s: seconds that the turns of other greenlets took during this work, without the time in which all
+            wait.
+        until: descriptor of the response for which this greenlet waits; None: it can run.
     """
 
     def __init__(self) -> None:
@@ -56,7 +57,7 @@ class _Turn(greenlet):
         self.until: int | None = None
 
     def begin(self, work: Callable[[], Any]) -> _Turn:
-        """Return this turn, ready to do `work` for the caller."""
+        """Prepare this greenlet to do `work` for the caller; return it."""
         self.parent = getcurrent()
         self.work = work
         self.done = False
@@ -65,13 +66,13 @@ class _Turn(greenlet):
         return self
 
     def end(self) -> tuple[Any, Exception | None]:
-        """Return the result and the failure of the work, and drop both."""
+        """Return the result and the failure of the work, and drop the references to both."""
         ended = self.result, self.failure
         self.work = self.result = self.failure = None
         return ended
 
     def _do_works(self) -> None:
-        """Do one work, and the next one after the next switch."""
+        """Call `work`, switch to the parent, and repeat both after each switch back."""
         while self.work is not None and self.parent is not None:
             try:
                 self.result = self.work()
@@ -82,7 +83,7 @@ class _Turn(greenlet):
 
 
 class _Idle(threading.local):
-    """Turns of this thread without work."""
+    """The greenlets of this thread that have no work."""
 
     def __init__(self) -> None:
         self.turns: list[_Turn] = []
@@ -92,10 +93,10 @@ _idle = _Idle()
 
 
 def let_others(until: PendingResponse | None = None) -> None:
-    """Let the other works of `take_turns` run first; without others, this does nothing.
+    """Let the other works of `take_turns` run first; without other works, do nothing.
 
     Args:
-        until: the others may run until its descriptor is readable; by default each runs once.
+        until: the other works may run until its descriptor is readable; None: each other work runs once.
     """
     turn = getcurrent()
     if isinstance(turn, _Turn) and turn.parent is not None:
@@ -106,19 +107,20 @@ def let_others(until: PendingResponse | None = None) -> None:
 
 
 def away_s() -> float:
-    """Return the seconds that the current work has spent in others' turns so far."""
+    """Return the seconds that other greenlets' turns have taken so far during the current work."""
     turn = getcurrent()
     return turn.away_s if isinstance(turn, _Turn) else 0.0
 
 
 def take_turns(works: Iterable[Callable[[], Any]]) -> list[Any]:
-    """Return the results of `works`, in their order; each runs until it calls `let_others`, then the next.
+    """Run `works` in turns that end in `let_others`; return their results in order.
 
-    All works finish before the first error is raised, so that no work stays half done.
+    All works finish before the first error is raised, so no work stays incomplete.
 
     Raises:
-        Exception: of the first work, in their order, that failed.
-        BaseException: of the current work, at once; the others are stopped where they are.
+        Exception: the error of the first failed work in the order of `works`.
+        BaseException: the error of the current work, for example after Ctrl-C; the other works are stopped at
+            once.
     """
     turns = [(_idle.turns.pop() if _idle.turns else _Turn()).begin(work) for work in works]
     waiting = turns
@@ -127,7 +129,7 @@ def take_turns(works: Iterable[Callable[[], Any]]) -> list[Any]:
             for turn in _ready(waiting):
                 turn.switch()
             waiting = [turn for turn in waiting if not turn.done]
-    except BaseException:  # also Ctrl-C: no work may continue in a later call
+    except BaseException:  # after Ctrl-C too, because no work may continue in a later call
         for turn in turns:
             if not turn.dead:
                 turn.throw()
@@ -141,7 +143,7 @@ def take_turns(works: Iterable[Callable[[], Any]]) -> list[Any]:
 
 
 def _ready(turns: list[_Turn]) -> list[_Turn]:
-    """Return the turns that can run, at least one, in their order; wait if none can."""
+    """Return the greenlets that can run, at least one, in their order; wait if all wait for responses."""
     awaited = [turn.until for turn in turns if turn.until is not None]
     if not awaited or len(turns) == 1:
         return turns

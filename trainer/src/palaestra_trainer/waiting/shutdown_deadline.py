@@ -1,7 +1,8 @@
-"""One deadline for all waits for simulators after a signal asked the run to end.
+"""A common deadline for all waits for simulators, after a signal requested the end of the run.
 
-Each call has its own deadline, but sixteen simulators of a run may hang, and the run has only one grace
-period. A signal handler sets the deadline as a number; it does not raise in the middle of a call.
+Each call has its own deadline. But if all sixteen simulators of a run hang, these deadlines together exceed
+the grace period of the pod. The signal handler only sets this deadline as a number, so it does not raise in
+the middle of a call.
 """
 
 from __future__ import annotations
@@ -9,12 +10,13 @@ from __future__ import annotations
 import math
 import time
 
-# The checkpoint needs half of the default grace period, and a pending call may last twice its deadline.
+# The checkpoint needs half of the default grace period, and a pending call may last twice its deadline. So
+# this time is left for further waits.
 LEFT_S = 10.0
 
 
 class _Limit:
-    """The time after which no wait of this process may begin, on its monotonic clock."""
+    """The time, on the monotonic clock, after which no wait of this process may begin."""
 
     at_s = math.inf
 
@@ -25,7 +27,7 @@ def end(after_s: float = LEFT_S) -> None:
 
 
 def renew() -> None:
-    """Remove the deadline: each call waits for its own deadline again."""
+    """Remove the deadline, so that each call waits until its own deadline again."""
     _Limit.at_s = math.inf
 
 

@@ -1,4 +1,4 @@
-"""The time that each thread waited for simulators; the trainer itself uses the rest of a step."""
+"""Measure the time that each thread waits for simulators; the trainer itself uses the rest of a step."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _waits = _Waits()
 
 
 def count_wait(seconds: float) -> None:
-    """Add to the time that the calling thread has waited."""
+    """Add seconds to the time that the calling thread has waited for simulators."""
     _waits.seconds += seconds
 
 

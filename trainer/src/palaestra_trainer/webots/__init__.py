@@ -1,7 +1,7 @@
-"""Layer 2: Webots as Python objects, over the services and topics of its stock `ros` controller.
+"""Webots as Python objects, by the services and topics of its `ros` controller; layer 2 of the trainer.
 
-Only this package handles the peculiarities of that controller: it can lose a wake-up, a step blocks forever
-while the simulation is paused, and a reset does not restore the whole state.
+Only this package handles the peculiarities of that controller. The controller can lose a wake-up. A step
+blocks forever while the simulation is paused. A reset does not restore the whole state.
 """
 
 from palaestra_trainer.ros import ensure_node

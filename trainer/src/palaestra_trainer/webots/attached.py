@@ -6,14 +6,14 @@ from palaestra_trainer.errors import ConfigurationError
 
 
 class Attached:
-    """A launcher that starts nothing: the facade uses the simulator that already runs under its name.
+    """A launcher that starts no process; the facade uses a simulator that already runs under its name.
 
-    The facade may step, reset, pause and change the simulator, like the program that started it. It cannot
-    stop the simulator.
+    The facade may step, reset, pause and change the simulator, like the program that started the simulator.
+    The facade cannot stop the simulator.
     """
 
     def start(self) -> None:
-        """Do nothing, because the simulator runs already; if it does not, `failure` reports that."""
+        """Do nothing, because the simulator already runs; if it does not run, `failure` reports that."""
 
     def confirm_ready(self) -> None:
         """Do nothing."""
@@ -32,7 +32,7 @@ class Attached:
         raise ConfigurationError("only attached to this simulator; stop it where it was started")
 
     def failure(self) -> str | None:
-        """Return the reason why it cannot be used; called only while it does not respond."""
+        """Return the reason why the simulator cannot be used; called only while it does not respond."""
         return "no simulator responds under this name; start it, or remove launcher=Attached()"
 
     def refused(self) -> bool:

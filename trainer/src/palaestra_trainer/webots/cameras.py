@@ -1,6 +1,6 @@
-"""The sensors of a robot whose readings are arrays: cameras, depth cameras and lidars.
+"""The sensors of a robot with arrays as readings: cameras, depth cameras and lidars.
 
-An array is valid until the next step, which writes the next one into the same memory; see `image_decoding`.
+An array is valid until the next step, which writes the next array into the same memory; see `image_decoding`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from palaestra_trainer.webots.image_decoding import ImageReading, PointsReading,
 
 
 class _Rendered(Sensor):
-    """A sensor whose readings must be rendered by the simulator."""
+    """A sensor whose readings the simulator must render."""
 
     __slots__ = ()
 
@@ -36,7 +36,7 @@ class _Rendered(Sensor):
 
 
 class Camera(_Rendered):
-    """A camera; `value` is its image, read-only: shape (height, width, 4), uint8, BGRA."""
+    """A camera; `value` is its read-only image: shape (height, width, 4), uint8, BGRA."""
 
     __slots__ = ()
 
@@ -45,7 +45,7 @@ class Camera(_Rendered):
 
     @property
     def rgb(self) -> NDArray[np.uint8]:
-        """The image without alpha: shape (height, width, 3), RGB; a view of `value`.
+        """A view of `value` without alpha: shape (height, width, 3), RGB.
 
         Raises:
             NoReading: before the first step.
@@ -54,9 +54,9 @@ class Camera(_Rendered):
 
 
 class RangeFinder(_Rendered):
-    """A depth camera; `value` is meters, read-only: shape (height, width), float32.
+    """A depth camera; `value` is a read-only array of meters: shape (height, width), float32.
 
-    Infinite means out of range.
+    An infinite value means out of range.
     """
 
     __slots__ = ()
@@ -75,9 +75,10 @@ class RangeFinder(_Rendered):
 
 
 class Lidar(Sensor):
-    """A lidar; `value` is meters, read-only: shape (layers, rays), float32; infinite: out of range.
+    """A lidar; `value` is a read-only array of meters: shape (layers, rays), float32.
 
-    Layers are ordered from the top down, the rays of a layer from left to right.
+    An infinite value means out of range. Layers are ordered from the top down. The rays of a layer are
+    ordered from left to right.
     """
 
     __slots__ = ()
@@ -87,10 +88,11 @@ class Lidar(Sensor):
 
 
 class LidarPoints(Sensor):
-    """The point cloud of a lidar; enables that lidar. A `Lidar` of the same device may be added too.
+    """The point cloud of a lidar, which this sensor enables too.
 
-    `value` is read-only: shape (layers * rays, 3), float32, x, y and z in meters in the lidar's frame;
-    infinite where a ray hit nothing.
+    A robot may have a `Lidar` of the same device in addition. `value` is a read-only array: shape (layers *
+    rays, 3), float32, with x, y and z in meters in the lidar's frame. The values of a ray without a hit are
+    infinite.
     """
 
     __slots__ = ("_cloud",)

@@ -1,7 +1,8 @@
 """Check before the first step that a world has the devices and nodes that a program needs.
 
-Without the check a missing device would look like a broken simulator, because no node offers its service.
-Only a complete list or a definite response counts, so a simulator that is still starting is not blamed.
+Without the check, a missing device would look like a fault of the simulator, because no node serves the
+device. Only a complete list or a definite response counts as proof. So a simulator that is still starting is
+not mistaken for a wrong world.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ def require_devices(robot: str, wanted: Iterable[str]) -> None:
     """Check that the robot with the ROS name `robot` has every device in `wanted`.
 
     Raises:
-        WorldMisfit: its list of devices is complete and lacks some.
+        WorldMisfit: the robot's list of devices is complete, and a wanted device is not in it.
         SimulatorDead, SimulatorHung, WrongData: the simulator does not respond.
     """
     observer = Observer(robot)

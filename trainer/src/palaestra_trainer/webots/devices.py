@@ -1,4 +1,4 @@
-"""The devices of a robot: sensors that publish, and motors."""
+"""The devices of a robot: sensors, which publish their readings, and motors."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from palaestra_trainer.waiting.greenlets import let_others
 from palaestra_trainer.webots.message_decoding import BOOL, FLOAT64, RANGE, NumberReading
 from palaestra_trainer.webots.services import Services
 
-# Webots replaces only these characters in names of devices.
+# Webots replaces only these characters when it converts a device's name to a path.
 _REPLACED = str.maketrans("-. ()", "_____")
 
 
 def topic_name(device: str) -> str:
-    """Return the device's name as used in paths, e.g. touch_sensor for "touch sensor"."""
+    """Return the device's name as it is in ROS paths, e.g. touch_sensor for "touch sensor"."""
     return device.translate(_REPLACED)
 
 
 class Sensor:
-    """A sensor that is enabled with a period, then read once a step.
+    """A sensor that is enabled with a period, and then read once in each step.
 
     Args:
         robot: the ROS name of the robot's controller.
         device: the device's name in the world, e.g. ir1
-        type_name: the type of its topic.
-        decode: reads the value out of a message's bytes.
-        topic: the name of its topic, below the name of the device.
+        type_name: the type of the sensor's topic.
+        decode: a function that returns the value in the bytes of a message.
+        topic: the name of the sensor's topic, below the name of the device.
 
     Attributes:
         robot: see above.
@@ -80,7 +80,7 @@ class Sensor:
         )
 
     def read(self) -> bool:
-        """Read the next message; if it does not arrive in time, keep the old value and return False.
+        """Read the next message; if no message arrives in time, keep the old value and return False.
 
         Raises:
             SimulatorDead, WrongData: as `RosSubscriber`.
@@ -93,7 +93,7 @@ class Sensor:
         return True
 
     def read_arrived(self) -> bool:
-        """Read the last message that has already arrived; return False if no message has.
+        """Read the last message that has already arrived; return False without such a message.
 
         Raises:
             SimulatorDead, WrongData: as `RosSubscriber`.
@@ -108,7 +108,7 @@ class Sensor:
         """Disable the sensor and unsubscribe.
 
         Raises:
-            SimulatorDead, SimulatorHung, WrongData: as `RosService`; the subscription then remains.
+            SimulatorDead, SimulatorHung, WrongData: as `RosService`; the subscription then stays.
         """
         self._enable(value=0)
         self.close()
@@ -120,7 +120,7 @@ class Sensor:
 
 
 class DistanceSensor(Sensor):
-    """A distance sensor; `value` is the output of its lookup table, volts for a Robotino."""
+    """A distance sensor; `value` is the output of its lookup table, which is volts for a Robotino."""
 
     __slots__ = ()
 
@@ -129,7 +129,7 @@ class DistanceSensor(Sensor):
 
 
 class TouchSensor(Sensor):
-    """A bumper; `value` is True while something touches it."""
+    """A bumper; `value` is True while an object touches it."""
 
     __slots__ = ()
 
@@ -138,7 +138,7 @@ class TouchSensor(Sensor):
 
 
 class PositionSensor(Sensor):
-    """The position of a joint; `value` in radians or meters."""
+    """A sensor for the position of a joint; `value` is in radians or meters."""
 
     __slots__ = ()
 
@@ -156,7 +156,7 @@ class Motor:
     Attributes:
         robot: see above.
         device: see above.
-        velocity: the last confirmed velocity in rad/s; None until the simulator confirms a command.
+        velocity: the last velocity in rad/s that the simulator confirmed; None before it confirms a command.
         velocity_service: the service that sets the velocity.
     """
 
@@ -183,17 +183,17 @@ class Motor:
         self.velocity = velocity
 
     def set_position(self, position: float) -> None:
-        """Turn to `position` rad; infinity means velocity control.
+        """Turn to `position` rad; infinity switches to velocity control.
 
         Raises:
             SimulatorDead, SimulatorHung, WrongData: as `RosService`.
         """
-        # Under position control the simulator confirms a backward velocity but ignores it.
+        # Under position control, the simulator confirms a negative velocity, but does not apply it.
         self.velocity = None
         self._position(value=position)
 
     def release(self) -> None:
-        """Switch to velocity control and stop, as needed at the start and after every reset.
+        """Switch to velocity control and stop; this is needed at the start and after every reset.
 
         Raises:
             SimulatorDead, SimulatorHung, WrongData: as `RosService`.
@@ -208,10 +208,10 @@ class Motor:
 
 
 def set_velocities(wanted: Iterable[tuple[Motor, float]]) -> None:
-    """Set velocities of motors in rad/s from the next step on; all requests are sent at once.
+    """Set velocities of motors in rad/s from the next step on; send all requests together.
 
-    A velocity that a motor has confirmed is not sent again. So call `release` of the motors after a reset of
-    the simulation.
+    A velocity that the simulator has confirmed for a motor is not sent again. So call `release` of the motors
+    after a reset of the simulation.
 
     Raises:
         SimulatorDead, SimulatorHung, WrongData: as `RosService`; the next call sends the velocities again.

@@ -1,7 +1,7 @@
-"""Webots, started on demand: the facade of the paper.
+"""The facade of the paper, which starts Webots on demand.
 
-Simulated time passes only inside `with webots:` and `webots.run(...)`. Outside of them every simulator is
-paused, because a simulator that is not paused uses a whole core even between steps.
+Simulated time passes only inside `with webots:` and `webots.run(...)`. Outside of these, every simulator is
+paused, because a running simulator uses a whole core even between steps.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class Launcher(Protocol):
     """Starts the process of a simulator and reports whether it runs."""
 
     def start(self) -> None:
-        """Start it without waiting until it is ready."""
+        """Start the simulator without waiting until it is ready."""
         ...
 
     def confirm_ready(self) -> None:
@@ -49,22 +49,22 @@ class Launcher(Protocol):
         ...
 
     def expect_stop(self, deadline_s: float) -> None:
-        """Announce that the simulator will end; it is killed after `deadline_s` seconds."""
+        """Announce that the simulator will end; after `deadline_s` seconds, kill it."""
         ...
 
     def failure(self) -> str | None:
-        """Return the reason why it is no longer running; None while it runs or starts."""
+        """Return the reason why the simulator no longer runs; None while it runs or starts."""
         ...
 
     def refused(self) -> bool:
-        """Return whether it ended with exit code 2, by which a program refuses its input."""
+        """Return whether the simulator ended with exit code 2, with which a program refuses its input."""
         ...
 
     def wait_stopped(self, deadline_s: float) -> None:
-        """Wait until its process has ended.
+        """Wait until the process of the simulator has ended.
 
         Raises:
-            SimulatorHung: it did not end within `deadline_s` seconds.
+            SimulatorHung: the process did not end within `deadline_s` seconds.
         """
         ...
 
@@ -73,25 +73,25 @@ class Owned(Launcher, Protocol):
     """A launcher that belongs to one facade."""
 
     def close(self) -> None:
-        """End the process that it started."""
+        """End the process that this launcher started."""
         ...
 
 
 class Webots:
-    """One simulator that can be started, stopped, run fast and paused.
+    """A simulator that a program can start, stop, run fast and pause.
 
-    By default it is a new simulator. If the ROS names of the world are in use on the master, `_2`, `_3`, ...
-    is appended to them. To use a simulator that already runs, pass `launcher=Attached()`.
+    By default the simulator is new. If the ROS names of the world are already in use on the master, `_2`,
+    `_3`, ... is appended to the names. To use a simulator that already runs, pass `launcher=Attached()`.
 
-    The next environment that is created without a simulator uses this one.
+    The next environment that is created without a simulator uses this simulator.
 
     Args:
         supervisor_node_name: the ROS name of the supervisor in the world.
-        world_path: the world to load; or the name of a world that ships, e.g. "arena".
-        launcher: starts the process; by default on this machine.
-        driver: the program of that process: "stub", "mujoco" or "webots".
-        options: command-line options of that process, e.g. ["--step-sleep-ms=5"].
-        start_deadline_s: the longest time until it responds.
+        world_path: path of the world to load, or the name of a shipped world, e.g. "arena".
+        launcher: starts the process of the simulator; by default on this machine.
+        driver: the simulator program: "stub", "mujoco" or "webots".
+        options: command-line options of the simulator program, e.g. ["--step-sleep-ms=5"].
+        start_deadline_s: the longest time from the start until the simulator responds.
 
     Raises:
         ConfigurationError: the process on this machine refused the world or the driver.
@@ -119,7 +119,7 @@ class Webots:
         self.observer = Observer(supervisor_node_name)
         self.supervisor = Supervisor(supervisor_node_name, self.observer)
         self._launcher = launcher
-        # The probe has its own connection with a shorter deadline, because it must report a hang early.
+        # The probe has its own connection with a shorter deadline, because it must detect a hang early.
         self._probe = RosService(f"/{supervisor_node_name}/robot/get_time", "webots_ros/get_float", _PROBE_S)
         self._start_deadline_s = start_deadline_s
         self._at_start: dict[str, Callable[[], None]] = {}
@@ -129,30 +129,30 @@ class Webots:
 
     @property
     def robot_name(self) -> str:
-        """The ROS name under which the supervisor runs: the given name, possibly with `_2` appended."""
+        """The ROS name of the running supervisor: the given name, possibly with `_2` appended."""
         return self.supervisor_node_name
 
     def name_of(self, robot: str) -> str:
-        """Return the ROS name under which a robot runs; `robot` is its ROS name in the world."""
+        """Return the ROS name of a running robot; `robot` is its ROS name in the world."""
         return f"{robot}{self._suffix}"
 
     def at_start(self, name: str, connect: Callable[[], None]) -> None:
-        """Call `connect` after each later start; it replaces the previous function with this `name`."""
+        """Call `connect` after each later start, instead of a previous function with this `name`."""
         self._at_start[name] = connect
 
     def start(self) -> None:
         """Start the simulator and wait until it responds and its robots are connected.
 
-        If it runs, its connections are opened again; if it hangs, it is restarted. Outside `with webots:` it
-        is paused afterwards.
+        If the simulator already runs, its connections are opened again. If it hangs, it is restarted. Outside
+        `with webots:` it is paused afterwards.
 
         Raises:
             SimulatorDead: its process ended.
             SimulatorHung: it did not respond in time.
-            WrongData: it refuses to pause, or refuses a robot's devices.
+            WrongData: the simulator refuses to pause, or refuses the devices of a robot.
         """
         if self._launcher.ready() and not self.available():
-            self.stop()  # the simulator hangs, and no other can be started while it exists
+            self.stop()  # the simulator hangs, and must end before another can start
         self._disconnect()
         self._launcher.start()
         self.wait_available()
@@ -166,7 +166,8 @@ class Webots:
         """Wait until the simulator responds, after a start or a reload.
 
         Raises:
-            SimulatorDead: its process ended; a SimulatorRefused if the process refused its input.
+            SimulatorDead: the simulator's process ended; SimulatorRefused, a subclass, if it refused its
+                input.
             SimulatorHung: it did not respond in time.
         """
         give_up = time.monotonic() + self._start_deadline_s
@@ -182,7 +183,7 @@ class Webots:
             time.sleep(_POLL_S)  # the master has no call that waits for a node
 
     def stop(self) -> None:
-        """End the simulator through its supervisor; it is killed only if it does not quit.
+        """End the simulator through its supervisor; kill it only if it does not quit.
 
         Raises:
             SimulatorHung: the simulator did not quit, and the kill did not end it in time.
@@ -195,7 +196,7 @@ class Webots:
         self._launcher.wait_stopped(_STOP_DEADLINE_S + _PROBE_S)
 
     def __call__(self) -> None:
-        """Restart the simulator in any state; then the state is the same as after `start`.
+        """Restart the simulator in any state; afterwards its state is the same as after `start`.
 
         Raises:
             SimulatorDead, SimulatorHung, WrongData: as `stop` and `start`.
@@ -212,15 +213,15 @@ class Webots:
         return True
 
     def run(self, callback: Callable[[], Result], restart: bool = False) -> Result:  # noqa: FBT001, FBT002 - the paper's signature
-        """Return the result of `callback`, called while the simulation runs as fast as possible.
+        """Call `callback` while the simulation runs as fast as possible; return its result.
 
         Args:
             callback: the function that needs the simulation.
-            restart: whether the simulator is restarted first.
+            restart: whether to restart the simulator first.
 
         Raises:
-            SimulatorDead, SimulatorHung, WrongData: it cannot be started, run or paused.
-            Any error of `callback`; it replaces an error of the pause that follows.
+            SimulatorDead, SimulatorHung, WrongData: the simulator cannot be started, run or paused.
+            Any error of `callback`, even if the pause after it fails too.
         """
         if restart:
             self()
@@ -243,19 +244,19 @@ class Webots:
     ) -> None:
         self._entered -= 1
         if self._entered or self._stopped:
-            return  # an enclosing block still steps, or the simulator has stopped
+            return  # an enclosing block continues, or the simulator has stopped
         try:
             self.supervisor.set_mode(Mode.PAUSE)
         except TrainerError:
-            # An error that the block raised is more important than a simulator that cannot be paused.
+            # If the block raised an error, that error is more important than the failed pause.
             if exc is None:
                 raise
 
     def close(self) -> None:
-        """Close all connections, and end the process if it was started for this facade alone.
+        """Close all connections; end the simulator's process if this facade started it.
 
         Raises:
-            subprocess.TimeoutExpired: that process does not end; errors of the simulator are suppressed.
+            subprocess.TimeoutExpired: the process does not end. Errors of the simulator are suppressed.
         """
         open_facades.withdraw(self)
         self._disconnect()
@@ -267,7 +268,7 @@ class Webots:
             self._launcher.expect_stop(0.0)
             return
         self._launcher.expect_stop(_STOP_DEADLINE_S)
-        # If the simulator breaks before it quits, the launcher kills it at the announced deadline.
+        # If the simulator fails before it quits, the launcher kills it at the announced deadline.
         with contextlib.suppress(SimulatorFault):
             self.supervisor.quit()
 

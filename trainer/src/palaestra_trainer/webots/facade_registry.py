@@ -1,8 +1,8 @@
-"""The facades that environments may use: open ones that this process created for itself.
+"""The registry of the open facades of this process, which environments may use.
 
-In a notebook, an environment that is created after `Webots(...)` is meant for that simulator. A facade is
-offered until it is closed, except while an environment uses it. A forked process does not get the facades of
-its parent.
+If a notebook creates an environment after `Webots(...)`, the environment should use that simulator. A facade
+is offered until it is closed, except while an environment uses it. A forked process does not use the facades
+of its parent.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ Facade = TypeVar("Facade")
 
 
 class FacadeRegistry(Generic[Facade]):
-    """The open facades of this process and its parents; the registry does not keep them alive."""
+    """The open facades of this process and its parents, by weak references."""
 
     def __init__(self) -> None:
         self._numbers = itertools.count()
-        self._open: WeakValueDictionary[tuple[int, int], Facade] = WeakValueDictionary()  # by process, number
+        self._open: WeakValueDictionary[tuple[int, int], Facade] = WeakValueDictionary()  # by pid, number
         self._taken: WeakSet[Facade] = WeakSet()
 
     def offer(self, facade: Facade) -> None:
@@ -28,13 +28,13 @@ class FacadeRegistry(Generic[Facade]):
         self._open[os.getpid(), next(self._numbers)] = facade
 
     def withdraw(self, facade: Facade) -> None:
-        """Stop offering a facade to environments; safe to repeat."""
+        """Stop offering a facade to environments; further calls have no effect."""
         for key, known in list(self._open.items()):
             if known is facade:
                 self._open.pop(key, None)
 
     def offered(self) -> Facade | None:
-        """Return the newest facade that no environment uses; None: all are used, or no facade is open."""
+        """Return the newest open facade that no environment uses; None without such a facade."""
         mine = sorted(key for key in list(self._open.keys()) if key[0] == os.getpid())
         known = (self._open.get(key) for key in reversed(mine))
         return next((facade for facade in known if facade is not None and facade not in self._taken), None)

@@ -1,6 +1,6 @@
 """Convert values of fields between Python and the services that read and write them.
 
-In Python a rotation is axis and angle, as in a world file; its service takes a quaternion.
+In Python a rotation is an axis and an angle, as in a world file. The services take a quaternion instead.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ from palaestra_trainer.errors import ConfigurationError
 
 Value = bool | int | float | str | tuple[float, ...]
 
-_MULTIPLE: Final = 0x10  # added to the type number of a field that may have several values
-# An exact identity quaternion has no axis: Webots would keep the old rotation and report success.
+_MULTIPLE: Final = 0x10  # Webots adds this to the type number of a field that may have several values
+# For an exact identity quaternion, which has no axis, Webots would keep the old rotation and report success.
 _SMALLEST_TURN: Final = 1e-6
 
 
 class FieldCodec(NamedTuple):
-    """The type of a field: its name in services, a description of its values, its encoder and decoder."""
+    """The type of a field: its name in services, a description of its values, encoder and decoder."""
 
     name: str
     wanted: str
@@ -28,10 +28,10 @@ class FieldCodec(NamedTuple):
 
 
 def kind_of(type_number: int, field: str) -> FieldCodec:
-    """Return the type of a field from its type number; `field` is its name in errors.
+    """Return the codec for the type number of a field; `field` is the field's name in errors.
 
     Raises:
-        ConfigurationError: the field holds nodes, which are not values.
+        ConfigurationError: the field holds nodes, not values.
     """
     kind = _KINDS.get(type_number & ~_MULTIPLE)
     if kind is None:
@@ -40,10 +40,10 @@ def kind_of(type_number: int, field: str) -> FieldCodec:
 
 
 def encoded(kind: FieldCodec, field: str, value: Value) -> Any:
-    """Return `value` in the form that its service takes.
+    """Return `value` in the form that the service of the field takes.
 
     Raises:
-        ConfigurationError: the field cannot hold it.
+        ConfigurationError: the field cannot hold the value.
     """
     try:
         return kind.to_wire(value)
@@ -52,12 +52,12 @@ def encoded(kind: FieldCodec, field: str, value: Value) -> Any:
 
 
 def turn_about_z(heading_rad: float) -> dict[str, float]:
-    """Return the quaternion of a heading in a form that Webots accepts, also for 0."""
+    """Return the quaternion of a heading in a form that Webots applies even for 0."""
     return _quaternion((0.0, 0.0, 1.0, heading_rad))
 
 
 def _exactly(*types: type) -> Callable[[Any], Any]:
-    """Return a check that accepts only values of these exact types, so that a bool is not a number."""
+    """Return a check that accepts only these exact types, because a bool must not count as a number."""
 
     def check(value: Any) -> Any:
         if type(value) not in types:

@@ -1,10 +1,11 @@
-"""Read images and points from sensors' messages as NumPy arrays, without copying or decoding pixels.
+"""Read images and points in messages of sensors as NumPy arrays, without copying or decoding pixels.
 
-An array is a read-only view of the bytes that the connection received. It is valid until the next step, whose
-message is written into the same memory. Its numbers may be unaligned; a copy is aligned.
+An array is a read-only view of the bytes that the connection received. The array is valid until the next
+step, because the next message is written into the same memory. The numbers of the array may be unaligned in
+memory; a copy is aligned.
 
-All messages of one device have the same head except for number and time. So a head is parsed once, and the
-heads of later messages are only compared with it.
+All messages of one device have the same head except for sequence number and time. So a head is parsed once,
+and the heads of later messages are only compared with the parsed head.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from numpy.typing import NDArray
 
 Message = bytes | memoryview
 
-_HEAD_AT: Final = 12  # the offset behind sequence number and stamp, which change
+_HEAD_AT: Final = 12  # the offset after sequence number and stamp, which change
 _LENGTH: Final = struct.Struct("<I")
 _SIZE: Final = struct.Struct("<II")  # height, width
 _IMAGE: Final = struct.Struct("<BII")  # is_bigendian, step, bytes of data
@@ -36,9 +37,9 @@ class _Layout:
     """The positions of the numbers in a message.
 
     Attributes:
-        head: the bytes from the frame_id to the data, which all messages of this layout have.
+        head: the bytes from the frame_id to the data, equal in all messages of this layout.
         data_at: the offset of the first number, in bytes.
-        length: bytes of the whole message.
+        length: length of the whole message, in bytes.
         shape: shape of the array.
         strides: strides of the array, in bytes.
     """
@@ -51,11 +52,11 @@ class _Layout:
 
 
 class _Arrays(ABC):
-    """Reads the array of one device's messages.
+    """Reads the arrays in the messages of one device.
 
     Args:
         device: the device's name in errors.
-        dtype: NumPy type of the array's numbers.
+        dtype: NumPy type of an array's numbers.
     """
 
     __slots__ = ("_device", "_dtype", "_layout")
@@ -69,7 +70,7 @@ class _Arrays(ABC):
         """Return a read-only view of the array in the message.
 
         Raises:
-            ValueError: the message is of another format, has a wrong length or an invalid number.
+            ValueError: the message has another format, a wrong length or an invalid number.
             struct.error: the message ends within its head.
         """
         layout = self._layout
@@ -122,7 +123,7 @@ class ImageReading(_Arrays):
 
 
 class RangesReading(ImageReading):
-    """Reads sensor_msgs/Image in encoding 32FC1: shape (height, width), float32; infinite: out of range."""
+    """Reads sensor_msgs/Image in encoding 32FC1: shape (height, width), float32, infinite out of range."""
 
     __slots__ = ()
     encoding = "32FC1"
@@ -139,7 +140,7 @@ class RangesReading(ImageReading):
             struct.error: the message ends within its head.
         """
         ranges = super().__call__(message)
-        if not (ranges >= 0.0).all():  # written so that NaN is refused too
+        if not (ranges >= 0.0).all():  # this form of the comparison refuses NaN too
             raise ValueError(f"a distance that is negative or NaN from {self._device}")
         return ranges
 
@@ -178,13 +179,13 @@ class PointsReading(_Arrays):
 
 
 def _after_text(message: Message, at: int) -> int:
-    """Return the offset after the text at offset `at`, which begins with its length."""
+    """Return the offset after the text at offset `at`; a text begins with its length."""
     (length,) = _LENGTH.unpack_from(message, at)
     return at + _LENGTH.size + int(length)
 
 
 def _point_fields(message: Message, at: int) -> tuple[dict[str, int], int]:
-    """Return the offsets of the float32 fields of a point by name, and the end of the list of fields."""
+    """Return the offsets of a point's float32 fields by name, and the offset after the list of fields."""
     (count,) = _LENGTH.unpack_from(message, at)
     at += _LENGTH.size
     offsets = {}

@@ -1,4 +1,4 @@
-"""Motors of grippers, forks, arms and models of MuJoCo; each motor takes one kind of command."""
+"""Motors of grippers, forks, arms and models of MuJoCo, each with one type of command."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ Command = Literal["position", "velocity", "force", "torque", "control"]
 
 
 class JointMotor:
-    """A motor that takes one kind of command.
+    """A motor with one type of command.
 
     Args:
         robot: the ROS name of the robot's controller.
         device: the motor's name in the world.
-        command: "position" (rad or m), "velocity", "force" (N), "torque" (N m), or "control". The latter is
-            for actuators of MuJoCo without a motor in Webots, in the units of the actuator.
+        command: "position" (rad or m), "velocity", "force" (N), "torque" (N m), or "control". "control" is
+            for actuators of MuJoCo that have no equivalent motor in Webots, in the units of the actuator.
 
     Attributes:
         robot: see above.
@@ -50,7 +50,7 @@ class JointMotor:
         self.service(value=value)
 
     def prepare(self) -> None:
-        """Prepare the motor for commands of `service`; needed before the first command after a reset.
+        """Prepare the motor for commands of `service`, before the first command after a reset.
 
         Raises:
             SimulatorDead, SimulatorHung, WrongData: as `RosService`.
@@ -60,10 +60,10 @@ class JointMotor:
         self._ready = True
 
     def release(self) -> None:
-        """Keep the state that the simulator's reset has set, until the next command.
+        """Send no command, so that the motor keeps the state that the simulator's reset has set.
 
-        The world defines that state: the position in the file, or the control of a keyframe, which holds a
-        robot up. A command of 0 would replace it.
+        The world defines that state: the position in the file, or the control of a keyframe, which may hold a
+        robot upright. A command of 0 would replace that state.
         """
         self._ready = False
 

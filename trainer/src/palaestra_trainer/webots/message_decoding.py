@@ -1,7 +1,7 @@
-"""Decode the reading in a sensor's message, and skip the rest of the message.
+"""Decode only the reading in a sensor's message.
 
-Every topic of a sensor begins with a std_msgs/Header. Only its `frame_id` varies in length, and one device
-always sends the same `frame_id`.
+Every topic of a sensor begins with a std_msgs/Header. Only the `frame_id` in the header varies in length, and
+a device always sends the same `frame_id`.
 """
 
 from __future__ import annotations
@@ -11,18 +11,18 @@ import struct
 from functools import cache
 from typing import Any
 
-# These are the numbers after the header, as codes of `struct`; the reading is the last one.
+# The numbers after the header, as codes of `struct`; the last number is the reading.
 RANGE = "Bffff"  # sensor_msgs/Range: type, field of view, least, most
 BOOL = "?"
 FLOAT64 = "d"
 POINT = "ddd"  # geometry_msgs/PointStamped: x, y, z
 
 _FRAME_ID_LENGTH = struct.Struct("<I")
-_FRAME_ID_AT = 12  # the offset behind sequence number and stamp
+_FRAME_ID_AT = 12  # the offset after sequence number and stamp
 
 
 class NumberReading:
-    """Reads the last number of one device's messages.
+    """Reads the last number in the messages of one device.
 
     Args:
         device: the device's name in errors.
@@ -41,7 +41,8 @@ class NumberReading:
         """Return the reading.
 
         Raises:
-            ValueError: it is not finite, or the message has a wrong length, so that its text would be read.
+            ValueError: the reading is not finite, or the message has a wrong length, so other bytes would be
+                read as a number.
             struct.error: the message ends within its header.
         """
         if len(message) != self._layout.size:
@@ -54,7 +55,7 @@ class NumberReading:
         return numbers[-1]
 
     def _fit(self, message: bytes | memoryview) -> None:
-        """Set the layout for messages of a new length."""
+        """Set the layout for messages with another length of the frame_id."""
         (frame_id_bytes,) = _FRAME_ID_LENGTH.unpack_from(message, _FRAME_ID_AT)
         length = self._layout.size - self._frame_id_bytes + frame_id_bytes
         if len(message) != length:
@@ -64,7 +65,7 @@ class NumberReading:
 
 
 class VectorReading(NumberReading):
-    """Reads all numbers after the header, as a tuple."""
+    """Reads all numbers after the header of a message, as a tuple."""
 
     __slots__ = ()
 

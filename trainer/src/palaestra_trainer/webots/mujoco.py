@@ -1,7 +1,7 @@
-"""Sensors and actuators of MuJoCo models for which Webots has no device.
+"""Sensors and actuators of MuJoCo models that have no equivalent device in Webots.
 
-A simulator offers them under names that begin with `mujoco/`: `mujoco/hip_force` is the sensor `hip_force` of
-the model.
+A simulator provides these devices under names that begin with `mujoco/`. For example, `mujoco/hip_force` is
+the sensor `hip_force` of the model.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ _decode: Final = message_type(_TYPE).codec.decode
 
 
 class MujocoSensor(Sensor):
-    """A sensor of several numbers; `value` is in MuJoCo's order and units: shape (numbers,), float64.
+    """A sensor of several numbers; `value` has MuJoCo's order and units: shape (numbers,), float64.
 
     Args:
         robot: the ROS name of the robot's controller.
-        sensor: its name in the model, e.g. hip_force
+        sensor: name of the sensor in the model, e.g. hip_force
     """
 
     __slots__ = ()
@@ -36,13 +36,13 @@ class MujocoSensor(Sensor):
 
 
 class MujocoActuator(JointMotor):
-    """An actuator that is not a motor in Webots, such as a muscle; `set` takes MuJoCo's control.
+    """An actuator without an equivalent motor in Webots, such as a muscle; `set` takes MuJoCo's control.
 
-    The simulator keeps the control within the actuator's `ctrlrange`.
+    The simulator clips the control to the actuator's `ctrlrange`.
 
     Args:
         robot: the ROS name of the robot's controller.
-        actuator: its name in the model, e.g. biceps
+        actuator: name of the actuator in the model, e.g. biceps
     """
 
     __slots__ = ()
@@ -52,7 +52,7 @@ class MujocoActuator(JointMotor):
 
 
 def read_numbers(message: bytes | memoryview) -> NDArray[np.float64]:
-    """Return the numbers of a message, as a new array.
+    """Return the numbers of a message in a new array.
 
     Raises:
         ValueError: a number is not finite, or the message is truncated.

@@ -1,4 +1,4 @@
-"""Queries that do not change the simulation."""
+"""Read the state of a simulation without changing it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _SCENE_STATE: Final = "palaestra/scene_state"
 
 
 class Mode(enum.IntEnum):
-    """The modes in which time passes. The numbers are those of Webots R2021a and later."""
+    """The modes of simulated time, with the numbers of Webots R2021a and later."""
 
     PAUSE = 0
     REAL_TIME = 1
@@ -28,7 +28,7 @@ class Mode(enum.IntEnum):
 
 
 class Observer:
-    """Queries of the supervisor's controller; none of them affects the simulation.
+    """Queries to the supervisor's controller, which do not affect the simulation.
 
     Every method raises SimulatorDead, SimulatorHung or WrongData.
 
@@ -73,14 +73,14 @@ class Observer:
         return bool(self._services.get("supervisor/get_from_def", "supervisor_get_from_def")(name=name).node)
 
     def pose(self, name: str) -> tuple[float, float, float]:
-        """Return x and y in meters and the heading in radians of the node with DEF `name`."""
+        """Return the pose of the node with DEF `name`: x and y in meters, and the heading in radians."""
         self.begin_pose(name)
         return self.finish_pose(name)
 
     def begin_pose(self, name: str) -> RosService:
-        """Request a pose and return the service that responds last.
+        """Request the pose of a node, and return the service that responds last.
 
-        `finish_pose` must follow; other work may be done in between.
+        Call `finish_pose` afterwards; other work may be done in between.
         """
         node = self.node(name)
         position, orientation = self._pose_services()
@@ -113,17 +113,17 @@ class Observer:
         return self._surroundings.read()
 
     def scene(self) -> VisibleScene | None:
-        """Return the looks of the world; None if the simulator does not describe them, as Webots."""
+        """Return the visible objects of the world; None if the simulator does not describe them (Webots)."""
         if not is_served(f"/{self.node_name}/{_SCENE}"):
             return None
         return self._read(VisibleScene, _SCENE, MOST_SCENE_BYTES)
 
     def scene_state(self) -> SceneState:
-        """Return the poses of the last step, for a scene that was read before."""
+        """Return the poses after the last step, for a scene that `scene` returned before."""
         return self._read(SceneState, _SCENE_STATE, MOST_STATE_BYTES)
 
     def node(self, name: str) -> int:
-        """Return the handle of the node with DEF `name`; it is valid until the world is reloaded.
+        """Return the handle of the node with DEF `name`, which is valid until the world is reloaded.
 
         Raises:
             WrongData: the world has no such node.
@@ -153,7 +153,7 @@ class Observer:
         return self._types[name, field]
 
     def forget_handles(self) -> None:
-        """Drop all handles, which become invalid when the world is reloaded or the simulator restarts."""
+        """Drop all handles; they become invalid when the world is reloaded or the simulator restarts."""
         self._nodes.clear()
         self._fields.clear()
         self._types.clear()

@@ -1,10 +1,10 @@
-"""The objects in a world, as a supervisor reads them from its nodes.
+"""Read the objects in a world from its nodes, through the supervisor.
 
 An object is a Solid at the top of the scene tree whose boundingObject consists of boxes, cylinders, capsules
-and spheres. Its shapes are read once after each start, its position at every `read`, so a moved object is
-reported at its current position. The floor is the Solid with DEF `FLOOR` and a box, or a RectangleArena or
-Floor of Webots. Solids inside other nodes, and Solids that a program adds while the simulation runs, are not
-read.
+and spheres. The shapes of an object are read once after each start. Its position is read at every `read`, so
+a moved object has its current position. The floor is the Solid with DEF `FLOOR` and a box, or a
+RectangleArena or Floor of Webots. The reader ignores Solids inside other nodes, and Solids that a program
+adds while the simulation runs.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ FLOOR = "FLOOR"  # DEF name
 _FLOOR_FIELDS = {
     "RectangleArena": "floorSize",
     "Floor": "size",
-}  # the fields with the size, by PROTO of Webots
+}  # the field that holds the size, for each PROTO of Webots
 _ROUND = ("Cylinder", "Capsule", "Sphere")
 _WRAPPERS = ("Pose", "Transform", "Group", "ObstacleShape")
 
@@ -28,7 +28,7 @@ Vector = tuple[float, float, float]
 
 
 class ObstacleShape(NamedTuple):
-    """A box or an upright cylinder: center in the frame of its object, half its size, radius if round."""
+    """A box or an upright cylinder: center in the object's frame, half the size, and radius (0 for a box)."""
 
     center: Vector
     half: Vector
@@ -36,7 +36,7 @@ class ObstacleShape(NamedTuple):
 
 
 class Thing(NamedTuple):
-    """A solid: DEF name or "", position, rotation about z (0 for the floor), and its shapes."""
+    """An object: DEF name or "", position, rotation about z (0 for the floor), and shapes."""
 
     name: str
     place: Vector
@@ -45,7 +45,7 @@ class Thing(NamedTuple):
 
 
 class _Known(NamedTuple):
-    """The constant facts of an object; the handle of its translation is 0 if it has no such field."""
+    """The constant data of an object; `translation` is a handle, 0 if the object has no such field."""
 
     name: str
     node: int
@@ -65,7 +65,7 @@ class ObstacleReader:
         self._things: list[_Known] | None = None
 
     def forget(self) -> None:
-        """Forget the nodes, whose handles become invalid when the world is reloaded."""
+        """Drop the known nodes, because handles become invalid when the world is reloaded."""
         self._things = None
 
     def read(self) -> list[Thing]:
@@ -126,9 +126,9 @@ class ObstacleReader:
 
     def _heading(self, known: _Known) -> float:
         if known.name == FLOOR:
-            return 0.0  # the sides of a layout are parallel to the axes of the world
+            return 0.0  # the sides of a floor are parallel to the axes of the world
         if all(shape.radius_m and shape.center[:2] == (0.0, 0.0) for shape in known.shapes):
-            return 0.0  # a rotation about z makes no difference
+            return 0.0  # a rotation about z does not change the outline
         orientation = self._ask("supervisor/node/get_orientation", "node_get_orientation", node=known.node)
         turn = orientation.orientation
         return math.remainder(2.0 * math.atan2(turn.z, turn.w), 2.0 * math.pi)

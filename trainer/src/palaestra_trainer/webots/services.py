@@ -1,4 +1,4 @@
-"""The services of one controller by path; each is created at its first use."""
+"""The services of one controller by path; a service is created at its first use."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ class Services:
         return service
 
     def ask(self, path: str, type_name: str) -> Any:
-        """Return the `value` of a service that takes no argument."""
+        """Call a service without arguments, and return the `value` of its response."""
         return self.get(path, type_name)(ask=True).value
 
     def close(self) -> None:
-        """Drop all connections."""
+        """Close all connections."""
         for service in self._services.values():
             service.close()

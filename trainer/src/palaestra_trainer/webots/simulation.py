@@ -1,11 +1,12 @@
-"""The steps of a simulation: the only caller of `time_step`.
+"""Step a simulation; only this module calls `time_step`.
 
-One step lasts one period for all robots of the world, and every sensor sends one message in it. The
-controller can miss its own wake-up and then sends nothing for that step. So the wait for a message is
-limited. After it the simulation steps once more; this is not a fault, but it is counted.
+One step lasts one period for all robots of the world, and in this period every sensor sends one message. The
+controller can miss its own wake-up, and then sends no messages for that step. So the wait for a message is
+limited. After this wait, the simulation steps once more. Such an extra step is not a fault, but it is
+counted.
 
-While the simulation is paused, no step is sent: the controller would wait for time to pass, and could not
-receive the request that ends the pause.
+While the simulation is paused, no step is requested. The controller would wait for simulated time to pass,
+and could not receive the request that ends the pause.
 """
 
 from __future__ import annotations
@@ -23,12 +24,13 @@ from palaestra_trainer.webots.devices import Sensor
 from palaestra_trainer.webots.observer import Observer
 from palaestra_trainer.webots.supervisor import Supervisor
 
-# Two extra steps deliver the messages of a lost wake-up; a sensor without a message after them is broken.
+# Two extra steps deliver the messages of a lost wake-up. A sensor that is still silent afterwards has a
+# fault.
 _MOST_EXTRA_STEPS = 2
 
 
 class Actuator(Protocol):
-    """The interface of a motor for `Stepper`."""
+    """The interface of a motor that `Stepper` uses."""
 
     @property
     def robot(self) -> str:
@@ -37,11 +39,11 @@ class Actuator(Protocol):
 
     @property
     def device(self) -> str:
-        """The name in the world."""
+        """The name of the motor in the world."""
         ...
 
     def release(self) -> None:
-        """Withdraw all commands, as needed at the start and after every reset."""
+        """Withdraw all commands; this is needed at the start and after every reset."""
         ...
 
     def close(self) -> None:
@@ -53,14 +55,15 @@ class Stepper:
     """Steps and resets the simulation.
 
     Args:
-        robots: the ROS names of all robots of the world; a step lasts until each has requested it.
-        supervisor: resets the simulation and places nodes.
-        observer: reads the tracked poses.
+        robots: the ROS names of all robots of the world; Webots steps only after all of them have requested a
+            step.
+        supervisor: the supervisor, which resets the simulation and places nodes.
+        observer: the observer, which reads the tracked poses.
         period_ms: simulated milliseconds per step, a multiple of the world's basicTimeStep.
 
     Attributes:
         simulated_s: seconds of simulated time since this object was created.
-        transport_s: seconds of this program in complete steps, without the waits for the simulator.
+        transport_s: seconds that this program spent in complete steps, without the waits for the simulator.
     """
 
     def __init__(
@@ -77,15 +80,15 @@ class Stepper:
         self._connected = False
 
     def add(self, sensors: Sequence[Sensor], motors: Sequence[Actuator]) -> None:
-        """Add a robot's devices: sensors are read at each step, motors are released at each reset."""
+        """Add a robot's devices; each step reads the sensors, and each reset releases the motors."""
         self._sensors += sensors
         self._motors += motors
 
     def use(self, sensor: Sensor) -> None:
-        """Add a sensor unless it is known; if the simulator is connected, enable it for the next step.
+        """Add a sensor unless it is already known; if the simulator is connected, enable the sensor.
 
         Raises:
-            WorldMisfit: the robot lacks the sensor, or it cannot be enabled; it is not added.
+            WorldMisfit: the robot lacks the sensor, or the sensor cannot be enabled; it is then not added.
             SimulatorDead, SimulatorHung, WrongData
         """
         if sensor in self._sensors:
@@ -100,10 +103,10 @@ class Stepper:
         self._sensors.append(sensor)
 
     def use_motor(self, motor: Actuator) -> None:
-        """Add a motor unless it is known; if the simulator is connected, release it.
+        """Add a motor unless it is already known; if the simulator is connected, release the motor.
 
         Raises:
-            WorldMisfit: the robot lacks the motor; it is not added.
+            WorldMisfit: the robot lacks the motor, which is then not added.
             SimulatorDead, SimulatorHung, WrongData
         """
         if motor in self._motors:
@@ -118,7 +121,7 @@ class Stepper:
         self._motors.append(motor)
 
     def track(self, name: str) -> None:
-        """Read the pose of the node with DEF `name` at each step, for `pose`."""
+        """Make each step read the pose of the node with DEF `name`, which `pose` then returns."""
         self._tracked[name] = None
 
     def pose(self, name: str) -> tuple[float, float, float]:
@@ -126,16 +129,17 @@ class Stepper:
 
         Raises:
             KeyError: the node is not tracked.
-            SimulatorDead, SimulatorHung, WrongData: before the first step, a request for the pose failed.
+            SimulatorDead, SimulatorHung, WrongData: before the first step, a request reads the pose, and it
+                failed.
         """
         return self._tracked[name] or self._observer.pose(name)
 
     def known_pose(self, name: str) -> tuple[float, float, float] | None:
-        """Return the pose of a tracked node after the last step, without a request; None before the first."""
+        """Return the pose of a tracked node after the last step, without a request; None before any step."""
         return self._tracked.get(name)
 
     def connect(self) -> None:
-        """Enable every sensor and release every motor, after the simulator has started.
+        """Enable every sensor and release every motor; call this method after a start of the simulator.
 
         Raises:
             WorldMisfit: the world lacks a device or a tracked node.
@@ -153,7 +157,7 @@ class Stepper:
 
         Raises:
             Paused: the simulation is paused; nothing was sent.
-            SimulatorDead, SimulatorHung: also when a sensor sends no message.
+            SimulatorDead, SimulatorHung: also if a sensor does not send a message.
             WrongData: the simulator refused the period, or a reading is invalid.
         """
         if self._supervisor.paused:
@@ -170,7 +174,7 @@ class Stepper:
         return extra_steps
 
     def reset(self, seed: int) -> None:
-        """Reset the simulation with that seed; the scene places its nodes afterwards.
+        """Reset the simulation with a seed; afterwards the scene places its nodes.
 
         Raises:
             Paused: the simulation is paused; nothing was sent.
@@ -206,8 +210,8 @@ class Stepper:
                 sensor.read_arrived()
         try:
             self._advance()
-            # Poses are requested before the sensors are read, so that responses and messages arrive during
-            # others' turns. A controller responds after it has sent the messages of its sensors.
+            # Poses are requested before the sensors are read, so responses and messages arrive during the
+            # turns of other simulators. A controller responds after it has sent the messages of its sensors.
             asked = None
             for name in self._tracked:
                 asked = self._observer.begin_pose(name)
@@ -215,17 +219,17 @@ class Stepper:
             silent = self._read_sensors()
             for name in self._tracked:
                 self._tracked[name] = self._observer.finish_pose(name)
-        except BaseException:  # also Ctrl-C: messages that arrive later belong to this step
+        except BaseException:  # after Ctrl-C too: messages that arrive later belong to this step
             for sensor in self._sensors:
                 sensor.late = True
             raise
         return silent
 
     def _read_sensors(self) -> Sensor | None:
-        """Read every sensor once; return the first one without a message, or None if all had one."""
+        """Read every sensor once; return the first sensor without a message, or None."""
         silent = None
         for sensor in self._sensors:
-            # A lost wake-up affects all sensors, so the method waits for only one of them.
+            # A lost wake-up affects all sensors, so this method waits only for the first silent sensor.
             spoke = sensor.read() if silent is None else sensor.read_arrived()
             if not spoke:
                 silent = silent or sensor
@@ -250,5 +254,5 @@ class Stepper:
 
 
 def _busy_s() -> float:
-    """Return seconds that pass while this thread works, for this simulator and not for others."""
+    """Return a clock that counts only the seconds in which this thread works for this simulator."""
     return time.perf_counter() - away_s() - waited_s()

@@ -1,4 +1,4 @@
-"""Commands that change a simulation."""
+"""Change a simulation through its supervisor."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ Vector = tuple[float, float, float]
 class Supervisor:
     """Changes the simulation through the supervisor's controller.
 
-    Every method raises SimulatorDead, SimulatorHung or WrongData. Field changes take effect with the next
+    Every method raises SimulatorDead, SimulatorHung or WrongData. Changes of fields take effect in the next
     step.
 
     Args:
         node_name: the ROS name of the supervisor.
-        observer: provides node and field handles.
+        observer: the observer, which provides handles of nodes and fields.
 
     Attributes:
-        paused: whether the simulator has confirmed that it is paused; False while that is unknown.
+        paused: whether the simulator has confirmed that it is paused; False if that is unknown.
     """
 
     def __init__(self, node_name: str, observer: Observer) -> None:
@@ -34,7 +34,7 @@ class Supervisor:
         self._services = Services(node_name)
 
     def set_mode(self, mode: Mode) -> None:
-        """Set the mode in which time passes.
+        """Set the mode of simulated time.
 
         Raises:
             WrongData: also if the simulator refuses the mode.
@@ -45,11 +45,11 @@ class Supervisor:
         self.paused = mode == Mode.PAUSE
 
     def reset(self) -> None:
-        """Reset the simulation within the next step; enabled sensors stay enabled."""
+        """Reset the simulation in the next step; enabled sensors stay enabled."""
         self._services.ask("supervisor/simulation_reset", "get_bool")
 
     def reload(self) -> None:
-        """Reload the world; controllers restart, and all connections must be opened again."""
+        """Reload the world; controllers restart, so all connections must be opened again."""
         # The response may be lost, because the controller that sends it restarts too.
         with contextlib.suppress(SimulatorDead):
             self._services.ask("supervisor/world_reload", "get_bool")
@@ -92,15 +92,15 @@ class Supervisor:
         call_together(setters)
 
     def stop_inertia(self, name: str) -> None:
-        """Stop all motion of the node with DEF `name` and of its parts."""
+        """Stop all motion of the node with DEF `name` and of its child nodes."""
         service = self._services.get("supervisor/node/reset_physics", "node_reset_functions")
         service(node=self._observer.node(name))
 
     def get_field(self, name: str, field: str, index: int = 0) -> Value:
         """Return the value of a field of the node with DEF `name`, in the type of the field.
 
-        It is a bool, int, float or str; x, y (, z) or red, green, blue; or a rotation as x, y, z of its axis
-        and the angle in radians. `index` selects one value of a field that has several.
+        The value is a bool, int, float or str, or a tuple: x, y (, z); red, green, blue; or a rotation as x,
+        y, z of its axis and the angle in radians. `index` selects a value of a field with several values.
 
         Raises:
             ConfigurationError: the field holds nodes.
@@ -112,7 +112,7 @@ class Supervisor:
         return kind.from_wire(service(field=self._observer.field(name, field), index=index).value)
 
     def set_field(self, name: str, field: str, value: Value, index: int = 0) -> None:
-        """Write a field of the node with DEF `name`; `value` has the form that `get_field` returns.
+        """Write `value`, in the form that `get_field` returns, to a field of the node with DEF `name`.
 
         Raises:
             ConfigurationError: the field holds nodes, or values of another type.
@@ -125,10 +125,10 @@ class Supervisor:
         service(field=self._observer.field(name, field), index=index, value=wire)
 
     def set_joint(self, name: str, position: float) -> None:
-        """Move the joint with DEF `name` to a position in radians or meters; it is at rest there.
+        """Move the joint with DEF `name` to a position in radians or meters, at rest.
 
         Raises:
-            WrongData: also if the joint does not exist, or its stops exclude that position.
+            WrongData: also if the joint does not exist, or the position is outside the joint's stops.
         """
         service = self._services.get("supervisor/node/set_joint_position", "node_set_joint_position")
         service(node=self._observer.node(name), position=position, index=1)
@@ -150,6 +150,6 @@ class Supervisor:
         service(node=self._observer.node(name), velocity=wanted)
 
     def close(self) -> None:
-        """Close the connections and forget the confirmed state."""
+        """Close the connections and reset `paused`."""
         self.paused = False
         self._services.close()

@@ -1,1 +1,1 @@
-"""Play a few episodes of an environment before training: its results, its speed, and its problems."""
+"""Play a few episodes of an environment before training, and report its results, speed and problems."""

@@ -1,4 +1,4 @@
-"""Agents that act in an environment before training: zeros, and random actions."""
+"""Agents that choose actions without a trained policy: zeros, and random actions."""
 
 from __future__ import annotations
 
@@ -16,33 +16,33 @@ AGENTS = ("zero", "random", "keyboard")
 
 
 class EndEpisode(Exception):
-    """The person begins the next episode."""
+    """The person asks for the next episode."""
 
 
 class EndTry(Exception):
-    """The person has seen enough."""
+    """The person ends the program."""
 
 
 class Agent(Protocol):
-    """Chooses actions."""
+    """The interface of an object that chooses actions."""
 
     def act(self, mask: np.ndarray | None) -> Any:
-        """Return the next action; `mask` has the allowed choices, None: all are allowed.
+        """Return the next action; `mask` has the allowed choices, and None allows all.
 
         Raises:
-            EndEpisode, EndTry: a person wants no further action.
+            EndEpisode, EndTry: the person ends the episode or the program.
         """
         ...
 
     def got(self, step: int, reward: float) -> None:
-        """Take note of the reward of a step, counted from 1 in its episode."""
+        """Receive the reward of a step; the steps of an episode are counted from 1."""
         ...
 
 
 class Zero:
-    """Chooses the same action always: zero, or the one within the bounds that is nearest to it.
+    """Always chooses the same action: zero, or the action nearest to zero within the bounds.
 
-    Of a Discrete space that is the first action; masks have no effect.
+    In a Discrete space this is the first action. Masks have no effect.
     """
 
     def __init__(self, space: spaces.Space[Any]) -> None:
@@ -58,7 +58,7 @@ class Zero:
 
 
 class Random:
-    """Chooses among all allowed actions, all equally likely; the same seed chooses the same ones."""
+    """Chooses random allowed actions, all equally likely; the same seed gives the same actions."""
 
     def __init__(self, space: spaces.Space[Any], seed: int) -> None:
         self._space = deepcopy(space)  # the environment may draw from the generator of its own action space
@@ -81,7 +81,7 @@ class Random:
 
 
 def zero_of(space: spaces.Space[Any]) -> Any:
-    """Return the zero of a space, or the nearest point to it."""
+    """Return the zero of a space, or the point of the space that is nearest to zero."""
     known: Any = space
     match space:
         case spaces.Box():
@@ -99,9 +99,9 @@ def zero_of(space: spaces.Space[Any]) -> Any:
 
 
 def names_of_actions(env: gymnasium.Env[Any, Any]) -> tuple[str, ...]:
-    """Return the names of an environment's discrete actions, in order; () if it names none.
+    """Return the names of an environment's discrete actions, in order; () without names.
 
-    Palaestra's environments name them `movements` in their options.
+    In Palaestra's environments, the option `movements` has these names.
     """
     movements = getattr(getattr(env.unwrapped, "options", None), "movements", ())
     return tuple(str(movement.name).lower() for movement in movements)

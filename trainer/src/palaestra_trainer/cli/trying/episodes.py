@@ -1,4 +1,4 @@
-"""Play the episodes of a try, and collect their results and problems."""
+"""Play the episodes of `palaestra-try`, and collect their results and problems."""
 
 from __future__ import annotations
 
@@ -24,20 +24,20 @@ from palaestra_trainer.run.signals import Interrupted
 from palaestra_trainer.simulators.restarter import LOOK_EVERY_S, Restarter
 from palaestra_trainer.waiting.check import Check
 
-MOST_STEPS = 10_000  # the limit of one episode; a trainer would wait longer, but a person would not
+MOST_STEPS = 10_000  # limit of one episode; a person does not wait as long as a trainer
 
 
 @dataclass(slots=True, kw_only=True)
 class Tried:
-    """The results of a try.
+    """The results of `palaestra-try`.
 
     Attributes:
-        episodes: those that ended by themselves.
+        episodes: the episodes that the environment ended.
         problems: the problems of the environment and its simulator.
         times: the times of the steps.
         reset_s: seconds of each reset.
-        rewards: rewards that were not 0.
-        moved: whether any observation differed from the first one of its episode.
+        rewards: number of rewards that were not 0.
+        moved: whether any observation differed from the first observation of its episode.
     """
 
     episodes: list[Episode] = field(default_factory=list)
@@ -49,7 +49,7 @@ class Tried:
 
 
 class _Stop(Exception):
-    """The environment is too broken to go on."""
+    """The environment has a problem after which it cannot continue."""
 
 
 def play(
@@ -59,17 +59,17 @@ def play(
     check: Check,
     report: Callable[[int, Episode], object],
 ) -> Tried:
-    """Return the results of the checkers and of an episode for each seed; a problem does not raise.
+    """Run the checkers and play an episode for each seed; return the results and problems.
 
     Args:
-        restarter: a simulator that is up.
+        restarter: the restarter of a simulator that is up.
         agent: chooses the actions.
-        seeds: at least one.
-        check: called before each step and during waits; it raises to cancel the try.
-        report: called with the number of each complete episode, from 1, and the episode.
+        seeds: the seeds of the episodes, at least one.
+        check: called before each step and during waits; it raises to cancel the remaining episodes.
+        report: called after each complete episode, with its number from 1 and its result.
 
     Raises:
-        FaultBudgetSpent: the simulator broke more often than its budget allows.
+        FaultBudgetSpent: the simulator failed more often than its restart budget allows.
     """
     tried = Tried()
     try:
@@ -88,7 +88,7 @@ def play(
 
 
 def _attempt(restarter: Restarter, tried: Tried, work: Callable[[], None]) -> None:
-    """Do one part of a try; an error of the environment becomes a problem."""
+    """Call `work`; record an error of the environment as a problem."""
     try:
         work()
     except EndEpisode:
@@ -167,13 +167,13 @@ def _equal(one: Any, other: Any) -> bool:
 
 
 def _transport_s(restarter: Restarter) -> float:
-    """Return the seconds of transport so far; 0 for a member without a simulation."""
+    """Return the seconds so far that the member spent on transport; 0 without a simulation."""
     robot = getattr(restarter.member, "robot", None)
     return float(robot.simulation.transport_s) if robot is not None else 0.0
 
 
 def _of_all(tried: Tried) -> Iterable[str]:
-    """Yield the problems that only all episodes together show."""
+    """Yield the problems that can be found only after all episodes."""
     if not tried.times.count:
         return
     steps = f"{tried.times.count:,} steps"

@@ -1,4 +1,4 @@
-"""A person who drives with the keys of a terminal: each key is one step."""
+"""Let a person drive with the keys of a terminal; each key is one step."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _MOST_BYTES = 64
 
 @contextmanager
 def keys_at_once() -> Iterator[int]:
-    """Yield the descriptor of the terminal, which gives each key at once; restore the terminal at the end."""
+    """Set the terminal so that each key arrives at once, and yield its descriptor; restore it at the end."""
     descriptor = sys.stdin.fileno()
     before = termios.tcgetattr(descriptor)
     try:
@@ -38,7 +38,7 @@ class Keyboard:
     """Waits for a key and returns its action; other keys have no effect.
 
     Args:
-        terminal: a descriptor that gives each key at once.
+        terminal: descriptor of a terminal from which each key arrives at once.
         keys: the action of each key.
         check: called every tenth of a second; it raises to end the wait.
         show: called with a line for each step.
@@ -56,7 +56,7 @@ class Keyboard:
         """Return the action of the next key.
 
         Raises:
-            EndEpisode, EndTry: the person pressed the key for it, or closed the terminal.
+            EndEpisode, EndTry: the person pressed the key for that, or closed the terminal.
         """
         del mask
         while True:

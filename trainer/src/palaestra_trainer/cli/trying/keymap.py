@@ -1,4 +1,4 @@
-"""Which key is which action; pure."""
+"""Map keys of a terminal to actions, without input or output."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _MOST_ACTIONS, _MOST_NUMBERS = 10, 3
 _ESCAPED = {b"A": UP, b"B": DOWN, b"C": RIGHT, b"D": LEFT}
 _PLAIN = {b" ": SPACE, b"\x04": QUIT}
 _NAMED = {UP: "forward", DOWN: "backward", LEFT: "left", RIGHT: "right", SPACE: "stop"}
-# The keys assume that the first number of an action moves the robot ahead, and the second one to the left.
+# The keys assume that the first number of an action moves the robot ahead, and the second number to the left.
 _AXES = ((UP, DOWN), (LEFT, RIGHT), ("a", "d"))
 
 Keys = Mapping[str, Any]
@@ -26,7 +26,7 @@ def keys_of(space: spaces.Space[Any], names: Sequence[str] = ()) -> Keys:
 
     Args:
         space: the space of the actions.
-        names: names of the actions of a Discrete space, as far as they are known.
+        names: names of the actions of a Discrete space; empty if the names are unknown.
 
     Raises:
         ConfigurationError: a person cannot choose among these actions with a few keys.
@@ -44,13 +44,13 @@ def keys_of(space: spaces.Space[Any], names: Sequence[str] = ()) -> Keys:
 
 
 def legend(keys: Keys, names: Sequence[str] = ()) -> str:
-    """Return the keys and their actions as a line for a person."""
+    """Return a line of text with the keys and their actions."""
     told = ", ".join(f"{key}: {_told(action, names)}" for key, action in keys.items())
     return f"keys: {told}; {NEXT}: next episode, {QUIT}: end; each key is one step"
 
 
 def decode(typed: bytes) -> tuple[list[str], bytes]:
-    """Return the keys in the bytes of a terminal, and the bytes of a key that has not arrived whole."""
+    """Return the keys in the bytes of a terminal, and the bytes of an incomplete last key."""
     keys: list[str] = []
     while typed:
         if typed[:1] == b"\x1b":

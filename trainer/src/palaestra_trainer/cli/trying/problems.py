@@ -1,4 +1,4 @@
-"""The problems of an environment: one sentence with a remedy for each."""
+"""Find the problems of an environment; each problem is a sentence with a remedy."""
 
 from __future__ import annotations
 
@@ -19,28 +19,28 @@ from palaestra_trainer.errors import SimulatorFault, TrainerError, fact_of
 
 
 class Problems:
-    """The problems that were found, in the order of their first time."""
+    """The problems that were found, in the order in which they first occurred."""
 
     def __init__(self) -> None:
         self._found: Counter[str] = Counter()
 
     def add(self, sentence: str) -> None:
-        """Add a problem; the same one again only counts."""
+        """Add a problem; if it was added before, only count it."""
         self._found[sentence] += 1
 
     def __bool__(self) -> bool:
         return bool(self._found)
 
     def lines(self) -> list[str]:
-        """Return each problem once, with the number of its times if it came again."""
+        """Return each problem once, with a count if it occurred several times."""
         return [f"{line} ({count} times)" if count > 1 else line for line, count in self._found.items()]
 
 
 def check_by_libraries(env: gymnasium.Env[Any, Any], problems: Problems) -> None:
-    """Add the problems that the checkers of gymnasium and Stable-Baselines3 find; they play some steps.
+    """Run the checkers of gymnasium and Stable-Baselines3, which play some steps; add their problems.
 
     Raises:
-        SimulatorFault: the simulator broke.
+        SimulatorFault: the simulator failed.
     """
     checkers: tuple[tuple[str, Callable[..., Any], Any, dict[str, bool]], ...] = (
         (
@@ -57,12 +57,12 @@ def check_by_libraries(env: gymnasium.Env[Any, Any], problems: Problems) -> None
 
 
 def beyond(space: spaces.Space[Any], observation: Any) -> str:
-    """Return the problem of an observation that is not in its space, as a sentence; "" if it is."""
+    """Return the problem of an observation outside its space, as a sentence; "" if it is in the space."""
     parts = space.items() if isinstance(space, spaces.Dict) else [("", space)]
     for name, part in parts:
         value = observation[name] if name else observation
         if fact := mismatch(part, value):
-            # The value differs at each step, so that the sentence would too.
+            # The sentence omits the value, because with it each step would add a different problem.
             where = f"observation {name}".rstrip()
             known = fact if not isinstance(part, spaces.Box) else _outside(part, np.asarray(value))
             return f"{where} is not in its space: {known}; widen the space, or clip the observation"
@@ -77,7 +77,7 @@ def _outside(space: spaces.Box, value: np.ndarray) -> str:
 def _objections(
     check: Callable[..., Any], env: Any, options: dict[str, bool], problems: Problems
 ) -> list[str]:
-    """Return the objections of a checker; a sentence of our own checks inside `env` is added as it is."""
+    """Return the objections of a checker; add an error of our own checks inside `env` to `problems`."""
     found: list[str] = []
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")

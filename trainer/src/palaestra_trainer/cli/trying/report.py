@@ -1,4 +1,4 @@
-"""The results of a try, for a person and for programs."""
+"""Format the results of `palaestra-try`, as text for a person and as JSON data for programs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from palaestra_trainer.episodes.evaluation import Episode
 
 
 def line_of(number: int, episode: Episode) -> str:
-    """Return an episode as a line."""
+    """Return the result of an episode as a line of text."""
     ends = {True: "success", False: "no success", None: ""}[episode.success]
     words = ", ".join(word for word in (ends, episode.outcome) if word)
     steps = "1 step" if episode.length == 1 else f"{episode.length} steps"
@@ -18,7 +18,7 @@ def line_of(number: int, episode: Episode) -> str:
 
 
 def summary(tried: Tried) -> list[str]:
-    """Return the figures of all episodes, then the problems, as lines."""
+    """Return lines of text: first the statistics of all episodes, then the problems."""
     return [*_figures(tried), *_times(tried), *_problems(tried)]
 
 
@@ -58,7 +58,7 @@ def _problems(tried: Tried) -> list[str]:
 
 
 def as_json(tried: Tried) -> dict[str, Any]:
-    """Return the results of a try for programs; times are means in milliseconds."""
+    """Return the results as JSON data; times are means in milliseconds."""
     times, count = tried.times, max(tried.times.count, 1)
     return {
         "episodes": [episode.record() for episode in tried.episodes],

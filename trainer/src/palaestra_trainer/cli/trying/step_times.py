@@ -1,4 +1,4 @@
-"""The time of a step by part: the simulator, the transport and the environment."""
+"""Measure the time of a step in three parts: the simulator, the transport and the environment."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from palaestra_trainer.waiting.wait_time import waited_s
 
 @dataclass(slots=True, kw_only=True)
 class StepTimes:
-    """Seconds of all steps together.
+    """The total time of all steps, in seconds.
 
     Attributes:
         count: number of steps.
-        simulator_s: waiting for the simulator.
-        transport_s: sending commands, and reading and checking sensors.
-        environment_s: the environment's own code, its wrappers, and the checks of what it returns.
+        simulator_s: time of waiting for the simulator.
+        transport_s: time of sending commands, and of reading and checking sensors.
+        environment_s: time of the environment's own code, of its wrappers, and of the checks of its results.
     """
 
     count: int = 0
@@ -33,12 +33,12 @@ class StepTimes:
         clock: Callable[[], float] = time.perf_counter,
         waited: Callable[[], float] = waited_s,
     ) -> Iterator[None]:
-        """Count the time of one step; one that raises is not counted.
+        """Add the time of one step; a step that raises is not counted.
 
         Args:
-            transported: returns the seconds of transport so far.
-            clock: returns seconds.
-            waited: returns the seconds that this thread has waited for simulators so far.
+            transported: a function that returns the seconds of transport so far.
+            clock: a function that returns the time in seconds.
+            waited: a function that returns the seconds that this thread has waited for simulators.
         """
         began, waits, transports = clock(), waited(), transported()
         yield
@@ -50,5 +50,5 @@ class StepTimes:
 
     @property
     def seconds(self) -> float:
-        """Seconds of all steps."""
+        """The total seconds of all steps."""
         return self.simulator_s + self.transport_s + self.environment_s

@@ -1,1 +1,1 @@
-"""The code of a job's author: its classes and their options are checked."""
+"""Import the classes of a job's author, check their options, and copy the values that they exchange."""

@@ -1,8 +1,8 @@
-"""Import the code of a job's author: robots, environments, algorithms, policies and their parts, callbacks.
+"""Import the code of a job's author: robots, environments, algorithms, policies and callbacks.
 
-A job names a class as `module:Class`. The module is imported from where Python finds it: the image, or
-PYTHONPATH. An import runs the author's code, which may raise anything, so every exception becomes a
-ConfigurationError with the name, the fact and the remedy.
+A job names a class as `module:Class`. Python finds the module in the image or in PYTHONPATH. An import runs
+the author's code, which may raise any exception. So every exception becomes a ConfigurationError with the
+name, the fact and the remedy.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ def names_class(value: Any) -> bool:
 
 
 def class_named(name: str, field: str, base: type[Any]) -> type[Any]:
-    """Return the class that `name` names, a subclass of `base`.
+    """Import the class `name`, check that it is a subclass of `base`, and return it.
 
     Args:
         name: `module:Class`.
         field: field of the job, for messages.
-        base: the class that it must be a subclass of.
+        base: the class that the named class must extend.
 
     Raises:
         ConfigurationError: the class cannot be imported, or is not a subclass of `base`.
@@ -45,7 +45,7 @@ def class_named(name: str, field: str, base: type[Any]) -> type[Any]:
 
 
 def object_named(name: str, subject: str) -> Any:
-    """Return the object that `name` names.
+    """Import and return the object `name`.
 
     Args:
         name: `module:object`.
@@ -61,7 +61,7 @@ def object_named(name: str, subject: str) -> Any:
 
 
 def module_named(name: str, subject: str) -> ModuleType:
-    """Return the module with this name; for `subject` see `object_named`.
+    """Import and return the module with this name; for `subject` see `object_named`.
 
     Raises:
         ConfigurationError: it cannot be imported.
@@ -72,7 +72,7 @@ def module_named(name: str, subject: str) -> ModuleType:
 
 @contextmanager
 def _reported(subject: str, remedy: str, if_missing: str | None = None) -> Iterator[None]:
-    """Turn errors of the block into a ConfigurationError; `if_missing` is the remedy for an ImportError."""
+    """Convert errors of the block to a ConfigurationError; `if_missing` is the remedy for an ImportError."""
     try:
         yield
     except (Exception, SystemExit) as error:  # the author's code may raise anything, and a script may exit

@@ -12,11 +12,11 @@ _NAMED = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONL
 
 
 class AcceptedArguments:
-    """The arguments that a class or function accepts by name.
+    """The keyword arguments that a class or function accepts.
 
     Args:
         taker: the class or function.
-        name: its name in messages.
+        name: name of the class or function in messages.
     """
 
     def __init__(self, taker: Callable[..., Any], name: str) -> None:
@@ -26,7 +26,7 @@ class AcceptedArguments:
         self._any = takes_any(signature)
 
     def accepts(self, name: str) -> bool:
-        """Return whether an argument of this name may be given."""
+        """Return whether the class or function accepts an argument of this name."""
         return self._any or name in self._named
 
     def mistakes(self, field: str, options: Iterable[str], others: Iterable[str] = ()) -> Iterator[str]:
@@ -35,7 +35,7 @@ class AcceptedArguments:
         Args:
             field: the field of the job with the options.
             options: the names of the arguments that the job gives.
-            others: the names of the arguments that come from elsewhere.
+            others: the names of the arguments that the trainer adds.
         """
         known = list(self._named)
         for name in options:
@@ -49,10 +49,10 @@ class AcceptedArguments:
 
 
 def named(signature: inspect.Signature) -> Mapping[str, inspect.Parameter]:
-    """Return the parameters of a signature that can be given by name, without those of its `**kwargs`."""
+    """Return the parameters of a signature that a caller can pass by name, except for its `**kwargs`."""
     return {name: found for name, found in signature.parameters.items() if found.kind in _NAMED}
 
 
 def takes_any(signature: inspect.Signature) -> bool:
-    """Return whether a signature accepts every name, by `**kwargs`."""
+    """Return whether a signature has `**kwargs`, and so accepts every name."""
     return any(found.kind is inspect.Parameter.VAR_KEYWORD for found in signature.parameters.values())

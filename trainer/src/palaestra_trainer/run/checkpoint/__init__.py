@@ -1,10 +1,11 @@
-"""Save the state of a run, and find it again, so that a resumed run continues as if it had never ended.
+"""Save and restore the state of a run, so that a resumed run continues as if it had never ended.
 
 A checkpoint is a folder `<step>/` with the model's tensors, its experience, and the rest of the state that
-the next step depends on. A manifest with the digest of each file is written last. The folder is written under
-a temporary name and renamed, so a checkpoint is complete or absent; one that was damaged later is skipped.
-Loading does not unpickle: the model is rebuilt from the configuration, tensors are read with `weights_only`,
-and the rest is JSON and plain arrays. docs/decisions/0008-exact-resume.md explains exact resumes.
+the next step depends on. A manifest with the digest of each file is written last. The folder has a temporary
+name until all files are written, so every checkpoint is complete. A checkpoint that was damaged later is
+skipped. Loading does not unpickle. The trainer creates the model from the configuration, reads tensors with
+`weights_only`, and reads the rest from JSON and plain arrays. docs/decisions/0008-exact-resume.md explains
+exact resumes.
 """
 
 from palaestra_trainer.run.checkpoint.initial_policy import begin_from

@@ -1,7 +1,7 @@
-"""Begin a run with the policy of another run: its tensors, and the statistics of its normalizer.
+"""Begin a run with the policy of another run: load its tensors, and the statistics of its normalizer.
 
-The file is the zip of any model of Stable-Baselines3. Nothing in it is unpickled, so it need not be trusted.
-The optimizers are new, and all counts of the run start at 0.
+The file is the zip of any model of Stable-Baselines3. This module does not unpickle, so the file may come
+from an untrusted source. The run has new optimizers, and all its counts start at 0.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ log = structlog.get_logger(__name__)
 
 POLICY = "policy.pth"
 _SHOWN = 3  # number of mismatches in a message
-_OVERHEAD_BYTES = 1 << 20  # room for names, statistics, and the overhead of PyTorch's format
+_OVERHEAD_BYTES = 1 << 20  # bytes for names, statistics, and the overhead of PyTorch's format
 
 
 def begin_from(path: Path, model: BaseAlgorithm) -> None:
-    """Load the policy of a zip into a new model, and its statistics if both normalize.
+    """Load the policy of a zip into a new model; load its statistics too if both models normalize.
 
     Raises:
-        ConfigurationError: the file cannot be read, or a tensor or statistic does not fit this model.
+        ConfigurationError: the file cannot be read, or a tensor or statistic does not match this model.
     """
     own = model.policy.state_dict()
     tensors, known = _read(path, model.device, _most_bytes(own))
@@ -47,19 +47,19 @@ def begin_from(path: Path, model: BaseAlgorithm) -> None:
 
 
 def _most_bytes(own: Mapping[str, torch.Tensor]) -> int:
-    """Return the most bytes that a policy of these tensors can need in a file, at twice their precision."""
+    """Return an upper limit for the bytes of these tensors in a file, even with twice their precision."""
     return 2 * sum(tensor.nbytes for tensor in own.values()) + _OVERHEAD_BYTES
 
 
 def _read(path: Path, device: torch.device, most: int) -> tuple[Any, dict[str, Any]]:
-    """Return the tensors and the statistics in a zip; refuse members of more than `most` bytes together."""
+    """Return the tensors and the statistics in a zip; refuse more than `most` bytes in total."""
     try:
         with zipfile.ZipFile(path) as archive:
             statistics = [NORMALIZE] if NORMALIZE in archive.namelist() else []
             _refuse_larger(path, map(archive.getinfo, [POLICY, *statistics]), most)
             content = io.BytesIO(archive.read(POLICY))
             known = json.loads(archive.read(NORMALIZE)) if statistics else {}
-        if zipfile.is_zipfile(content):  # the format of PyTorch is a zip too, whose members may be compressed
+        if zipfile.is_zipfile(content):  # PyTorch's format is a zip too, and its members may be compressed
             with zipfile.ZipFile(content) as inner:
                 _refuse_larger(path, inner.infolist(), most)
         content.seek(0)
@@ -76,7 +76,7 @@ def _read(path: Path, device: torch.device, most: int) -> tuple[Any, dict[str, A
 
 
 def _refuse_larger(path: Path, members: Iterable[zipfile.ZipInfo], most: int) -> None:
-    """Refuse members of a zip that would unpack to more bytes than the policy of this run can need."""
+    """Refuse members of a zip that would unpack to more bytes than this run's policy can need."""
     unpacked = sum(each.file_size for each in members)
     if unpacked > most:
         raise _refused(

@@ -1,4 +1,4 @@
-"""The manifest of a checkpoint: its metadata, and the digests that show damage."""
+"""The manifest of a checkpoint: its metadata, and digests to detect damaged files."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from palaestra_trainer.job.configuration import Configuration
 MANIFEST = "manifest.json"
 EXPERIENCE = "experience"
 FORMAT = 1
-_NOT_COMPARED = {"callbacks"}  # a run may continue with other callbacks, because they are not part of a model
+_NOT_COMPARED = {"callbacks"}  # a run may resume with other callbacks, because a model does not contain them
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,7 +25,7 @@ class Manifest:
     """The metadata of a checkpoint.
 
     Attributes:
-        step: valid environment steps learned from.
+        step: number of valid environment steps that the model has learned from.
         seed: the replica's seed.
         algorithm: name and hyperparameters of the run.
         environment: id, reward and options of the run.
@@ -43,7 +43,7 @@ class Manifest:
     format: int = FORMAT
 
     def write(self, folder: Path) -> None:
-        """Write it into a checkpoint's folder, with a digest of the manifest itself."""
+        """Write the manifest into a checkpoint's folder, with a digest of the manifest itself."""
         content = asdict(self)
         text = json.dumps(content | {"digest": _digest_of(content)}, indent=2)
         (folder / MANIFEST).write_text(text + "\n", encoding="utf-8")
@@ -54,8 +54,8 @@ class SavedCheckpoint:
     """A checkpoint whose files match its manifest.
 
     Attributes:
-        path: its folder.
-        manifest: its manifest.
+        path: folder of the checkpoint.
+        manifest: manifest of the checkpoint.
         lost: files of experience that are damaged; all other files are undamaged.
     """
 
@@ -65,9 +65,10 @@ class SavedCheckpoint:
 
 
 def describe(configuration: Configuration, step: int, counters: Mapping[str, Any]) -> Manifest:
-    """Return the manifest of a checkpoint of this run, without its files.
+    """Return the manifest of a checkpoint of this run, still without its list of files.
 
-    Fields that are None are omitted, so an older release finds an unknown field only if the job sets it.
+    Fields that are None are omitted. So an older release finds an unknown field only if the job sets that
+    field.
     """
     return Manifest(
         step=step,
@@ -79,11 +80,11 @@ def describe(configuration: Configuration, step: int, counters: Mapping[str, Any
 
 
 def read(folder: Path) -> SavedCheckpoint:
-    """Return the checkpoint in a folder, after a comparison of its files with their digests.
+    """Compare the files of a checkpoint with their digests, and return the checkpoint.
 
     Raises:
         OSError, ValueError, TypeError: a file other than experience is damaged.
-        ConfigurationError: it is undamaged, but this release does not read its format.
+        ConfigurationError: the checkpoint is undamaged, but this release cannot read its format.
     """
     manifest = _read_manifest(folder)
     damaged = [name for name, digest in manifest.files.items() if not _is(folder / name, digest)]
@@ -100,10 +101,10 @@ def digest_of(path: Path) -> str:
 
 
 def refuse_another_run(checkpoint: SavedCheckpoint, configuration: Configuration) -> None:
-    """Check that the checkpoint is of a run of this configuration.
+    """Check that the checkpoint's run has the algorithm and environment of this configuration.
 
     Raises:
-        ConfigurationError: it is of another algorithm or environment.
+        ConfigurationError: the checkpoint's run has another algorithm or environment.
     """
     for part in ("algorithm", "environment"):
         section: BaseModel = getattr(configuration, part)
@@ -118,7 +119,7 @@ def refuse_another_run(checkpoint: SavedCheckpoint, configuration: Configuration
 
 
 def _completed(saved: dict[str, Any], section: type[BaseModel]) -> dict[str, Any]:
-    """Return a section that an older release saved, with the defaults of fields that are newer.
+    """Return a section that an older release saved, with defaults for the fields that it did not have.
 
     A section of a newer release is returned unchanged.
     """
@@ -137,8 +138,8 @@ def _read_manifest(folder: Path) -> Manifest:
     number = content.get("format")
     if whole and number != FORMAT:
         raise ConfigurationError(
-            f"{folder}: is of format {number}, of another release than this one, which reads {FORMAT}; "
-            "continue with the release that wrote it, or use another run directory"
+            f"{folder}: is of format {number}, unknown to this release, which reads {FORMAT}; "
+            "continue with the release that wrote the checkpoint, or use another run directory"
         )
     if not whole:
         raise ValueError(f"{MANIFEST} does not match its digest")

@@ -1,4 +1,4 @@
-"""The state of an author's buffer in a checkpoint, besides its rows: arrays, tensors and plain values."""
+"""Save and load the state of an author's buffer besides its rows: arrays, tensors and plain values."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _ARRAY, _TENSOR, _PLAIN = "array:", "tensor:", "plain"
 
 
 def write(model: BaseAlgorithm, folder: Path) -> None:
-    """Write the state of the model's buffer, if the buffer has an author's class.
+    """Write the state of the model's buffer, if its class is a job author's.
 
     Raises:
         ConfigurationError: the buffer has a value that a checkpoint cannot hold.
@@ -38,7 +38,7 @@ def write(model: BaseAlgorithm, folder: Path) -> None:
 
 
 def read(model: BaseAlgorithm, folder: Path) -> None:
-    """Load the file that `write` wrote into the buffer of an equal model.
+    """Read the file that `write` wrote, and load its state into the buffer of an equal model.
 
     Raises:
         OSError, ValueError, KeyError: the file is damaged.

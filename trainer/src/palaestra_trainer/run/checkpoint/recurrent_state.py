@@ -1,4 +1,4 @@
-"""The tensors that an algorithm changes in a rollout, as `algorithms.rollout_state` declares them."""
+"""Read and set the tensors that a rollout changes, which `algorithms.rollout_state` declares."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from palaestra_trainer.algorithms.rollout_state import rollout_state_of
 
 
 def networks(model: BaseAlgorithm) -> list[torch.Tensor]:
-    """Return the tensors of the networks that a rollout changes; the caller copies or overwrites them."""
+    """Return the tensors of the networks that a rollout changes, not copies."""
     return [
         tensor
         for name in rollout_state_of(model).networks
@@ -21,14 +21,14 @@ def networks(model: BaseAlgorithm) -> list[torch.Tensor]:
 
 
 def memories(model: BaseAlgorithm) -> list[torch.Tensor]:
-    """Return the states of the model's recurrent networks; no code writes to these tensors later."""
+    """Return the states of the model's recurrent networks; later steps replace these tensors."""
     return [state for name in rollout_state_of(model).memories for state in _tensors(getattr(model, name))]
 
 
 def remember(model: BaseAlgorithm, states: Sequence[torch.Tensor]) -> None:
-    """Set the states that `memories` returned, so that the model continues with them.
+    """Set the states of the model's recurrent networks to the result of `memories`.
 
-    A member without a saved state keeps the model's current one; its episode and its state begin together.
+    A member that is not in `states` keeps its current state, because it begins a new episode.
     """
     left = iter(states)
     for name in rollout_state_of(model).memories:
@@ -44,7 +44,7 @@ def _tensors(states: Any) -> Iterator[torch.Tensor]:
 
 
 def _replaced(states: Any, left: Iterator[torch.Tensor]) -> Any:
-    """Return nested tuples of the same types with the tensors of `left` in place of the old ones."""
+    """Return `states` with the same nested types, and with the tensors of `left` instead of its own."""
     if isinstance(states, torch.Tensor):
         known = next(left).to(states.device)[:, : states.shape[1]]
         return torch.cat([known, states[:, known.shape[1] :]], dim=1)

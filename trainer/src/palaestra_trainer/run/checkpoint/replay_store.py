@@ -1,7 +1,7 @@
-"""A replay buffer on disk: rows in their format in memory, in chunks that later checkpoints share.
+"""Save and load a replay buffer: chunks of rows as in memory, which later checkpoints share.
 
-Few rows change between two checkpoints. A chunk without a changed row is a hard link to the file of the
-previous checkpoint, or a copy of it if the volume does not support hard links.
+Few rows change between two checkpoints. For a chunk without a changed row, the new checkpoint has a hard link
+to the file of the previous checkpoint. If the volume does not support hard links, it has a copy.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ def write(buffer: ValidReplayBuffer, folder: Path, before: SavedCheckpoint | Non
     """Write the rows in use into a checkpoint's folder; return the digest of each file by its name.
 
     Args:
-        buffer: its `changed` chunks are those that differ from `before`.
-        folder: the new checkpoint.
-        before: an older one of the same buffer; None: every chunk is written.
+        buffer: the buffer; its attribute `changed` names the chunks that differ from `before`.
+        folder: the folder of the new checkpoint.
+        before: the previous checkpoint of the same buffer; None: every chunk is written.
     """
     (folder / EXPERIENCE).mkdir()
     known = before.manifest.files if before else {}
@@ -46,12 +46,12 @@ def write(buffer: ValidReplayBuffer, folder: Path, before: SavedCheckpoint | Non
 
 
 def read(buffer: ValidReplayBuffer, found: SavedCheckpoint) -> None:
-    """Load the rows of a checkpoint into an equal buffer with the same positions as when they were written.
+    """Load the rows of a checkpoint into an equal buffer, whose write positions are already restored.
 
-    Rows of lost chunks are omitted.
+    The rows of lost chunks are dropped from the buffer.
 
     Raises:
-        ValueError: the rows have another shape, or are pickled.
+        ValueError: the rows have another shape, or a file contains pickled data.
     """
     names = sorted(name for name in found.manifest.files if name.startswith(EXPERIENCE))
     kept = np.ones(buffer.buffer_size, dtype=bool)
@@ -82,7 +82,7 @@ def _share(old: Path, new: Path) -> bool:
         os.link(old, new)
     except FileNotFoundError:
         return False
-    except OSError:  # the volume does not support hard links, or the file has too many
+    except OSError:  # the volume does not support hard links, or the file has too many links
         shutil.copyfile(old, new)
         sync(new)
     return True

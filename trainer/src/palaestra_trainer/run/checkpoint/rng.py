@@ -1,4 +1,4 @@
-"""The states of the random generators that training draws from, as plain data."""
+"""Save and restore the states of the random generators that training uses."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Generators:
         )
 
     def put_back(self, action_space: spaces.Space[Any], device: torch.device) -> None:
-        """Set the generators to these states; that of a GPU only if the model is on a GPU now."""
+        """Set the generators to these states; set the GPU's generator only if the model is on a GPU now."""
         random.setstate(self.python)
         np.random.set_state(self.numpy)
         torch.set_rng_state(self.pytorch)
@@ -46,7 +46,7 @@ class Generators:
             torch.cuda.set_rng_state(self.gpu, device)
 
     def to_json(self) -> dict[str, Any]:
-        """Return them as JSON data."""
+        """Return the states as JSON data."""
         twister = self.numpy["state"]
         content = {
             "python": self.python,

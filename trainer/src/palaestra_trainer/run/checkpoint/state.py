@@ -1,7 +1,8 @@
-"""The state that the next step of a run depends on, except for saved tensors and experience.
+"""The state on which the next step of a run depends, except for saved tensors and experience.
 
-It is taken at each rollout boundary, which off policy is every few steps. So it must be cheap, and costs some
-ten microseconds: it holds references to objects that are not changed later, and copies of small ones.
+The training callback records this state at each boundary between rollouts, for off-policy algorithms every
+few steps. So it must be fast, and takes some ten microseconds. The state holds references to objects that
+later steps do not change, and copies of small objects.
 """
 
 from __future__ import annotations
@@ -29,31 +30,34 @@ from palaestra_trainer.run.checkpoint.rng import Generators
 
 STATE = "state.json"
 ARRAYS = "state.npz"
-# These are the counts of every algorithm; `algorithms.rollout_state` lists the others of each.
+# Every algorithm has these counts; `algorithms.rollout_state` lists further counts of each algorithm.
 _NUMBERS = ("num_timesteps", "_n_updates", "_episode_num", "_current_progress_remaining")
 _NOISE = ("exploration_mat", "exploration_matrices")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrainingState:
-    """A run at a rollout boundary.
+    """The state of a run at a boundary between two rollouts.
 
     Attributes:
         numbers: the counts of the algorithm, by attribute.
         generators: states of the random generators.
-        observation: the last observation, a row for each member, as the environments returned it.
-        episode_starts: for each row of `observation`, whether it is the first of an episode.
+        observation: the last observation of each member, one per row, as the environments returned it.
+        episode_starts: whether each row of `observation` is the first observation of an episode.
         episodes: statistics of the last episodes, as Stable-Baselines3 keeps them.
-        successes: whether the last episodes succeeded.
-        positions: positions of the replay buffer; None without one.
+        successes: for each of the last episodes, whether it succeeded.
+        positions: write positions of the replay buffer; None without a replay buffer.
         members: state of each collecting simulator's episode.
-        rollout: other counts during an episode, as JSON data; the training callback defines them.
-        noise: matrices of state-dependent exploration, drawn before the boundary; empty without it.
-        networks: copies of the networks' tensors that a rollout changes; not written, as the model has them.
+        rollout: other counts of running episodes, as JSON data; the training callback defines them.
+        noise: matrices of state-dependent exploration, drawn before the boundary; empty without such
+            exploration.
+        networks: copies of the networks' tensors that a rollout changes; `write` omits them, because
+            model.zip has them.
         memories: states of recurrent networks, each of shape (layers, members, units).
-        action_noise: state of the noise on each member's actions, if it lasts longer than a step.
-        scales: statistics of observations and rewards, if they are normalized; not written, as `networks`.
-        running_returns: for each member the discounted reward of its episode so far, if rewards need it.
+        action_noise: state of the noise on each member's actions; None if the noise has no state.
+        scales: statistics of observations and rewards, if they are normalized; `write` omits them too.
+        running_returns: for each member the discounted reward of its episode so far; None without
+            normalization.
     """
 
     numbers: dict[str, float]
@@ -76,7 +80,7 @@ class TrainingState:
     def of(
         cls, model: BaseAlgorithm, members: Sequence[EpisodeState], rollout: Mapping[str, Any]
     ) -> TrainingState:
-        """Return the state of a model that has begun to learn and is at a rollout boundary."""
+        """Return the state of a model that has begun to learn and is between two rollouts."""
         buffer, normalizer = replay_buffer(model), normalizer_of(model)
         seen = normalizer.old_obs if normalizer else model._last_obs
         return cls(
@@ -98,7 +102,7 @@ class TrainingState:
         )
 
     def put_back(self, model: BaseAlgorithm) -> None:
-        """Set the state of the model; its other tensors and its experience must be from this boundary."""
+        """Set the state of the model; its tensors and experience must be those of the same boundary."""
         for name, value in self.numbers.items():
             setattr(model, name, value)
         self.generators.put_back(model.action_space, model.device)
@@ -130,7 +134,7 @@ class TrainingState:
         model._last_original_obs = original
 
     def write(self, folder: Path) -> None:
-        """Write it into a folder, without the parts that belong to the model."""
+        """Write the state into a folder, without the tensors and statistics that model.zip has."""
         arrays = by_name(self.observation, "observation") | {"episode_starts": self.episode_starts}
         if self.action_noise is not None:
             arrays["action_noise"] = self.action_noise
@@ -191,7 +195,7 @@ class TrainingState:
 
 
 def replay_buffer(model: BaseAlgorithm) -> ValidReplayBuffer | None:
-    """Return the model's replay buffer; None on policy."""
+    """Return the model's replay buffer; None for an on-policy model."""
     buffer = getattr(model, "replay_buffer", None)
     return buffer if isinstance(buffer, ValidReplayBuffer) else None
 

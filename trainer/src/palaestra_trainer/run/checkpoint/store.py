@@ -1,4 +1,4 @@
-"""The folder of a run's checkpoints: find the newest one, and add another."""
+"""Find the newest checkpoint of a run, and write a new checkpoint."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from palaestra_trainer.run.checkpoint.tensors import load_tensors, save_tensors
 log = structlog.get_logger(__name__)
 
 MODEL = "model.zip"
-# For example file systems of object stores.
+# File systems over object stores, for example, raise these errors when a folder is renamed.
 _NO_RENAME = frozenset({errno.EPERM, errno.ENOTSUP, errno.ENOSYS, errno.EXDEV})
 _NUMBER = re.compile(r"[0-9]{1,18}")
 
@@ -33,7 +33,7 @@ class Saver:
     Args:
         folder: the folder of the checkpoints; it may be missing.
         keep: number of newest checkpoints to keep.
-        resumed: the checkpoint that the attempt resumed from.
+        resumed: the checkpoint from which the attempt resumed; None: it did not resume.
     """
 
     def __init__(self, folder: Path, keep: int, resumed: SavedCheckpoint | None = None) -> None:
@@ -42,13 +42,14 @@ class Saver:
         self._before = resumed
 
     def save(self, model: BaseAlgorithm, state: TrainingState, described: Manifest) -> bool:
-        """Set the model back to `state`, write a checkpoint, and remove all but the newest ones.
+        """Set the model back to `state`, write a checkpoint, and remove old checkpoints.
 
-        Returns whether it was written: a full disk is logged, and the older checkpoints then stay.
+        Returns whether the checkpoint was written. If the disk is full, this method logs an error, returns
+        False and keeps the older checkpoints.
 
         Raises:
             ConfigurationError: the file system cannot rename folders.
-            OSError: it cannot be written for another reason than a full disk.
+            OSError: the checkpoint cannot be written, for another reason than a full disk.
         """
         state.put_back(model)
         draft = self._folder / f".{described.step}.draft"
@@ -71,9 +72,10 @@ class Saver:
         return True
 
     def size_bytes(self) -> int:
-        """Return the size of the newest checkpoint, with the files that it shares with others.
+        """Return the size of the newest checkpoint, including files that other checkpoints share.
 
-        It is 0 before the first checkpoint, or if its files cannot be read: that must not end a run.
+        The size is 0 before the first checkpoint. It is also 0 if the files cannot be read, because such an
+        error must not end the run.
         """
         newest = self._before
         if newest is None:
@@ -103,21 +105,21 @@ class Saver:
         return complete
 
     def _prune(self, step: int) -> None:
-        """Remove all but the newest; those beyond `step` are damaged, or of a run that was not continued."""
+        """Keep only the newest checkpoints up to `step`; later ones are damaged, or the run began again."""
         reached = sorted((path for path in _steps(self._folder) if _step(path) <= step), key=_step)
         for path in set(_steps(self._folder)).difference(reached[-self._keep :]):
             shutil.rmtree(path, ignore_errors=True)
 
 
 def newest(folder: Path) -> SavedCheckpoint | None:
-    """Return the newest undamaged checkpoint; None if the folder has no checkpoints. Nothing is changed.
+    """Return the newest undamaged checkpoint; None if the folder has no checkpoints.
 
-    Checkpoints share chunks of experience, so a damaged chunk may affect all of them. If all are affected,
-    return the newest one whose other files are undamaged.
+    This function does not change the folder. Checkpoints share chunks of experience, so a damaged chunk may
+    affect all checkpoints. In that case, return the newest checkpoint whose other files are undamaged.
 
     Raises:
-        ConfigurationError: a checkpoint has a format that this release does not read, or all are damaged: a
-            run from the beginning would replace them.
+        ConfigurationError: this release cannot read the format of a checkpoint, or all checkpoints are
+            damaged. A run from the beginning would replace these checkpoints.
     """
     rest, damage = None, ""
     for path in sorted(_steps(folder), key=_step, reverse=True):
@@ -148,10 +150,10 @@ def newest(folder: Path) -> SavedCheckpoint | None:
 def restore(checkpoint: SavedCheckpoint, model: BaseAlgorithm) -> TrainingState:
     """Load tensors and experience of a checkpoint into a new model of the same configuration.
 
-    Returns the rest of the state; call its `put_back` last, directly before learning.
+    Returns the rest of the state. Call `put_back` of this state last, directly before learning.
 
     Raises:
-        ConfigurationError: the tensors are of another kind of model.
+        ConfigurationError: the tensors are those of a different model.
     """
     load_tensors(checkpoint.path / MODEL, model)
     state = TrainingState.read(checkpoint.path)
@@ -165,7 +167,7 @@ def restore(checkpoint: SavedCheckpoint, model: BaseAlgorithm) -> TrainingState:
 
 
 def _put_in_place(draft: Path) -> Path:
-    """Rename a complete draft to its final name; an older checkpoint of the same step stays until then."""
+    """Rename a complete draft to its final name, and then remove an older checkpoint of the same step."""
     name = draft.name.removeprefix(".").removesuffix(".draft")
     target, replaced = draft.with_name(name), draft.with_name(f".{name}.replaced")
     try:
@@ -185,7 +187,7 @@ def _put_in_place(draft: Path) -> Path:
 
 
 def tidy(folder: Path) -> None:
-    """Finish or undo a write that a kill interrupted; call it before writing to the folder."""
+    """Finish or undo a write that a kill interrupted; call this function before a new write."""
     for draft in folder.glob(".*.draft"):
         shutil.rmtree(draft, ignore_errors=True)
     for replaced in folder.glob(".*.replaced"):

@@ -1,7 +1,7 @@
-"""A model's tensors in a zip of Stable-Baselines3, which is read without unpickling.
+"""Save a model's tensors in a zip of Stable-Baselines3, and load them without unpickling.
 
 If a model normalizes, the zip has one more member: the statistics of observations and rewards, as JSON. So
-the file alone is a usable policy. Stable-Baselines3 reads such a zip like any other.
+the policy needs no other file. Stable-Baselines3 ignores this member when it reads the zip.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ NORMALIZE = "normalize.json"
 
 @dataclass(frozen=True, slots=True)
 class Tensors:
-    """A copy of all tensors that an update changes; an interrupted update is undone with it.
+    """A copy of all tensors that an update changes; it serves to undo an interrupted update.
 
     Attributes:
         parameters: tensors of networks and optimizers, by their names in Stable-Baselines3.
@@ -44,13 +44,13 @@ class Tensors:
         return cls(deepcopy(model.get_parameters()), variables)
 
     def put_back(self, model: BaseAlgorithm) -> None:
-        """Set the model's tensors to the copied ones."""
+        """Set the model's tensors to the values of this copy."""
         model.set_parameters(self.parameters, exact_match=True, device=model.device)
         _set_variables(model, self.variables)
 
 
 def save_tensors(path: Path, model: BaseAlgorithm) -> None:
-    """Write the zip of a model, with the statistics that its policy needs.
+    """Write the zip of a model; include the statistics that its policy needs.
 
     Raises:
         OSError: the file could not be written.
@@ -62,10 +62,10 @@ def save_tensors(path: Path, model: BaseAlgorithm) -> None:
 
 
 def load_tensors(path: Path, model: BaseAlgorithm) -> None:
-    """Load the file that `save_tensors` wrote into `model`; nothing is unpickled.
+    """Load the file that `save_tensors` wrote into `model`, without unpickling.
 
     Raises:
-        ConfigurationError: the file is of another kind of model, or of one with other normalization.
+        ConfigurationError: the file is of a different model, or of a model with other normalization.
     """
     try:
         _, parameters, variables = load_from_zip_file(path, device=model.device, load_data=False)

@@ -1,1 +1,1 @@
-"""Reports of a run while it trains: progress, metrics, /status, /metrics and the log."""
+"""Report the progress of a run while it trains, in /status, /metrics, files and the log."""

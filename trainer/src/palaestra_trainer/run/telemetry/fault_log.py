@@ -1,6 +1,6 @@
-"""The faults of a run as lines of a file: one per fault, and one when the simulator is up again.
+"""Write the faults of a run to a file: a line per fault, and a line when the simulator is up again.
 
-A line is written at once, so a fault is known even if the run is killed before the simulator is up.
+A line is written at once, so the file has a fault even if the run is killed before the simulator is up.
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ from palaestra_trainer.job.run_directory import append_line
 
 log = structlog.get_logger(__name__)
 
-MOST_BYTES = 2**20  # the limit of the file; the counters of the run count every fault
+MOST_BYTES = 2**20  # size limit of the file; the counters of the run still count every fault
 
 
 class FaultLog:
-    """The file of one attempt; callable from any thread.
+    """Writes the faults of one attempt; any thread may call its methods.
 
-    A full disk is logged once and ends nothing here: the next checkpoint reports it.
+    A full disk is logged once. It does not end the run here, because the next checkpoint reports it.
 
     Args:
         path: the file; it may be missing.
         attempt: number of the attempt.
-        clock: returns seconds from any starting point.
+        clock: a function that returns seconds from any starting point.
     """
 
     def __init__(self, path: Path, attempt: int, clock: Callable[[], float] = time.monotonic) -> None:
@@ -37,7 +37,7 @@ class FaultLog:
         self._attempt = attempt
         self._clock = clock
         self._lock = threading.Lock()
-        self._down: dict[str, list[float]] = {}  # times of the faults of each simulator that is down
+        self._down: dict[str, list[float]] = {}  # for each simulator that is down, the times of its faults
         self._full = False
 
     def broke(self, fault: FaultRecord, steps_lost: int) -> None:
@@ -47,7 +47,7 @@ class FaultLog:
             self._write(fault.to_json() | {"attempt": self._attempt, "steps_lost": steps_lost})
 
     def is_up(self, simulator: str) -> None:
-        """Record that a simulator is up, if it was down."""
+        """Record that a simulator is up again; do nothing if it was not down."""
         with self._lock:
             if times := self._down.pop(simulator, None):
                 seconds = [round(self._clock() - began, 3) for began in times]

@@ -1,8 +1,8 @@
 """Divide the wall-clock time of a run among causes.
 
 Every second since the start is counted under exactly one cause, so the causes add up to the wall-clock time.
-Only the thread that created the ledger counts time. Work of other threads, such as the restart of one of
-several simulators, does not delay the run, so it is not counted.
+Only the thread that created the ledger counts time. The work of other threads is not counted, because it does
+not delay the run. An example is the restart of one of several simulators.
 """
 
 from __future__ import annotations
@@ -19,14 +19,15 @@ TRAINING = (Cause.STEPPING, Cause.TRANSPORT, Cause.LEARNING)
 
 
 class GoodputLedger:
-    """The ledger of one attempt; it begins with the cause `starting`.
+    """The ledger of one attempt, which begins with the cause `starting`.
 
-    A vector step counts as transport, except for the time that the thread waited for simulators, which counts
-    as stepping.
+    In a vector step, the time that the thread waits for simulators counts as stepping, and the rest counts as
+    transport.
 
     Args:
-        clock: returns seconds from any starting point.
-        waited: returns the seconds that the calling thread has waited for simulators since any time.
+        clock: a function that returns seconds from any starting point.
+        waited: a function that returns the seconds that the calling thread has waited for simulators, from
+            any starting point.
     """
 
     def __init__(
@@ -43,12 +44,12 @@ class GoodputLedger:
 
     @property
     def cause(self) -> Cause:
-        """The cause under which time is counted now."""
+        """The cause under which time is currently counted."""
         return self._cause
 
     @contextmanager
     def spending(self, cause: Cause) -> Iterator[None]:
-        """Count the time inside under `cause`, except that of inner contexts; no effect in other threads."""
+        """Count the time in the context under `cause`, except in inner contexts and in other threads."""
         if threading.get_ident() != self._owner:
             yield
             return
@@ -63,10 +64,10 @@ class GoodputLedger:
         self._in_vain |= threading.get_ident() == self._owner
 
     def seconds(self) -> dict[str, float]:
-        """Return the seconds counted under each cause so far; callable from any thread.
+        """Return the seconds under each cause so far; any thread may call this method.
 
-        They add up to the wall-clock time without the current step. That step can be divided among the causes
-        only at its end, and the seconds of a cause must never decrease.
+        The seconds add up to the wall-clock time without the current step. A step can be divided among the
+        causes only at its end, and the seconds of a cause must never decrease.
         """
         with self._lock:
             seconds = dict(self._seconds)

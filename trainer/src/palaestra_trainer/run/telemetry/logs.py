@@ -1,6 +1,6 @@
-"""The format of log lines: constant message, values as fields, on standard error.
+"""Format log lines with a constant message and values as fields, and write them to standard error.
 
-The last lines are kept for the termination message, because a pod's log is deleted with the pod.
+This module keeps the last lines for the termination message, because a pod's log is deleted with the pod.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ def configure_logs() -> None:
 
 
 def last_lines() -> tuple[str, ...]:
-    """Return the last lines that were logged, the newest last; never blocks."""
+    """Return the last logged lines, the newest last; this function never blocks."""
     return tuple(_last_lines)
 
 
 class _Renderer(structlog.dev.ConsoleRenderer):
-    """Renders log lines without the passwords in addresses, and keeps the last lines."""
+    """Renders log lines with masked passwords in addresses, and keeps the last lines."""
 
     def __call__(self, logger: Any, name: str, event_dict: structlog.typing.EventDict) -> str:
         text = masked(super().__call__(logger, name, event_dict))

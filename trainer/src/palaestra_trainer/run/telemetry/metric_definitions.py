@@ -1,7 +1,7 @@
-"""Definitions of all metrics of a trainer, by name; `metrics` reads the values.
+"""Definitions of all metrics of a trainer; `palaestra_trainer.run.telemetry.metrics` reads their values.
 
-Metrics of the run continue in the next attempt, because its checkpoints keep them. Metrics of its simulators
-begin at 0 in each attempt. Prometheus adds the labels of job and replica when it scrapes.
+Counters of the run continue in the next attempt, because checkpoints save them. Counters of simulators begin
+at 0 in each attempt. Prometheus adds the labels of job and replica when it scrapes.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ from palaestra_protocol.metrics import Family, Label, counter, gauge, histogram
 from palaestra_protocol.pod.status import Cause, FaultKind, Role
 from palaestra_trainer.simulators.stats import STEP_S
 
-# The scale of returns is not known in advance, and returns are often negative. So the buckets are the same on
-# both sides of 0, and each bound is at most two and a half times the one before.
+# The scale of returns is not known in advance, and returns are often negative. So the buckets are symmetric
+# around 0, and each bound is at most two and a half times the previous bound.
 DECADES = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
 RETURNS = (*(-decade for decade in reversed(DECADES)), 0.0, *DECADES)
 LENGTHS = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0, 10_000.0)
@@ -20,7 +20,7 @@ CHECKPOINT_S = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
 QUANTILES = (0.0, 0.1, 0.5, 0.9, 1.0)
 RECYCLED = "recycled"
 GIVEN_UP = "given_up"
-# These are the names in the logs of Stable-Baselines3, without the part before the slash.
+# The names of losses in the logs of Stable-Baselines3, without the part before the slash.
 LOSSES = (
     "loss",
     "policy_loss",

@@ -1,4 +1,4 @@
-"""Values of one attempt that only /metrics exports; they are not kept for the next attempt."""
+"""Values of one attempt that only /metrics exports; the next attempt begins with new values."""
 
 from __future__ import annotations
 
@@ -24,20 +24,20 @@ def _successes() -> deque[bool]:
 
 @dataclass(slots=True)
 class MetricValues:
-    """The values; the training thread writes them, and any thread may read them.
+    """The values of one attempt; the training thread writes them, and any thread may read them.
 
     Attributes:
-        returns: returns of training episodes.
-        lengths: lengths of training episodes, in steps.
-        successes: success of each of the last training episodes, if the environment reports it.
+        returns: histogram of the returns of training episodes.
+        lengths: histogram of the lengths of training episodes, in steps.
+        successes: success of the last training episodes, if the environment reports success.
         evaluations: number of evaluations.
         evaluation: the last evaluation; None before the first.
-        saves: seconds to write each checkpoint.
+        saves: histogram of the seconds to write a checkpoint.
         saved_at: Unix time of the newest checkpoint; None before the first.
-        saved_bytes: size of its files; None before the first.
+        saved_bytes: size of the newest checkpoint's files; None before the first.
         saves_refused: number of checkpoints that could not be written.
         logged: the values that the learner logged last, by their names in TensorBoard.
-        meters: the counts of each simulator, by its name.
+        meters: the statistics of each simulator, by its name.
     """
 
     returns: Tally = field(default_factory=metric_definitions.RETURN.tally)
@@ -53,7 +53,7 @@ class MetricValues:
     meters: Mapping[str, SimulatorStats] = field(default_factory=dict)
 
     def played(self, info: Mapping[str, Any]) -> None:
-        """Count a training episode by the info of its last step."""
+        """Count a training episode from the info of its last step."""
         self.returns.observe(info["episode"]["r"])
         self.lengths.observe(info["episode"]["l"])
         if "is_success" in info:
@@ -65,13 +65,13 @@ class MetricValues:
         self.evaluations += 1
 
     def saved(self, seconds: float, size_bytes: int) -> None:
-        """Count a checkpoint with its size and the time it took to write."""
+        """Record the time that a checkpoint took to write, and its size."""
         self.saves.observe(seconds)
         self.saved_at, self.saved_bytes = time.time(), size_bytes
 
 
 class Logged(KVWriter):
-    """An output of Stable-Baselines3's logger: copies the values for TensorBoard to `figures`."""
+    """An output of Stable-Baselines3's logger that copies the values for TensorBoard to `figures`."""
 
     def __init__(self, figures: MetricValues) -> None:
         self._figures = figures
@@ -79,9 +79,9 @@ class Logged(KVWriter):
     def write(
         self, key_values: dict[str, Any], key_excluded: dict[str, tuple[str, ...]], step: int = 0
     ) -> None:
-        """Keep the newest value of each name."""
+        """Store the newest value of each name."""
         del key_excluded, step
         self._figures.logged = {**self._figures.logged, **key_values}
 
     def close(self) -> None:
-        """Do nothing, because nothing is open."""
+        """Do nothing, because this output has no file."""

@@ -1,7 +1,7 @@
 """Export the state of a run as Prometheus metrics.
 
-This module counts nothing: each scrape reads `Progress`, so that /metrics and /status cannot differ. Every
-family is always present; it has no sample while its value is unknown.
+This module does not count. Each scrape reads `Progress`, so /metrics and /status cannot differ. Every family
+is always exported, but without samples while its value is unknown.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from palaestra_trainer.run.telemetry import metric_definitions
 from palaestra_trainer.run.telemetry.metric_values import MetricValues
 from palaestra_trainer.run.telemetry.progress import Counters, Progress
 
-# Each value of the label, with the name under which Stable-Baselines3 logs it.
+# The values of the labels `loss` and `measure`, each with its name in Stable-Baselines3's log.
 LOSSES = MappingProxyType({name: f"train/{name}" for name in metric_definitions.LOSSES})
 MEASURES = MappingProxyType(
     {"exploration_rate": "rollout/exploration_rate", "ent_coef": "train/ent_coef", "std": "train/std"}
@@ -43,7 +43,7 @@ def registry(progress: Progress, known: Mapping[Family, Values] = MappingProxyTy
     """Return a new registry with the metrics of a run and of this process.
 
     Args:
-        progress: state of the run.
+        progress: progress of the run.
         known: the result of `constants`.
     """
     made = CollectorRegistry()
@@ -147,7 +147,7 @@ def _simulators(figures: MetricValues) -> dict[Family, Values]:
 
 
 def _one(value: float | None) -> Values:
-    """Return the value of a family without labels; None: unknown."""
+    """Return the value of a family without labels; empty for None, an unknown value."""
     return {} if value is None else {(): value}
 
 
@@ -156,7 +156,7 @@ def _logged(logged: Mapping[str, float], names: Mapping[str, str]) -> Values:
 
 
 def _quantiles(values: Sequence[float]) -> Values:
-    """Return the value nearest to each of `QUANTILES`."""
+    """Return for each of `QUANTILES` the nearest value."""
     ordered = sorted(values)
     last = len(ordered) - 1
     return {

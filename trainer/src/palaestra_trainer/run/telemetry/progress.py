@@ -1,7 +1,7 @@
-"""The progress of a run, in one object for all of its readers.
+"""The progress of a run, in one object for all its readers.
 
-The training loop, the VecEnv and the evaluations report to it, each from its
-own thread. /status, /metrics, the log, the summary and the watchdog read it.
+The training loop, the VecEnv and the evaluations report to the `Progress` object, each from its own thread.
+/status, /metrics, the log, the summary and the watchdog read the object.
 """
 
 from __future__ import annotations
@@ -48,16 +48,16 @@ PHASES: Mapping[Cause, str] = MappingProxyType(
 
 @dataclass(slots=True)
 class Counters:
-    """The counts over all attempts of a run; its checkpoints keep them.
+    """The counts over all attempts of a run; checkpoints save them.
 
     Attributes:
-        episodes: collected episodes that ended without a fault.
-        faults: by kind: dead, hung, wrong_data; and slow, which is not a fault.
-        restarts: the restarts of simulators, after faults.
-        recycled: restarts of healthy simulators.
-        given_up: simulators that the run continued without.
+        episodes: number of collected episodes that ended without a fault.
+        faults: number of faults by kind: dead, hung and wrong_data; also of slow steps, which are not faults.
+        restarts: number of restarts of simulators after faults.
+        recycled: number of restarts of healthy simulators.
+        given_up: number of simulators that were given up while the run continued.
         extra_steps: simulation steps taken because a message was late.
-        steps_lost: valid steps that were lost, see `TrainerStatus`.
+        steps_lost: number of valid steps that were lost, see `TrainerStatus`.
         goodput: seconds spent, by cause.
     """
 
@@ -81,7 +81,7 @@ class Counters:
         return self.faults.total() - self.faults[FaultKind.SLOW]
 
     def to_json(self) -> dict[str, Any]:
-        """Return them as JSON data."""
+        """Return the counters as JSON data."""
         own = {name: getattr(self, name) for name in self.__slots__}
         return own | {"faults": dict(self.faults), "goodput": dict(self.goodput)}
 
@@ -94,20 +94,20 @@ class Counters:
 
 
 class Progress:
-    """The state of a run; a `Watcher` of its simulators. All methods may be called from any thread.
+    """The progress of a run, and the `Watcher` of its simulators; any thread may call its methods.
 
     Attributes:
-        step: valid environment steps so far, over all attempts.
-        target: steps at which the run ends.
-        counters: counts over all attempts; the time of this attempt is missing, see `counted`.
+        step: number of valid environment steps so far, over all attempts.
+        target: number of steps at which the run ends.
+        counters: counts over all attempts, without the time of this attempt; `counted` adds that time.
         success_rate: success rate of this attempt's last evaluation or confirmation; None before the first,
-            or if the environment reports no success.
-        success_interval: the interval around `success_rate`; None if that is None.
+            or if the environment does not report success.
+        success_interval: the interval around `success_rate`; None if the rate is None.
         checkpoint: the newest checkpoint; None before the first.
-        attempt: this attempt's number in the run directory; None before it is recorded.
+        attempt: number of this attempt in the run directory; None before the attempt is recorded.
         figures: values of this attempt only, for /metrics.
-        fault_log: the file of faults; None: they are not written.
-        moments: returns where the collecting simulators are in their episodes, for viewers.
+        fault_log: the file of faults; None: faults are not written to a file.
+        moments: a function that returns the episode and step of each collecting simulator, for viewers.
     """
 
     def __init__(
@@ -137,12 +137,12 @@ class Progress:
 
     @property
     def phase(self) -> str:
-        """The run's activity now: starting, training, evaluating, saving, recovering or recycling."""
+        """The current activity: starting, training, evaluating, saving, recovering or recycling."""
         return PHASES.get(self._goodput.cause, "training")
 
     @property
     def awaits_simulators(self) -> bool:
-        """Whether the run waits only for simulators now."""
+        """Whether the training thread currently waits for simulators."""
         return self._goodput.cause in {Cause.TRANSPORT, Cause.RECOVERING, Cause.RECYCLING}
 
     def spending(self, cause: Cause) -> AbstractContextManager[None]:
@@ -150,13 +150,13 @@ class Progress:
         return self._goodput.spending(cause)
 
     def stepped(self, steps: int) -> None:
-        """Count environment steps of any simulator, in training or evaluation."""
+        """Record that a simulator has stepped, in training or evaluation."""
         del steps
         self._moved = self._clock()
         self._moved_at = time.time()
 
     def resumed(self, step: int, counters: Counters) -> None:
-        """Continue from the checkpoint at `step`: report its step and counters from now on."""
+        """Continue with the step and counters of the checkpoint at `step`."""
         self.step = step
         self.counters = replace(counters, faults=Counter(counters.faults))
         self.saved(step)
@@ -188,7 +188,7 @@ class Progress:
             self.fault_log.broke(record, steps_lost)
 
     def slow(self, simulator: str, seconds: float) -> None:
-        """Count a step that took much longer than others, which is not a fault."""
+        """Count a step that took much longer than usual, which is not a fault."""
         del seconds
         with self._lock:
             self.counters.faults[FaultKind.SLOW] += 1
@@ -206,7 +206,7 @@ class Progress:
             self._standings.gave_up(simulator)
 
     def add(self, simulator: str, role: Role) -> None:
-        """Add a simulator, unless it is known already."""
+        """Add a simulator, unless it is already known."""
         with self._lock:
             self._standings.add(simulator, role)
 
@@ -219,7 +219,7 @@ class Progress:
         self._standings.reports_left_out(simulator, ask)
 
     def left_out(self) -> tuple[str, ...]:
-        """Return the parts that simulators left out of their worlds, in lines that begin with the group."""
+        """Return the parts that simulators left out of their worlds, as lines that begin with the group."""
         return self._standings.left_out()
 
     def started(self, simulator: str) -> None:
@@ -241,7 +241,7 @@ class Progress:
             self.fault_log.is_up(simulator)
 
     def collected(self, step: int, infos: Sequence[Mapping[str, Any]]) -> None:
-        """Set the step of training, and count a vector step by its infos."""
+        """Set the step of training, and count a vector step from its infos."""
         with self._lock:
             self.step = step
             for info in infos:
@@ -268,7 +268,7 @@ class Progress:
         self.checkpoint = CheckpointStatus(step=step, time=timestamp(time.time()))
 
     def counted(self, kept: int | None = None) -> Counters:
-        """Return the counters as they are now, or as they will be if the run resumes from step `kept`."""
+        """Return the current counters, or those of a run that resumes from step `kept`."""
         lost = 0 if kept is None else max(self.step - kept, 0)
         with self._lock:
             so_far, before = self.counters, self.counters.goodput
@@ -307,16 +307,16 @@ class Progress:
     def restarts(self) -> int:
         """Return the restarts of simulators after faults, in this attempt.
 
-        Never blocks: the watchdog calls it while other threads hang.
+        This method never blocks, because the watchdog calls it while other threads hang.
         """
         return self._standings.restarts()
 
     def faults(self) -> tuple[FaultRecord, ...]:
-        """Return the last faults of this attempt, the newest last; never blocks."""
+        """Return the last faults of this attempt, the newest last; this method never blocks."""
         return tuple(self._standings.faults)
 
     def down(self) -> list[str]:
-        """Return the names of the simulators that are not up; never blocks."""
+        """Return the names of the simulators that are not up; this method never blocks."""
         return self._standings.down()
 
     def idle_s(self) -> float:

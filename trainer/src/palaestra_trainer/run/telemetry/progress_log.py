@@ -1,4 +1,4 @@
-"""The progress of a run as a log line every few seconds."""
+"""Log the progress of a run every few seconds."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class ProgressLog:
 
     @property
     def due(self) -> bool:
-        """Whether the progress should be logged now; cheap, because it is called at every step."""
+        """Whether the progress should be logged now; this check is fast, because every step makes it."""
         return time.monotonic() >= self._next
 
     def write(self, status: TrainerStatus) -> None:

@@ -1,4 +1,4 @@
-"""The state of each simulator of a run, and the last faults. `Progress` holds the lock for this module."""
+"""Keep the state of each simulator and the last faults; the caller, `Progress`, holds a lock."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from palaestra_protocol.pod.enums import Role
 from palaestra_protocol.pod.status import MOST_FAULTS, FaultKind, FaultRecord, SimulatorStatus
 from palaestra_trainer.run.telemetry.metric_definitions import RECYCLED
 
-FLAPPING_S = 600.0  # a simulator counts as flapping for this time after the last call of `flaps`
+FLAPPING_S = 600.0  # time after the last call of `flaps` in which a simulator counts as flapping
 AskStandby = Callable[[], str | None]
 AskLeftOut = Callable[[], tuple[str, ...]]
 
 
 def _none() -> None:
-    """Return the state of the spare of a simulator without one."""
+    """Return None, the state of the spare for a simulator without a spare."""
 
 
 def _nothing() -> tuple[str, ...]:
-    """Return the left-out parts for a simulator that does not report them."""
+    """Return no left-out parts, for a simulator that does not report them."""
     return ()
 
 
@@ -40,7 +40,7 @@ class _Standing:
 
 
 class SimulatorStatuses:
-    """The state of the simulators in this attempt.
+    """The states of all simulators in this attempt.
 
     Attributes:
         faults: the last faults, the newest last.
@@ -52,7 +52,7 @@ class SimulatorStatuses:
         self.faults: deque[FaultRecord] = deque(maxlen=MOST_FAULTS)
 
     def add(self, simulator: str, role: Role) -> None:
-        """Add a simulator, unless it is known already."""
+        """Add a simulator, unless it is already known."""
         self._all.setdefault(simulator, _Standing(role=role))
 
     def broke(self, fault: FaultRecord) -> None:
@@ -97,7 +97,7 @@ class SimulatorStatuses:
         self._all[simulator].left_out = ask
 
     def left_out(self) -> tuple[str, ...]:
-        """Return the report of one simulator of each group, because all of a group have the same world."""
+        """Return the left-out parts of one simulator per group, because a group has one world."""
         reports: dict[str, tuple[str, ...]] = {}
         for name, standing in self._all.items():
             group = name.rpartition("-")[0]
@@ -109,7 +109,7 @@ class SimulatorStatuses:
         return sum(standing.restarts.total() for standing in self._all.values())
 
     def down(self) -> list[str]:
-        """Return the names of the simulators that are not up, without those that were given up."""
+        """Return the names of the simulators that are not up, except those that were given up."""
         return [name for name, each in self._all.items() if each.state != "ready" and not each.given_up]
 
     def statuses(self) -> tuple[SimulatorStatus, ...]:

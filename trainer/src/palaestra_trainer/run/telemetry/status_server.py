@@ -1,4 +1,4 @@
-"""The HTTP server of a trainer for /status, /metrics, /healthz and /watch."""
+"""Create a trainer's HTTP server for /status, /metrics, /healthz and /watch."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from palaestra_trainer.run.telemetry.progress import Progress
 def status_server(
     address: str, progress: Progress, known: Mapping[Family, Values] = MappingProxyType({})
 ) -> Server:
-    """Return a server that has bound the address; it responds after its start.
+    """Return a server that is bound to the address; it responds after its start.
 
     Args:
-        address: `host:port`; port 0 chooses a free one.
-        progress: the state of the run.
+        address: `host:port`; port 0 chooses a free port.
+        progress: the progress of the run.
         known: metrics that do not change, see `metrics.constants`.
 
     Raises:

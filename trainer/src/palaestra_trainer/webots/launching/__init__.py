@@ -1,1 +1,1 @@
-"""Start and stop the processes around a simulator: its sidecar, the simulator itself, and a ROS master."""
+"""Start and stop the processes of a simulator: its sidecar, the simulator itself, and a ROS master."""

@@ -1,6 +1,7 @@
-"""Simulators as processes of this machine, for notebooks and scripts, without a pod or a runner.
+"""Run simulators as processes of this machine, for notebooks and scripts without a pod or a runner.
 
-The process is a sidecar, so restarts, kills and clean ends use the same code as in a pod.
+The trainer starts a sidecar, which starts the simulator. So restarts, kills and clean ends use the same code
+as in a pod.
 """
 
 from __future__ import annotations
@@ -24,17 +25,17 @@ _ADDRESSES = re.compile(r"control=(\S+)")
 
 
 class ProcessLauncher(Sidecar):
-    """Starts a new sidecar, and a ROS master if none responds at ROS_MASTER_URI.
+    """Starts a new sidecar; if no ROS master responds at ROS_MASTER_URI, also starts a master.
 
     Args:
-        world: path of the world, or the name of one that ships.
-        driver: stub, mujoco or webots.
+        world: path of the world, or the name of a world that Palaestra ships.
+        driver: the simulator program: stub, mujoco or webots.
         options: command-line options for the simulator.
         names: sidecar options that set the ROS names of the robots.
         suffix: text that is appended to the ROS names in the world.
 
     Raises:
-        ConfigurationError: the sidecar refused the world or the driver; its output is in the message.
+        ConfigurationError: the sidecar refused the world or the driver; the message has its output.
     """
 
     def __init__(
@@ -70,7 +71,7 @@ class ProcessLauncher(Sidecar):
 
     @classmethod
     def beside_others(cls, world: str | Path, driver: str, options: Sequence[str]) -> ProcessLauncher:
-        """Return a launcher that keeps the world's ROS names, or appends `_2`, `_3`, ... if those are in use.
+        """Return a launcher with the world's ROS names, or with `_2`, `_3`, ... appended if they are in use.
 
         Raises:
             ConfigurationError: the sidecar refused the world or the driver, or all names are in use.
@@ -87,7 +88,7 @@ class ProcessLauncher(Sidecar):
         )
 
     def reserve(self) -> bool:
-        """Reserve the ROS names of this simulator until `close`; return False if one is in use.
+        """Reserve the ROS names of this simulator until `close`; return False if a name is in use.
 
         Raises:
             MasterLost: no ROS master responds.
@@ -101,6 +102,6 @@ class ProcessLauncher(Sidecar):
 
 
 def _program(name: str) -> list[str]:
-    """Return the program in the folder of this interpreter, else the one that PATH finds."""
+    """Return the command of a program: its path next to this interpreter, or else its name for PATH."""
     installed = Path(sys.executable).with_name(name)
     return [str(installed) if installed.exists() else name]

@@ -1,8 +1,8 @@
-"""Locks between processes of one machine, each on a file; the kernel releases them when their process ends.
+"""File locks between processes of one machine; the kernel releases a lock when its process ends.
 
-They are POSIX record locks, which a forked process does not inherit. A forked process would inherit locks of
-`flock` and of libraries that use it, but it must neither share nor release the lock of its parent. A record
-lock does not exclude other threads of its process, so a set keeps the locks of this process.
+The locks are POSIX record locks, which a forked process does not inherit. A forked process would inherit a
+lock of `flock`, but it must neither share nor release the lock of its parent. A record lock does not exclude
+other threads of its process. So this module keeps a set of the locks that this process holds.
 """
 
 from __future__ import annotations
@@ -30,18 +30,18 @@ class FileLock:
 
     @classmethod
     def acquire(cls, path: Path, variable: str) -> Self | None:
-        """Lock a file, which is created if missing; return None if this or another process holds the lock.
+        """Lock a file; create it if it is missing. Return None if this or another process holds the lock.
 
         Args:
             path: the file.
-            variable: the environment variable that names a folder above it, for messages.
+            variable: the environment variable that names a folder above the file, for messages.
 
         Raises:
             ConfigurationError: the file cannot be written, or its file system does not support locks.
         """
         with _held_lock:
             mine = (os.getpid(), path)
-            if mine in _held:  # opening and closing the file again would release the lock
+            if mine in _held:  # to open and close the file again would release the lock
                 return None
             try:
                 descriptor = _locked(path)
@@ -54,11 +54,11 @@ class FileLock:
 
     @property
     def held(self) -> bool:
-        """Whether this process holds the lock; a process that was forked later does not."""
+        """Whether this process holds the lock; in a process that was forked later, it is False."""
         return self._descriptor is not None and self._owner == os.getpid()
 
     def release(self) -> None:
-        """Release the lock; safe to repeat, without effect in a forked process."""
+        """Release the lock; further calls, and calls in a forked process, have no effect."""
         with _held_lock:
             if self.held and self._descriptor is not None:
                 os.close(self._descriptor)

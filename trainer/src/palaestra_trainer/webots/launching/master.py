@@ -1,4 +1,4 @@
-"""A ROS master for programs that run outside a pod."""
+"""Start a ROS master for programs that run outside a pod."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from palaestra_trainer.webots.launching.subprocesses import first_line, start_ch
 
 
 def ensure_master() -> None:
-    """Start a ROS master on a free port if none responds.
+    """Start a ROS master on a free port, unless a master responds at ROS_MASTER_URI.
 
-    Sets ROS_MASTER_URI and ROS_HOSTNAME of this process to the new master.
+    Set ROS_MASTER_URI and ROS_HOSTNAME of this process for the new master.
     """
     try:
         Master("/palaestra").ping()

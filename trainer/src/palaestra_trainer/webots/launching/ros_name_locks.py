@@ -1,6 +1,6 @@
-"""Reserve the ROS names of a simulator on this machine, from before its start to its end.
+"""Reserve the ROS names of a simulator on this machine, from the time before its start until its end.
 
-A name is free if no node of that name runs and no program has reserved it.
+A name is free if no program has reserved the name, and no node of that name runs.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ TEMPORARY = "TMPDIR"  # the environment variable that names the folder for tempo
 
 
 class Reservation:
-    """The names that one simulator has reserved."""
+    """The ROS names that are reserved for one simulator."""
 
     def __init__(self) -> None:
         self._locks: list[FileLock] = []
 
     def take(self, names: Iterable[str]) -> bool:
-        """Reserve all of `names`; if one is in use, reserve nothing and return False.
+        """Reserve all of `names` and return True; if a name is in use, reserve none and return False.
 
         Raises:
             MasterLost: no ROS master responds.

@@ -1,4 +1,4 @@
-"""A client of a sidecar's control port; the Webots facade uses it as its launcher."""
+"""A client of a sidecar's control port, which the Webots facade uses as its launcher."""
 
 from __future__ import annotations
 
@@ -20,24 +20,24 @@ from palaestra_trainer.errors import SimulatorDead, SimulatorHung, WrongData
 
 _TIMEOUT_S = 5.0
 _POLL_S = 0.02
-_REFUSED = 2  # the exit code of our simulators for a world, an option or a variable that is wrong
+_REFUSED = 2  # our simulators exit with this code if the world, an option or a variable is wrong
 _MOST_BYTES = 65536
 _CONFLICT = 409
 
 
 class Sidecar:
-    """One simulator behind the control port of its sidecar.
+    """A client for one simulator, which its sidecar controls.
 
     Every method raises SimulatorDead if the sidecar is gone, and SimulatorHung if it does not respond.
 
     Attributes:
         address: e.g. http://127.0.0.1:7100
-        left_out: the parts that the simulator left out of its world at its last start, in lines for people.
+        left_out: the parts of the world that the simulator left out at its last start, as lines of text.
 
     Args:
         address: see Attributes.
         name: the simulator's name, for messages.
-        above: prefix of this simulator's paths.
+        above: prefix of the URL paths of this simulator.
     """
 
     def __init__(self, address: str, name: str, above: str = "") -> None:
@@ -49,7 +49,7 @@ class Sidecar:
         self._above = above
 
     def standby(self) -> Sidecar:
-        """Return the second simulator of the same sidecar; the sidecar must run with --standby."""
+        """Return a client for the standby of the same sidecar, which must run with --standby."""
         return Sidecar(self.address, self._name, STANDBY)
 
     def state(self) -> SimulatorState:
@@ -57,10 +57,10 @@ class Sidecar:
         return self._ask("GET", "/state")
 
     def first_state(self, deadline_s: float) -> SimulatorState:
-        """Return the state; wait if the sidecar does not listen yet.
+        """Return the state; if the sidecar does not listen yet, wait for it.
 
         Raises:
-            SimulatorDead, SimulatorHung: it did not respond within `deadline_s` seconds.
+            SimulatorDead, SimulatorHung: the sidecar did not respond within `deadline_s` seconds.
         """
         give_up = time.monotonic() + deadline_s
         while True:
@@ -69,14 +69,14 @@ class Sidecar:
             except SimulatorDead:
                 if time.monotonic() > give_up:
                     raise
-            time.sleep(_POLL_S)  # the sidecar is still starting; no call can wait for the end of its start
+            time.sleep(_POLL_S)  # a sidecar that is starting cannot report when it is ready
 
     def start(self) -> None:
-        """Start the simulator without waiting for it; do nothing if it is already starting."""
+        """Begin to start the simulator; do nothing if the simulator is already starting."""
         self._ask("POST", "/start", {})
 
     def confirm_ready(self) -> None:
-        """Report to the sidecar that the simulator has responded to a real request."""
+        """Report to the sidecar that the simulator has responded to a request."""
         self.left_out = self._ask("POST", "/ready", {}).left_out
 
     def ready(self) -> bool:
@@ -84,7 +84,7 @@ class Sidecar:
         return self.state().state is SidecarState.READY
 
     def expect_stop(self, deadline_s: float) -> None:
-        """Announce that the simulator will end; the sidecar kills it after `deadline_s` seconds."""
+        """Announce that the simulator will end; after `deadline_s` seconds, the sidecar kills it."""
         self._ask("POST", "/stop", StopRequest(deadline_s=deadline_s).to_json())
 
     def failure(self) -> str | None:
@@ -95,7 +95,7 @@ class Sidecar:
         return state.detail or f"its state is {state.state.value}"
 
     def refused(self) -> bool:
-        """Return whether it ended with exit code 2, by which a program refuses its input."""
+        """Return whether the simulator ended with exit code 2, with which a program refuses its input."""
         last = self.state().last_exit
         return last is not None and last.code == _REFUSED
 
@@ -103,13 +103,13 @@ class Sidecar:
         """Wait until the simulator has ended.
 
         Raises:
-            SimulatorHung: it did not end within `deadline_s` seconds.
+            SimulatorHung: the simulator did not end within `deadline_s` seconds.
         """
         give_up = time.monotonic() + deadline_s
         while self.state().state not in {SidecarState.IDLE, SidecarState.FAILED}:
             if time.monotonic() > give_up:
                 raise SimulatorHung(self._name, f"did not end within {deadline_s:g} s")
-            time.sleep(_POLL_S)  # the control port has no request that waits
+            time.sleep(_POLL_S)  # the control port has no request that waits for an end
 
     def _ask(self, method: str, path: str, body: dict[str, Any] | None = None) -> SimulatorState:
         connection = http.client.HTTPConnection(self._host, self._port, timeout=_TIMEOUT_S)

@@ -1,7 +1,7 @@
-"""Child processes that end with this program, because each reads from a pipe at its standard input.
+"""Start child processes that end when this program ends, by a pipe to their standard input.
 
-The kernel closes our end of the pipe when this program ends, even by a kill. The child stops when it reads
-the end of the file.
+The kernel closes this program's end of the pipe when the program ends, even after a kill. The child then
+reads the end of its input and stops.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _ANSWER_S = 20.0
 
 
 def start_child(command: list[str], stderr: int) -> subprocess.Popen[bytes]:
-    """Return a process in its own session that ends when this program exits.
+    """Start a process in its own session that ends when this program exits; return the process.
 
     Raises:
         ConfigurationError: the program cannot be started.
@@ -36,7 +36,7 @@ def start_child(command: list[str], stderr: int) -> subprocess.Popen[bytes]:
 
 
 def end_child(process: subprocess.Popen[bytes]) -> None:
-    """Close the pipe that keeps the process alive, and wait for its end; safe to repeat."""
+    """Close the pipe that keeps the process alive, and wait for its end; further calls have no effect."""
     if process.stdin is not None:
         process.stdin.close()
     process.wait(_ANSWER_S)
@@ -46,7 +46,7 @@ def end_child(process: subprocess.Popen[bytes]) -> None:
 
 
 def drain(process: subprocess.Popen[bytes]) -> None:
-    """Read and drop the later output of the process, because a full pipe would block it forever."""
+    """Read and drop the further output of the process, because a full pipe would block the process."""
     for pipe in (process.stdout, process.stderr):
         if pipe is not None:
             threading.Thread(target=_drop, args=(pipe,), daemon=True).start()
@@ -63,7 +63,7 @@ def first_line(process: subprocess.Popen[bytes]) -> str:
     """Return the first line of the process's output; empty if the process ended without output.
 
     Raises:
-        SimulatorDead: it printed no line in time.
+        SimulatorDead: the process did not print a line in time.
     """
     if process.stdout is None:
         raise ValueError("the process was started without a pipe for its output")
