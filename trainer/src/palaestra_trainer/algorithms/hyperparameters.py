@@ -1,7 +1,7 @@
 """Check the values of hyperparameters against a constructor's signature, and convert them to its types.
 
 A job is YAML, which cannot contain a schedule, a tuple or a class. A job writes a schedule as text, as points
-or as the name of a function, see `schedules` and `own_schedules`. For a tuple, the job writes a list.
+or as the name of a function, see `schedules`. For a tuple, the job writes a list.
 Activation functions and optimizers have their PyTorch names. For every argument of a policy that is a class,
 the job may write `module:Class`.
 """
@@ -20,8 +20,7 @@ from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from torch import nn, optim
 
 from palaestra_trainer.algorithms.constructor_params import types
-from palaestra_trainer.algorithms.own_schedules import own_schedule
-from palaestra_trainer.algorithms.schedules import schedule_of
+from palaestra_trainer.algorithms.schedules import own_schedule, schedule_of
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.job.configuration import nearest
 from palaestra_trainer.job.user_code import imports

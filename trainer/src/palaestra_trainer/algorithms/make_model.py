@@ -10,13 +10,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import structlog
+import torch
 from gymnasium import spaces
 from sb3_contrib import TQC
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import VecEnv
 
 from palaestra_trainer.algorithms import buffer_options, hyperparameters, limits, noise, unknown_words
-from palaestra_trainer.algorithms.device import usable
 from palaestra_trainer.algorithms.images import with_channels_first, with_network
 from palaestra_trainer.algorithms.inputs import give_copies
 from palaestra_trainer.algorithms.normalization import ValidNormalize
@@ -24,6 +25,8 @@ from palaestra_trainer.algorithms.registry import ARENA_ENVIRONMENTS, Registered
 from palaestra_trainer.algorithms.space_compat import named_policy, policy_of_spaces
 from palaestra_trainer.errors import ConfigurationError, fact_of
 from palaestra_trainer.job.configuration import Algorithm, Device
+
+log = structlog.get_logger(__name__)
 
 
 def check(algorithm: Algorithm) -> RegisteredAlgorithm:
@@ -130,7 +133,7 @@ def make_model(algorithm: Algorithm, env: VecEnv, seed: int, device: Device = "c
         env = ValidNormalize(env, algorithm.normalize, chosen["gamma"])
     _refuse_members(chosen, env.num_envs)
     try:
-        model = entry.cls(policy, env, seed=seed, device=usable(device), **chosen)
+        model = entry.cls(policy, env, seed=seed, device=_usable(device), **chosen)
     except ConfigurationError:
         raise
     except (ArithmeticError, AssertionError, AttributeError, LookupError, TypeError, ValueError) as error:
@@ -155,3 +158,18 @@ def _refuse_dropping_all(model: BaseAlgorithm) -> None:
         f"{model.critic.n_quantiles} quantiles of each critic leaves none; lower it, or raise "
         "policy_kwargs.n_quantiles"
     )
+
+
+def _usable(wanted: Device) -> Device:
+    """Return the wanted device; if PyTorch does not find a GPU, log a warning and return the CPU.
+
+    The default is the CPU even on a node with a GPU, because networks of some hundred units learn faster on
+    the CPU. A resumed run ends with exactly the same numbers only on the CPU.
+    """
+    if wanted == "cuda" and not torch.cuda.is_available():
+        log.warning(
+            "PyTorch sees no GPU, so the CPU is used",
+            remedy="a trainer image that is built with TORCH=cuda, on a node with a GPU",
+        )
+        return "cpu"
+    return wanted

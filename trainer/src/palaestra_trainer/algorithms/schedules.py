@@ -1,8 +1,9 @@
-"""Convert a schedule that a job writes as text or as a list of points.
+"""Convert a schedule that a job writes as text, as a list of points, or as the name of a function.
 
 `lin_0.001` falls from 0.001 at the start of the training to 0 at its end, as in rl-baselines3-zoo. A list has
 points [share of the steps, value], such as `[[0, 0.001], [0.5, 0.0002]]`. Between two points the value
-changes linearly. Before the first point and after the last point the value is constant.
+changes linearly. Before the first point and after the last point the value is constant. A function of the
+job's author is named as `module:function`; the model.zip contains only this name.
 
 Stable-Baselines3 pickles the schedules of a model into its model.zip. So a schedule consists of classes and
 functions of the standard library, NumPy and Stable-Baselines3, and the file has only their names and some
@@ -12,6 +13,7 @@ contained the class as byte code, only the same version of Python could read it.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable
 from functools import partial
@@ -21,7 +23,11 @@ from typing import Any
 import numpy as np
 from stable_baselines3.common.utils import LinearSchedule
 
+from palaestra_trainer.errors import ConfigurationError, fact_of
+from palaestra_trainer.job.user_code import imports
+
 LINEAR = re.compile(r"lin_(\d+(?:\.\d*)?(?:e-?\d+)?)")
+_TRIED = (1.0, 0.5, 0.0)  # remaining shares of the steps, with which a function is tried
 
 
 def schedule_of(value: Any) -> Callable[[float], float] | None:
@@ -53,3 +59,34 @@ def _is_point(value: Any) -> bool:
         and len(value) == len(("share", "value"))
         and all(isinstance(it, int | float) and not isinstance(it, bool) for it in value)
     )
+
+
+def own_schedule(name: str, field: str) -> Callable[[float], float]:
+    """Return the function `name`, after a check of a few of its values.
+
+    Args:
+        name: `module:function`.
+        field: field of the job, for messages.
+
+    Raises:
+        ConfigurationError: the function cannot be imported, or returns a value that is negative, infinite or
+            not a number.
+    """
+    schedule: Callable[[float], float] = imports.object_named(name, f"{field}: {name}")
+    for left in _TRIED:
+        value = _value(schedule, left, f"{field}: {name}({left})")
+        if not (math.isfinite(value) and value >= 0):
+            raise ConfigurationError(
+                f"{field}: {name}({left}) is {value}; return a finite number of 0 or more"
+            )
+    return schedule
+
+
+def _value(schedule: Callable[[float], float], left: float, subject: str) -> float:
+    try:
+        return float(schedule(left))
+    except Exception as error:  # the author's code may raise anything
+        raise ConfigurationError(
+            f"{subject} cannot be used ({fact_of(error)}); name a function that takes the share of the steps "
+            "that is left, 1.0 to 0.0, and returns a number"
+        ) from error

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -43,6 +43,7 @@ exit codes:
   130 ended by Ctrl-C; nothing is written
   1   any other error; a retry may help
 """
+_HEAD = f"{'simulator':<10}{'success':>8}  {'95 % interval':<14}{'return':>9}{'steps':>8}{'faults':>8}"
 
 
 def evaluate(arguments: Sequence[str] | None = None) -> int:
@@ -93,7 +94,6 @@ def _evaluate(chosen: argparse.Namespace) -> None:
         configuration = configuration.model_copy(update={"simulators": load().simulators})
     with without_collections():
         from palaestra_trainer.run.evaluate import in_each, measure
-        from palaestra_trainer.run.evaluation_table import HEAD, row
         from palaestra_trainer.simulators.connect import connect_here, connect_members
 
     wanted = {"episodes": chosen.episodes, "stream": chosen.seeds}
@@ -106,7 +106,7 @@ def _evaluate(chosen: argparse.Namespace) -> None:
         if chosen.json:
             _write_result(result)
         else:
-            write_line(row(result) if number else f"{HEAD}\n{row(result)}")
+            write_line(_row(result) if number else f"{_HEAD}\n{_row(result)}")
 
 
 def _write_result(result: dict[str, Any]) -> None:
@@ -120,3 +120,14 @@ def _drivers(text: str) -> tuple[str, ...]:
         if name not in DRIVERS:
             raise argparse.ArgumentTypeError(f"{name!r} is not a simulator; choose of {', '.join(DRIVERS)}")
     return names
+
+
+def _row(result: Mapping[str, Any]) -> str:
+    """Return the row of one result of `run.evaluate.in_each`."""
+    rate, interval = result["success_rate"], result["success_interval"]
+    bounds = "" if interval is None else f"{interval['low']:.0%} to {interval['high']:.0%}"
+    success = "unknown" if rate is None else f"{rate:.0%}"
+    return (
+        f"{result['simulator']:<10}{success:>8}  {bounds:<14}"
+        f"{result['mean_return']:>9.2f}{result['mean_length']:>8.1f}{result['faults']:>8}"
+    )
