@@ -7,7 +7,7 @@ import pytest
 
 from palaestra_sim.errors import WorldError
 from palaestra_sim.scene.tree.field_types import FieldType
-from tests.values.frames import frame
+from tests.values.frames import axis_angle, frame
 from tests.values.standing import MOUNT, POSES
 from tests.values.worlds import SETTINGS, STEP_MS, cached, device, enable, move, robot
 
@@ -107,6 +107,118 @@ def test_a_light_sensor_adds_what_each_light_contributes(setting, name):
         assert device(simulation, "eye").value == pytest.approx(FILTER @ colors / 3.0, rel=1e-6), pose
 
 
+FLOOR = "Solid { rotation %s boundingObject Plane { size 1 1 } }"
+BALL = "DEF BALL Solid { translation %s boundingObject Sphere { radius 0.1 } }"
+
+
+def shaded(setting, way, hiding, occlusion="TRUE"):
+    """Return the reading of a sensor, and the ambient and the direct irradiance of its two lights.
+
+    The lights are a PointLight at `way` from the sensor, in its frame, and a DirectionalLight from there.
+    `hiding` returns nodes of the world, and a part of the robot, for the positions of sensor and light.
+    """
+    pose = setting.put(POSES[3])
+    sensor = pose @ MOUNT
+    light = sensor.position + sensor.rotation @ way
+    nodes, part = hiding(sensor.position, light)
+    lights = f"""PointLight {{ ambientIntensity 0.5 intensity 2 location {words(light)} }}
+      DirectionalLight {{ ambientIntensity 0.25 intensity 3 direction {words(sensor.position - light)} }}"""
+    eye = SENSOR.replace("NAME", f'eye" occlusion {occlusion} model "')
+    simulation = setting.load(lights + nodes + robot(eye + part))
+    enable(simulation)
+    move(simulation, "R", pose)
+    simulation.step(STEP_MS)
+    direct = 5.0 * facing(sensor, np.array(light - sensor.position))
+    return device(simulation, "eye").value, np.array([0.75, direct]) * FILTER.sum() / 3.0
+
+
+def nothing(_sensor, _light):
+    """Hide nothing."""
+    return "", ""
+
+
+def between(sensor, light):
+    """Put a ball between sensor and light."""
+    return BALL % words((sensor + light) / 2.0), ""
+
+
+def next_to_it(sensor, light):
+    """Put a ball next to the line from sensor to light."""
+    aside = np.cross(light - sensor, [1.0, 2.0, 3.0])
+    return BALL % words((sensor + light) / 2.0 + 0.3 * aside / np.linalg.norm(aside)), ""
+
+
+def behind(sensor, light):
+    """Put a ball behind the light; the DirectionalLight shines from farther away, so the ball hides it."""
+    return BALL % words(light + (light - sensor)), ""
+
+
+def own_part(_sensor, _light):
+    """Enclose the sensor in a part of its own robot."""
+    return "", 'Solid { name "hull" boundingObject Sphere { radius 0.6 } }'
+
+
+@pytest.mark.parametrize("setting", SETTINGS, ids=str)
+@pytest.mark.parametrize(
+    ("hiding", "share"),
+    [(nothing, 1.0), (between, 0.0), (next_to_it, 1.0), (behind, 0.4)],
+)
+def test_a_shape_in_front_of_a_light_hides_its_direct_light(setting, hiding, share):
+    """In Webots, a hidden light still contributes its ambient light."""
+    value, (ambient, direct) = shaded(setting, (2.0, 0.5, 0.3), hiding)
+
+    assert direct > 1.0
+    assert value == pytest.approx(ambient + share * direct, rel=1e-6)
+
+
+@pytest.mark.parametrize("setting", [it for it in SETTINGS if it.system == "ENU"], ids=str)
+def test_a_part_of_the_same_robot_hides_no_light(setting):
+    """As in Webots without `selfCollision`: else every sensor inside a hull would see only ambient light."""
+    value, (ambient, direct) = shaded(setting, (2.0, 0.5, 0.3), own_part)
+
+    assert value == pytest.approx(ambient + direct, rel=1e-6)
+
+
+def test_without_occlusion_no_shape_hides_a_light():
+    """FALSE is the default value, because a ray for each light costs time."""
+    value, (ambient, direct) = shaded(SETTINGS[0], (2.0, 0.5, 0.3), between, occlusion="FALSE")
+
+    assert value == pytest.approx(ambient + direct, rel=1e-6)
+
+
+@pytest.mark.parametrize("setting", SETTINGS, ids=str)
+def test_a_floor_hides_the_lights_below_it(setting):
+    """The sensor looks down through the floor; a Plane has no shape that rays could meet."""
+    down = MOUNT.rotation.T @ POSES[3].rotation.T @ [0.3, 0.0, -2.0]
+    way = np.array([abs(down[0]), down[1], down[2]])
+    value, (ambient, direct) = shaded(
+        setting, way, lambda _sensor, _light: (FLOOR % words(axis_angle(setting.axes)), "")
+    )
+
+    assert direct >= 0.0
+    assert value == pytest.approx(ambient, rel=1e-6)
+
+
+@pytest.mark.parametrize("setting", SETTINGS, ids=str)
+def test_a_shape_that_moves_away_lets_the_light_pass(setting):
+    """A supervisor or the physics may move a shape at any time."""
+    pose = setting.put(POSES[3])
+    sensor = pose @ MOUNT
+    light = sensor.position + sensor.rotation @ (2.0, 0.5, 0.3)
+    eye = SENSOR.replace("NAME", 'eye" occlusion TRUE model "')
+    lamp = f"PointLight {{ intensity 2 location {words(light)} }}"
+    simulation = setting.load(lamp + BALL % words((sensor.position + light) / 2.0) + robot(eye))
+    enable(simulation)
+    move(simulation, "R", pose)
+    simulation.step(STEP_MS)
+    before = device(simulation, "eye").value
+    move(simulation, "BALL", setting.put(frame((9.0, 9.0, 0.1))))
+    simulation.step(STEP_MS)
+
+    assert before == 0.0
+    assert device(simulation, "eye").value > 0.5
+
+
 def test_a_light_that_a_supervisor_switches_on_is_seen():
     """The sensor reads the light's fields at each step, so a change counts at once."""
     simulation = SETTINGS[0].load(LIGHTS[dark] + robot(SENSOR.replace("NAME", "eye")))
@@ -144,7 +256,6 @@ def test_a_light_that_a_supervisor_adds_is_seen():
         ("FloorLight { }", "", "a FloorLight, whose light is not simulated"),
         ("CeilingLight { }", "", "a CeilingLight, whose light is not simulated"),
         ('TexturedBackgroundLight { texture "dusk" }', "", "the texture dusk, whose light is not simulated"),
-        ("PointLight { }", "occlusion TRUE", "a light sensor that sees shadows"),
     ],
 )
 def test_what_a_light_sensor_cannot_measure_is_refused(world, fields, fact):

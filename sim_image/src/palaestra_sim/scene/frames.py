@@ -62,6 +62,11 @@ class Frame:
         """Whether a client may set this frame."""
         return True
 
+    def admits(self, rotation: AxisAngle) -> bool:
+        """Return whether this frame can have that rotation."""
+        del rotation
+        return True
+
     @property
     def pose(self) -> Pose:
         """The pose in the parent's frame."""

@@ -8,7 +8,7 @@ it. Source: reference/lightsensor.md and WbLightSensor.cpp of Webots.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Final
 
@@ -33,9 +33,13 @@ _MOUNTAINS: Final = "mountains"
 _FROM_MOUNTAINS: Final = (0.55, -0.6, -1.0)  # east, north, up
 _OF_MOUNTAINS, _AMBIENT_OF_MOUNTAINS = 2.7, 1.0  # intensities
 _EVERYWHERE: Final = (1.0, 0.0, 0.0)  # an attenuation that does not depend on the distance
+_FAR_M: Final = 1000.0  # the length of a ray to such a light in Webots
 _LEAST: Final = 1e-300  # replaces a divisor of 0; Webots limits that quotient to the end of the lookup table
 _WIDEST_RAD: Final = 0.785398  # the default of SpotLight.cutOffAngle
 _BEAM_RAD: Final = 1.570796
+
+Lit = Callable[[Vector], bool]
+"""Gets the way from a sensor to a light, in meters in the axes of the world; returns whether it is free."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,26 +54,32 @@ class Light:
     node: SceneNode
     axes: tuple[int, int, int]
 
-    def irradiance(self, sensor: Pose, shares: Vector) -> float:
-        """Return the irradiance in W/m2 at a sensor that looks along x, without shadows.
+    def irradiance(self, sensor: Pose, shares: Vector, lit: Lit) -> float:
+        """Return the irradiance in W/m2 at a sensor that looks along x.
 
-        `shares` are the fractions of red, green and blue light that the sensor measures.
+        Args:
+            sensor: the pose of the sensor, in the axes of the world.
+            shares: the fractions of red, green and blue light that the sensor measures.
+            lit: decides whether the direct light reaches the sensor; called only if there is direct light.
         """
         if not self.node.flag("on", True):
             return 0.0
-        white = self._white(sensor.position, sensor.turned((1.0, 0.0, 0.0)))
+        ambient, direct, way = self._white(sensor.position, sensor.turned((1.0, 0.0, 0.0)))
+        white = ambient + direct if direct > 0.0 and lit(way) else ambient
         return white * dot(shares, _vector(self.node, "color", (1.0, 1.0, 1.0))) / 3.0
 
-    def _white(self, at: Vector, normal: Vector) -> float:
-        """Return the sum of the ambient and the direct irradiance, for a white light."""
+    def _white(self, at: Vector, normal: Vector) -> tuple[float, float, Vector]:
+        """Return the ambient and the direct irradiance of a white light, and the way to it in meters."""
         node = self.node
         if node.type_name == _BACKGROUND:
-            direct = _cosine(normal, _opposite(self._from_mountains()))
-            return _AMBIENT_OF_MOUNTAINS + _OF_MOUNTAINS * _number(node, "luminosity", 1.0) * direct
+            way = _far(_opposite(self._from_mountains()))
+            direct = _OF_MOUNTAINS * _number(node, "luminosity", 1.0) * _cosine(normal, way)
+            return _AMBIENT_OF_MOUNTAINS, direct, way
         ambient, intensity = _number(node, "ambientIntensity", 0.0), _number(node, "intensity", 1.0)
         direction = _vector(node, "direction", (0.0, 0.0, -1.0))
         if node.type_name == "DirectionalLight":
-            return ambient + intensity * _cosine(normal, _opposite(direction))
+            way = _far(_opposite(direction))
+            return ambient, intensity * _cosine(normal, way), way
         way = minus(self._location(), at)
         far_m = math.hypot(*way)
         a, b, c = attenuation = _vector(node, "attenuation", _EVERYWHERE)
@@ -78,7 +88,8 @@ class Light:
             ambient = 0.0
         if node.type_name == "SpotLight":
             intensity *= self._share_of_beam(_cosine(way, _opposite(direction)))
-        return (ambient + intensity * _cosine(normal, way)) / max(weakened, _LEAST)
+        weakened = max(weakened, _LEAST)
+        return ambient / weakened, intensity * _cosine(normal, way) / weakened, way
 
     def _from_mountains(self) -> Vector:
         direction = [0.0, 0.0, 0.0]
@@ -120,6 +131,15 @@ def _cosine(one: Vector, other: Vector) -> float:
     """Return the cosine of the angle between two directions; 0 beyond a right angle."""
     length = math.hypot(*one) * math.hypot(*other)
     return max(0.0, dot(one, other) / length) if length else 0.0
+
+
+def _far(direction: Vector) -> Vector:
+    """Return the way to a light that has a direction but no location."""
+    length = math.hypot(*direction)
+    if length == 0.0:
+        return direction
+    x, y, z = direction
+    return x * _FAR_M / length, y * _FAR_M / length, z * _FAR_M / length
 
 
 def _opposite(vector: Vector) -> Vector:

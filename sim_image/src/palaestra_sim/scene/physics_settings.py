@@ -50,9 +50,13 @@ class PhysicsSettings:
     floor: str = DEFAULT
     floors: tuple[Floor, ...] = ()
 
+    def floors_m(self) -> tuple[float, ...]:
+        """Return the current heights of the floors that the file contains."""
+        return tuple(floor.height_m for floor in self.floors)
+
     def heights_m(self) -> tuple[float, ...]:
-        """Return the current heights of the floors."""
-        return tuple(floor.height_m for floor in self.floors) or (0.0,)
+        """Return the current heights of the floors; without a floor in the file, that of a floor at 0."""
+        return self.floors_m() or (0.0,)
 
     def friction(self, one: str, other: str) -> float:
         """Return the coefficient of friction of two materials."""

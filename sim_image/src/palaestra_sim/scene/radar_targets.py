@@ -14,10 +14,9 @@ from typing import NamedTuple
 
 from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.geometry import Pose, Vector
-from palaestra_sim.scene.hits import first_hit
 from palaestra_sim.scene.nodes.scene_node import SceneNode
-from palaestra_sim.scene.shapes import Shape, bounding_shapes
-from palaestra_sim.scene.validation import NodeReader
+from palaestra_sim.scene.outlines import Outlines, free_path
+from palaestra_sim.scene.shapes import Shape
 
 
 class Bounds(NamedTuple):
@@ -74,24 +73,14 @@ class RadarTargets:
         The distance is in meters, and infinite without an obstacle. `robot` contains the nodes of the robot
         that carries the radar.
         """
-        end = target.place.ground_pose.position
-        way = (end[0] - start[0], end[1] - start[1], end[2] - start[2])
-        length = math.hypot(*way)
-        if length == 0.0:
-            return math.inf
-        direction = (way[0] / length, way[1] / length, way[2] / length)
         others = (it for it in self.shapes if it.node not in target.nodes and it.node not in robot)
-        nearest = min((_entry(shape, start, direction) for shape in others), default=math.inf)
-        return nearest if nearest < length else math.inf
+        return free_path(others, start, target.place.ground_pose.position)
 
 
-def echoes_of(nodes: Collection[SceneNode]) -> RadarTargets:
-    """Return the current radar targets among these nodes."""
-    shapes: dict[SceneNode, tuple[Shape, ...]] = {}
+def echoes_of(nodes: Collection[SceneNode], outlines: Outlines) -> RadarTargets:
+    """Return the current radar targets among these nodes, which have these outlines."""
+    shapes = outlines.shapes
     targets = []
-    for node in nodes:
-        if node.place is not None and not node.left_out and node.nodes("boundingObject"):
-            shapes[node] = tuple(bounding_shapes(NodeReader(), node, node.place))
     for node in nodes:
         cross_section = (node.numbers("radarCrossSection") or (0.0,))[0]
         if node.place is not None and not node.left_out and cross_section > 0.0:
@@ -104,9 +93,7 @@ def echoes_of(nodes: Collection[SceneNode]) -> RadarTargets:
                     nodes=frozenset(inside),
                 )
             )
-    return RadarTargets(
-        targets=tuple(targets), shapes=tuple(shape for several in shapes.values() for shape in several)
-    )
+    return RadarTargets(targets=tuple(targets), shapes=outlines.all)
 
 
 def _box(pose: Pose, shape: Shape) -> Bounds:
@@ -150,9 +137,3 @@ def _around(boxes: Sequence[Bounds]) -> Bounds | None:
         [b - a for a, b in zip(low, high, strict=True)],
     )
     return Bounds((x, y, z), (depth, width, height))
-
-
-def _entry(shape: Shape, start: Vector, direction: Vector) -> float:
-    """Return the distance in meters at which a ray meets a shape; infinite if it misses."""
-    frame = shape.pose.inverse
-    return first_hit(shape, frame.carry(start), frame.turned(direction))

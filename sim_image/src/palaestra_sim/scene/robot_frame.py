@@ -53,10 +53,16 @@ class RobotFrame(Frame):
 
     @rotation.setter
     def rotation(self, value: AxisAngle) -> None:
-        rotation = from_axis_angle(value)
-        if self.axes is not None:
-            rotation = multiply(self.axes, rotation)
-        self._body.place(self._body.x, self._body.y, Pose(rotation=rotation).heading_rad)
+        self._body.place(self._body.x, self._body.y, self._on_ground(value).heading_rad)
+
+    def admits(self, rotation: AxisAngle) -> bool:
+        """Return whether a robot with that rotation stands upright."""
+        return self._on_ground(rotation).upright
+
+    def _on_ground(self, rotation: AxisAngle) -> Pose:
+        """Return a pose with that rotation, in the axes of the ground."""
+        matrix = from_axis_angle(rotation)
+        return Pose(rotation=matrix if self.axes is None else multiply(self.axes, matrix))
 
     @property
     def height_m(self) -> float:
@@ -101,6 +107,10 @@ class TurnedFrame(Frame):
     @rotation.setter
     def rotation(self, value: AxisAngle) -> None:
         self._upright.rotation = turned(value, transposed(self._turn))
+
+    def admits(self, rotation: AxisAngle) -> bool:
+        """Return whether a robot with that rotation stands upright."""
+        return self._upright.admits(turned(rotation, transposed(self._turn)))
 
     def return_to_start(self) -> None:
         """Return the upright frame, and with it this frame, to the pose in the world file."""

@@ -18,7 +18,6 @@ from collections.abc import Callable
 from palaestra_sim.errors import SimError, WorldError
 from palaestra_sim.scene.appearance import Appearance
 from palaestra_sim.scene.devices.connector import Connector
-from palaestra_sim.scene.devices.radar import Radar
 from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.geometry import Vector
 from palaestra_sim.scene.mode import Mode
@@ -26,8 +25,8 @@ from palaestra_sim.scene.movies import Movies
 from palaestra_sim.scene.node_motion import NodeMotion
 from palaestra_sim.scene.nodes.instantiate import Descriptions
 from palaestra_sim.scene.nodes.scene_node import SceneNode
+from palaestra_sim.scene.observers import OutlineObservers
 from palaestra_sim.scene.physics import Physics
-from palaestra_sim.scene.radar_targets import echoes_of
 from palaestra_sim.scene.radio import Radio
 from palaestra_sim.scene.reader import SceneContents, read_added, read_scene
 from palaestra_sim.scene.robot import Robot
@@ -323,15 +322,13 @@ class Simulation:
         connectors = tuple(it for robot in devices for it in robot if isinstance(it, Connector))
         for connector in connectors:
             connector.others = connectors
-        self._radars = tuple(it for robot in devices for it in robot if isinstance(it, Radar))
-        self._show_to_radars()
+        self._observers = OutlineObservers(it for robot in devices for it in robot)
+        self._show_outlines()
         self._samplers = tuple(sample for robot in self.robots for sample in robot.samplers)
 
-    def _show_to_radars(self) -> None:
-        if self._radars:
-            echoes = echoes_of(self.tree.nodes.values())
-            for radar in self._radars:
-                radar.show(echoes, lambda: self.time_ms)
+    def _show_outlines(self) -> None:
+        floors_m = self.scene.surroundings.floors_m
+        self._observers.show(self.tree.nodes.values(), floors_m, lambda: self.time_ms)
 
     def _resize(self, node: SceneNode) -> None:
         """Read the outline of an obstacle again, because a part of it has a new size."""
@@ -342,7 +339,7 @@ class Simulation:
             first = next((at for at, shape in enumerate(solids) if shape.place is owner.place), len(solids))
             kept = [shape for shape in solids if shape.place is not owner.place]
             self.scene.solids = [*kept[:first], *fresh, *kept[first:]]
-            self._show_to_radars()
+            self._show_outlines()
             self._arrange()
 
     def _moved(self, place: Frame) -> None:

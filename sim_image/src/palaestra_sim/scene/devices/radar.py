@@ -18,6 +18,7 @@ from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.geometry import Vector
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.old_axes import looking
+from palaestra_sim.scene.outlines import robot_around
 from palaestra_sim.scene.radar_targets import Bounds, RadarTarget, RadarTargets
 
 _LIGHT_M_S: Final = 299_792_458.0
@@ -111,8 +112,7 @@ class Radar:
     def show(self, echoes: RadarTargets, now_ms: Callable[[], int]) -> None:
         """Set the targets of the world; `now_ms` returns the simulated time."""
         self._echoes, self._now_ms = echoes, now_ms
-        robot = next((it for it in self.node.ancestors() if it.type_name == "Robot"), self.node)
-        self._robot = frozenset((robot, *robot.descendants()))
+        self._robot = robot_around(self.node)
 
     def enabled(self, period_ms: int) -> None:
         """Start or stop sampling."""

@@ -19,7 +19,7 @@ from palaestra_sim.errors import SimError
 from palaestra_sim.scene.geometry import AxisAngle
 from palaestra_sim.scene.nodes.scene_node import FieldContent, SceneNode
 from palaestra_sim.scene.tree.field_types import WIDTH, FieldKind, FieldType
-from palaestra_sim.scene.tree.write_rules import require_effect
+from palaestra_sim.scene.tree.write_rules import require_admitted, require_effect
 
 
 class NoValueError(SimError, LookupError):
@@ -78,7 +78,7 @@ class NodeField:
         """Write a value, which takes effect at the next basic step; a read returns it at once.
 
         Raises:
-            UnsimulatedError: the write would have no effect.
+            UnsimulatedError: the write would have no effect, or the node cannot have that value.
         """
         at = index if self.kind.multiple else 0
         if type_ is not self.kind.type or not _acceptable(type_, value):
@@ -89,6 +89,7 @@ class NodeField:
         if self.node.outline and not _positive(value):
             return
         self._require_effect()
+        require_admitted(self.node, self.name, value)
         values[at] = value
         self._values = values
         self._writes += 1

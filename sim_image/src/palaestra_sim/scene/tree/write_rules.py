@@ -61,6 +61,21 @@ def require_effect(node: SceneNode, field: str) -> None:
         )
 
 
+def require_admitted(node: SceneNode, field: str, value: object) -> None:
+    """Check that the node can have that value; a robot that drives is always upright.
+
+    Raises:
+        UnsimulatedError: the node cannot have the value.
+    """
+    if field != "rotation" or not isinstance(value, tuple):
+        return
+    if any(it.place is not None and not it.place.admits(value) for it in node.twins):
+        raise UnsimulatedError(
+            f"{node.type_name}.rotation: this rotation tilts a robot that drives, and such a robot is always "
+            "upright here; turn it about the vertical axis only, or use driver webots"
+        )
+
+
 def require_room(node: SceneNode, field: str, added: Sequence[SceneNode]) -> None:
     """Check that nodes, added to the node's field `field`, have the same effect as in Webots.
 
