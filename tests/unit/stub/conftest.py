@@ -282,6 +282,17 @@ def position():
 
 
 @pytest.fixture
+def field(robot):
+    """`field("TARGET", "translation")` returns the handle of a field of a node with that DEF."""
+
+    def find(def_name, name):
+        node = robot.get("supervisor/get_from_def", name=def_name)
+        return robot.get("supervisor/node/get_field", node=node, fieldName=name)
+
+    return find
+
+
+@pytest.fixture
 def world():
     """`world(objects, robot=...)` returns a world file with these nodes and a robot."""
 
