@@ -5,9 +5,11 @@ import math
 import pytest
 
 from palaestra_sim.errors import WorldError
+from palaestra_sim.ros_interfaces import UnsimulatedError
 from palaestra_sim.scene.geometry import turn
 from palaestra_sim.scene.nodes.instantiate import Descriptions
 from palaestra_sim.scene.simulation import Simulation
+from palaestra_sim.scene.tree.field_types import FieldType
 from palaestra_sim.scene.validation import LeaveOut
 from palaestra_sim.stub.physics import StubPhysics
 from palaestra_sim.world import builtin_protos, parse
@@ -216,3 +218,19 @@ def test_a_robot_of_webots_drives_in_an_old_world():
 
     assert robot.place.translation == pytest.approx(y_up(twin.place.translation))
     assert robot.sensors["ps0"].value == pytest.approx(twin.sensors["ps0"].value)
+
+
+@pytest.mark.parametrize(
+    ("system", "upright"),
+    [("ENU", (0.0, 0.0, 1.0, 0.4)), ("NUE", (1.0, 0.0, 0.0, -math.pi / 2.0))],
+    ids=["z points up", "y points up"],
+)
+def test_a_rotation_that_tilts_a_robot_is_refused(system, upright):
+    """The robot can only turn, so it would have another rotation than the one that the client reads back."""
+    simulation = load_twin(system)
+    [robot] = simulation.robots
+    field = simulation.tree.field_of(robot.parts.node, "rotation", simulation)
+
+    field.set(FieldType.ROTATION, 0, upright)
+    with pytest.raises(UnsimulatedError, match="this rotation tilts a robot that drives"):
+        field.set(FieldType.ROTATION, 0, (1.0, 0.0, 0.0, 0.5))
