@@ -6,6 +6,7 @@ import re
 import signal
 import subprocess
 import sys
+import urllib.request
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +20,7 @@ from palaestra_trainer.ros.master import Master
 from tests.jobs import example
 from tests.local_run import EXAMPLES, PALAESTRA, LocalRun, left_of
 
+PAGE = re.compile(r"http://127\.0\.0\.1:\d+(?= shows )")
 EVAL = Path(sys.executable).with_name("palaestra-eval")
 FEW = {
     "steps": 600,
@@ -72,12 +74,14 @@ class Unplugged:
     Attributes:
         nodes: the robots that were registered at the ROS master.
         named: the robots in the worlds of the sidecars.
+        page: the response of the page of `--view`.
         pids: the ids of all processes below the runner.
         left: the ids of processes that still ran after the kill.
     """
 
     nodes: set[str]
     named: set[str]
+    page: str
     pids: list[int]
     left: list[int]
 
@@ -90,8 +94,9 @@ def unplugged(tmp_path_factory):
     run = LocalRun(tmp_path_factory.mktemp("unplugged"), job)
     with ExitStack() as stack:
         stack.callback(run.stop)
-        run.start("-v")
+        run.start("-v", "--view")
         run.wait_for_step(100)
+        page = page_of(run)
         nodes = registered(run)
         worlds = sorted((run.directory / "scratch").glob("*/work/*.wbt"))
         pids = [pid for pid, _ in run.processes()]
@@ -100,6 +105,7 @@ def unplugged(tmp_path_factory):
     return Unplugged(
         nodes=nodes,
         named={f"/{robot.ros_name}" for world in worlds for robot in robots(world.read_bytes())},
+        page=page,
         pids=pids,
         left=left_of(pids),
     )
@@ -160,15 +166,38 @@ def test_a_person_reads_how_the_run_goes(finished):
 def test_the_demo_plays_a_policy_until_it_is_interrupted(finished, tmp_path):
     """The policy does not learn during the demo, and the same command starts the demo again."""
     job = data_of(playing_job(job_of(finished.run.file), finished.run.directory))
-
-    with LocalRun(tmp_path, job) as run:
+    run = LocalRun(tmp_path, job)
+    with ExitStack() as stack:
+        stack.callback(run.stop)
+        run.start("--view")
         run.until(lambda: "[trainer] episode 1: " in run.output())
+        address = address_of(run)
+        page = page_of(run)
         run.process.send_signal(signal.SIGTERM)
         code, output = run.end()
 
     assert code == 75, output
     assert " succeeded" in output
     assert "interrupted; the same command starts its program again" in output
+    assert "<title>" in page
+    with pytest.raises(OSError, match="refused"):
+        urllib.request.urlopen(address, timeout=5)
+
+
+def test_a_run_can_be_watched_in_a_browser(unplugged):
+    """The page of `--view` is served from the start of the run."""
+    assert "<title>" in unplugged.page
+
+
+def address_of(run):
+    """Wait until a run with `--view` has printed the address of its page, and return the address."""
+    return run.until(lambda: PAGE.search(run.output()))[0]
+
+
+def page_of(run):
+    """Wait until a run with `--view` serves its page, and return the page."""
+    with urllib.request.urlopen(address_of(run), timeout=30) as response:
+        return response.read().decode()
 
 
 def test_a_finished_run_is_reported_and_not_repeated(finished):
