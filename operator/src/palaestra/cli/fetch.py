@@ -8,6 +8,7 @@ from palaestra.cli.subcommands import Commands
 from palaestra.client import Client
 from palaestra.client.client import FETCH_S
 from palaestra.local.outcome import uses
+from palaestra.local.report import complete_report
 from palaestra.plan.resources import in_bytes
 from palaestra_protocol.numbers import seconds, whole
 
@@ -15,7 +16,8 @@ FETCH = """\
 Copies policy, evaluations, report and TensorBoard data of a run to <dir>/<job>/<replica>/. This folder must
 not exist yet; it is written completely or not at all. The data is read in the pod that trains. If that pod
 has ended, the command creates a pod that mounts the claim read-only, and deletes this pod afterwards. You
-need the rights to create and delete pods and to run commands in them.
+need the rights to create and delete pods and to run commands in them. If the run still trains, or if its
+trainer was killed, the command writes the report here, provided that palaestra-trainer is installed.
 """
 
 
@@ -49,6 +51,7 @@ def _fetch(client: Client, options: argparse.Namespace) -> int:
             deadline_s=options.timeout,
             most_bytes=options.max_size,
         )
+    complete_report(folder)
     say([str(folder), *uses(folder)])
     return 0
 

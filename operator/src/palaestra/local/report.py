@@ -1,4 +1,4 @@
-"""Write the report of a run whose trainer could not write it, because the trainer was killed."""
+"""Write the report of a run whose trainer was killed or still trains."""
 
 import asyncio
 import os
@@ -17,7 +17,7 @@ _WRITTEN_BY_THE_TRAINER = "end.json"
 
 
 def complete_report(run_directory: Path) -> None:
-    """Write the report of an ended run if its trainer has not written it; do nothing if this fails.
+    """Write the report of a run if its trainer was killed or still trains; do nothing if this fails.
 
     A run of a custom program gets no report, because it need not have the necessary files.
     """
