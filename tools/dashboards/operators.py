@@ -141,7 +141,7 @@ def _failed() -> Panel:
     errors = _of(looks, 'result="error"')
     return Panel(
         question="Which share of its reconciles fails?",
-        says="After ten minutes above 0 an alert fires: find the cause in the log, `not reconciled` or `refused`.",
+        says="After ten minutes above 0 an alert fires; the log has `not reconciled` or `refused`.",
         unit=units.PercentUnit,
         least=0,
         width=12,
