@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Install what Palaestra needs into .venv, on a machine with Python 3.11 or newer; needs no root.
-# With TORCH_INDEX, PyTorch comes from that package index, for example from the index with builds for the processor alone.
+# With TORCH_INDEX, PyTorch comes from that package index, for example from PyTorch's index with builds for CPUs.
 # You can repeat this script safely: a failed run leaves no .venv/ready behind, so the next run starts over.
 set -euo pipefail
 cd "$(dirname "$0")/.."

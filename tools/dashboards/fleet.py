@@ -61,7 +61,7 @@ def _pending() -> Panel:
         question="Whose jobs wait?",
         says=(
             "Pending and suspended jobs by namespace. If a job is pending for long, `kubectl describe "
-            "tj` shows what is missing: room in the cluster, a quota, a volume, an image."
+            "tj` shows what is missing: free resources, a quota, a volume, an image."
         ),
         unit=units.Short,
         look=Look.SHARES,
@@ -120,7 +120,7 @@ def _waits() -> Panel:
 def _steps() -> Panel:
     return Panel(
         question="How many steps does the fleet make in a second?",
-        says="Valid steps of all runs, by namespace. If it falls while as many jobs run, see Simulators.",
+        says="Valid steps of all runs, by namespace. If it falls with equally many jobs, see Simulators.",
         unit=units.OpsPerSecond,
         least=0,
         width=6,

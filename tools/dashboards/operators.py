@@ -93,7 +93,7 @@ def _waits() -> Panel:
         question="How long do they wait?",
         says=(
             "The median and the slowest of a hundred. If it is above a second, see how many jobs wait, "
-            "and how long a look takes."
+            "and how long a reconcile takes."
         ),
         unit=units.Seconds,
         least=0,
@@ -107,9 +107,9 @@ def _waits() -> Panel:
 def _looks() -> Panel:
     looks = _of("palaestra_operator_reconcile_duration_seconds_count")
     return Panel(
-        question="How do its looks at a job end?",
+        question="How do its reconciles of a job end?",
         says=(
-            "Looks a second. conflict is harmless: another client wrote meanwhile. error is not "
+            "Reconciles per second. conflict is harmless: another client wrote meanwhile. error is not "
             "harmless: the log has `not reconciled` or `refused`, with the cause."
         ),
         unit=units.OpsPerSecond,
@@ -121,7 +121,7 @@ def _looks() -> Panel:
 def _seconds() -> Panel:
     looks = _of("palaestra_operator_reconcile_duration_seconds_bucket")
     return Panel(
-        question="How long is one look?",
+        question="How long is one reconcile?",
         says=(
             "The median and the slowest of a hundred; nearly all of the time is spent waiting for the API "
             "server."
@@ -140,8 +140,8 @@ def _failed() -> Panel:
     looks = "palaestra_operator_reconcile_duration_seconds_count"
     errors = _of(looks, 'result="error"')
     return Panel(
-        question="Which share of its looks fails?",
-        says="Anything above zero for minutes is an alert: the log says `not reconciled`, with a traceback.",
+        question="Which share of its reconciles fails?",
+        says="After ten minutes above 0 an alert fires; the log has `not reconciled` or `refused`.",
         unit=units.PercentUnit,
         least=0,
         width=12,

@@ -60,7 +60,7 @@ def _states() -> Panel:
 def _up() -> Panel:
     return Panel(
         question="Does each have a process?",
-        says="1 for each simulator; b is its standby. 0: it is being restarted, or waits for the trainer.",
+        says="1 for each simulator; slot b is its standby. 0: it restarts, or waits for the trainer.",
         unit=units.Short,
         least=0,
         most=1,
@@ -102,8 +102,8 @@ def _budget() -> Panel:
         question="How much of the restart budget is spent?",
         says=(
             "Restarts after faults within restart.withinSeconds, divided by restart.limit. At 1, the "
-            "next fault gives the simulator up, and may end the run. Above 0.7 an alert fires: find "
-            "the cause of the faults."
+            "trainer gives the simulator up at the next fault, and the run may end. Above 0.7 an alert "
+            "fires: find the cause of the faults."
         ),
         unit=units.PercentUnit,
         least=0,
@@ -180,7 +180,8 @@ def _spread() -> Panel:
     return Panel(
         question="How are the steps' times spread?",
         says=(
-            "How many steps took how long. If there is a second band far above the first, some steps stall."
+            "Steps, counted by their duration. If there is a second band far above the first, some steps "
+            "stall."
         ),
         unit=units.Seconds,
         look=Look.SPREAD,
@@ -208,8 +209,8 @@ def _simulated() -> Panel:
     return Panel(
         question="How much is simulated in a second?",
         says=(
-            "Simulated seconds a second of all simulators together, with the time for learning and "
-            "saving: the benefit that the run gets from its cores. Compare it before and after a "
+            "Seconds that all simulators together simulate in a second of the run, learning and saving "
+            "included. This is what the run gets from its cores: compare it before and after a "
             "change of the job."
         ),
         unit=units.Short,
@@ -222,7 +223,7 @@ def _resets() -> Panel:
     return Panel(
         question="How many episodes begin?",
         says=(
-            "Resets a second, in training and evaluation. A simulator without any takes no part: see "
+            "Resets a second, in training and evaluation. A simulator without resets is not used: see "
             "its state. If there are many more than before, episodes end early."
         ),
         unit=units.OpsPerSecond,

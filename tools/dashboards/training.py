@@ -29,8 +29,8 @@ def _success() -> Panel:
     return Panel(
         question="How often does it reach its goal?",
         says=(
-            "Evaluation: the policy without exploration, on seeds of its own, between the bounds of "
-            "the 95 % interval; at the end its confirmation. Training: the last 100 episodes, with "
+            "Evaluation: the policy without exploration, on separate seeds, between the bounds of the "
+            "95 % interval; at the end of the run, its confirmation. Training: the last 100 episodes, with "
             "exploration. If both are still zero after a tenth of the steps, read the returns; if "
             "these do not rise either, the reward gives the policy nothing to learn from."
         ),
@@ -62,7 +62,7 @@ def _spread() -> Panel:
     return Panel(
         question="How are the returns spread?",
         says=(
-            "How many training episodes of all chosen runs ended with which return. If two bands "
+            "Training episodes of all chosen runs, counted by their return. If two separate bands "
             "stay, the policy solves one kind of start and not the other."
         ),
         unit=units.Short,
@@ -92,8 +92,8 @@ def _evaluated() -> Panel:
     return Panel(
         question="What do evaluations return?",
         says=(
-            "Mean return of the last evaluation; model.zip has the policy with the best one so far. "
-            "If it falls while that of training rises, the policy relies on exploration, or forgets: "
+            "Mean return of the last evaluation; model.zip has the policy of the best evaluation so far. "
+            "If it falls while the return of training rises, the policy relies on exploration, or forgets: "
             "lower the learning rate."
         ),
         unit=units.Short,
@@ -157,7 +157,7 @@ def _speed() -> Panel:
         question="How many steps does it make in a second?",
         says=(
             "Valid steps over the last 30 s. Regular dips are evaluations and checkpoints. If it "
-            "halves and stays there, look for the cause in the panel about its time, then at "
+            "halves and stays there, see the panel 'Where does its time go?', then the dashboard "
             "Simulators."
         ),
         unit=units.OpsPerSecond,
@@ -205,10 +205,10 @@ def _idle() -> Panel:
 
 def _lost() -> Panel:
     return Panel(
-        question="What was played in vain?",
+        question="Which steps were lost?",
         says=(
-            "Since the run began: steps of episodes that a fault cut or that were played again after "
-            "an interruption, and simulation steps that late messages cost. If many are lost, see the "
+            "Since the run began: steps of episodes that a fault ended or that were played again after "
+            "an interruption, and extra simulation steps to get late messages. If many are lost, see the "
             "faults under Simulators; without faults, save more often (checkpoint.everySteps)."
         ),
         unit=units.Short,
@@ -228,8 +228,8 @@ def _behind() -> Panel:
     return Panel(
         question="How many checkpoints is it behind?",
         says=(
-            "Steps since the newest checkpoint, in intervals: these would be trained again if the run "
-            "ended now. If it is above 1 for long, read the trainer's log; the disk may be full. "
+            "Steps since the newest checkpoint, divided by checkpoint.everySteps: they are lost if the run "
+            "is killed now. If it is above 1 for long, read the trainer's log; the disk may be full. "
             "Above 3 an alert fires."
         ),
         unit=units.Short,
@@ -270,8 +270,8 @@ def _size() -> Panel:
     return Panel(
         question="Do checkpoints fit on the volume?",
         says=(
-            "Size of the newest checkpoint. checkpoint.keep of them and one more must fit into "
-            "storage.size: make it larger, keep fewer, or give the algorithm a smaller buffer_size."
+            "Size of the newest checkpoint. As many as checkpoint.keep, and one more, must fit into "
+            "storage.size. If not, raise storage.size, keep fewer, or set a smaller buffer_size."
         ),
         unit=units.BytesIEC,
         width=12,

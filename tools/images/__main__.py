@@ -14,7 +14,7 @@ from tools.images.recipes import recipes
 ROOT = Path(__file__).parents[2]
 LOCK_DEADLINE_S = 3600  # another call may hold the lock while it builds everything
 INTERRUPTED = 130
-EPILOG = "Archives are kept in $PALAESTRA_CACHE/images (default: ~/.cache/palaestra), the last three of each."
+EPILOG = "$PALAESTRA_CACHE/images (default: ~/.cache/palaestra) keeps the last three archives of each image."
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -100,7 +100,7 @@ class Workshop:
         filled, wheels = self.folder / "contexts" / name, self.folder / "wheels"
         context.fill(filled, self.root, wanted.recipe, wanted.inside, wheels=wheels, machine=self.machine)
         if context.contents(self.root, wanted.recipe, self.machine) != wanted.inside:
-            raise ImagesError(f"{name}: its sources changed while they were read; repeat this")
+            raise ImagesError(f"{name}: its sources changed while they were read; repeat this command")
         dockerfile = filled / "Dockerfile"
         dockerfile.write_bytes(wanted.dockerfile)
         self.engine.build(

@@ -59,4 +59,4 @@ def prune(paths: Iterable[Path], kept: int) -> None:
 
 
 def _give_up(file: Path, *_: object) -> None:
-    raise ImagesError(f"{file}: another call holds it for too long; end that one (`fuser {file}` names it)")
+    raise ImagesError(f"{file}: another process holds this lock; end the process that `fuser {file}` names")

@@ -15,7 +15,7 @@ from tools.images import programs
 from tools.images.errors import ImagesError
 
 DEBIAN = "docker.io/library/debian:trixie-slim"
-# With these options, the mounts and the processes of a build end with it, also if it is killed.
+# With these options, the mounts and the processes of a build end with the build, even if it is killed.
 _ISOLATED = ("unshare", "--mount", "--pid", "--fork", "--kill-child", "--mount-proc", "--")
 _ASK_DEADLINE_S = 20
 _PULL_DEADLINE_S = 180
@@ -133,8 +133,8 @@ class Buildah:
         """
         if os.geteuid() != 0:
             raise ImagesError(
-                "no Docker Engine with buildx and debian:trixie-slim answers, and without one the images are "
-                "built by root; start Docker, or repeat this with sudo"
+                "no Docker Engine with buildx and debian:trixie-slim responds, and without Docker only root "
+                "can build images; start Docker, or repeat this command with sudo"
             )
         logs = folder / "logs"
         if shutil.which("buildah") is None:
