@@ -51,13 +51,17 @@ class Setting:
         """Return a frame of the ground's axes in the axes of the file."""
         return Frame(self.axes @ frame.position, self.axes @ frame.rotation)
 
-    def load(self, nodes, info=""):
-        """Return the simulation of a world with these nodes."""
-        world = f"""#VRML_SIM R2023b utf8
+    def text(self, nodes, info=""):
+        """Return the text of a world with these nodes."""
+        return f"""#VRML_SIM R2023b utf8
 WorldInfo {{ basicTimeStep {STEP_MS} coordinateSystem "{self.system}" {info} }}
 {nodes}
 """
-        return Simulation.load(world.encode(), PHYSICS[self.physics](), "values", Mode.FAST)
+
+    def load(self, nodes, info=""):
+        """Return the simulation of a world with these nodes."""
+        world = self.text(nodes, info).encode()
+        return Simulation.load(world, PHYSICS[self.physics](), "values", Mode.FAST)
 
 
 SETTINGS = [Setting(physics, system) for physics in PHYSICS for system in AXES]

@@ -12,7 +12,7 @@ from palaestra_trainer.webots.message_decoding import (
     POINT,
     RANGE,
     NumberReading,
-    VectorReading,
+    PickedReading,
 )
 
 KINDS = {
@@ -98,7 +98,7 @@ def test_a_reading_of_several_numbers_is_a_tuple():
     """The numbers are in the order of the message."""
     point = message_type("geometry_msgs/PointStamped").codec.encode({"point": {"x": 1.0, "y": 2.0, "z": 3.0}})
 
-    assert VectorReading("gps", POINT)(point) == (1.0, 2.0, 3.0)
+    assert PickedReading("gps", POINT, (0, 1, 2))(point) == (1.0, 2.0, 3.0)
 
 
 @pytest.mark.parametrize("axis", ["x", "y", "z"])
@@ -107,4 +107,4 @@ def test_each_number_of_a_tuple_has_to_be_finite(axis):
     point = message_type("geometry_msgs/PointStamped").codec.encode({"point": {axis: math.nan}})
 
     with pytest.raises(ValueError, match=r"nan.* from gps"):
-        VectorReading("gps", POINT)(point)
+        PickedReading("gps", POINT, (0, 1, 2))(point)

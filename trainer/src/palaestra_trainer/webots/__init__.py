@@ -18,6 +18,15 @@ from palaestra_trainer.webots.devices import (
 )
 from palaestra_trainer.webots.facade import Launcher, Webots
 from palaestra_trainer.webots.joint_motor import Command, JointMotor, set_commands
+from palaestra_trainer.webots.motion_sensors import (
+    GPS,
+    Accelerometer,
+    Altimeter,
+    Compass,
+    Gyro,
+    InertialUnit,
+    LightSensor,
+)
 from palaestra_trainer.webots.mujoco import MujocoActuator, MujocoSensor
 from palaestra_trainer.webots.observer import Mode, Observer
 from palaestra_trainer.webots.obstacles import FLOOR, Thing
@@ -26,15 +35,22 @@ from palaestra_trainer.webots.supervisor import Supervisor
 
 __all__ = [
     "FLOOR",
+    "GPS",
+    "Accelerometer",
     "Actuator",
+    "Altimeter",
     "Attached",
     "Camera",
     "Command",
+    "Compass",
     "DistanceSensor",
+    "Gyro",
+    "InertialUnit",
     "JointMotor",
     "Launcher",
     "Lidar",
     "LidarPoints",
+    "LightSensor",
     "Mode",
     "Motor",
     "MujocoActuator",

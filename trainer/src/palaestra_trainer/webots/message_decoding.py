@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import struct
+from collections.abc import Sequence
 from functools import cache
 from typing import Any
 
@@ -54,6 +55,15 @@ class NumberReading:
             raise ValueError(f"{numbers[-1]} from {self._device}")
         return numbers[-1]
 
+    def _numbers(self, message: bytes | memoryview) -> tuple[Any, ...]:
+        """Return the length of the frame_id, and the numbers after the header."""
+        if len(message) != self._layout.size:
+            self._fit(message)
+        numbers = self._layout.unpack(message)
+        if numbers[0] != self._frame_id_bytes:
+            raise ValueError(f"a frame_id of {numbers[0]} bytes, not {self._frame_id_bytes}")
+        return numbers
+
     def _fit(self, message: bytes | memoryview) -> None:
         """Set the layout for messages with another length of the frame_id."""
         (frame_id_bytes,) = _FRAME_ID_LENGTH.unpack_from(message, _FRAME_ID_AT)
@@ -64,22 +74,32 @@ class NumberReading:
         self._layout = _layout(frame_id_bytes, self._codes)
 
 
-class VectorReading(NumberReading):
-    """Reads all numbers after the header of a message, as a tuple."""
+class PickedReading(NumberReading):
+    """Reads some of the numbers after the header of a message, as a tuple.
 
-    __slots__ = ()
+    Args:
+        device: the device's name in errors.
+        codes: `struct` codes of the numbers after the header.
+        picked: the positions of the wanted numbers; 0 is the first number after the header.
+    """
+
+    __slots__ = ("_picked",)
+
+    def __init__(self, device: str, codes: str, picked: Sequence[int]) -> None:
+        super().__init__(device, codes)
+        self._picked = tuple(place + 1 for place in picked)  # the length of the frame_id is at place 0
 
     def __call__(self, message: bytes | memoryview) -> tuple[float, ...]:
-        """Return the reading.
+        """Return the wanted numbers.
 
         Raises:
             ValueError, struct.error: as `NumberReading`.
         """
-        super().__call__(message)
-        numbers = self._layout.unpack(message)[1:]
-        if not all(map(math.isfinite, numbers)):
-            raise ValueError(f"{numbers} from {self._device}")
-        return numbers
+        numbers = self._numbers(message)
+        wanted = tuple(numbers[place] for place in self._picked)
+        if not all(map(math.isfinite, wanted)):
+            raise ValueError(f"{wanted} from {self._device}")
+        return wanted
 
 
 @cache

@@ -1,0 +1,122 @@
+"""The facades of sensors of place, motion and environment, compared with formulas in each simulator."""
+
+import math
+
+import pytest
+
+from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.robots.simulated import SimulatedRobot
+from palaestra_trainer.webots import (
+    GPS,
+    Accelerometer,
+    Altimeter,
+    Compass,
+    Gyro,
+    InertialUnit,
+    LightSensor,
+    Webots,
+)
+from tests.values.frames import axis_angle, frame
+from tests.values.standing import GRAVITY, MOUNT, POSES, REFERENCE, ROWS
+from tests.values.worlds import PHYSICS, STEP_MS, Setting, robot
+
+DEADLINE_S = 60.0
+FACADES = {
+    "accelerometer": Accelerometer,
+    "altimeter": Altimeter,
+    "compass": Compass,
+    "gps": GPS,
+    "gyro": Gyro,
+    "inertial unit": InertialUnit,
+    "light sensor": LightSensor,
+}
+MEASURED = {row.name: row for row in ROWS if row.name in FACADES}
+
+
+class Measuring(SimulatedRobot):
+    """A robot with one sensor of each facade; one axis of another compass is switched off in the world."""
+
+    definition = "R"
+    period_ms = STEP_MS
+    target = None
+
+    def equip(self):
+        """Add the sensors."""
+        self.sensors = {name: facade(self.node_name, name) for name, facade in FACADES.items()}
+        self.flat = Compass(self.node_name, "compass axes", axes="xz")
+        self.simulation.add([*self.sensors.values(), self.flat], [])
+
+
+@pytest.fixture(scope="module", params=PHYSICS)
+def measured(request, master, tmp_path_factory):
+    """Yield a setting, a robot after one step at a tilted pose, and the frame of its sensors."""
+    del master
+    setting = Setting(request.param)
+    rows = [*MEASURED.values(), next(row for row in ROWS if row.name == "compass axes")]
+    sensors = " ".join(row.node.format(place=f'name "{row.name}" {MOUNT.fields}') for row in rows)
+    info = "gravity {} gpsReference {} {} {}".format(GRAVITY, *REFERENCE)
+    world = tmp_path_factory.mktemp("world") / "sensors.wbt"
+    world.write_text(setting.text(robot(sensors, POSES[0].fields), info))
+    webots = Webots("r", world, driver=request.param, start_deadline_s=DEADLINE_S)
+    measuring = Measuring(webots)
+    try:
+        with webots:
+            measuring.advance()
+            yield setting, measuring, POSES[0] @ MOUNT
+    finally:
+        measuring.close()
+        webots.close()
+
+
+@pytest.mark.parametrize("name", FACADES)
+def test_a_facade_reads_what_the_formula_gives(measured, name):
+    """The author of an environment reads the same value with each simulator."""
+    setting, measuring, sensor = measured
+    expected = MEASURED[name].formula(sensor, setting)
+
+    value = measuring.sensors[name].value
+
+    assert value == pytest.approx(expected if len(expected) > 1 else expected[0], abs=1e-6)
+
+
+def test_an_axis_that_is_switched_off_is_left_out(measured):
+    """The simulator sends NaN for this axis, and the trainer takes NaN for a fault of the simulator."""
+    setting, measuring, sensor = measured
+    north = sensor.rotation.T @ setting.north
+
+    assert measuring.flat.value == pytest.approx([north[0], north[2]], abs=1e-6)
+
+
+def test_the_angles_of_an_inertial_unit_are_those_of_its_quaternion(measured):
+    """Rotations about x, then y, then z by these angles give the sensor's rotation again."""
+    _, measuring, sensor = measured
+    turns = [
+        frame(axis=axis, angle_rad=angle).rotation
+        for axis, angle in zip(
+            ((1, 0, 0), (0, 1, 0), (0, 0, 1)), measuring.sensors["inertial unit"].roll_pitch_yaw, strict=True
+        )
+    ]
+
+    again = turns[2] @ turns[1] @ turns[0]
+
+    assert axis_angle(again.T @ sensor.rotation)[3] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_before_the_first_step_an_inertial_unit_has_no_angles():
+    """The sensor has read nothing, and angles of 0 would be a wrong reading."""
+    assert InertialUnit("r", "inertial unit").roll_pitch_yaw is None
+
+
+@pytest.mark.parametrize("axes", ["", "xw", "X"])
+def test_unknown_axes_are_refused(axes):
+    """Without the error, a misspelled axis would shorten the reading, and so change the observation."""
+    with pytest.raises(ConfigurationError, match="are not letters of xyz"):
+        Gyro("r", "gyro", axes=axes)
+
+
+def test_the_light_sensor_reads_a_number(measured):
+    """Its message has a variance too, which is not part of the reading."""
+    _, measuring, _ = measured
+
+    assert isinstance(measuring.sensors["light sensor"].value, float)
+    assert math.isfinite(measuring.sensors["light sensor"].value)

@@ -1,0 +1,131 @@
+"""The sensors of a robot that measure its place, its motion and its environment, as tuples of numbers."""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar, Final
+
+from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.webots.devices import Sensor
+from palaestra_trainer.webots.message_decoding import FLOAT64, POINT, NumberReading, PickedReading
+
+AXES: Final = "xyz"
+_IMU: Final = "37d"  # sensor_msgs/Imu: orientation, turning rate and acceleration, each with a covariance
+_FIELD: Final = "12d"  # sensor_msgs/MagneticField: x, y, z, and a covariance
+_ILLUMINANCE: Final = "2d"  # sensor_msgs/Illuminance: the reading, and a variance
+_ORIENTATION, _RATE, _ACCELERATION = 0, 13, 25  # positions of the first numbers in sensor_msgs/Imu
+
+
+class _AxesSensor(Sensor):
+    """A sensor with one number for each axis.
+
+    Args:
+        robot: the ROS name of the robot's controller.
+        device: the device's name in the world.
+        axes: the axes to read, in their order in `value`. Leave out an axis that is switched off in the
+            world, because the simulator then sends NaN for it.
+
+    Raises:
+        ConfigurationError: `axes` contains other letters than x, y and z.
+    """
+
+    __slots__ = ()
+    type_name: ClassVar[str]
+    codes: ClassVar[str]
+    first: ClassVar[int] = 0
+
+    def __init__(self, robot: str, device: str, axes: str = AXES) -> None:
+        if not axes or not set(axes) <= set(AXES):
+            raise ConfigurationError(
+                f'{device}: axes "{axes}" are not letters of {AXES}; write "xz", for example'
+            )
+        picked = tuple(self.first + AXES.index(axis) for axis in axes)
+        super().__init__(robot, device, self.type_name, PickedReading(device, self.codes, picked), "values")
+
+
+class Compass(_AxesSensor):
+    """A compass; `value` is the direction of north in the sensor's axes: x, y, z of a unit vector."""
+
+    __slots__ = ()
+    type_name = "sensor_msgs/MagneticField"
+    codes = _FIELD
+
+
+class Gyro(_AxesSensor):
+    """A gyro; `value` is the turning rate about the sensor's axes in rad/s: x, y, z."""
+
+    __slots__ = ()
+    type_name = "sensor_msgs/Imu"
+    codes = _IMU
+    first = _RATE
+
+
+class Accelerometer(_AxesSensor):
+    """An accelerometer; `value` is the acceleration along the sensor's axes in m/s2: x, y, z.
+
+    At rest it is the reaction to gravity, so the axis that points up reads 9.81.
+    """
+
+    __slots__ = ()
+    type_name = "sensor_msgs/Imu"
+    codes = _IMU
+    first = _ACCELERATION
+
+
+class GPS(Sensor):
+    """A GPS; `value` is its position: x, y, z in meters in the axes of the world.
+
+    In a world with `gpsCoordinateSystem "WGS84"`, `value` is latitude and longitude in degrees, and altitude
+    in meters.
+    """
+
+    __slots__ = ()
+
+    def __init__(self, robot: str, device: str) -> None:
+        reading = PickedReading(device, POINT, (0, 1, 2))
+        super().__init__(robot, device, "geometry_msgs/PointStamped", reading, "values")
+
+
+class InertialUnit(Sensor):
+    """An inertial unit; `value` is the rotation of the sensor in the world as a quaternion: x, y, z, w."""
+
+    __slots__ = ()
+
+    def __init__(self, robot: str, device: str) -> None:
+        picked = tuple(range(_ORIENTATION, _ORIENTATION + 4))
+        super().__init__(robot, device, "sensor_msgs/Imu", PickedReading(device, _IMU, picked), "quaternion")
+
+    @property
+    def roll_pitch_yaw(self) -> tuple[float, float, float] | None:
+        """The same rotation as angles in radians, about x, then y, then z of a world whose z axis points up.
+
+        None before the first step. At a pitch of 90 degrees, only the sum or the difference of roll and yaw
+        is defined.
+        """
+        if self.value is None:
+            return None
+        x, y, z, w = self.value
+        return (
+            math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
+            math.asin(max(-1.0, min(1.0, 2.0 * (w * y - z * x)))),
+            math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
+        )
+
+
+class Altimeter(Sensor):
+    """An altimeter; `value` is the height of the sensor in the world, in meters."""
+
+    __slots__ = ()
+
+    def __init__(self, robot: str, device: str) -> None:
+        super().__init__(robot, device, "webots_ros/Float64Stamped", NumberReading(device, FLOAT64))
+
+
+class LightSensor(Sensor):
+    """A light sensor; `value` is the output of its lookup table, or W/m2 if the table is empty."""
+
+    __slots__ = ()
+
+    def __init__(self, robot: str, device: str) -> None:
+        reading = PickedReading(device, _ILLUMINANCE, (0,))
+        super().__init__(robot, device, "sensor_msgs/Illuminance", lambda message: reading(message)[0])
