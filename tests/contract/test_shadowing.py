@@ -81,7 +81,10 @@ def test_each_program_starts_or_names_the_files(program, folder):
 @pytest.mark.parametrize("name", ["re", "fnmatch", "msvcrt", "queue"])
 @pytest.mark.parametrize("program", ["palaestra", "palaestra-train"])
 def test_a_module_that_is_harmless_by_itself_is_found_too(program, name, tmp_path):
-    """Python imports some modules at its start, so a harmless copy is loaded before our check runs."""
+    """Python imports some modules at its start, so a harmless copy is loaded before our check runs.
+
+    The check must still name its file.
+    """
     (tmp_path / f"{name}.py").write_text("x = 1\n")
     arguments = ("plan", JOB) if program == "palaestra" else ("--help",)
 

@@ -129,7 +129,10 @@ def test_applying_makes_it_so_and_applying_less_takes_it_back(real, namespace):
 
 
 def test_a_field_of_another_manager_is_taken_by_force_only(real, namespace):
-    """The operator needs both behaviors: a conflict, and the change by force."""
+    """Without force, a client must not overwrite the value of another manager.
+
+    With force, it must be able to do so.
+    """
     real.apply(config_map(namespace, data={"a": "1"}), manager="another")
 
     with pytest.raises(Conflict, match="another"):

@@ -180,7 +180,10 @@ def test_a_trial_that_is_stopped_leaves_nothing(control_plane, place, tmp_path):
 
 
 def test_a_trial_of_a_wrong_file_asks_nothing(typed, place, tmp_path):
-    """The exit code is 2, as for every mistake in a command line."""
+    """A wrong file must create no job in the cluster.
+
+    As for every mistake in a command line, the exit code is 2.
+    """
     file = tmp_path / "job.yaml"
     file.write_text(TRIAL + "  seed: -1\n")
 

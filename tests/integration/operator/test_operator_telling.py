@@ -109,7 +109,10 @@ def test_log_lines_are_constant_messages_with_fields(place, start):
 
 
 def test_nothing_that_the_operator_asks_for_is_forbidden(place, start, control_plane):
-    """The roles of install.yaml must suffice. Unit tests check that the roles grant nothing else."""
+    """The roles of install.yaml must suffice.
+
+    test_operator_rights.py checks that these roles grant nothing else.
+    """
     operator = start()
     place.train()
     place.pods()

@@ -137,7 +137,7 @@ def ask_for_much(peer, dial, monkeypatch):
 
 
 def test_an_answer_that_the_socket_cannot_take_at_once_arrives_whole(peer, ask_for_much):
-    """An image of a camera may be that long."""
+    """An image of a camera may be longer than the buffers of a connection."""
     connection = ask_for_much()
     peer.do(lambda: None)
 

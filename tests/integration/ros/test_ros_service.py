@@ -209,7 +209,7 @@ def test_another_type_is_refused(service):
 
 
 def test_a_service_known_to_the_master_can_be_asked_for_its_type(peer):
-    """`rosservice type` sends `*` instead of an md5 sum."""
+    """`rosservice type` looks up this address at the master, and then requests the type from the node."""
     host, port = Master("/probe").service_address(f"/{peer.name}/double")
 
     assert (host, port > 0) == (os.environ["ROS_HOSTNAME"], True)

@@ -130,7 +130,7 @@ def test_a_robotino_uses_what_its_world_fits_it_with(running):
 
 @pytest.mark.parametrize("use", ["use_scanner", "use_gripper", "use_forklift"])
 def test_what_a_world_lacks_is_refused_by_name(arena, use):
-    """The robot is connected, so its list of devices is known."""
+    """The connected robot knows its devices, so a user learns at once which device the world lacks."""
     with pytest.raises(NoSuchSensor, match="the robot has no device"):
         getattr(arena.robot, use)()
 

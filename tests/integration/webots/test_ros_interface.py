@@ -161,7 +161,7 @@ def test_a_picture_arrives_whole(outcomes, topic, encoding):
 
 @pytest.mark.parametrize("simulator", FAILING)
 def test_the_last_service_ends_the_simulator_with_the_status_that_was_asked_for(outcomes, simulator):
-    """Before this request, the client used reset, restart, revert, reload and load."""
+    """A request to quit must also work after the client has used reset, restart, revert, reload and load."""
     outcome = outcomes(simulator)
 
     assert outcome["answers"]["supervisor/simulation_quit"]["success"]

@@ -119,7 +119,7 @@ def test_the_page_shows_the_smallest_example(repository) -> None:
 
 
 def test_the_page_quotes_the_real_messages(repository, problems) -> None:
-    """The example messages on the page must be real messages."""
+    """A user who compares a message with the page must find the same words there."""
     text = (repository / "docs/reference/trainingjob.md").read_text(encoding="utf-8")
 
     (role,) = problems({"simulators.1.role": "Eval"})
@@ -149,7 +149,7 @@ def test_every_rule_stands_below_its_table() -> None:
 
 
 def test_a_table_tells_type_default_and_what_is_required() -> None:
-    """A row has the name of a field, its type with its limits, and its default or `required`."""
+    """A reader must see in the table which fields are required, and the default of each other field."""
     rows = tables().splitlines()
 
     assert any(row.startswith("| `count` | integer, 1 to 16 | `1` |") for row in rows)

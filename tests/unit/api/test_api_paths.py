@@ -61,7 +61,10 @@ def test_what_is_not_there_cannot_be_taken() -> None:
 
 
 def test_a_stand_in_is_put_once() -> None:
-    """`take` returns False the second time: the error is then in the stand-in itself."""
+    """`take` puts the stand-in only once.
+
+    If the error stays, it is in the stand-in itself, and `take` returns False.
+    """
     pruned = Pruned({"metadata": 3})
 
     assert pruned.take(("metadata",), {"name": "stand-in"})
@@ -91,7 +94,7 @@ def test_the_model_at_a_path_is_found_through_lists() -> None:
 
 
 def test_the_tree_of_models_begins_with_the_job_itself() -> None:
-    """The walk also reaches the most deeply nested model."""
+    """A rule may be at any depth, so the walk must reach the most deeply nested model."""
     paths = [path for path, _ in walk(TrainingJob)]
 
     assert paths[0] == ()

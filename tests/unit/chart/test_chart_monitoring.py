@@ -44,9 +44,9 @@ def test_tensorboard_changes_no_run(one):
 
 @pytest.mark.parametrize(("chosen", "shown"), [({}, f"/runs/{FOLDER}"), ({"folder": ""}, "/runs")])
 def test_tensorboard_shows_the_links_that_trainers_make(chosen, shown):
-    """TensorBoard follows links, so in the root of the claim it would show each run twice.
+    """TensorBoard follows symbolic links, so in the root of the claim it would show each run twice.
 
-    One of the two would have a UID as its name.
+    One of the two runs would have a UID as its name.
     """
     made = objects(merged(MODES["offline"], {"tensorboard": chosen}))
 

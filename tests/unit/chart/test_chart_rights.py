@@ -105,7 +105,7 @@ def test_a_refused_request_is_no_right():
 
 
 def test_people_discovery_the_past_and_half_a_line_are_left_out():
-    """Other users send requests to the same API server, and it still writes the log during the test."""
+    """Only complete requests of service accounts for objects, since the given time, use a permission."""
     discovery = json.loads(entry("get"))
     del discovery["objectRef"]
     lines = [entry("list", user="admin"), json.dumps(discovery), entry("list"), '{"verb": "li']

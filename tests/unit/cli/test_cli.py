@@ -275,7 +275,7 @@ def test_a_file_that_is_no_text_is_one_line(tmp_path, fails):
 
 
 def test_a_replica_that_the_job_does_not_have_is_refused(job, tmp_path, fails):
-    """The message lists the replicas that the job has."""
+    """A user may count the replicas from 1, so the message shows the numbers that exist."""
     [line] = fails("run", job, "--replica", "2", "--dir", tmp_path / "runs")
 
     assert line == "--replica 2: the job has 2; use 0 to 1, or raise spec.replicas"

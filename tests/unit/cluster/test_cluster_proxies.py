@@ -68,7 +68,7 @@ def test_a_proxy_is_named_in_every_form_of_curl(text, proxy):
     "text", ["ftp://me:secret@proxy", "me:secret@", "http://", "http://me:secret@proxy:port"]
 )
 def test_what_is_no_proxy_is_refused_without_its_password(text):
-    """The message has the name of the variable and the remedy."""
+    """The message names the variable and the remedy. The password must not reach a terminal or a log."""
     with pytest.raises(NotConfigured, match=r"^HTTPS_PROXY: .* is not a proxy; write http://") as refused:
         proxy_named(text, "HTTPS_PROXY")
 

@@ -233,7 +233,10 @@ def test_a_selector_of_pods_of_others_is_refused(make_scene, selector):
     ],
 )
 def test_an_empty_name_hides_no_other(make_scene, scheduling):
-    """Today the API server refuses a pod with an empty name; the check must not depend on that."""
+    """An empty value must not make the check skip the other values.
+
+    The API server refuses such a pod today, but the check must not depend on that.
+    """
     scene = make_scene(scheduling=scheduling)
 
     scene.settle()

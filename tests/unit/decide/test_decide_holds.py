@@ -117,7 +117,10 @@ def held(scene):
     ],
 )
 def test_a_job_is_held_with_a_reason_and_creates_nothing(make_scene, spec, there, reason, message):
-    """The message has a field, a fact and a remedy; the job stays Pending and starts after the remedy."""
+    """The author can remove the cause, so the job waits.
+
+    The message has the field, the fact and the remedy.
+    """
     scene = make_scene(**spec)
     scene.there = there
 

@@ -15,7 +15,10 @@ from palaestra_protocol.pod.status import SuccessInterval
     ],
 )
 def test_an_exit_code_that_forbids_another_try_is_the_reason(training, last_word, code, reason, begin):
-    """The message quotes the trainer's termination message."""
+    """Kubernetes does not retry after these exit codes.
+
+    The user reads the cause in the trainer's own words.
+    """
     scene, pod = training()
     scene.end(pod, code, last_word(step=40, reason="Why: because"))
     scene.end_job("Failed", 0, "PodFailurePolicy", "Container trainer ... matching FailJob rule")

@@ -84,7 +84,10 @@ def test_a_trainer_that_its_probe_ended_says_so_with_the_remedy(training, words,
 
 
 def test_a_trainer_that_its_probe_ended_counts_once_and_evicts_nothing(training):
-    """The Job counts no failure for exit code 75. Without the operator's count it would retry for ever."""
+    """The Job counts no failure for exit code 75.
+
+    Without the operator's count, the Job would retry for ever.
+    """
     scene, pod = training()
     end_by_probe(scene, pod)
 

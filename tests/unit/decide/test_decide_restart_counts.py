@@ -24,7 +24,7 @@ def test_a_failure_is_a_restart_once_another_pod_is_there(training, last_word):
 
 
 def test_a_pod_that_was_taken_is_a_disruption(training):
-    """The Job does not count a disruption against `backoffLimit`."""
+    """The Job counts no failure for an evicted pod, so `backoffLimit` does not limit evictions."""
     scene, pod = training()
     scene.take(pod)
     scene.pass_(5)
@@ -36,7 +36,7 @@ def test_a_pod_that_was_taken_is_a_disruption(training):
 
 
 def test_a_pod_that_somebody_deleted_is_a_disruption_too(training):
-    """The deleted pod left no record, but a newer pod exists."""
+    """The deleted pod left no record. Only the newer pod shows that an attempt has ended."""
     scene, _ = training()
     scene.objects["pods"].clear()
     scene.pass_(5)

@@ -175,7 +175,10 @@ def test_the_status_has_step_and_time_of_the_last_checkpoint(training):
 
 
 def test_a_trainer_that_has_ended_leaves_its_replica_running_until_its_pod_has(training, last_word):
-    """Kubernetes still stops the simulators of the pod, so the operator neither retries nor starts a pod."""
+    """Kubernetes still stops the simulators of the pod.
+
+    Until the pod has ended, its replica must not count as ended or be retried.
+    """
     scene, pod = training()
     scene.container(pod, "trainer", code=0, message=last_word(step=100))
 

@@ -174,7 +174,7 @@ def test_a_simulator_that_is_killed_for_its_memory_is_named(training):
 
 
 def test_between_two_pods_the_message_says_how_the_last_one_failed(training, last_word):
-    """The message quotes the trainer's termination message."""
+    """While no pod runs, the user reads in this message why the last pod failed."""
     scene, pod = training()
     scene.end(pod, 70, last_word(reason="Unexpected: KeyError"))
     scene.count_failures(1)

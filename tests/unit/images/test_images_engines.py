@@ -80,7 +80,7 @@ def test_a_base_image_that_is_there_is_not_pulled(docker):
 
 
 def test_docker_builds_with_the_arguments_and_saves_the_archive(docker, order):
-    """Comments in the Dockerfiles explain these build arguments."""
+    """A Dockerfile gets the version and the packages of its image from these build arguments."""
     calls = docker(EVERYTHING)
     Docker.here().build(order)
 

@@ -96,7 +96,10 @@ def test_a_force_accelerates_its_joint(load):
 
 
 def test_a_servo_for_a_velocity_turns_at_it_and_to_a_target(load):
-    """A motor of Webots does the same. With an infinite target position the motor turns at its velocity."""
+    """A motor of Webots turns to its target position.
+
+    With an infinite target position it turns at its velocity.
+    """
     simulation = load(VELOCITY)
     motor = simulation.robots[0].motors["push"]
     motor.set_position(math.inf)

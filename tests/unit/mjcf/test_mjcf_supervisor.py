@@ -90,7 +90,7 @@ def home(control):
 @pytest.mark.parametrize("velocity", [None, 5.0])
 @pytest.mark.parametrize("reset", [False, True])
 def test_a_servo_holds_the_position_of_the_keyframe_until_it_gets_another(load, velocity, reset):
-    """A velocity is not a target position.
+    """A velocity command is not a target position.
 
     Without this rule a standing robot would move its legs to position 0.
     """

@@ -92,7 +92,7 @@ def test_conditions_say_why(look, raw_pod, condition, field, value):
 
 
 def test_the_last_word_is_of_our_protocol(look, raw_pod):
-    """The trainer's termination message is JSON of a fixed format."""
+    """Only JSON of this format is the trainer's report, whose numbers go into the status."""
     word = Termination(step=7, reason="Completed", success_rate=0.5, attempt=2, restarts=1)
     ended = {"terminated": {"exitCode": 0, "message": word.to_message()}}
     raw_pod["status"]["containerStatuses"] = [state("trainer", state=ended)]

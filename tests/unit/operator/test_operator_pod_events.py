@@ -239,7 +239,7 @@ def test_a_stranger_is_looked_at_again_until_it_is_gone(server):
 
 
 def test_who_is_in_the_cache_is_no_stranger(server):
-    """The Job belonged to the operator, but was not yet in its cache."""
+    """The operator's own Job had the name, but the cache got that Job only after the refused creation."""
     server.jobs["job-0"] = job()
     strangers = ForeignJobs(server, lambda: server.now)
     strangers.meet(KEY, UID, "job-0")

@@ -60,7 +60,10 @@ def test_a_robot_pushes_a_door_open(load, drive):
 
 
 def test_rays_meet_a_door_where_it_is(load):
-    """A supervisor opens a door that has long been at rest, and the door stays open."""
+    """A supervisor opens a door that has long been at rest.
+
+    The robot's infra-red sensor must then measure past the open door.
+    """
     simulation = load()
     simulation.step(1920)
     ahead = simulation.robots[0].sensors["ir1"]

@@ -76,9 +76,9 @@ def test_a_robot_slides_along_a_wall(load, drive):
 
 
 def test_sensors_see_walls_and_not_their_robot(load):
-    """For the same distance each physics gives the same voltage and draws the same noise.
+    """If the rays met their own robot, all sensors would read about the same.
 
-    The rays do not meet their own robot.
+    Here the sensor that faces the wall reads the highest voltage.
     """
     simulation = load()
     place(simulation, 1.6, 0.0)
@@ -221,7 +221,7 @@ def free_pair():
 
 
 def test_mujoco_follows_the_stub_through_each_change_of_speed(drive, free_pair):
-    """A policy trained under one of them then finds the same accelerations under the other."""
+    """A policy that was trained with one of the two physics finds the same accelerations with the other."""
     pair = free_pair()
     for simulation in pair:
         place(simulation, 0.0, 0.0, 2.5)

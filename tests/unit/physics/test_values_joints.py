@@ -141,9 +141,9 @@ SLEDGE = """SliderJoint {{
 
 @pytest.mark.parametrize("shape", [it for it in SHAPES if it.volume_m3], ids=str)
 def test_a_shape_has_the_mass_of_its_volume(shape):
-    """MuJoCo only: a force of 100 N gives the shape the acceleration for 200 kg/m3.
+    """MuJoCo only: 100 N accelerate the shape as its volume at 200 kg/m3 requires.
 
-    A convex hull would be heavier.
+    Its convex hull would be heavier.
     """
     base = "translation 0 0 1 boundingObject Box { size 0.1 0.1 0.1 }"
     simulation = Setting("mujoco").load(robot(SLEDGE.format(shape.node), base))

@@ -139,9 +139,9 @@ def test_wheels_take_a_robot_where_they_roll(base, setting):
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
 @pytest.mark.parametrize("base", BASES)
 def test_sensors_of_motion_read_what_the_circle_gives(base, setting):
-    """The sensors are turned and off the robot's center.
+    """The robot drives along a circle at a constant speed.
 
-    The robot drives along a circle at a constant speed.
+    The sensors are rotated, and mounted off the robot's center.
     """
     simulation = simulation_of(setting, base)
     for start, speeds in zip(STARTS, COMMANDS[base], strict=True):

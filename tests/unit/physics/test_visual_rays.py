@@ -196,7 +196,10 @@ def test_what_moves_is_seen_where_it_is(begin):
 
 
 def test_rays_pass_the_robot_and_what_is_around_it(begin):
-    """The robot's own parts are often simpler here than in Webots; a surface is not drawn from inside."""
+    """The robot's own parts are often simpler here than in Webots, so its rays pass them.
+
+    The rays also pass a surface from its inside, which Webots does not draw.
+    """
     own = "Solid { translation 0.3 0 0 children [ Shape { geometry Box { size 0.1 1 1 } } ] }"
     around = "Solid { children [ Shape { geometry Sphere { radius 30 } } ] }"
 
