@@ -98,7 +98,7 @@ def test_a_module_that_is_harmless_by_itself_is_found_too(program, name, tmp_pat
 
 
 def test_a_local_run_names_every_file_before_anything_starts(folder, tmp_path):
-    """Otherwise the simulators would start, and only then the trainer would fail."""
+    """Without this check, the simulators would start, and only then the trainer would fail."""
     code, _, err = ran("palaestra", folder, "run", JOB, "--dir", tmp_path / "runs")
 
     assert code == 2

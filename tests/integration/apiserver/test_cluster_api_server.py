@@ -208,7 +208,7 @@ def test_a_reflector_follows_what_happens_and_looks_up_by_label(real, namespace)
 
 
 def test_contents_of_objects_can_stay_with_the_api_server(real, namespace):
-    """Otherwise a list of a thousand jobs would hold a thousand worlds in memory."""
+    """With their contents, a list of a thousand jobs would hold a thousand worlds in memory."""
     real.create(CONFIG_MAPS, config_map(namespace, data={"world": "x" * 1000}, mine="yes"))
 
     found = real.list(CONFIG_MAPS.only_metadata(), namespace, labels="mine=yes")

@@ -187,7 +187,7 @@ def test_trouble_that_lasts_is_met_with_patience(follow, rude, trouble):
 
 
 def test_an_event_that_was_cut_is_never_seen(follow):
-    """The client must drop half of an event; the next watch brings the whole event."""
+    """The client must drop half of an event, because the next watch brings the whole event."""
     followed = follow(stream(added("c", "11"), ends="broken"), stream(added("d", "12"), ends="silent"))
 
     followed.wait_reported("d")

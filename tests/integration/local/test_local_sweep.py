@@ -140,7 +140,7 @@ def test_a_trial_that_optuna_prunes_is_stopped(desk, tmp_path, capsys):
 
 
 def test_every_trial_is_checked_before_the_first_begins(desk, tmp_path, capsys):
-    """Otherwise a user might find the mistake only after a night, when the last trial starts."""
+    """A user must not find the mistake only after a night, when the last trial starts."""
     file = desk(LEARN, matrix={"trainer.steps": [10, 0]})
 
     assert main(["sweep", str(file), "--dir", str(tmp_path / "runs")]) == 2

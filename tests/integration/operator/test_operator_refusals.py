@@ -348,7 +348,7 @@ def kueue(installed):
 
 
 def test_a_queue_without_kueue_is_reported_until_kueue_is_there(place, start, request):
-    """Otherwise the job would stay suspended without a reason that the user can see."""
+    """Without Kueue the job stays suspended, so the user must see the reason."""
     start()
     place.train(scheduling={"queueName": "robots"})
     eventually(lambda: place.condition("Accepted").get("reason") == "NoKueue")

@@ -81,7 +81,10 @@ def test_the_metrics_are_those_of_the_page(place, start):
 
 
 def test_a_job_that_runs_and_ends_is_counted(place, start):
-    """A job's time to the start and its reason of the end are counted when its status shows them."""
+    """Users query the time to the start and the reason of the end.
+
+    The operator counts each once, when the status first shows it.
+    """
     operator = start()
     place.train()
     [pod] = place.pods()

@@ -154,7 +154,7 @@ def test_a_client_that_reads_slowly_gets_the_whole_answer(peer, ask_for_much):
 
 
 def test_a_node_keeps_nothing_for_a_client_that_stops_reading(ask_for_much, monkeypatch):
-    """Otherwise the node would hold an image in memory for each client that stopped reading."""
+    """If the node kept unsent data, it would hold an image in memory for each client that stopped reading."""
     monkeypatch.setattr(links, "SEND_S", 0.01)
     connection = ask_for_much()
     eventually(lambda: all(link.closed for link in links_there()))

@@ -146,7 +146,7 @@ def test_a_service_that_does_not_answer_hangs(service):
 
 
 def test_when_patience_is_over_nobody_is_waited_for(service):
-    """Otherwise sixteen hanging simulators would delay the end of a trainer by sixteen timeouts."""
+    """Sixteen hanging simulators must not delay the end of a trainer by sixteen timeouts."""
     never = [service("never", deadline_s=30.0) for _ in range(16)]
     get_time = service("get_time")
     get_time(ask=True)

@@ -124,7 +124,7 @@ def test_a_service_of_the_page_succeeds(outcomes, simulator, path):
 
 @for_each("simulator, path", cases(FAILING.__getitem__))
 def test_a_service_that_the_page_calls_failing_fails(outcomes, simulator, path):
-    """Otherwise the service would report success without an effect."""
+    """If such a service reported success, a client would rely on an effect that it does not have."""
     answer = outcomes(simulator)["answers"][path]
 
     assert "failed" in answer or not next(iter(answer.values()))

@@ -113,7 +113,7 @@ def test_two_groups_of_one_name_are_found_beside_another_mistake(problems) -> No
 
 
 def test_no_simulators_is_not_the_same_as_nothing_said(problems) -> None:
-    """An empty list is a mistake; a missing list means the default."""
+    """An empty list is a mistake, but a missing list means the default groups."""
     assert problems({"simulators": []}) == ["spec.simulators: has no entry; give one or remove the line"]
 
 

@@ -51,7 +51,7 @@ def test_what_is_left_of_a_list_knows_its_old_numbers() -> None:
 
 
 def test_what_is_not_there_cannot_be_taken() -> None:
-    """`take` returns False if the path does not exist; the caller then removes the parent object."""
+    """`take` returns False for a missing path, so that the caller can remove the parent object."""
     pruned = Pruned({"a": {"b": 1}})
 
     assert not pruned.take(("a", "c"))

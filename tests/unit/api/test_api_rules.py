@@ -343,7 +343,10 @@ RULES = {
 
 @pytest.mark.parametrize("name", BROKEN)
 def test_a_broken_rule_is_reported_in_one_line(name, problems) -> None:
-    """The line has a path, a fact and a remedy; further errors that the mistake causes are not reported."""
+    """The line has a path, a fact and a remedy.
+
+    Further errors that the same mistake causes would distract the author.
+    """
     changes, line = BROKEN[name]
 
     assert problems(changes) == [line]

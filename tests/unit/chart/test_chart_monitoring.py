@@ -55,7 +55,10 @@ def test_tensorboard_shows_the_links_that_trainers_make(chosen, shown):
 
 
 def test_the_token_of_the_notebooks_is_in_no_object(one):
-    """The token stays in its Secret, which is mounted as a file; the server receives only the file's path."""
+    """A token in an object could be read by everybody who may read the object.
+
+    It stays in its Secret, and the server receives only the path of the mounted file.
+    """
     pod = one("offline", "Deployment", "palaestra-jupyter")["spec"]["template"]["spec"]
     [server] = pod["containers"]
 

@@ -38,7 +38,10 @@ def test_another_simulator_is_refused_with_the_known_ones(run, capsys):
 
 
 def test_a_folder_without_a_run_is_refused(tmp_path, capsys):
-    """An argument with a slash is always a folder; a name without a slash may be a job in a cluster."""
+    """An argument with a slash is always a folder.
+
+    The command must not look for a job of this name in a cluster.
+    """
     assert main(["view", str(tmp_path)]) == 2
     assert "is not a run directory, which has training.yaml" in capsys.readouterr().err
 

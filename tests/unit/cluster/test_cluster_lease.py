@@ -75,6 +75,6 @@ def test_the_times_in_a_lease_are_never_compared_with_a_clock():
 
 
 def test_a_lease_without_a_spec_is_nobodys():
-    """Another program may have written the Lease; its content must not stop the operator."""
+    """Another program may have written the Lease, and its content must not stop the operator."""
     assert LeaseSpec.read({"metadata": {"name": "x"}}) == LeaseSpec()
     assert ObservedLease().free(0.0)

@@ -64,6 +64,9 @@ def test_nothing_else_of_the_values_changes():
 
 
 def test_values_without_that_image_are_an_error():
-    """Another release of Kueue may name its image elsewhere; without the error its chart would not change."""
+    """Another release of Kueue may name its image elsewhere.
+
+    Without the error, its chart would silently stay unchanged.
+    """
     with pytest.raises(LookupError, match="has no repository of an image below controllerManager"):
         released("controllerManager: {}\n")

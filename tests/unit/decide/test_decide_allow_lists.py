@@ -152,7 +152,10 @@ def test_what_affects_others_is_held_with_its_field_and_the_value_that_allows_it
 
 @pytest.mark.parametrize("name", [name for name, (_, allowed, *_) in REFUSED.items() if allowed])
 def test_what_the_installation_allows_starts_the_job(make_scene, name):
-    """An administrator sets the chart's value, which restarts the operator; the held job then starts."""
+    """An administrator sets the chart's value, which restarts the operator.
+
+    The new operator must start the held job.
+    """
     scheduling, allowed, *_ = REFUSED[name]
     scene = make_scene(scheduling=scheduling)
     scene.settle()

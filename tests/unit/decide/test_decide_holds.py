@@ -237,7 +237,10 @@ def test_a_world_that_goes_away_later_does_not_matter_to_a_running_job(make_scen
 
 
 def test_a_label_that_was_taken_away_keeps_a_new_pod_from_it(make_scene):
-    """The replica whose Job is missing is held; the replica that runs continues."""
+    """A new pod must not use the object, so the replica without a Job is held.
+
+    The other replica runs and continues.
+    """
     scene = make_scene(simulators=WORLD, replicas=2)
     scene.there[("ConfigMap", "worlds")] = config_map({"hall.wbt": WORLD_TEXT})
     scene.settle()

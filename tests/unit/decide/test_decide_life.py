@@ -298,7 +298,7 @@ def test_a_job_is_deleted_when_its_time_to_live_is_over(training, last_word):
 
 
 def test_the_time_to_live_may_be_given_after_the_end(training, last_word):
-    """A user may set this field of an ended job; the status then has the new generation."""
+    """A user may set this field of an ended job, and its status must then have the new generation."""
     scene, pod = training()
     scene.end(pod, 0, last_word(step=100))
     scene.end_job("Complete")
@@ -315,7 +315,7 @@ def test_the_time_to_live_may_be_given_after_the_end(training, last_word):
 def test_a_pod_that_only_says_to_be_the_replicas_is_waited_for(accepted, last_word):
     """The pod has the labels of the replica, but not its owner.
 
-    It may write to the volume, so the operator waits for its end; it ignores the pod's report.
+    The pod may write to the volume, so the operator waits for its end. It must not trust the pod's report.
     """
     scene = accepted()
     pod = scene.running_pod()

@@ -71,7 +71,7 @@ def test_the_start_timeout_counts_while_a_trainer_has_not_answered(start_slowly)
 
 @pytest.mark.parametrize(("words", "probe"), [(LIVENESS, "liveness"), (STARTUP, "startup")])
 def test_a_trainer_that_its_probe_ended_says_so_with_the_remedy(training, words, probe):
-    """The pod does not show the sender of the signal; only the kubelet's event does."""
+    """The pod does not show who sent the signal. Only the kubelet's event shows it."""
     scene, pod = training()
     end_by_probe(scene, pod, words)
 

@@ -273,7 +273,7 @@ def test_deciding_again_says_nothing_new(history):
 @settings(max_examples=30)
 @given(histories)
 def test_an_end_is_an_end(history):
-    """A terminal phase never changes, and the operator never plans an ended replica again."""
+    """Programs act on a terminal phase, so it must never change. An ended replica must not train again."""
     for before, _, _, decision in decisions(history):
         ended = {each.index for each in before.replicas if each.phase in TERMINAL}
         now_ended = {each.index for each in decision.status.replicas if each.phase in TERMINAL}
@@ -310,9 +310,10 @@ def kept(replica):
 @settings(max_examples=30)
 @given(histories)
 def test_phase_and_conditions_tell_the_same(history):
-    """At most one condition of a phase is true, and it belongs to the current phase.
+    """Some programs read the phase, and others the conditions.
 
-    At most one of Reconciling and Stalled is true.
+    At most one condition of a phase is true, and it belongs to the current phase. At most one of Reconciling
+    and Stalled is true.
     """
     for _, _, _, decision in decisions(history):
         status = decision.status

@@ -102,7 +102,7 @@ def test_what_others_have_written_into_the_object_takes_room_too():
 
 
 def test_a_replica_that_failed_keeps_its_log_longest():
-    """A person reads this log to find the cause; a running replica sends its log again."""
+    """A person reads this log to find the cause of the failure. A running replica sends its log again."""
     status = whole([replica(i, "Failed" if i == 7 else "Running") for i in range(100)])
 
     cut = fitted(job(1_000_000), status)

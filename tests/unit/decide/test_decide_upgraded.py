@@ -32,7 +32,7 @@ def upgraded(request, make_scene):
 
 
 def test_a_new_job_like_it_is_not_accepted(upgraded, make_scene):
-    """This test shows that the rule exists; the tests below would pass without the rule."""
+    """If the rule did not exist, the tests below would pass without a meaning."""
     scene = make_scene(**upgraded.raw["spec"])
 
     decision = scene.settle()

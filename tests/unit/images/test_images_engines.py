@@ -55,7 +55,7 @@ def order(tmp_path):
 
 @pytest.mark.parametrize("lacking", ["version", "buildx-version"])
 def test_without_an_engine_or_buildx_there_is_no_docker(docker, lacking):
-    """Many machines have only Docker's client; an old engine cannot mount files during a build."""
+    """Many machines have only Docker's client, and an old engine cannot mount files during a build."""
     docker(" ".join(word for word in EVERYTHING.split() if word != lacking))
 
     assert Docker.here() is None

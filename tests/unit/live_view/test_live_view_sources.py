@@ -130,7 +130,7 @@ def test_the_sentence_of_a_sidecar_is_passed_on(serve, run, status, error, fact)
 
 
 def test_an_older_sidecar_and_a_dead_one_are_told_apart(serve, run):
-    """An older sidecar will never serve a scene; a dead one may be restarted."""
+    """An older sidecar will never serve a scene, but a dead one may be restarted."""
     (old,) = LocalRun(run(serve(state=answer(MOVED)))).sources()
     with pytest.raises(NotShown, match="is not one of /state"):
         old.scene()

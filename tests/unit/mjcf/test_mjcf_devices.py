@@ -22,7 +22,10 @@ def value(simulation, name):
 
 
 def test_every_actuator_sensor_and_camera_is_a_device(load):
-    """A model needs no list of devices; a sensor without a name is named after its joint and its type."""
+    """The author of a model need not list its devices.
+
+    A sensor without a name is named after its joint and its type.
+    """
     assert kinds(load()) == {
         "push": "LinearMotor",
         "cart position": "PositionSensor",

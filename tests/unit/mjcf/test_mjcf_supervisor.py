@@ -183,7 +183,10 @@ def test_a_body_on_joints_takes_no_velocity(load):
 
 
 def test_contact_points_are_where_a_body_touches(load):
-    """The ball first falls, and then lies on the floor."""
+    """While the ball falls, it touches nothing.
+
+    When it lies on the floor, the contact point is below its center.
+    """
     simulation = load()
     ball = simulation.tree.of_def("ball")
     assert simulation.contact_points(ball, descendants=False) == []

@@ -64,7 +64,10 @@ def place(picture):
 
 
 def test_a_movie_shows_the_robot_drive_in_the_time_of_the_simulation(simulation, tmp_path):
-    """The movie has 25 frames a second; its file gets its name only when the movie is complete."""
+    """At 25 frames a second, the movie must be as long as the drive.
+
+    Its file gets its name only when the movie is complete.
+    """
     path = tmp_path / "drive.mp4"
     assert simulation.movies.ready
     assert simulation.movies.start(movie(path))
@@ -82,7 +85,7 @@ def test_a_movie_shows_the_robot_drive_in_the_time_of_the_simulation(simulation,
 
 
 def test_a_movie_follows_the_viewpoint(tmp_path):
-    """The robot stands still, and a client moves the viewpoint."""
+    """The robot stands still and a client moves the viewpoint, so the robot must move in the picture."""
     simulation = Simulation.load(WORLD.encode(), MujocoPhysics(), "world", Mode.FAST)
     viewpoint = next(node for node in simulation.tree.root.nodes() if node.type_name == "Viewpoint")
     path = tmp_path / "panorama.mp4"
@@ -99,7 +102,10 @@ def test_a_movie_follows_the_viewpoint(tmp_path):
 
 
 def test_a_movie_removes_what_a_killed_simulator_left_of_it(simulation, tmp_path):
-    """The hidden files of other movies stay, and so do files that another simulator is writing."""
+    """The unfinished file of a killed simulator would stay for ever.
+
+    The hidden files of other movies stay, and so do files that another simulator is writing.
+    """
     path = tmp_path / "drive.mp4"
     code = f"""if True:
         import os, signal
@@ -178,7 +184,7 @@ def test_a_movie_that_cannot_be_written_fails_at_the_start(simulation, tmp_path,
 
 
 def test_a_movie_without_a_step_fails(simulation, tmp_path, caplog):
-    """A failed movie leaves no file."""
+    """A movie without a frame cannot be played, so it fails and leaves no file."""
     simulation.movies.start(movie(tmp_path / "it.mp4"))
     simulation.movies.stop()
 
@@ -235,7 +241,7 @@ def test_without_the_library_the_refusal_names_what_to_install(simulation, tmp_p
 
 
 def test_a_simulator_without_pictures_records_none(tmp_path):
-    """Webots with `--no-rendering` does the same; a request to stop is not an error."""
+    """Webots with `--no-rendering` records no movie either. A request to stop one is then not an error."""
     simulation = Simulation.load(WORLD.encode(), StubPhysics(), "world", Mode.FAST)
 
     assert not simulation.movies.start(movie(tmp_path / "it.mp4"))

@@ -87,7 +87,7 @@ def test_a_red_box_ahead_is_in_the_middle_before_the_sky(load):
 
 
 def test_a_color_is_blue_green_red_alpha(load):
-    """Webots has this order of colors; alpha is 255 in every pixel."""
+    """Programs for Webots expect this order of colors. Alpha is 255 in every pixel."""
     picture = look(load(BOX))
     blue, green, red, _ = picture[HEIGHT // 2, WIDTH // 2]
 
@@ -204,7 +204,7 @@ def test_a_shape_on_a_joint_moves_with_its_motor(load):
     ],
 )
 def test_every_geometry_is_drawn_where_it_is(load, geometry):
-    """MuJoCo moves the origin of a mesh to its center; the renderer must undo this."""
+    """MuJoCo moves the origin of a mesh to its center, so the renderer must move it back."""
     picture = look(load(BOX.replace("Box { size 1 1 1 }", geometry)))
     rows, columns = np.nonzero(reds(picture))
 
@@ -335,7 +335,7 @@ except SimError as error:
     ],
 )
 def test_a_machine_that_cannot_draw_simulates_the_rest(environment, message):
-    """OpenGL is loaded only for the first camera; the error then names the missing packages."""
+    """OpenGL is loaded only for the first camera. The error then names the missing packages."""
     done = subprocess.run(
         [sys.executable, "-c", BLIND % environment], capture_output=True, text=True, check=True
     )

@@ -85,7 +85,10 @@ def test_the_words_of_others_are_one_line_and_cut(look, raw_pod):
     ],
 )
 def test_conditions_say_why(look, raw_pod, condition, field, value):
-    """The scheduler, the kubelet and the program that removes a pod each set a condition."""
+    """A user must learn why a pod waits or is removed.
+
+    The scheduler, the kubelet and the program that removes a pod each set a condition with the reason.
+    """
     raw_pod["status"]["conditions"] = [condition]
 
     assert getattr(pod(look, raw_pod), field) == value

@@ -46,7 +46,7 @@ def angle(simulation, name="DOOR"):
 
 
 def test_a_robot_pushes_a_door_open(load, drive):
-    """Without a push the door stays shut in its frame. Its knob moves together with it."""
+    """Without a push the door stays shut in its frame. The knob moves together with the door."""
     simulation = load()
     simulation.step(1920)
     assert angle(simulation) == pytest.approx(0.0, abs=1e-3)

@@ -65,7 +65,7 @@ def test_a_wall_holds_a_robot_and_its_bumper_feels_it(load, drive):
 
 
 def test_a_robot_slides_along_a_wall(load, drive):
-    """The wall stops the motion toward it; the motion along the wall continues."""
+    """The wall stops the motion toward it, but not the motion along it."""
     simulation = load()
     place(simulation, 1.7, -0.5)
 
@@ -174,7 +174,7 @@ def test_a_reset_forgets_everything(load, drive):
 
 
 def test_an_imported_crate_is_an_obstacle_until_the_reset(load, drive):
-    """The import changes no state of the robot; the reset removes the crate."""
+    """The import must not change the state of the robot, and the reset must remove the crate."""
     simulation = load()
     drive(simulation, 0.2, 0.0, 0.0, steps=2)
     before = simulation.robots[0].place.translation

@@ -157,7 +157,7 @@ def test_a_shape_has_the_mass_of_its_volume(shape):
 @pytest.mark.parametrize("damping", [0.5, 2.0, 8.0])
 @pytest.mark.parametrize("physics", ["stub", "mujoco"])
 def test_a_brake_limits_a_motor_to_its_torque_over_the_damping(physics, damping):
-    """At the limit the damper takes the motor's whole 20 N m; slower commands are not limited."""
+    """At the limit the damper takes the motor's whole 20 N m. A slower command is not limited."""
     axis, away, _ = BOXES[0]
     base = "translation 0 0 1 boundingObject Box { size 0.1 0.1 0.1 }"
     simulation = Setting(physics).load(robot(HEAVY.format(axis=axis, away=away), base))

@@ -160,7 +160,7 @@ def test_each_ray_of_a_lidar_leaves_at_its_azimuth_and_elevation(setting, name):
 
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
 def test_a_rotating_lidar_sees_all_around_within_a_turn(setting):
-    """The head begins ahead and turns to the right; the tilt raises each of its rays."""
+    """The head of the lidar begins ahead and turns to the right. The tilt raises each of its rays."""
     simulation = scanned(setting)
     for sensor in LOOKS:
         move(simulation, "R", setting.put(WALL @ sensor @ MOUNT.inverse))
