@@ -90,7 +90,10 @@ def seeing():
 
 
 def test_a_policy_is_trained_on_what_a_camera_sees(namespace, seeing, tmp_path):
-    """Each observation contains an image of 64 x 48 pixels. Mesa draws it on the simulator's own thread."""
+    """A policy with a camera must train in a pod without a GPU.
+
+    Each observation contains an image of 64 x 48 pixels, which Mesa draws on the simulator's own thread.
+    """
     namespace.apply(seeing)
     pod = namespace.wait_for_pod("see-target")
 

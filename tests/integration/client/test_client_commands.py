@@ -263,7 +263,7 @@ def test_suspending_a_job_with_a_queue_says_that_kueue_decides_and_how_to_stop_i
 
 @pytest.mark.parametrize("command", ["suspend", "resume"])
 def test_a_job_that_has_ended_is_neither_suspended_nor_resumed(typed, place, tell, command):
-    """Otherwise a user's `kubectl wait --for=condition=Suspended` would wait forever."""
+    """An ended job never becomes Suspended. A user's `kubectl wait` for that condition would last forever."""
     place.train("a")
     tell("a", "Succeeded")
 

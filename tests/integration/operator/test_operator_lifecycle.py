@@ -212,7 +212,7 @@ def test_a_missing_world_is_reported_and_the_job_starts_when_it_is_there(place, 
 
 
 def test_a_world_without_the_label_for_jobs_is_not_opened(place, start):
-    """If no label were needed, an author could read any ConfigMap of the namespace by a TrainingJob."""
+    """Without this rule, an author could read any ConfigMap of the namespace through a TrainingJob."""
     start()
     world = world_map()
     del world["metadata"]["labels"]

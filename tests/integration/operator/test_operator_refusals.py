@@ -286,7 +286,7 @@ def test_no_secret_is_looked_at_where_nobody_allowed_it(place, start, installed)
 
 
 def test_a_pull_secret_needs_the_label_and_is_looked_at_where_somebody_allowed_it(place, start, installed):
-    """Otherwise an author could run and read private images without the consent of their owner."""
+    """Without this rule, an author could run and read private images without the consent of their owner."""
     open_secrets(installed, place)
     place.create(SECRETS, {**SECRET, "metadata": {"name": "token"}})
     start()

@@ -285,7 +285,10 @@ def test_a_late_subscriber_of_a_latched_topic_gets_the_last_message(peer, dial):
 
 
 def test_a_subscriber_that_does_not_read_gets_the_newest(peer, dial):
-    """With queue size 1, a subscriber that does not read loses old messages and delays no other client."""
+    """A slow subscriber must not block the publisher.
+
+    With queue size 1, the subscriber loses old messages and gets the newest one.
+    """
     topic = {"topic": f"/{peer.name}/ir1/value", "md5sum": "*", "type": "sensor_msgs/Range"}
     connection, _ = dial(**topic)
     count = 200_000

@@ -239,7 +239,10 @@ def test_a_program_that_is_a_node_already_stays_the_one_it_is(peer):
 
 
 def test_a_node_that_ends_in_good_order_is_unregistered(peer):
-    """Otherwise clients would look for the next simulator of that name at the old address."""
+    """The old address must not stay at the master.
+
+    Clients would look there for the next simulator of that name.
+    """
     peer.end()
 
     assert Master("/probe").service_address(f"/{peer.name}/double") is None

@@ -21,7 +21,10 @@ from palaestra.api.simulators import WorldSource
     ],
 )
 def test_a_path_is_shown_as_a_person_writes_it(path, text) -> None:
-    """The path has dots between words, numbers in brackets, and quotes around the rest."""
+    """Authors find the field in their file by this path.
+
+    It has dots between words, numbers in brackets, and quotes around the rest.
+    """
     assert shown(path) == text
 
 
@@ -81,7 +84,7 @@ JSON = st.recursive(
 
 @given(JSON)
 def test_nothing_taken_is_everything_left(data) -> None:
-    """Without a call of `take`, `data` returns the data unchanged."""
+    """A job without errors must be validated as its author wrote it."""
     assert Pruned(data).data() == data
 
 

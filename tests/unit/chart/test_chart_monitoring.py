@@ -34,7 +34,7 @@ def test_what_has_no_login_is_reached_by_nobody(one):
 
 
 def test_tensorboard_changes_no_run(one):
-    """TensorBoard mounts the volumes of the runs read-only."""
+    """An error in TensorBoard must not destroy a run, so TensorBoard mounts the volumes read-only."""
     pod = one("offline", "Deployment", "palaestra-tensorboard")["spec"]["template"]["spec"]
     mounts = {mount["name"]: mount for mount in pod["containers"][0]["volumeMounts"]}
 
@@ -91,7 +91,10 @@ def test_runbooks_are_links_if_a_value_has_the_address():
 
 
 def test_every_dashboard_is_mounted_as_it_is(made):
-    """Each dashboard has the content of its file, and the label that Grafana's sidecar searches for."""
+    """Grafana's sidecar finds a dashboard only by the label `grafana_dashboard`.
+
+    The content must be that of the file, which other tests check.
+    """
     found = {
         name: (json.loads(text), each["metadata"]["labels"].get("grafana_dashboard"))
         for each in made("monitored")

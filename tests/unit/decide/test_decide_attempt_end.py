@@ -116,7 +116,10 @@ def test_the_log_of_a_container_before_the_trainer_is_kept(accepted, command_gro
     ],
 )
 def test_how_an_attempt_ended_is_one_of_the_reasons(training, last_word, code, word, reason):
-    """The exit code and the trainer's termination message determine the reason."""
+    """Users and programs know only the documented reasons.
+
+    The exit code and the trainer's termination message determine which reason it is.
+    """
     scene, pod = training()
     scene.end(pod, code, last_word(reason=word))
 

@@ -88,7 +88,7 @@ def test_only_a_replica_that_lacks_an_object_is_planned(accepted):
 
 
 def test_a_job_that_trains_says_so(training):
-    """The phase, the printer columns and the conditions agree."""
+    """Users read the phase and the columns, and programs read the conditions. All of them must agree."""
     scene, _ = training()
 
     held = {each.type.value: each.status.value for each in scene.status.conditions}
@@ -100,7 +100,10 @@ def test_a_job_that_trains_says_so(training):
 
 
 def test_a_job_succeeds_when_all_its_replicas_have(accepted, last_word):
-    """The status has the values that each trainer reported last."""
+    """One successful replica does not complete the job.
+
+    At the end, the status has the values that the trainers reported last.
+    """
     scene = accepted(replicas=2)
     pods = [scene.running_pod(index) for index in (0, 1)]
     scene.settle()
@@ -157,7 +160,10 @@ def test_a_replica_that_failed_does_not_stop_the_others(accepted):
 
 
 def test_a_job_with_a_failed_replica_fails_when_the_last_has_ended(accepted, last_word):
-    """The message has the number of failed replicas, and the reason of the first one."""
+    """The other replicas may still succeed.
+
+    At the end, the message has the number of failed replicas and the reason of the first one.
+    """
     scene = accepted(replicas=2)
     pods = [scene.running_pod(index) for index in (0, 1)]
     scene.end(pods[0], 81, last_word(reason="Diverged: NaN"))

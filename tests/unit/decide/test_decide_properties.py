@@ -288,7 +288,10 @@ def test_an_end_is_an_end(history):
 @settings(max_examples=30)
 @given(histories)
 def test_counts_never_fall_and_always_add_up(history):
-    """The attempt number is one more than the sum of the restarts of all causes."""
+    """Users and metrics rely on the counts.
+
+    The attempt number is one more than the sum of the restarts of all causes.
+    """
     for before, _, _, decision in decisions(history):
         for old, new in zip(before.replicas, decision.status.replicas, strict=False):
             was, now = old.restarts, new.restarts

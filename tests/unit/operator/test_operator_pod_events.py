@@ -110,7 +110,10 @@ def look_at(hindrances, number):
 
 
 def test_at_most_five_events_lists_a_second_are_asked_for_and_everybody_has_a_turn(server):
-    """The limit holds for all namespaces together. A reconcile before its turn sends no request."""
+    """The API server must not be flooded, so the limit holds for all namespaces together.
+
+    A reconcile before its turn sends no request.
+    """
     hindrances = PodEvents(server, lambda: server.now)
     due = {number: look_at(hindrances, number).again_s for number in range(1500)}
     looks = 0

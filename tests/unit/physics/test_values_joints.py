@@ -119,7 +119,10 @@ BOXES = [
 
 @pytest.mark.parametrize(("axis", "away", "inertia"), BOXES)
 def test_a_torque_and_a_force_speed_up_what_they_move(axis, away, inertia):
-    """MuJoCo only: half the acceleration times the time squared. The stub rejects torques and forces."""
+    """MuJoCo only: the distance is half the acceleration times the time squared.
+
+    The stub rejects torques and forces.
+    """
     base = "translation 0 0 1 boundingObject Box { size 0.1 0.1 0.1 }"
     simulation = Setting("mujoco").load(robot(HEAVY.format(axis=axis, away=away), base))
     device(simulation, "turn").set_effort(1.5)
@@ -182,7 +185,10 @@ TURNS = [
 
 @pytest.mark.parametrize("mounted", TURNS, ids=lambda it: it.fields[20:])
 def test_a_sensor_of_force_measures_its_own_weight_in_its_own_axes(mounted):
-    """MuJoCo only: `force-3d` reads the weight in the sensor's frame, `force` the part along x."""
+    """MuJoCo only: `force-3d` reads the weight in the sensor's frame.
+
+    `force` reads only the pressure along the x axis.
+    """
     weight = mounted.rotation.T @ [0.0, 0.0, -2.0 * 9.81]
     rotation = mounted.fields.partition("rotation")[2]
     for kind, expected in (("force-3d", weight), ("force", [max(0.0, -weight[0])])):

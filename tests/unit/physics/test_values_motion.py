@@ -183,7 +183,7 @@ BUMPER = """TouchSensor { name "bumper" type "bumper" translation 0.1 0 0.2
 def test_a_bumper_touches_a_wall_where_its_rim_reaches_it(setting):
     """The rim is 0.3 m from the robot's center.
 
-    A wall one millimeter nearer touches it, one millimeter farther does not.
+    A wall at 0.299 m touches the rim, and a wall at 0.301 m does not.
     """
     wheels = " ".join(wheel(f"wheel {index}", *it) for index, it in enumerate(TWO))
     wall = 'DEF WALL Solid { name "wall" boundingObject Box { size 0.2 2 1 } }'

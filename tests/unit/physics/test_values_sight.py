@@ -255,7 +255,7 @@ def test_a_pixel_of_a_range_finder_is_a_distance_along_the_lens(setting):
 
 @pytest.mark.parametrize("setting", MUJOCO, ids=str)
 def test_a_camera_recognizes_an_object_where_it_is(setting):
-    """MuJoCo only: the camera returns the object's pose in its own frame and the middle in the picture."""
+    """MuJoCo only: the camera returns the object's pose in the camera's frame, and its middle in pixels."""
     simulation = pictures_of(setting)
     starts = [(2.0, 0.3, -0.4), (1.5, -1.0, 0.6), (3.0, 1.0, 1.0)]
     for roll, start in enumerate(starts):
