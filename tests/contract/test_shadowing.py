@@ -67,7 +67,10 @@ def ran(program, folder, *arguments):
     sorted({each.name for name in PACKAGES for each in distribution(name).entry_points}),
 )
 def test_each_program_starts_or_names_the_files(program, folder):
-    """A program that runs users' code must name the files and stop. Every other program must start."""
+    """Users' code could import such a file instead of Python's module.
+
+    So a program that runs users' code must name the files and stop. Every other program must start.
+    """
     code, out, err = ran(program, folder, "--help")
 
     if program in WITH_CODE_OF_USERS:

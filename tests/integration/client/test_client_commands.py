@@ -207,7 +207,10 @@ def started(control_plane, place, *arguments):
 
 
 def test_watch_draws_where_there_is_a_terminal(control_plane, place, tell):
-    """The last picture stays on the screen, followed by the line about the end of the job."""
+    """On a terminal a user sees a picture that changes.
+
+    The last picture stays on the screen, followed by the line about the end of the job.
+    """
     place.train("a")
     tell("a", "Succeeded", replicas=[REPLICA | {"successRate": 0.5}])
     ours, theirs = os.openpty()
@@ -237,7 +240,10 @@ def test_watch_draws_where_there_is_a_terminal(control_plane, place, tell):
 
 
 def test_suspend_and_resume_change_the_spec(typed, place):
-    """A user may name several jobs in one command, as with kubectl."""
+    """The operator acts on the spec of a job.
+
+    As with kubectl, a user may name several jobs in one command.
+    """
     for name in ("a", "b"):
         place.train(name)
 

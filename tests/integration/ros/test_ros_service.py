@@ -103,7 +103,10 @@ def test_calls_together_are_all_answered(service):
 
 
 def test_both_ends_are_set_up_for_small_messages(service):
-    """BBR, a common default, needs a timer for each connection, which slows four simulators down."""
+    """BBR is a common default for congestion control.
+
+    It needs a timer for each connection, which slows four simulators down.
+    """
     double = service("double", "webots_ros/set_float")
     double.begin(value=1.0)
 

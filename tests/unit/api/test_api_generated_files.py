@@ -40,7 +40,10 @@ def test_the_committed_file_is_current(name, repository) -> None:
 
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_an_example_is_a_job_of_its_own_name(name, repository) -> None:
-    """Every example is a valid job, and its `metadata.name` is the name of its file."""
+    """A user finds the job in a cluster by the name of the file.
+
+    So every example is a valid job with that name.
+    """
     path = repository / "manifests/examples" / f"{name}.yaml"
 
     job = load(path.read_text(encoding="utf-8"), path.name)

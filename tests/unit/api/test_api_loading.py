@@ -208,5 +208,5 @@ def test_a_whole_number_is_one_however_it_is_written() -> None:
 
 @pytest.mark.parametrize("steps", ["1.5", "1e-3", "1e300"])
 def test_a_number_that_is_not_whole_is_still_refused(steps) -> None:
-    """A float that is too large to be an exact integer is refused too."""
+    """A job cannot train half a step. A float that is too large to be an exact integer is refused too."""
     assert any("spec.trainer.steps" in each for each in told(MILLIONS.replace("1e6\n", f"{steps}\n")))

@@ -83,7 +83,10 @@ def test_the_installation_grants_no_secrets_though_a_role_for_them_is_in_it():
 
 
 def test_a_request_is_the_use_of_a_right():
-    """The use contains the subresource and the API server's reason to allow the request."""
+    """A logged request shows that a permission is in use.
+
+    The use contains the subresource and the API server's reason to allow the request.
+    """
     log = entry("patch", apiGroup="palaestra.dev", resource="trainingjobs", subresource="status")
 
     right = Right("palaestra.dev", "trainingjobs/status", "patch")

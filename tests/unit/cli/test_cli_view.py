@@ -32,7 +32,7 @@ def test_a_missing_library_is_named_with_the_command_that_installs_it(run, monke
 
 
 def test_another_simulator_is_refused_with_the_known_ones(run, capsys):
-    """The message lists the simulators of the run."""
+    """The user must learn which simulators the run has."""
     assert main(["view", run, "--simulator", "collect-7"]) == 2
     assert capsys.readouterr().out == "--simulator collect-7: the run has collect-0\n"
 
@@ -56,6 +56,6 @@ def test_a_name_that_is_no_folder_is_looked_up_in_the_cluster_and_that_is_said(t
 
 
 def test_a_simulator_that_shows_nothing_opens_no_page(run, capsys):
-    """The command prints the error that the sidecar returned."""
+    """An empty page would not explain the cause, so the command prints the sidecar's error."""
     assert main(["view", run]) == 1
     assert capsys.readouterr().out.startswith("collect-0: path: is not one of")

@@ -133,7 +133,7 @@ def test_asking_for_built_programs_builds_nothing(run):
     ],
 )
 def test_an_error_has_a_remedy(run, command, environment, message):
-    """The message names the object, the fact and the remedy."""
+    """A user must learn from the message what to do next."""
     if "Go" in message and shutil.which("go", path="/usr/bin:/bin"):
         pytest.skip("Go is installed next to the system's programs")
 

@@ -34,7 +34,7 @@ MUJOCO = [
 
 
 def test_a_newer_release_plans_mujoco_with_the_image_of_the_old_one(make_scene):
-    """MuJoCo follows the same rule as every other image of a job."""
+    """A job keeps its simulator for its whole life, so the image of MuJoCo must not change either."""
     scene = make_scene(simulators=MUJOCO)
     scene.step()
     scene.layout = type(scene.layout)(images=type(scene.layout.images).of_release("2"))
@@ -120,7 +120,10 @@ def test_a_job_succeeds_when_all_its_replicas_have(accepted, last_word):
 
 
 def test_the_last_word_is_waited_for(training, last_word):
-    """The ends of the Job and of its pod come from two watches, in any order."""
+    """The operator may see the Job's end before its pod's end.
+
+    Only the pod has the last values of the trainer.
+    """
     scene, pod = training()
     scene.end_job("Complete")
     decision = scene.step(1)
@@ -204,7 +207,10 @@ def test_a_job_that_somebody_deleted_is_made_again_once_its_pods_are_gone(traini
 
 
 def test_suspending_is_one_patch_of_each_job_that_goes_on(training):
-    """Kubernetes deletes the pods of a suspended Job, and the job's active time stops."""
+    """One patch of the Job is enough, because Kubernetes then deletes the pods.
+
+    The job's active time must stop.
+    """
     scene, _ = training()
     scene.raw["spec"]["suspend"] = True
 

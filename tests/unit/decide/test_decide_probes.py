@@ -48,7 +48,7 @@ def test_a_trainer_that_has_not_answered_yet_starts(start_slowly):
 
 @pytest.mark.parametrize("answer", ["to the kubelet", "to the operator"])
 def test_a_trainer_runs_once_it_has_answered(start_slowly, answer):
-    """The trainer responds to the kubelet's probe or to the operator's poll, in any order."""
+    """A response to the kubelet's probe or to the operator's poll proves that the trainer runs."""
     scene, pod = start_slowly()
     if answer == "to the kubelet":
         pod["status"]["containerStatuses"][0]["started"] = True

@@ -77,7 +77,7 @@ def test_the_interval_of_the_success_rate_is_kept_as_the_rate_is(training):
 
 
 def test_the_status_lists_simulators(training, simulator):
-    """The last fault of each simulator is shown on one line."""
+    """A user must find the simulator that fails. The last fault of each simulator is shown on one line."""
     scene, pod = training()
     scene.poll(pod, simulators=(simulator(state="failed", last_fault="collect-0:\ngone", restarts=2),))
 
@@ -273,7 +273,10 @@ def test_an_ephemeral_run_is_named_in_a_condition(accepted):
 
 
 def test_each_action_and_each_change_is_one_event(make_scene):
-    """The creation of all objects of a replica is one event, and no event is repeated."""
+    """Too many events would hide the important ones.
+
+    So the creation of all objects of a replica is one event, and no event is repeated.
+    """
     scene = make_scene()
 
     told = [(each.reason.value, each.replica) for each in scene.settle().events]

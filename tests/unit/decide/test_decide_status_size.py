@@ -123,7 +123,10 @@ def test_a_replica_that_failed_keeps_its_log_longest():
 def test_every_status_fits_beside_its_spec_and_keeps_what_is_decided_by(
     phases, simulators, text, kills, taken
 ):
-    """The schema allows any of these statuses. To shorten a shortened status again must change nothing."""
+    """The schema allows any of these statuses.
+
+    If a second shortening changed the status again, each reconcile would write it.
+    """
     status = whole(
         [replica(i, each, simulators=simulators, text=text, kills=kills) for i, each in enumerate(phases)]
     )

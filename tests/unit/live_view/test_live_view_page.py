@@ -242,7 +242,7 @@ def test_a_run_without_an_evaluation_has_no_rate_and_one_between_two_attempts_no
 
 
 def test_a_capsule_has_the_height_with_its_caps():
-    """Viser has no capsule shape, so the page draws a mesh."""
+    """Viser has no capsule shape, so the page draws a mesh, which must have the size of the capsule."""
     points, faces = capsule(0.1, 0.6)
 
     assert (points[:, 2].min(), points[:, 2].max()) == pytest.approx((-0.3, 0.3))

@@ -312,7 +312,10 @@ def test_a_directory_without_a_readable_outcome_is_not_finished(directory, conte
 
 
 def test_the_summary_tells_what_was_measured_and_how_to_look_at_it(directory):
-    """The summary leaves out values that were not measured."""
+    """At the end of a run, a user looks for the result and for the next commands.
+
+    Values that were not measured are left out.
+    """
     for name in ("model.zip", "attempts.jsonl"):
         (directory / name).touch()
     (directory / "tensorboard").mkdir()

@@ -146,7 +146,10 @@ def test_a_field_does_not_move_what_joints_move(load):
 
 
 def test_a_joint_is_put_within_its_range(load):
-    """The task of a cart-pole starts each episode at a random position."""
+    """A task may request any random position at the start of an episode.
+
+    The joint must stay within its range.
+    """
     simulation = load()
 
     simulation.set_joint_position(simulation.tree.of_def("slider"), 9.0, 1)

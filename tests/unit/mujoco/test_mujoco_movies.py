@@ -146,7 +146,10 @@ def test_on_a_file_system_without_locks_a_movie_removes_nothing(simulation, tmp_
 
 
 def test_a_movie_may_be_faster_than_the_simulation(simulation, tmp_path):
-    """Four seconds of simulated time are one second of the movie."""
+    """A user can watch a long drive in a short movie.
+
+    Here four seconds of simulated time are one second of the movie.
+    """
     simulation.movies.start(movie(tmp_path / "fast.mp4", acceleration=4))
     simulation.step(1600)
     simulation.movies.stop()
@@ -176,7 +179,10 @@ def test_the_frames_in_a_second_follow_from_the_steps(simulation, tmp_path):
 
 
 def test_a_movie_that_cannot_be_written_fails_at_the_start(simulation, tmp_path, caplog):
-    """The log has one line with the path and the error."""
+    """A user must not learn only at the end that the movie is missing.
+
+    The log has one line with the path and the error.
+    """
     assert not simulation.movies.start(movie(tmp_path / "none" / "it.mp4"))
 
     assert simulation.movies.failed
@@ -225,7 +231,7 @@ def test_what_cannot_be_recorded_is_refused(simulation, changes, fact):
 
 
 def test_one_movie_is_recorded_at_a_time(simulation, tmp_path):
-    """The second request fails, and the first movie continues."""
+    """A second request must not spoil the movie that is being recorded, so it fails."""
     simulation.movies.start(movie(tmp_path / "it.mp4"))
 
     with pytest.raises(UnsimulatedError, match="stop it first"):

@@ -121,7 +121,10 @@ def test_a_distance_outside_of_the_range_is_infinite(load, away_m):
 
 
 def test_distances_have_the_resolution_of_the_finder(load):
-    """A measured distance is a multiple of the field `resolution`."""
+    """A policy must not get more precise distances than the range finder measures.
+
+    Each distance is a multiple of the field `resolution`.
+    """
     seen = depths(load(WALL, FINDER.replace("minRange", "resolution 0.3 minRange")))
 
     assert seen == pytest.approx(np.full((HEIGHT, WIDTH), 2.1), abs=1e-6)

@@ -17,7 +17,10 @@ def pod(look, raw):
 
 
 def test_containers_come_in_the_order_in_which_they_start(look, raw_pod):
-    """The pod's spec gives the kind of each container, and the status gives its state."""
+    """A container that waits delays all later ones, so the order counts.
+
+    The pod's spec gives the kind of each container, and the status gives its state.
+    """
     seen = pod(look, raw_pod)
 
     assert [(each.name, each.kind) for each in seen.containers] == [

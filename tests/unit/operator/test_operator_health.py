@@ -94,7 +94,7 @@ def test_the_error_for_a_taken_address_names_the_option():
 
 @pytest.mark.parametrize("text", ["8080", ":8080", "localhost:", "localhost:http", "localhost:65536"])
 def test_what_is_no_address_is_refused(text):
-    """The message has an example of an address."""
+    """The user must see how an address is written, so the message has an example."""
     with pytest.raises(PalaestraError, match=r"write it as 0\.0\.0\.0:8080"):
         address(text)
 

@@ -94,7 +94,7 @@ def test_the_feedback_of_a_lift_is_the_weight_that_it_holds(crane):
 
 
 def test_a_motor_publishes_its_feedback(crane):
-    """The service `enable` has the path of the feedback sensor; the topic has the path of the motor."""
+    """The service `enable` has the path of the feedback sensor, but the topic has the path of the motor."""
     simulation, _ = crane
     robot = simulation.robots[0]
     simulation.step(800)

@@ -90,9 +90,10 @@ def expected(name, sensor):
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
 @pytest.mark.parametrize("name", TYPES)
 def test_a_distance_sensor_measures_by_its_type(name, setting):
-    """The value is the average, the single ray, the nearest echo, or the color-weighted average.
+    """Each type of sensor combines its rays in another way.
 
-    Then the lookup table maps the value.
+    The value is the average, the single ray, the nearest echo, or the color-weighted average. Then the lookup
+    table maps the value.
     """
     simulation = simulation_of(setting)
     for sensor in LOOKS:
