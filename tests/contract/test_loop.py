@@ -18,7 +18,10 @@ def test_the_loop_is_read_in_one_screen():
 
 
 def test_the_operator_makes_no_object():
-    """Only the plan creates objects. If the operator created some too, two modules would have to agree."""
+    """Only the package `plan` builds objects.
+
+    If the operator built some too, two packages would have to agree.
+    """
     taken = {
         (node.module, each.name)
         for source in SOURCES

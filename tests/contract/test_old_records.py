@@ -137,7 +137,7 @@ def test_a_last_word_is_read_and_has_the_same_fields():
     [(TrainerStatus, "trainer-status.json"), (Termination, "interrupted/termination.json")],
 )
 def test_what_a_newer_trainer_reports_besides_is_ignored(kind, record):
-    """A job that names its own image may have a newer trainer, which reports fields unknown here."""
+    """A job may name an image with a newer trainer, which reports fields that this release does not know."""
     known = json.loads((OLD / record).read_text())
     checkpointed = (known["last_checkpoint"] or {}) | {"of_tomorrow": 1}
 

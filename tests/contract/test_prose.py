@@ -63,7 +63,7 @@ def test_a_planted_sentence_is_found(planted, name, text, tmp_path):
 
 
 def test_tables_and_code_in_a_docstring_are_no_sentences(tmp_path):
-    """In Markdown, an indented block after an empty line is code; a list of arguments is prose."""
+    """In Markdown, an indented block after an empty line is code. But a list of arguments is prose."""
     path = tmp_path / "blocks.py"
     path.write_text(
         '"""Return a table.\n\n    What is    a cell\n\n    Who leads  another\n\n'

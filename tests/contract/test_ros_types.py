@@ -16,7 +16,10 @@ MESSAGES, SERVICES = type_names()
 
 @for_each("name", sorted(MD5))
 def test_every_type_of_webots_ros_has_its_md5(name):
-    """Before the first byte of data, two nodes compare the md5 sums of their definitions."""
+    """Before the first byte of data, two nodes compare the md5 sums of their definitions.
+
+    If the sums differ, the nodes do not connect.
+    """
     type_ = message_type(name) if name in MESSAGES else service_type(name)
 
     assert type_.md5 == MD5[name]

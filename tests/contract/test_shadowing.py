@@ -67,7 +67,10 @@ def ran(program, folder, *arguments):
     sorted({each.name for name in PACKAGES for each in distribution(name).entry_points}),
 )
 def test_each_program_starts_or_names_the_files(program, folder):
-    """A program that runs users' code must name the files and stop. Every other program must start."""
+    """Users' code could import such a file instead of Python's module.
+
+    So a program that runs users' code must name the files and stop. Every other program must start.
+    """
     code, out, err = ran(program, folder, "--help")
 
     if program in WITH_CODE_OF_USERS:
@@ -81,7 +84,10 @@ def test_each_program_starts_or_names_the_files(program, folder):
 @pytest.mark.parametrize("name", ["re", "fnmatch", "msvcrt", "queue"])
 @pytest.mark.parametrize("program", ["palaestra", "palaestra-train"])
 def test_a_module_that_is_harmless_by_itself_is_found_too(program, name, tmp_path):
-    """Python imports some modules at its start, so a harmless copy is loaded before our check runs."""
+    """Python imports some modules at its start, so a harmless copy is loaded before our check runs.
+
+    The check must still name its file.
+    """
     (tmp_path / f"{name}.py").write_text("x = 1\n")
     arguments = ("plan", JOB) if program == "palaestra" else ("--help",)
 
@@ -95,7 +101,7 @@ def test_a_module_that_is_harmless_by_itself_is_found_too(program, name, tmp_pat
 
 
 def test_a_local_run_names_every_file_before_anything_starts(folder, tmp_path):
-    """Otherwise the simulators would start, and only then the trainer would fail."""
+    """Without this check, the simulators would start, and only then the trainer would fail."""
     code, _, err = ran("palaestra", folder, "run", JOB, "--dir", tmp_path / "runs")
 
     assert code == 2

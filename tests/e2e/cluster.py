@@ -1,6 +1,6 @@
 """A Kubernetes cluster as a user reaches it, through kubectl and the JSON of the API server.
 
-The tests do not use Palaestra's own client, because the client's errors would then hide themselves. One
+The tests do not use Palaestra's own client, because an error in that client could then go unnoticed. One
 `kubectl proxy` serves all requests, because kubectl supports every login method of a kubeconfig.
 """
 

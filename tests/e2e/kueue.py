@@ -44,7 +44,7 @@ class Kueue:
         self._chart = ""
 
     def taken(self) -> str:
-        """Return why Kueue cannot be installed (Kueue or the namespace already exists), or ""."""
+        """Return the reason why Kueue cannot be installed (Kueue or the namespace already exists), or ""."""
         if self._kinds():
             return "this cluster has a Kueue of its own"
         there = self._cluster.get("namespaces", None, NAMESPACE) is not None

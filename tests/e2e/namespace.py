@@ -108,7 +108,7 @@ class Namespace:
         return [pod for pod in found if not live or runs(pod)]
 
     def pods_made(self, name: str) -> int:
-        """Return how many pods the Job controller's events report for a TrainingJob's Jobs."""
+        """Return the number of pods that the Job controller's events report for a TrainingJob's Jobs."""
         made = [
             each
             for each in self.select("events")

@@ -155,7 +155,10 @@ def test_a_request_past_the_trainingjob_is_forbidden(author, shared, attempt):
 
 @each(REFUSED)
 def test_a_value_that_would_open_something_is_refused(train, shared, attempt):
-    """The API server rejects the TrainingJob and names the field, so no object is created."""
+    """The API server rejects the TrainingJob, so no object is created and its author gains nothing.
+
+    The message names the field.
+    """
     name = f"refused-{REFUSED.index(attempt)}"
 
     with pytest.raises(Refused) as refused:
@@ -321,7 +324,7 @@ def test_a_finalizer_brings_a_deleted_job_no_more_pods(planned, shared):
 
 
 def test_a_job_of_another_controller_is_not_planned(train, planned, shared):
-    """The operator creates no objects for a job whose `managedBy` names another controller."""
+    """Another controller may plan this job. The operator must not create objects for it as well."""
     train(authors("spoofed", ("spec.managedBy", "example.com/other")))
     nothing_is_left_to_see(planned)
 

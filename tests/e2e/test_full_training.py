@@ -25,7 +25,10 @@ def ros_names(content):
 
 
 def test_every_robot_of_all_pods_has_a_ros_name_of_its_own(long_run):
-    """With fixed ROS names, only one simulator of a world can run, which the paper names as a limitation."""
+    """With the same ROS names in each simulator, only one simulator of a world could run.
+
+    The paper names this as a limitation.
+    """
     known = {named(pod): set() for pod in long_run.pods()}
     space = long_run.namespace
     generated = [name for each in space.select("configmaps", PAIR) for name in ros_names(each["data"])]
@@ -56,7 +59,10 @@ def test_metrics_are_scraped_from_every_trainer_and_sidecar(long_run, monitor):
 
 
 def test_the_status_tells_where_each_replica_stands(long_run):
-    """The operator polls the trainers over the pod network, while the test kills the operator repeatedly."""
+    """A new operator must get the progress from the trainers again.
+
+    The test kills the operator repeatedly.
+    """
     long_run.pods()
     space = long_run.namespace
 

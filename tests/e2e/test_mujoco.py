@@ -54,7 +54,10 @@ print("red" if red > 2 * max(green, blue) else (red, green, blue))
 
 
 def test_a_policy_is_trained_in_mujoco(namespace, job):
-    """The simulator of the release's image draws on one thread, because simulators share a node's cores."""
+    """A complete run shows that image, driver and trainer fit together.
+
+    The simulator must draw on one thread, because simulators share a node's cores.
+    """
     namespace.apply(job("mujoco", simulators=SIMULATORS, trainer=TRAINER))
     pod = namespace.wait_for_pod("mujoco")
 
@@ -87,7 +90,10 @@ def seeing():
 
 
 def test_a_policy_is_trained_on_what_a_camera_sees(namespace, seeing, tmp_path):
-    """Each observation contains an image of 64 x 48 pixels. Mesa draws it on the simulator's own thread."""
+    """A policy with a camera must train in a pod without a GPU.
+
+    Each observation contains an image of 64 x 48 pixels, which Mesa draws on the simulator's own thread.
+    """
     namespace.apply(seeing)
     pod = namespace.wait_for_pod("see-target")
 

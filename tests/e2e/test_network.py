@@ -67,7 +67,10 @@ def test_ros_and_control_are_on_loopback_and_metrics_are_not(pod, shared, monito
 
 
 def test_no_stranger_reaches_a_training_pod(pod, shared, make_namespace, monitor, enforced):
-    """Neither a pod of the same namespace nor a pod with the operator's label elsewhere may connect."""
+    """Users can create pods with any label.
+
+    Neither a pod of the same namespace nor a pod with the operator's label elsewhere may connect.
+    """
     if not enforced:
         pytest.skip("this cluster's network enforces no NetworkPolicy: the control pod was reached")
     beside = Asker(shared, "beside")

@@ -20,7 +20,7 @@ def let_secrets_be_read(namespace):
 
 
 def test_a_claim_is_used_only_if_it_is_for_jobs(namespace, job):
-    """Otherwise a user who may only create TrainingJobs could write to every volume of the namespace."""
+    """Without this rule, any author of TrainingJobs could write to every volume of the namespace."""
     namespace.apply(job("writes", script="touch /var/lib/palaestra/mark", storage={"existingClaim": "kept"}))
     namespace.wait(lambda: namespace.condition("writes", "Accepted").get("reason") == "ClaimMissing")
 
@@ -34,7 +34,7 @@ def test_a_claim_is_used_only_if_it_is_for_jobs(namespace, job):
 
 
 def test_a_secret_is_used_only_if_it_is_for_jobs(namespace, job):
-    """Otherwise a user who may only create TrainingJobs could read every Secret of the namespace."""
+    """Without this rule, a user who may only create TrainingJobs could read every Secret of the namespace."""
     let_secrets_be_read(namespace)
     variable = {"name": "WORD", "secretKeyRef": {"name": "words", "key": "word"}}
     namespace.apply(job("reads", script='test "$WORD" = open', trainer={"env": [variable]}, backoffLimit=0))

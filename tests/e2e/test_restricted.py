@@ -57,8 +57,7 @@ def test_a_training_succeeds_and_its_status_tells_how(namespace, job):
 def test_a_pod_ends_with_its_trainer(namespace, job, moment):
     """Simulators and the ROS master must end with the trainer, because a preempted node allows little time.
 
-    Even while the sidecars start, the pod ends at once, although process 1 of a container ignores early
-    signals.
+    This holds even while the sidecars start, when process 1 of a container has no handler for signals yet.
     """
     namespace.apply(job("ends", script=ENDS[moment]))
     assert namespace.wait_for_end("ends") == "Succeeded"

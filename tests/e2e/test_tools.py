@@ -44,7 +44,7 @@ def readers(namespace):
 
 @pytest.mark.beside
 def test_a_run_that_goes_on_is_fetched_and_its_log_is_read(namespace, tmp_path):
-    """A user can look at a run without a disturbance of its trainer."""
+    """A user can look at a run without disturbing its trainer."""
     namespace.apply(tiny_job("goes-on", script=LEAVES_A_RUN + STAYS))
     namespace.wait(lambda: "left it" in typed(namespace, "logs", "goes-on")[1], LONG_S)
 

@@ -9,7 +9,10 @@ from tests.e2e.namespace import LONG_S, NO_RESTARTS, named
 @pytest.mark.comes_late
 @pytest.mark.timeout(1500)
 def test_each_of_several_evictions_costs_at_most_a_checkpoint_interval(evictions):
-    """No eviction counts against `backoffLimit`, and the status counts each eviction once."""
+    """The next pod resumes from the last checkpoint.
+
+    No eviction counts against `backoffLimit`, and the status counts each eviction once.
+    """
     evicted, namespace = evictions.result(), evictions.namespace
 
     resumed = [int(each["reason"].removeprefix("resumed at step ")) for each in evicted.attempts[1:]]

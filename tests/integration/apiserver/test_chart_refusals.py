@@ -8,7 +8,10 @@ MONITORS = "monitoring.podMonitor.enabled=true"
 
 
 def test_monitors_are_refused_until_the_cluster_knows_their_kinds(control_plane):
-    """A user finds this error in docs/howto/install.md, with the remedy: first install the operator."""
+    """A user finds this error in docs/howto/install.md.
+
+    The remedy there is to install the Prometheus Operator first.
+    """
     install = ("install", "palaestra", str(CHART), f"--namespace={NAMESPACE}", "--create-namespace")
     words = 'no matches for kind "PodMonitor"'
 

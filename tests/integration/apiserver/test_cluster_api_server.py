@@ -129,7 +129,10 @@ def test_applying_makes_it_so_and_applying_less_takes_it_back(real, namespace):
 
 
 def test_a_field_of_another_manager_is_taken_by_force_only(real, namespace):
-    """The operator needs both behaviors: a conflict, and the change by force."""
+    """Without force, a client must not overwrite the value of another manager.
+
+    With force, it must be able to do so.
+    """
     real.apply(config_map(namespace, data={"a": "1"}), manager="another")
 
     with pytest.raises(Conflict, match="another"):
@@ -205,7 +208,7 @@ def test_a_reflector_follows_what_happens_and_looks_up_by_label(real, namespace)
 
 
 def test_contents_of_objects_can_stay_with_the_api_server(real, namespace):
-    """Otherwise a list of a thousand jobs would hold a thousand worlds in memory."""
+    """With their contents, a list of a thousand jobs would hold a thousand worlds in memory."""
     real.create(CONFIG_MAPS, config_map(namespace, data={"world": "x" * 1000}, mine="yes"))
 
     found = real.list(CONFIG_MAPS.only_metadata(), namespace, labels="mine=yes")

@@ -385,7 +385,7 @@ def test_a_server_without_a_scheme_is_https_where_there_are_settings_for_it(secu
 
 
 def test_the_first_file_decides_the_current_context(secure, tmp_path):
-    """KUBECONFIG may name several files; as in kubectl, the first file that sets a value applies."""
+    """KUBECONFIG may name several files. As in kubectl, the first file that sets a value applies."""
     first = tmp_path / "first"
     first.write_text(json.dumps({"current-context": "other"}))
     second = written(tmp_path, secure.address, {"token": "x"}, **{"certificate-authority": secure.ca})

@@ -155,7 +155,7 @@ def test_a_leader_whose_lease_was_deleted_takes_it_again(candidate, real, namesp
 
 
 def test_a_leader_whose_lease_another_has_taken_stops(candidate, real, namespace):
-    """A user may write another holder into the lease; the operator must then stop."""
+    """A user may write another holder into the lease, and the operator must then stop."""
     first = candidate("first")
     assert first.line() == "leads True"
 

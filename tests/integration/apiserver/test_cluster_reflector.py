@@ -135,7 +135,10 @@ def test_a_watch_that_is_silent_for_too_long_is_given_up_and_continued(follow):
 
 
 def test_a_watch_whose_answer_never_begins_is_given_up(follow):
-    """The server accepts the connection and then sends nothing."""
+    """The server accepts the connection and then sends nothing.
+
+    Without a timeout, the cache would miss all later changes.
+    """
     followed = follow(hang, stream(added("c", "11"), ends="silent"))
 
     followed.wait_reported("c")
@@ -171,7 +174,10 @@ def test_a_version_that_is_forgotten_again_and_again_does_not_become_a_storm(fol
     ids=["500", "garbage", "ends at once", "garbage lines"],
 )  # fmt: skip
 def test_trouble_that_lasts_is_met_with_patience(follow, rude, trouble):
-    """The reflector waits 0.05 to 0.2 s between requests here, and 0.5 to 30 s in a cluster."""
+    """Without growing waits, a lasting error would flood the API server with requests.
+
+    The reflector waits 0.05 to 0.2 s between requests here, and 0.5 to 30 s in a cluster.
+    """
     follow()
     rude.script.watches = [trouble]
     rude.script.calls = [listed("a")]
@@ -181,7 +187,7 @@ def test_trouble_that_lasts_is_met_with_patience(follow, rude, trouble):
 
 
 def test_an_event_that_was_cut_is_never_seen(follow):
-    """The client must drop half of an event; the next watch brings the whole event."""
+    """The client must drop half of an event, because the next watch brings the whole event."""
     followed = follow(stream(added("c", "11"), ends="broken"), stream(added("d", "12"), ends="silent"))
 
     followed.wait_reported("d")

@@ -92,7 +92,7 @@ def test_a_busy_server_that_asks_for_no_time_at_all_is_not_hammered(rude):
 
 
 def test_an_eviction_that_a_disruption_budget_refuses_is_not_waited_for(rude):
-    """A budget may refuse for days; thirty such pods would block a worker for minutes at each reconcile."""
+    """A budget may refuse for days. Thirty such pods would block a worker for minutes at each reconcile."""
     rude.script.calls = [refusal(429, "TooManyRequests", Retry_After="0")]
 
     with pytest.raises(TooManyRequests):

@@ -98,7 +98,7 @@ def test_a_command_that_is_not_allowed_is_forbidden(rude):
 
 
 def test_a_server_that_is_not_there_is_unreachable(rude):
-    """The command may be long, so the error must not contain it."""
+    """A proxy responds for a server that is not there, and the user must see the proxy's code."""
     rude.script.calls = [raw(b"", code=502)]
 
     with pytest.raises(OSError, match="502"):

@@ -46,7 +46,7 @@ def typed(cluster, kubectl, tmp_path):
 
 
 def test_no_command_for_everybody_names_a_registry_that_is_a_placeholder():
-    """Later upgrades keep such a value, and no image could be pulled from a placeholder."""
+    """An upgrade keeps the values of the installation, and no image can be pulled from a placeholder."""
     assert [block for block in BLOCKS if "registry.example.com" in block] == []
     assert len(REGISTRY) == 1
 

@@ -148,7 +148,10 @@ def test_the_trial_needs_no_more_rights_than_it_has_and_says_what_is_missing(rel
 
 
 def test_a_test_of_a_release_is_reported_once(release, kubectl, api):
-    """The test sets the phase of the pod, because the control plane has no nodes."""
+    """Helm reports each hook as a test suite, so the chart has one hook.
+
+    The control plane has no nodes, so the test itself sets the phase of the hook's pod.
+    """
     release("install", "palaestra")
 
     with ThreadPoolExecutor() as threads:

@@ -180,7 +180,10 @@ def test_a_trial_that_is_stopped_leaves_nothing(control_plane, place, tmp_path):
 
 
 def test_a_trial_of_a_wrong_file_asks_nothing(typed, place, tmp_path):
-    """The exit code is 2, as for every mistake in a command line."""
+    """A wrong file must create no job in the cluster.
+
+    As for every mistake in a command line, the exit code is 2.
+    """
     file = tmp_path / "job.yaml"
     file.write_text(TRIAL + "  seed: -1\n")
 
@@ -204,7 +207,10 @@ def started(control_plane, place, *arguments):
 
 
 def test_watch_draws_where_there_is_a_terminal(control_plane, place, tell):
-    """The last picture stays on the screen, followed by the line about the end of the job."""
+    """On a terminal a user sees a picture that changes.
+
+    The last picture stays on the screen, followed by the line about the end of the job.
+    """
     place.train("a")
     tell("a", "Succeeded", replicas=[REPLICA | {"successRate": 0.5}])
     ours, theirs = os.openpty()
@@ -234,7 +240,10 @@ def test_watch_draws_where_there_is_a_terminal(control_plane, place, tell):
 
 
 def test_suspend_and_resume_change_the_spec(typed, place):
-    """A user may name several jobs in one command, as with kubectl."""
+    """The operator acts on the spec of a job.
+
+    As with kubectl, a user may name several jobs in one command.
+    """
     for name in ("a", "b"):
         place.train(name)
 
@@ -260,7 +269,7 @@ def test_suspending_a_job_with_a_queue_says_that_kueue_decides_and_how_to_stop_i
 
 @pytest.mark.parametrize("command", ["suspend", "resume"])
 def test_a_job_that_has_ended_is_neither_suspended_nor_resumed(typed, place, tell, command):
-    """Otherwise a user's `kubectl wait --for=condition=Suspended` would wait forever."""
+    """An ended job never becomes Suspended. A user's `kubectl wait` for that condition would last forever."""
     place.train("a")
     tell("a", "Succeeded")
 

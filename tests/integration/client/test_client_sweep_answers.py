@@ -28,7 +28,7 @@ def trial():
 
 
 def test_a_trial_whose_job_was_deleted_makes_room_for_the_next(server, trial):
-    """Otherwise, with one trial at a time, the sweep would wait forever for a deleted job."""
+    """With one trial at a time, the sweep would wait forever for a deleted job."""
     script, kubeconfig = server
     stored = {**data_of(trial.job), "metadata": {"name": "s-0", "labels": {LABEL: "s"}}}
     script.calls = [refusal(404, "NotFound"), reply(201, stored), reply(obj={"metadata": {}, "items": []})]

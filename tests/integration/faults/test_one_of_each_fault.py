@@ -46,7 +46,10 @@ def runs(control_plane, installed):
 
 @pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.words)
 def test_a_disturbed_operator_brings_every_job_to_the_same_end(fault, runs):
-    """The same states and counters result, each replica has one pod, no orphan stays, and requests stop."""
+    """A fault must leave no trace.
+
+    States and counters are the same, each replica has one pod, no orphan stays, and requests stop.
+    """
     run = runs[fault].result()
 
     assert run.met, "the fault never came"

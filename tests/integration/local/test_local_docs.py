@@ -73,7 +73,10 @@ def test_the_first_sweep_of_the_page_trains_and_compares(sweep, tmp_path, capsys
 
 @pytest.mark.parametrize(("fence", "count"), [("yaml sweep-at-random", 20), ("yaml sweep-by-optuna", 2)])
 def test_the_other_sweeps_of_the_page_are_right(sweep, fence, count):
-    """All jobs of a matrix are checked, and of a search the jobs at the bounds."""
+    """A reader copies these sweeps too.
+
+    All jobs of a matrix are checked, and of a search the jobs at the bounds of its ranges.
+    """
     assert len(trials(load(sweep(fence)))) == count
 
 

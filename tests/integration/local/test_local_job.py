@@ -103,7 +103,7 @@ def play(tmp_path, eventually):
 
 
 def test_a_trainer_that_is_done_completes_the_job(play):
-    """After exit code 0, the runner must start no second pod."""
+    """After exit code 0 the run is complete, and a second pod would only repeat it."""
     assert play.run("exit 0") == {"code": 0, "pods": 1, "steps": None, "seen": 1}
 
 

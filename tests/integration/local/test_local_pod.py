@@ -234,7 +234,7 @@ def test_a_program_that_does_not_exist_ends_as_in_a_shell(stage):
 
 
 def test_output_goes_to_a_file_for_each_container(stage):
-    """The file also contains the output from before a crash."""
+    """A user finds the cause of a crash in the file, which also has the output from before a restart."""
     said = f"until grep -q hello {stage.folder}/logs/chatty.log; do sleep 0.01; done"
 
     stage.run(

@@ -81,7 +81,10 @@ def test_a_run_ends_with_a_summary_and_is_reported_when_it_is_typed_again(desk):
 
 
 def test_a_finished_run_is_prolonged_by_more_steps_and_began_with_the_policy_of_another(desk):
-    """A user types the path of the other run relative to the working directory."""
+    """More steps do not change the policy with which the run began, and the trainer gets its path again.
+
+    A user types the path of the other run relative to the working directory.
+    """
     other = desk.folder / "other"
     other.mkdir()
     with zipfile.ZipFile(other / "model.zip", "w") as archive:

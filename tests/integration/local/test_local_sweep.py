@@ -104,7 +104,7 @@ def test_a_sweep_ends_with_a_table_a_picture_and_a_run_directory_a_seed(desk, tm
 
 
 def test_ctrl_c_ends_all_runs_with_a_checkpoint_and_the_same_command_resumes_them(desk, tmp_path):
-    """Two trials run and a third waits when the user types Ctrl-C."""
+    """A user may have to interrupt a sweep that takes days. Here two trials run, and a third one waits."""
     file = desk(WAIT_ONCE, matrix={RATE: [0.1, 0.2, 0.3]})
     command = [PALAESTRA, "sweep", file, "--dir", tmp_path / "runs", "--at-once", "2"]
     folder = tmp_path / "runs" / "s"
@@ -140,7 +140,7 @@ def test_a_trial_that_optuna_prunes_is_stopped(desk, tmp_path, capsys):
 
 
 def test_every_trial_is_checked_before_the_first_begins(desk, tmp_path, capsys):
-    """Otherwise a user might find the mistake only after a night, when the last trial starts."""
+    """A user must not find the mistake only after a night, when the last trial starts."""
     file = desk(LEARN, matrix={"trainer.steps": [10, 0]})
 
     assert main(["sweep", str(file), "--dir", str(tmp_path / "runs")]) == 2

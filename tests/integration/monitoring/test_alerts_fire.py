@@ -73,7 +73,11 @@ def test_no_alert_is_without_a_case_in_which_it_fires_and_one_in_which_it_does_n
 
 
 def test_the_alerts_about_a_sick_run_fire_and_clear(tmp_path, folder, rules):
-    """The run's simulators are slow and later stopped, it saves no checkpoint, and its budget runs out."""
+    """Each alert must fire for the problem that it names.
+
+    The run's simulators are slow and later stopped, the run saves no checkpoint, and its restart budget runs
+    out.
+    """
     job = tiny_job(**SICK)
     job["spec"]["stallDeadlineSeconds"] = 30
     with LocalRun(tmp_path, job) as run, scraping(targets.of_run(run, "lab"), folder, rules) as prometheus:

@@ -137,10 +137,10 @@ def test_suspending_and_resuming_changes_the_job_and_nothing_else(place, start):
 
 
 def test_a_job_is_suspended_once_its_pod_has_ended_and_runs_in_no_dying_pod(place, start):
-    """Otherwise a user's `kubectl wait` would return too early.
+    """A user's `kubectl wait` must not return too early.
 
-    The command would return for Suspended before the checkpoint is saved, and for Running while the old pod
-    still saves its checkpoint.
+    It must return for Suspended only after the checkpoint is saved, and for Running only after the old pod
+    has ended.
     """
     start()
     place.train()
@@ -212,7 +212,7 @@ def test_a_missing_world_is_reported_and_the_job_starts_when_it_is_there(place, 
 
 
 def test_a_world_without_the_label_for_jobs_is_not_opened(place, start):
-    """Otherwise an author could read any ConfigMap of the namespace by a TrainingJob."""
+    """Without this rule, an author could read any ConfigMap of the namespace through a TrainingJob."""
     start()
     world = world_map()
     del world["metadata"]["labels"]

@@ -177,10 +177,11 @@ def test_what_was_decided_on_a_cache_that_lags_is_not_done(place, installed):
 
 @pytest.mark.parametrize("write", [0, 1, 3])
 def test_a_suspended_job_that_is_stopped_is_deleted_and_not_made_again(write, place, start, control_plane):
-    """Otherwise a queue could admit the Job later and preempt other jobs for it.
+    """A queue could admit the remaining Job later, and preempt other jobs for it.
 
     The writes are the operator's mark, the stop of the other Job, the status and the deletion. If `write` is
-    0, no operator is killed; otherwise another operator continues.
+    0, no operator is killed. For any other number, the operator is killed after that write, and another
+    operator continues.
     """
     first = start()
     place.train(replicas=2, activeDeadlineSeconds=6)

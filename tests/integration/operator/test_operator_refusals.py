@@ -286,7 +286,7 @@ def test_no_secret_is_looked_at_where_nobody_allowed_it(place, start, installed)
 
 
 def test_a_pull_secret_needs_the_label_and_is_looked_at_where_somebody_allowed_it(place, start, installed):
-    """Otherwise an author could run and read private images without the consent of their owner."""
+    """Without this rule, an author could run and read private images without the consent of their owner."""
     open_secrets(installed, place)
     place.create(SECRETS, {**SECRET, "metadata": {"name": "token"}})
     start()
@@ -348,7 +348,7 @@ def kueue(installed):
 
 
 def test_a_queue_without_kueue_is_reported_until_kueue_is_there(place, start, request):
-    """Otherwise the job would stay suspended without a reason that the user can see."""
+    """Without Kueue the job stays suspended, so the user must see the reason."""
     start()
     place.train(scheduling={"queueName": "robots"})
     eventually(lambda: place.condition("Accepted").get("reason") == "NoKueue")

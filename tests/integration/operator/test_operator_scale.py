@@ -137,7 +137,10 @@ def test_nothing_is_asked_in_a_minute_in_which_nothing_changes(crowd, settled):
 
 
 def test_the_operator_stays_small(settled):
-    """The cache holds every TrainingJob and about nine other objects for each, including pods."""
+    """The cache holds every TrainingJob and about nine other objects for each, including pods.
+
+    So each object must need little memory.
+    """
     assert settled.rss_bytes() < MOST_BYTES
 
 

@@ -81,7 +81,10 @@ def test_the_metrics_are_those_of_the_page(place, start):
 
 
 def test_a_job_that_runs_and_ends_is_counted(place, start):
-    """A job's time to the start and its reason of the end are counted when its status shows them."""
+    """Users query the time to the start and the reason of the end.
+
+    The operator counts each once, when the status first shows it.
+    """
     operator = start()
     place.train()
     [pod] = place.pods()
@@ -109,7 +112,10 @@ def test_log_lines_are_constant_messages_with_fields(place, start):
 
 
 def test_nothing_that_the_operator_asks_for_is_forbidden(place, start, control_plane):
-    """The roles of install.yaml must suffice. Unit tests check that the roles grant nothing else."""
+    """The roles of install.yaml must suffice.
+
+    test_operator_rights.py checks that these roles grant nothing else.
+    """
     operator = start()
     place.train()
     place.pods()

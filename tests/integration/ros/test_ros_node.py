@@ -137,7 +137,7 @@ def ask_for_much(peer, dial, monkeypatch):
 
 
 def test_an_answer_that_the_socket_cannot_take_at_once_arrives_whole(peer, ask_for_much):
-    """An image of a camera may be that long."""
+    """An image of a camera may be longer than the buffers of a connection."""
     connection = ask_for_much()
     peer.do(lambda: None)
 
@@ -154,7 +154,7 @@ def test_a_client_that_reads_slowly_gets_the_whole_answer(peer, ask_for_much):
 
 
 def test_a_node_keeps_nothing_for_a_client_that_stops_reading(ask_for_much, monkeypatch):
-    """Otherwise the node would hold an image in memory for each client that stopped reading."""
+    """If the node kept unsent data, it would hold an image in memory for each client that stopped reading."""
     monkeypatch.setattr(links, "SEND_S", 0.01)
     connection = ask_for_much()
     eventually(lambda: all(link.closed for link in links_there()))
@@ -285,7 +285,10 @@ def test_a_late_subscriber_of_a_latched_topic_gets_the_last_message(peer, dial):
 
 
 def test_a_subscriber_that_does_not_read_gets_the_newest(peer, dial):
-    """With queue size 1, a subscriber that does not read loses old messages and delays no other client."""
+    """A slow subscriber must not block the publisher.
+
+    With queue size 1, the subscriber loses old messages and gets the newest one.
+    """
     topic = {"topic": f"/{peer.name}/ir1/value", "md5sum": "*", "type": "sensor_msgs/Range"}
     connection, _ = dial(**topic)
     count = 200_000

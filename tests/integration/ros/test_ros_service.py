@@ -103,7 +103,10 @@ def test_calls_together_are_all_answered(service):
 
 
 def test_both_ends_are_set_up_for_small_messages(service):
-    """BBR, a common default, needs a timer for each connection, which slows four simulators down."""
+    """BBR is a common default for congestion control.
+
+    It needs a timer for each connection, which slows four simulators down.
+    """
     double = service("double", "webots_ros/set_float")
     double.begin(value=1.0)
 
@@ -146,7 +149,7 @@ def test_a_service_that_does_not_answer_hangs(service):
 
 
 def test_when_patience_is_over_nobody_is_waited_for(service):
-    """Otherwise sixteen hanging simulators would delay the end of a trainer by sixteen timeouts."""
+    """Sixteen hanging simulators must not delay the end of a trainer by sixteen timeouts."""
     never = [service("never", deadline_s=30.0) for _ in range(16)]
     get_time = service("get_time")
     get_time(ask=True)
@@ -209,7 +212,7 @@ def test_another_type_is_refused(service):
 
 
 def test_a_service_known_to_the_master_can_be_asked_for_its_type(peer):
-    """`rosservice type` sends `*` instead of an md5 sum."""
+    """`rosservice type` looks up this address at the master, and then requests the type from the node."""
     host, port = Master("/probe").service_address(f"/{peer.name}/double")
 
     assert (host, port > 0) == (os.environ["ROS_HOSTNAME"], True)
@@ -239,7 +242,10 @@ def test_a_program_that_is_a_node_already_stays_the_one_it_is(peer):
 
 
 def test_a_node_that_ends_in_good_order_is_unregistered(peer):
-    """Otherwise clients would look for the next simulator of that name at the old address."""
+    """The old address must not stay at the master.
+
+    Clients would look there for the next simulator of that name.
+    """
     peer.end()
 
     assert Master("/probe").service_address(f"/{peer.name}/double") is None

@@ -62,7 +62,7 @@ def test_a_message_that_does_not_come_raises_an_error_in_time(peer, ranges):
 
 
 def test_a_killed_publisher_is_dead(peer, ranges):
-    """The kernel closes the connection of a killed publisher."""
+    """The kernel closes the connection of a killed publisher. So the error comes before the timeout."""
     peer.end(peer.node.abandon)
 
     with pytest.raises(SimulatorDead):

@@ -86,9 +86,9 @@ def modules(tmp_path, monkeypatch):
 @pytest.mark.usefixtures("modules")
 @pytest.mark.parametrize("variant", VARIANTS.values(), ids=VARIANTS)
 def test_an_interrupted_run_ends_as_one_that_was_not(tmp_path, variant):
-    """The signal arrives during an episode.
+    """An interruption must not change the result of a run.
 
-    The test compares world, experience, parameters and evaluations.
+    The signal arrives during an episode, and the test compares world, experience, parameters and evaluations.
     """
     whole, parts = (begun(tmp_path / name, variant.job) for name in ("whole", "parts"))
     with whole:

@@ -164,7 +164,10 @@ def test_a_person_reads_how_the_run_goes(finished):
 
 
 def test_the_demo_plays_a_policy_until_it_is_interrupted(finished, tmp_path):
-    """The policy does not learn during the demo, and the same command starts the demo again."""
+    """A viewer watches the policy, which does not learn during the demo.
+
+    The same command starts the demo again.
+    """
     job = data_of(playing_job(job_of(finished.run.file), finished.run.directory))
     run = LocalRun(tmp_path, job)
     with ExitStack() as stack:

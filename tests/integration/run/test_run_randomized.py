@@ -70,7 +70,10 @@ def curriculum():
 
 
 def test_the_example_changes_world_and_robot_with_the_progress_of_training(master, curriculum):
-    """At progress 0 the episode has no cylinders and no noise, and a repeated episode is equal."""
+    """The world of a curriculum gets harder with the progress.
+
+    At progress 0 the episode has no cylinders and no noise, and a repeated episode is equal.
+    """
     del master
     webots = Webots("robotino", "arena")
     robot = Robotino(webots)

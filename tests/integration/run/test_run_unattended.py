@@ -88,7 +88,10 @@ def lose_the_master(run):
 
 
 def test_a_run_whose_simulators_break_in_many_ways_succeeds():
-    """This run trains PPO, and test_bench.py trains DQN with similar faults."""
+    """Crashes and wrong data must not end a run.
+
+    This run trains PPO, and test_bench.py trains DQN with similar faults.
+    """
     found = kinds.play(MANY, LITTLE_PPO, "Succeeded")
 
     assert found["exit"] == 0

@@ -174,7 +174,10 @@ def test_the_environment_of_a_simulator_has_its_slot(two) -> None:
 
 
 def test_the_metrics_tell_the_two_apart(two, waits) -> None:
-    """A label names the simulator. For a sidecar with one simulator, the label always has the same value."""
+    """A label names the simulator.
+
+    A sidecar with one simulator has the same label, so one query fits both.
+    """
     it = two(waits)
     it.start(SECOND)
 

@@ -116,7 +116,7 @@ def test_a_message_cut_short_cannot_be_read(connected):
 
 
 def test_late_messages_come_after_newer_ones(connected):
-    """With a slow subscriber, too, messages may arrive in another order than the steps."""
+    """The author of a client must be able to test it with messages in another order than the steps."""
     _, service = connected(f"late:topic=ir1/value,latency_ms={SLOW_MS},step=1")
     subscriber = RosSubscriber("/robotino/ir1/value", "sensor_msgs/Range", deadline_s=DEADLINE_S)
     subscriber.connect()

@@ -73,8 +73,8 @@ class Listening(Progress):
 def attempt(fakes):
     """Return a function that runs one attempt and returns its exit code.
 
-    The function calls `interrupt` at one step of the first robot. It removes from `episodes` those after the
-    checkpoint from which the attempt starts, and appends the attempt's own episodes.
+    The function calls `interrupt` at one step of the first robot. It appends the attempt's episodes to
+    `episodes`, after it has removed the episodes that followed the checkpoint from which the attempt starts.
     """
     configure_logs()
 

@@ -150,7 +150,7 @@ def test_a_folder_without_a_model_is_refused(tmp_path, capsys):
 
 
 def test_the_example_drives_a_simulated_robot_without_pytorch(trained):
-    """The user's robot needs only onnxruntime and the facades, and not the library of the training."""
+    """The user's robot needs only onnxruntime and the facades, and neither PyTorch nor Stable-Baselines3."""
     written = exporting.export(trained(**CASES["PPO"]), "onnx")
     environment = {name: value for name, value in os.environ.items() if not name.startswith("ROS_")}
     alone = (

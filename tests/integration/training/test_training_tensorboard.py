@@ -48,10 +48,10 @@ def steps(ask):
 
 
 def write(run, step):
-    """Write a point into a new file, as another attempt does, in a second without another file.
+    """Write a point into a new file, as another attempt does.
 
-    TensorBoard sorts files by name. Names of the same second end in a count of writers, in which 10 sorts
-    before 9.
+    The function first waits for a second in which no file was created. TensorBoard sorts files by name, and
+    names of the same second end in a count of writers, in which 10 sorts before 9.
     """
     eventually(lambda: not list(run.tensorboard.glob(f"*.{int(time.time())}.*")))
     with SummaryWriter(str(run.tensorboard)) as writer:

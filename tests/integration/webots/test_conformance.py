@@ -15,7 +15,10 @@ def test_the_simulated_robotino_conforms(arena):
 
 
 def test_its_scene_conforms(arena):
-    """The scene must have the requested arrangement, and the seed must determine all random values."""
+    """An environment needs the arrangement that it requests.
+
+    Its random values must depend only on the seed.
+    """
     check_scene(arena.robot, arena.scene, Pose(-1.0, 0.1, 0.5), (1.0, 0.0))
 
 

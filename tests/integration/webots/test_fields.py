@@ -106,7 +106,10 @@ def test_a_cylinder_that_is_moved_by_field_is_met_where_it_is(arena):
 
 
 def test_a_velocity_that_is_given_is_had(arena):
-    """The units are meters and radians per second in world axes."""
+    """A user must read the velocity that she has set.
+
+    The units are meters and radians per second, in world axes.
+    """
     arena.scene.reset(1, START, (1.0, 0.0))
 
     arena.scene.supervisor.set_velocity("ROBOTINO", (0.2, 0.0, 0.0), (0.0, 0.0, 0.5))

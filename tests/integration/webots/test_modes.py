@@ -8,7 +8,7 @@ from palaestra_trainer.webots import Mode
 
 
 def test_a_step_while_paused_is_refused_and_the_next_context_goes_on(arena):
-    """Otherwise the controller would block until time passes, and could not be resumed."""
+    """If the step were accepted, the controller would block until time passes, and could not be resumed."""
     with arena.webots:
         arena.robot.advance()
     pid, before = arena.pid, arena.webots.observer.time()
@@ -23,7 +23,7 @@ def test_a_step_while_paused_is_refused_and_the_next_context_goes_on(arena):
 
 
 def test_a_reset_while_paused_is_refused_before_it_has_begun(arena):
-    """Otherwise half of the reset would take effect in the next step of any client."""
+    """If the reset began, half of it would take effect in the next step of any client."""
     with arena.webots:
         arena.scene.reset(1, Pose(-1.0, 0.0, 0.0), (1.0, 0.0))
 

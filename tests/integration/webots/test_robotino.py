@@ -87,7 +87,7 @@ def test_volts_become_metres_within_the_sensors_range():
 
 
 def test_it_has_no_camera(arena):
-    """An environment handles the error by its type."""
+    """An environment can catch this type of error, and then work without images."""
     with pytest.raises(NoSuchSensor, match="has no device camera"):
         arena.robot.use_cameras(color=True)
     with pytest.raises(NoSuchSensor, match=r"call use_cameras\(depth=True\), then advance"):

@@ -96,7 +96,7 @@ def test_a_robot_on_two_wheels_passes_the_checks(running, kind, world, near):
 
 
 def test_a_fake_e_puck_sees_what_one_in_a_simulator_sees(running):
-    """Otherwise results with the fake would not be valid for a simulator."""
+    """If the fake saw other distances, its results would not be valid for a simulator."""
     robot, scene = running(EPuck, builtin("pen"), "epuck")
     fake, fake_scene = fake_pen()
 
@@ -130,7 +130,7 @@ def test_a_robotino_uses_what_its_world_fits_it_with(running):
 
 @pytest.mark.parametrize("use", ["use_scanner", "use_gripper", "use_forklift"])
 def test_what_a_world_lacks_is_refused_by_name(arena, use):
-    """The robot is connected, so its list of devices is known."""
+    """The connected robot knows its devices, so a user learns at once which device the world lacks."""
     with pytest.raises(NoSuchSensor, match="the robot has no device"):
         getattr(arena.robot, use)()
 
@@ -186,7 +186,7 @@ def test_the_layout_is_that_of_the_world(arena, running):
 
 
 def test_the_layout_follows_a_thing_that_somebody_moved(arena):
-    """The supervisor or `put` may move an obstacle; a new episode moves it back."""
+    """The supervisor or `put` may move an obstacle, and a new episode moves it back."""
     arena.scene.supervisor.set_field("CYLINDER_0", "translation", (1.5, 0.0, 0.2))
     arena.scene.put("CYLINDER_1", (0.0, 1.5, 0.2))
     arena.robot.advance()

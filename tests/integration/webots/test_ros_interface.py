@@ -124,7 +124,7 @@ def test_a_service_of_the_page_succeeds(outcomes, simulator, path):
 
 @for_each("simulator, path", cases(FAILING.__getitem__))
 def test_a_service_that_the_page_calls_failing_fails(outcomes, simulator, path):
-    """Otherwise the service would report success without an effect."""
+    """If such a service reported success, a client would rely on an effect that it does not have."""
     answer = outcomes(simulator)["answers"][path]
 
     assert "failed" in answer or not next(iter(answer.values()))
@@ -161,7 +161,7 @@ def test_a_picture_arrives_whole(outcomes, topic, encoding):
 
 @pytest.mark.parametrize("simulator", FAILING)
 def test_the_last_service_ends_the_simulator_with_the_status_that_was_asked_for(outcomes, simulator):
-    """Before this request, the client used reset, restart, revert, reload and load."""
+    """A request to quit must also work after the client has used reset, restart, revert, reload and load."""
     outcome = outcomes(simulator)
 
     assert outcome["answers"]["supervisor/simulation_quit"]["success"]

@@ -86,7 +86,7 @@ def test_two_facades_of_one_world_drive_a_simulator_each(make, name):
 
 
 def test_a_name_is_free_again_once_its_facade_is_closed(make, name):
-    """Otherwise each repetition of a notebook's cell would get a higher number."""
+    """If closed facades kept their names, each repetition of a notebook's cell would get a higher number."""
     first = make()
     first.close()
 

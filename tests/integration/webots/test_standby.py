@@ -184,7 +184,7 @@ def test_a_broken_spare_fails_one_restart_and_the_next_one_succeeds(pair, number
 
 
 def test_a_spare_that_does_not_come_up_is_tried_again_while_nobody_waits(pair):
-    """Otherwise the next fault would cost a start, even long after the refusal."""
+    """Without another attempt, the next fault would cost a start, even long after the refusal."""
     it = pair("--fault=start_refused:start=2").begin()
 
     it.member.restart()

@@ -46,7 +46,10 @@ def test_inside_the_context_time_is_fast_and_outside_it_stands(own_arena):
 
 
 def test_run_returns_what_the_callback_returns(own_arena):
-    """`run(callback)` has the same effect as the `with` block."""
+    """A program needs the result of its callback.
+
+    Apart from that, `run(callback)` has the same effect as the `with` block.
+    """
     assert own_arena.webots.run(own_arena.webots.observer.mode) is Mode.FAST
     assert own_arena.webots.observer.mode() is Mode.PAUSE
 

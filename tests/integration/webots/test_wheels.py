@@ -57,7 +57,7 @@ def motor(arena):
 def test_a_velocity_that_did_not_change_is_not_sent_again(arena, stranger):
     """Webots keeps a velocity, and a policy often repeats an action.
 
-    Without these commands, a step needs three messages less of fifteen.
+    Without the repeated commands, a step needs 12 messages instead of 15.
     """
     arena.robot.drive(*CURVE)
     stranger.tell(7.0)

@@ -59,7 +59,10 @@ def test_no_keyword_is_used_that_a_structural_schema_forbids() -> None:
 
 
 def test_every_type_is_spelled_out() -> None:
-    """Only quantities and the values of free objects have no `type`; an `x-kubernetes-` mark replaces it."""
+    """An API server refuses an untyped value.
+
+    Only quantities and free objects may have an `x-kubernetes-` mark instead.
+    """
     marks = ("x-kubernetes-int-or-string", "x-kubernetes-preserve-unknown-fields")
     untyped = [path for path, schema in ALL.items() if "type" not in schema]
 
@@ -76,7 +79,7 @@ def test_every_type_is_spelled_out() -> None:
     ],
 )
 def test_every_text_and_list_is_bounded(kind, bounds) -> None:
-    """An API server estimates the cost of a CEL rule from the largest object that the schema admits."""
+    """An API server refuses a CEL rule whose cost could be too high for the largest possible object."""
     unbounded = [
         path for path, schema in ALL.items()
         if schema.get("type") == kind and not bounds & schema.keys()
@@ -86,7 +89,7 @@ def test_every_text_and_list_is_bounded(kind, bounds) -> None:
 
 
 def test_every_map_is_bounded_and_every_object_has_fields() -> None:
-    """An object has either named fields or a limit on the number of its keys."""
+    """Without fields or a limit on its keys, an object makes the estimated cost of CEL rules too high."""
     loose = [
         path for path, schema in ALL.items()
         if schema.get("type") == "object"
@@ -99,7 +102,8 @@ def test_every_map_is_bounded_and_every_object_has_fields() -> None:
 def test_free_objects_keep_what_an_api_server_does_not_know() -> None:
     """Without `x-kubernetes-preserve-unknown-fields` the API server would prune all hyperparameters.
 
-    Free objects must be maps: if two objects have unknown fields, an API server overlooks a renamed key.
+    The mark is on the values of a map: in an object with unknown fields, an API server would not notice that
+    a frozen field has a renamed key.
     """
     free = [path for path, schema in ALL.items()
             if schema.get("x-kubernetes-preserve-unknown-fields")]  # fmt: skip
@@ -153,7 +157,7 @@ def test_the_defaults_are_those_of_the_models(job_data) -> None:
 
 
 def test_rules_stand_where_the_models_have_them() -> None:
-    """The definition has each CEL rule of the models once, at the same path and with the same message."""
+    """The API server must refuse the same jobs as the models, at the same path and with the same message."""
     for path, model in walk(TrainingJob):
         at = WHOLE
         for name in path:

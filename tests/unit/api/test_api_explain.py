@@ -70,7 +70,7 @@ def test_a_wrong_path_is_one_sentence_with_the_nearest_fields(typed, remedy) -> 
 
 
 def test_the_text_has_type_default_rules_and_fields() -> None:
-    """The text has the same facts as the tables of the reference page."""
+    """A user who knows the tables of the reference page must find the same facts in the terminal."""
     text = field_text(field_at("trainer.algorithm.normalize"), 100)
 
     assert text.startswith("spec.trainer.algorithm.normalize: object; optional\n\n  Normalization of ")

@@ -40,7 +40,10 @@ def test_the_committed_file_is_current(name, repository) -> None:
 
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_an_example_is_a_job_of_its_own_name(name, repository) -> None:
-    """Every example is a valid job, and its `metadata.name` is the name of its file."""
+    """A user finds the job in a cluster by the name of the file.
+
+    So every example is a valid job with that name.
+    """
     path = repository / "manifests/examples" / f"{name}.yaml"
 
     job = load(path.read_text(encoding="utf-8"), path.name)
@@ -56,7 +59,7 @@ def test_every_example_is_tested_here(repository) -> None:
 
 
 def test_the_smallest_example_is_twelve_lines_at_most(repository) -> None:
-    """The README shows this job; good defaults keep it short."""
+    """The README shows this job, which must be short. So the other fields need good defaults."""
     text = (repository / "manifests/examples/minimal.yaml").read_text(encoding="utf-8")
 
     assert len(text.splitlines()) <= 12
@@ -119,7 +122,7 @@ def test_the_page_shows_the_smallest_example(repository) -> None:
 
 
 def test_the_page_quotes_the_real_messages(repository, problems) -> None:
-    """The example messages on the page must be real messages."""
+    """A user who compares a message with the page must find the same words there."""
     text = (repository / "docs/reference/trainingjob.md").read_text(encoding="utf-8")
 
     (role,) = problems({"simulators.1.role": "Eval"})
@@ -149,7 +152,7 @@ def test_every_rule_stands_below_its_table() -> None:
 
 
 def test_a_table_tells_type_default_and_what_is_required() -> None:
-    """A row has the name of a field, its type with its limits, and its default or `required`."""
+    """A reader must see in the table which fields are required, and the default of each other field."""
     rows = tables().splitlines()
 
     assert any(row.startswith("| `count` | integer, 1 to 16 | `1` |") for row in rows)

@@ -113,7 +113,7 @@ def test_two_groups_of_one_name_are_found_beside_another_mistake(problems) -> No
 
 
 def test_no_simulators_is_not_the_same_as_nothing_said(problems) -> None:
-    """An empty list is a mistake; a missing list means the default."""
+    """An empty list is a mistake, but a missing list means the default groups."""
     assert problems({"simulators": []}) == ["spec.simulators: has no entry; give one or remove the line"]
 
 
@@ -208,5 +208,5 @@ def test_a_whole_number_is_one_however_it_is_written() -> None:
 
 @pytest.mark.parametrize("steps", ["1.5", "1e-3", "1e300"])
 def test_a_number_that_is_not_whole_is_still_refused(steps) -> None:
-    """A float that is too large to be an exact integer is refused too."""
+    """A job cannot train half a step. A float that is too large to be an exact integer is refused too."""
     assert any("spec.trainer.steps" in each for each in told(MILLIONS.replace("1e6\n", f"{steps}\n")))

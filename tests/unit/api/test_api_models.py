@@ -97,7 +97,7 @@ def test_a_job_cannot_be_edited(least) -> None:
 
 
 def test_names_in_python_are_written_in_snake_case() -> None:
-    """A field is named in camelCase in YAML and in snake_case in Python."""
+    """YAML follows the naming of Kubernetes, and Python programs use the same models with Python's naming."""
     group = SimulatorGroup(name="collect", role=Role.COLLECT, start_deadline_seconds=5)
 
     assert group.model_dump(by_alias=True)["startDeadlineSeconds"] == 5

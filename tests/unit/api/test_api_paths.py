@@ -21,7 +21,10 @@ from palaestra.api.simulators import WorldSource
     ],
 )
 def test_a_path_is_shown_as_a_person_writes_it(path, text) -> None:
-    """The path has dots between words, numbers in brackets, and quotes around the rest."""
+    """Authors find the field in their file by this path.
+
+    It has dots between words, numbers in brackets, and quotes around the rest.
+    """
     assert shown(path) == text
 
 
@@ -51,7 +54,7 @@ def test_what_is_left_of_a_list_knows_its_old_numbers() -> None:
 
 
 def test_what_is_not_there_cannot_be_taken() -> None:
-    """`take` returns False if the path does not exist; the caller then removes the parent object."""
+    """`take` returns False for a missing path, so that the caller can remove the parent object."""
     pruned = Pruned({"a": {"b": 1}})
 
     assert not pruned.take(("a", "c"))
@@ -61,7 +64,10 @@ def test_what_is_not_there_cannot_be_taken() -> None:
 
 
 def test_a_stand_in_is_put_once() -> None:
-    """`take` returns False the second time: the error is then in the stand-in itself."""
+    """`take` puts the stand-in only once.
+
+    If the error stays, it is in the stand-in itself, and `take` returns False.
+    """
     pruned = Pruned({"metadata": 3})
 
     assert pruned.take(("metadata",), {"name": "stand-in"})
@@ -78,7 +84,7 @@ JSON = st.recursive(
 
 @given(JSON)
 def test_nothing_taken_is_everything_left(data) -> None:
-    """Without a call of `take`, `data` returns the data unchanged."""
+    """A job without errors must be validated as its author wrote it."""
     assert Pruned(data).data() == data
 
 
@@ -91,7 +97,7 @@ def test_the_model_at_a_path_is_found_through_lists() -> None:
 
 
 def test_the_tree_of_models_begins_with_the_job_itself() -> None:
-    """The walk also reaches the most deeply nested model."""
+    """A rule may be at any depth, so the walk must reach the most deeply nested model."""
     paths = [path for path, _ in walk(TrainingJob)]
 
     assert paths[0] == ()

@@ -152,7 +152,7 @@ def test_a_job_is_the_same_after_writing_and_reading(data) -> None:
 
 @given(JOBS)
 def test_defaults_are_resolved_once(data) -> None:
-    """A job with its defaults written out is equal to the job without them."""
+    """An API server stores a job with its defaults written out, and the job must keep its meaning."""
     resolved = as_data(validate(data))
 
     assert as_data(validate(resolved)) == resolved

@@ -11,7 +11,7 @@ from palaestra.api.reasons import LONGEST_MESSAGE, Reason
 
 
 def test_every_reason_has_a_row() -> None:
-    """The row contains the meaning of the reason and its remedy."""
+    """A user who looks up a reason must find its meaning and its remedy."""
     assert set(ROWS) == set(Reason)
 
 

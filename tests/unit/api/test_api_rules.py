@@ -280,7 +280,10 @@ RULES = {
 
 @pytest.mark.parametrize("name", BROKEN)
 def test_a_broken_rule_is_reported_in_one_line(name, problems) -> None:
-    """The line has a path, a fact and a remedy; further errors that the mistake causes are not reported."""
+    """The line has a path, a fact and a remedy.
+
+    Further errors that the same mistake causes would distract the author.
+    """
     changes, line = BROKEN[name]
 
     assert problems(changes) == [line]
@@ -307,7 +310,10 @@ def test_a_rule_reads_only_fields_that_there_are(name) -> None:
 
 @pytest.mark.parametrize("name", RULES)
 def test_a_rule_is_one_fact_and_one_remedy(name) -> None:
-    """Each message states a fact and, after a semicolon, an instruction without a full stop."""
+    """Users read many of these messages, so all have one form.
+
+    A fact is followed by a semicolon and an instruction without a full stop.
+    """
     message = RULES[name][1].message
 
     fact, remedy = message.split("; ")

@@ -33,14 +33,17 @@ from palaestra.api.yaml_io import NotYaml, read, write
     ],
 )
 def test_a_scalar_is_what_a_cluster_takes_it_for(text, value) -> None:
-    """`5e-4` is a number; `1:30` is not the number 90, and a date stays text."""
+    """The same file must mean the same here and in a cluster.
+
+    `5e-4` is a number, but `1:30` is not the number 90, and a date stays text.
+    """
     found = read(f"a: {text}", "job.yaml")["a"]
 
     assert (found, type(found)) == (value, type(value))
 
 
 def test_anchors_and_merges_are_followed() -> None:
-    """An anchor avoids repetition; a mapping's own key overrides a merged key."""
+    """Authors use anchors to avoid repetition. A mapping's own key overrides a merged key."""
     text = "a: &a {x: 1, y: 2}\nb: {<<: *a, y: 3}\nc: {<<: [{x: 5}, *a]}\n"
 
     assert read(text, "job.yaml") == {

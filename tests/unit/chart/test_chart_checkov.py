@@ -49,7 +49,7 @@ def found():
 
 @pytest.mark.parametrize("mode", EXPECTED)
 def test_every_finding_has_a_reason_and_every_reason_a_finding(found, mode):
-    """A new finding is fixed or gets a reason; the reason of a fixed finding is removed."""
+    """A new finding must be fixed or get a reason. When a finding is fixed, its reason must be removed."""
     parts = {OPERATOR, TRIAL} if mode == "default" else {OPERATOR, TENSORBOARD, JUPYTER, TRIAL}
 
     assert found[mode] == {

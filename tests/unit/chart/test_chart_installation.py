@@ -82,5 +82,5 @@ def test_nothing_needs_what_a_plain_cluster_lacks(made):
 
 
 def test_nothing_of_helm_test_is_left_in_it(made):
-    """Only Helm deletes the objects of its hook; in a cluster without Helm they would stay."""
+    """Only Helm deletes the objects of its hook, so they would stay in a cluster without Helm."""
     assert [name for _, name in made if "test" in name] == []

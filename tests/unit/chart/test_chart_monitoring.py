@@ -34,7 +34,7 @@ def test_what_has_no_login_is_reached_by_nobody(one):
 
 
 def test_tensorboard_changes_no_run(one):
-    """TensorBoard mounts the volumes of the runs read-only."""
+    """An error in TensorBoard must not destroy a run, so TensorBoard mounts the volumes read-only."""
     pod = one("offline", "Deployment", "palaestra-tensorboard")["spec"]["template"]["spec"]
     mounts = {mount["name"]: mount for mount in pod["containers"][0]["volumeMounts"]}
 
@@ -44,9 +44,9 @@ def test_tensorboard_changes_no_run(one):
 
 @pytest.mark.parametrize(("chosen", "shown"), [({}, f"/runs/{FOLDER}"), ({"folder": ""}, "/runs")])
 def test_tensorboard_shows_the_links_that_trainers_make(chosen, shown):
-    """TensorBoard follows links, so in the root of the claim it would show each run twice.
+    """TensorBoard follows symbolic links, so in the root of the claim it would show each run twice.
 
-    One of the two would have a UID as its name.
+    One of the two runs would have a UID as its name.
     """
     made = objects(merged(MODES["offline"], {"tensorboard": chosen}))
 
@@ -55,7 +55,10 @@ def test_tensorboard_shows_the_links_that_trainers_make(chosen, shown):
 
 
 def test_the_token_of_the_notebooks_is_in_no_object(one):
-    """The token stays in its Secret, which is mounted as a file; the server receives only the file's path."""
+    """A token in an object could be read by everybody who may read the object.
+
+    It stays in its Secret, and the server receives only the path of the mounted file.
+    """
     pod = one("offline", "Deployment", "palaestra-jupyter")["spec"]["template"]["spec"]
     [server] = pod["containers"]
 
@@ -88,7 +91,10 @@ def test_runbooks_are_links_if_a_value_has_the_address():
 
 
 def test_every_dashboard_is_mounted_as_it_is(made):
-    """Each dashboard has the content of its file, and the label that Grafana's sidecar searches for."""
+    """Grafana's sidecar finds a dashboard only by the label `grafana_dashboard`.
+
+    The content must be that of the file, which other tests check.
+    """
     found = {
         name: (json.loads(text), each["metadata"]["labels"].get("grafana_dashboard"))
         for each in made("monitored")

@@ -211,7 +211,10 @@ def test_the_operator_s_defaults_are_those_of_its_release(one):
 
 
 def test_every_image_comes_from_the_registry_by_its_digest(made, one):
-    """An offline cluster can pull only from this registry; the images of tests and options are included."""
+    """An offline cluster can pull only from this registry.
+
+    So the images of tests and options must come from it too.
+    """
     images = {container["image"] for pod in pods(made("offline")).values() for container in pod["containers"]}
     chosen = options(one("offline", "Deployment"))
     images |= {chosen.trainer_image, chosen.stub_image, chosen.mujoco_image, chosen.webots_image}
@@ -253,7 +256,10 @@ def test_the_trial_is_a_job_that_the_api_takes(one, mode):
 
 
 def test_the_definition_is_that_of_the_models_and_is_kept(one):
-    """The definition is a template, so Helm upgrades it; the annotation keeps it after `helm uninstall`."""
+    """The definition is a template, so that Helm upgrades it.
+
+    The annotation keeps the definition, and with it all jobs, after `helm uninstall`.
+    """
     definition = one("default", "CustomResourceDefinition", "trainingjobs.palaestra.dev")
 
     annotations = definition["metadata"].pop("annotations")

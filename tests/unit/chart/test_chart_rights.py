@@ -83,7 +83,10 @@ def test_the_installation_grants_no_secrets_though_a_role_for_them_is_in_it():
 
 
 def test_a_request_is_the_use_of_a_right():
-    """The use contains the subresource and the API server's reason to allow the request."""
+    """A logged request shows that a permission is in use.
+
+    The use contains the subresource and the API server's reason to allow the request.
+    """
     log = entry("patch", apiGroup="palaestra.dev", resource="trainingjobs", subresource="status")
 
     right = Right("palaestra.dev", "trainingjobs/status", "patch")
@@ -105,7 +108,7 @@ def test_a_refused_request_is_no_right():
 
 
 def test_people_discovery_the_past_and_half_a_line_are_left_out():
-    """Other users send requests to the same API server, and it still writes the log during the test."""
+    """Only complete requests of service accounts for objects, since the given time, use a permission."""
     discovery = json.loads(entry("get"))
     del discovery["objectRef"]
     lines = [entry("list", user="admin"), json.dumps(discovery), entry("list"), '{"verb": "li']

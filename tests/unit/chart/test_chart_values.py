@@ -100,7 +100,7 @@ def test_a_wrong_value_is_refused_with_its_place(path, value, below):
     ],
 )
 def test_values_that_do_not_go_together_are_refused(values, told):
-    """Helm refuses misspelled values, and values that require another value."""
+    """A misspelled value, or a value that lacks another one, would have no effect without an error."""
     assert told in refusal(values)
 
 

@@ -88,7 +88,7 @@ def test_plan_prints_the_objects_of_every_replica_for_kubectl(job, capsys):
 
 
 def test_plan_can_print_what_run_would_do_here(job, tmp_path, capsys):
-    """`--layout local` prints the plan that `palaestra run` executes on this machine."""
+    """A user can inspect the plan before `palaestra run` executes it on this machine."""
     main(["plan", str(job), "--layout", "local", "--dir", str(tmp_path)])
 
     assert f"value: {tmp_path}/a/1" in capsys.readouterr().out
@@ -116,7 +116,10 @@ def test_world_prints_the_world_of_one_simulator(tmp_path, capsys):
 
 
 def test_world_puts_in_what_a_world_for_ros_lacks(tmp_path, capsys):
-    """Most worlds with the `ros` controller lack both options; the rest of the file must not change."""
+    """Most worlds with the `ros` controller lack both options.
+
+    The command adds them and must not change the rest of the file.
+    """
     path = tmp_path / "plain.wbt"
     path.write_text('#VRML_SIM R2023b utf8\nE-puck {\n  controller "ros"\n}\n')
 
@@ -152,7 +155,7 @@ def test_world_refuses_a_world_without_a_robot_that_ros_drives(tmp_path, fails):
 
 
 def test_world_without_a_job_is_refused(tmp_path, fails):
-    """The ROS names of the robots contain the job's name; only `--check` works without a job."""
+    """The ROS names of the robots contain the job's name, so only `--check` works without a job."""
     path = tmp_path / "my.wbt"
     path.write_bytes(builtin("arena"))
 
@@ -162,7 +165,7 @@ def test_world_without_a_job_is_refused(tmp_path, fails):
 
 
 def test_world_can_be_checked_by_each_simulator(tmp_path, capsys):
-    """The check prints a result for each simulator and starts none of them."""
+    """The author of a world learns which simulators accept it, and none of them is started."""
     path = tmp_path / "my.wbt"
     path.write_bytes(builtin("arena"))
     assert main(["world", str(path), "--check"]) == 0
@@ -179,7 +182,7 @@ def test_world_can_be_checked_by_each_simulator(tmp_path, capsys):
 
 
 def test_mujoco_is_asked_only_where_it_is_installed(tmp_path, capsys, monkeypatch):
-    """MuJoCo is an optional extra; a world for the stub can be checked without it."""
+    """MuJoCo is an optional extra, so a world for the stub must be checked without it."""
     path = tmp_path / "my.wbt"
     path.write_bytes(builtin("arena"))
     monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
@@ -220,7 +223,7 @@ def test_crd_prints_a_custom_resource_definition(capsys):
 
 @pytest.mark.parametrize("command", ["run", "plan"])
 def test_all_mistakes_of_a_wrong_job_are_printed(command, tmp_path, fails, monkeypatch):
-    """The file has five mistakes; the command prints five lines, and starts and writes nothing."""
+    """A user can correct all five mistakes at once. The command starts and writes nothing."""
     monkeypatch.chdir(tmp_path)
     path = tmp_path / "wrong.yaml"
     path.write_text(WRONG)
@@ -275,7 +278,7 @@ def test_a_file_that_is_no_text_is_one_line(tmp_path, fails):
 
 
 def test_a_replica_that_the_job_does_not_have_is_refused(job, tmp_path, fails):
-    """The message lists the replicas that the job has."""
+    """A user may count the replicas from 1, so the message shows the numbers that exist."""
     [line] = fails("run", job, "--replica", "2", "--dir", tmp_path / "runs")
 
     assert line == "--replica 2: the job has 2; use 0 to 1, or raise spec.replicas"

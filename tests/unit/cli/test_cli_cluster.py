@@ -50,7 +50,7 @@ def test_a_context_that_is_not_there_is_named(tmp_path, capsys):
 
 @pytest.mark.parametrize("option", ["-n", "--namespace=lab", "--context", "--kubeconfig"])
 def test_the_error_for_an_option_before_the_command_shows_where_it_goes(option, monkeypatch, capsys):
-    """Users of kubectl write options before the command; argparse then took the namespace for a command."""
+    """Users of kubectl write options before the command. Then argparse takes the namespace for a command."""
     monkeypatch.setattr("sys.argv", ["/usr/bin/kubectl-palaestra"])
 
     with pytest.raises(SystemExit) as ended:

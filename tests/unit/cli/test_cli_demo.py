@@ -9,7 +9,10 @@ EXAMPLE = Path(__file__).parents[3] / "manifests/examples/move-to-target.yaml"
 
 
 def test_the_demo_trains_the_example_of_make_run():
-    """The README gives the results of this example; a wheel has the demo's file but not the examples."""
+    """The README gives the results of this example.
+
+    A wheel contains a copy for the demo, which must be equal to the example.
+    """
     example = palaestra.api.load(EXAMPLE.read_text(), EXAMPLE.name)
 
     assert demo_job().spec == example.spec

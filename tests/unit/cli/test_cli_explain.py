@@ -26,7 +26,10 @@ def test_a_field_is_printed_in_the_width_of_the_terminal(capsys, monkeypatch):
 
 
 def test_a_field_that_does_not_exist_is_one_sentence(capsys):
-    """The message proposes the nearest field; standard output stays empty, so a pipe receives nothing."""
+    """The message proposes the nearest field.
+
+    Standard output stays empty, so that a pipe receives nothing.
+    """
     assert main(["explain", "trainer.step\x1b[2J"]) == 2
     assert main(["explain", "trainer.step"]) == 2
 

@@ -32,13 +32,16 @@ def test_a_missing_library_is_named_with_the_command_that_installs_it(run, monke
 
 
 def test_another_simulator_is_refused_with_the_known_ones(run, capsys):
-    """The message lists the simulators of the run."""
+    """The user must learn which simulators the run has."""
     assert main(["view", run, "--simulator", "collect-7"]) == 2
     assert capsys.readouterr().out == "--simulator collect-7: the run has collect-0\n"
 
 
 def test_a_folder_without_a_run_is_refused(tmp_path, capsys):
-    """An argument with a slash is always a folder; a name without a slash may be a job in a cluster."""
+    """An argument with a slash is always a folder.
+
+    The command must not look for a job of this name in a cluster.
+    """
     assert main(["view", str(tmp_path)]) == 2
     assert "is not a run directory, which has training.yaml" in capsys.readouterr().err
 
@@ -53,6 +56,6 @@ def test_a_name_that_is_no_folder_is_looked_up_in_the_cluster_and_that_is_said(t
 
 
 def test_a_simulator_that_shows_nothing_opens_no_page(run, capsys):
-    """The command prints the error that the sidecar returned."""
+    """An empty page would not explain the cause, so the command prints the sidecar's error."""
     assert main(["view", run]) == 1
     assert capsys.readouterr().out.startswith("collect-0: path: is not one of")

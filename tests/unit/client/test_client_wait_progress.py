@@ -64,7 +64,7 @@ def test_a_reason_that_comes_back_is_reported_again(news):
 
 @pytest.mark.parametrize("reason", ["Queued", "SecretMissing", "Unschedulable", "OfANewerRelease"])
 def test_every_hold_and_trouble_is_a_reason_to_wait(news, reason):
-    """Reasons that this release does not know are included."""
+    """A user must see every cause of a wait, even a reason that this release does not know."""
     [_, line] = news(WAITS | {"reason": reason})
 
     assert f": {reason} since" in line

@@ -16,7 +16,10 @@ def claim(**changes):
 
 @given(duration_s=durations, offset=seconds, sent=seconds, travel=seconds, looked=seconds, now=seconds)
 def test_a_leader_has_stopped_before_anyone_can_follow(duration_s, offset, sent, travel, looked, now):
-    """The clocks of leader and follower differ by `offset`, and run at the same speed."""
+    """Two leaders at the same time could undo each other's writes.
+
+    The clocks of leader and follower differ by `offset`, but run at the same speed.
+    """
     tenure = Tenure(sent=sent, duration_s=duration_s)
     follower = ObservedLease()
     # The API server writes a renewal `travel` s after it is sent; the follower reads it `looked` s later.
@@ -72,6 +75,6 @@ def test_the_times_in_a_lease_are_never_compared_with_a_clock():
 
 
 def test_a_lease_without_a_spec_is_nobodys():
-    """Another program may have written the Lease; its content must not stop the operator."""
+    """Another program may have written the Lease, and its content must not stop the operator."""
     assert LeaseSpec.read({"metadata": {"name": "x"}}) == LeaseSpec()
     assert ObservedLease().free(0.0)

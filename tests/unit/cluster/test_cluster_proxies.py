@@ -43,7 +43,10 @@ from palaestra.cluster.proxies import Proxy, connects_directly, proxy_named, pro
     ],
 )
 def test_no_proxy_is_read_as_go_does(exceptions, host, direct):
-    """NO_PROXY may list networks, ports and subdomains; connections to this machine never use a proxy."""
+    """NO_PROXY may list networks, ports and subdomains.
+
+    Even without it, connections to this machine never use a proxy.
+    """
     assert connects_directly(host, 6443, exceptions) is direct
 
 
@@ -60,7 +63,10 @@ def test_no_proxy_is_read_as_go_does(exceptions, host, direct):
     ],
 )
 def test_a_proxy_is_named_in_every_form_of_curl(text, proxy):
-    """If the port is missing, the default port of the scheme is used."""
+    """A value that works for curl must work here.
+
+    If the port is missing, the default port of the scheme is used.
+    """
     assert proxy_named(text, "HTTPS_PROXY") == proxy
 
 
@@ -68,7 +74,7 @@ def test_a_proxy_is_named_in_every_form_of_curl(text, proxy):
     "text", ["ftp://me:secret@proxy", "me:secret@", "http://", "http://me:secret@proxy:port"]
 )
 def test_what_is_no_proxy_is_refused_without_its_password(text):
-    """The message has the name of the variable and the remedy."""
+    """The message names the variable and the remedy. The password must not reach a terminal or a log."""
     with pytest.raises(NotConfigured, match=r"^HTTPS_PROXY: .* is not a proxy; write http://") as refused:
         proxy_named(text, "HTTPS_PROXY")
 
@@ -88,7 +94,10 @@ def test_what_is_no_proxy_is_refused_without_its_password(text):
     ],
 )
 def test_the_variables_are_those_of_go(environment, server, address):
-    """The upper-case variable has priority, an empty variable counts as unset, and ALL_PROXY is ignored."""
+    """`kubectl` is a Go program and must find the same proxy.
+
+    The upper-case variable has priority, an empty variable counts as unset, and ALL_PROXY is ignored.
+    """
     found = proxy_of_environment(server, environment | {"ALL_PROXY": "http://never"})
 
     assert (found.address if found else None) == address

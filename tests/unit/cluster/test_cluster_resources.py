@@ -78,7 +78,7 @@ def test_each_refusal_has_its_error(code, reason, error):
 def test_a_terminating_namespace_is_distinguished_from_a_missing_right():
     """Both responses are 403 Forbidden.
 
-    A terminating namespace needs no action; a missing permission needs a person.
+    A terminating namespace needs no action, but a missing permission needs a person.
     """
     causes = [{"reason": "NamespaceTerminating", "message": "namespace lab is being terminated"}]
 
@@ -97,5 +97,5 @@ def test_the_wait_that_a_busy_server_asks_for_is_read(header, seconds):
 
 
 def test_a_status_without_anything_still_says_what_happened():
-    """A proxy may respond without a Status object; the error then has the HTTP code."""
+    """A proxy may respond without a Status object. The error then has only the HTTP code."""
     assert str(from_status(502, {})) == "HTTP502 (502): the API server gave no message"

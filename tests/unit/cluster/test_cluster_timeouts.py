@@ -34,7 +34,10 @@ def test_two_clients_that_fail_together_do_not_come_back_together():
 
 
 def test_work_that_fails_is_tried_again_after_a_twentieth_of_a_second_to_a_minute():
-    """docs/reference/operator.md names these bounds."""
+    """A first retry should cost little time, and a lasting failure few requests.
+
+    docs/reference/operator.md names both bounds.
+    """
     waits = [RETRY.wait_s(failures) for failures in range(1, 30)]
 
     assert min(waits) >= 0.05

@@ -167,7 +167,7 @@ def test_the_time_that_a_name_waited_is_reported():
 
 
 def test_four_threads_do_every_change_and_never_one_name_together():
-    """The state machine above uses one thread; this test uses four."""
+    """The state machine above uses one thread and cannot find a race, so this test uses four."""
     queue, busy, done, together = WorkQueue(), set(), [], []
     lock = threading.Lock()
 

@@ -48,7 +48,7 @@ def test_every_digest_is_that_of_the_content(image, tmp_path):
 
 
 def test_the_descriptors_lead_from_the_index_to_the_layer(image, tmp_path):
-    """Index, manifest, configuration and layer refer to each other with the right digests and sizes."""
+    """A container engine follows these references, and refuses an image with a wrong digest or size."""
     write_archive(image, tmp_path / "image.tar")
     files = contents(tmp_path / "image.tar")
 

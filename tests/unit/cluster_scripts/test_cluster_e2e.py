@@ -112,7 +112,10 @@ def e2e(tmp_path):
 
 @pytest.mark.parametrize("code", ["0", "1"])
 def test_the_cluster_goes_however_the_tests_end(e2e, code):
-    """The script returns the exit code of the tests and removes the cluster that it started."""
+    """A forgotten cluster would use the memory of the machine.
+
+    The script still returns the exit code of the tests.
+    """
     assert e2e.run(code) == int(code)
 
     assert e2e.calls == ["up.sh", "tests", "down.sh"]

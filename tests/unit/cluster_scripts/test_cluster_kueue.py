@@ -52,7 +52,10 @@ def test_the_chart_names_the_image_that_is_made_with_it(tmp_path):
 
 
 def test_nothing_else_of_the_values_changes():
-    """The images of other components and all comments stay the same."""
+    """The tests must run Kueue with its own settings.
+
+    The script changes only the image of Kueue's manager.
+    """
     before, after = VALUES.splitlines(), released(VALUES).splitlines()
 
     changed = [new for old, new in zip(before, after, strict=True) if old != new]
@@ -61,6 +64,9 @@ def test_nothing_else_of_the_values_changes():
 
 
 def test_values_without_that_image_are_an_error():
-    """Another release of Kueue may name its image elsewhere; without the error its chart would not change."""
+    """Another release of Kueue may name its image elsewhere.
+
+    Without the error, its chart would silently stay unchanged.
+    """
     with pytest.raises(LookupError, match="has no repository of an image below controllerManager"):
         released("controllerManager: {}\n")

@@ -59,7 +59,7 @@ def test_a_recorded_process_is_found_while_it_runs(shell):
 
 
 def test_another_process_with_the_recorded_id_is_left_alone(shell):
-    """The kernel reuses process ids; without the start time an unrelated process would be killed."""
+    """The kernel reuses process ids, so without the start time an unrelated process would be killed."""
     result = shell("""
         echo "$$ 1 $(cat /proc/sys/kernel/random/boot_id)" >"$CACHE.pid"
         recorded_process "$CACHE.pid" || echo stranger
@@ -133,7 +133,7 @@ def test_asking_for_built_programs_builds_nothing(run):
     ],
 )
 def test_an_error_has_a_remedy(run, command, environment, message):
-    """The message names the object, the fact and the remedy."""
+    """A user must learn from the message what to do next."""
     if "Go" in message and shutil.which("go", path="/usr/bin:/bin"):
         pytest.skip("Go is installed next to the system's programs")
 
@@ -145,7 +145,7 @@ def test_an_error_has_a_remedy(run, command, environment, message):
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can change to another user")
 def test_missing_packages_are_one_line_to_type_for_who_is_not_root(run):
-    """The script installs nothing without consent; it prints the one command to run."""
+    """The script installs nothing without consent. A user who is not root gets the one command to run."""
     nobody = ("setpriv", "--reuid", "65534", "--clear-groups")
     if run(*nobody, "test", "-r", CLUSTER / "settings.sh").returncode:
         pytest.skip("another user can't read this checkout")

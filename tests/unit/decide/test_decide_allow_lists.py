@@ -152,7 +152,10 @@ def test_what_affects_others_is_held_with_its_field_and_the_value_that_allows_it
 
 @pytest.mark.parametrize("name", [name for name, (_, allowed, *_) in REFUSED.items() if allowed])
 def test_what_the_installation_allows_starts_the_job(make_scene, name):
-    """An administrator sets the chart's value, which restarts the operator; the held job then starts."""
+    """An administrator sets the chart's value, which restarts the operator.
+
+    The new operator must start the held job.
+    """
     scheduling, allowed, *_ = REFUSED[name]
     scene = make_scene(scheduling=scheduling)
     scene.settle()
@@ -233,7 +236,10 @@ def test_a_selector_of_pods_of_others_is_refused(make_scene, selector):
     ],
 )
 def test_an_empty_name_hides_no_other(make_scene, scheduling):
-    """Today the API server refuses a pod with an empty name; the check must not depend on that."""
+    """An empty value must not make the check skip the other values.
+
+    The API server refuses such a pod today, but the check must not depend on that.
+    """
     scene = make_scene(scheduling=scheduling)
 
     scene.settle()
@@ -258,7 +264,7 @@ VALUES = st.recursive(
 
 @given(st.dictionaries(st.sampled_from(["podAffinity", "podAntiAffinity"]), VALUES, max_size=2))
 def test_no_affinity_breaks_the_check(affinity):
-    """An affinity is a free object, so its values may have any type and must not crash the operator."""
+    """An affinity is a free object, so its values may have any type. None of them may crash the operator."""
     job = validate(make_job(scheduling={"affinity": affinity}))
 
     not_allowed(job, Allowed())

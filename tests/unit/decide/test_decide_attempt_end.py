@@ -116,7 +116,10 @@ def test_the_log_of_a_container_before_the_trainer_is_kept(accepted, command_gro
     ],
 )
 def test_how_an_attempt_ended_is_one_of_the_reasons(training, last_word, code, word, reason):
-    """The exit code and the trainer's termination message determine the reason."""
+    """Users and programs know only the documented reasons.
+
+    The exit code and the trainer's termination message determine which reason it is.
+    """
     scene, pod = training()
     scene.end(pod, code, last_word(reason=word))
 
@@ -216,7 +219,7 @@ def test_two_disruptions_in_a_row_are_two_events(training):
 
 
 def test_of_attempts_that_nobody_saw_the_last_is_kept(training, last_word):
-    """The operator did not run while two attempts ended; the status has the later one."""
+    """Two attempts ended while no operator ran, and a user needs the reason of the later one."""
     scene, pod = training()
     scene.end(pod, 70, last_word(reason="Unexpected: first"))
     scene.pass_(15)
@@ -249,7 +252,10 @@ def test_an_older_pod_that_is_still_there_is_not_taken_for_the_last(training, la
 
 
 def test_a_failed_pod_that_was_tidied_away_is_not_called_disrupted(training):
-    """Somebody deleted the failed pod; the Job has counted its failure, so the status reports a failure."""
+    """Somebody deleted the failed pod, but the Job has counted its failure.
+
+    So the status must report a failure.
+    """
     scene, _ = training()
     scene.objects["pods"].clear()
     scene.count_failures(1)
@@ -275,7 +281,7 @@ def test_a_suspended_attempt_ended_by_suspension(training):
 
 
 def test_an_attempt_that_kueue_took_back_says_so(make_scene):
-    """Kueue suspended the Job to admit another one; the trainer saved a checkpoint before it ended."""
+    """Kueue suspended the Job to admit another one. The user must see this cause, and not a disruption."""
     scene = make_scene(scheduling={"queueName": "robots"})
     scene.kueue = True
     scene.settle()
@@ -330,7 +336,7 @@ def test_a_replica_whose_last_pod_is_gone_ended_for_the_reason_of_its_job(traini
 
 
 def test_the_end_of_an_attempt_is_kept_where_its_pod_goes_after_the_job_has_failed(training):
-    """The operator may see the changes of Jobs and pods in any order; the result must be the same."""
+    """The operator may see the changes of Jobs and pods in any order, and the result must be the same."""
     scene, _ = training(activeDeadlineSeconds=60)
     scene.step(60)
     scene.settle()

@@ -276,7 +276,10 @@ def take(scene, pod, seconds=5):
 
 @pytest.mark.parametrize(("limit", "pods"), [(None, 6), (2, 2), (0, None)])
 def test_pods_that_are_taken_without_a_step_are_bounded_by_the_limit(training, limit, pods):
-    """`noProgressLimit` counts evicted pods since the last progress; 0 means no limit."""
+    """A run without progress must not use a cluster for ever.
+
+    `noProgressLimit` counts the evicted pods since the last progress, and 0 means no limit.
+    """
     spec = {} if limit is None else {"noProgressLimit": limit}
     scene, pod = training(**spec)
     scene.poll(pod, step=7)

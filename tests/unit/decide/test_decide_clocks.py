@@ -148,7 +148,10 @@ def test_a_lost_node_is_waited_for_from_the_first_sight_of_a_deletion(training, 
 
 
 def test_the_last_word_is_waited_for_whenever_its_job_says_that_it_ended(training, last_word):
-    """The control plane's clock gives the time of a Job's end, so the operator does not compare this time."""
+    """The control plane's clock sets the time of a Job's end.
+
+    The operator must not compare this time with its own clock.
+    """
     scene, pod = training()
     scene.server_s -= HOUR_S
     scene.end_job("Complete")

@@ -74,7 +74,10 @@ def test_time_in_which_a_hold_keeps_a_job_from_being_planned_does_not_count(make
 
 
 def test_the_active_deadline_may_be_raised_and_is_woken_for(training):
-    """A user may change this field while the job runs; the next reconcile then moves to the new deadline."""
+    """A user may change this field while the job runs.
+
+    The next reconcile must then be at the new deadline.
+    """
     scene, _ = training(activeDeadlineSeconds=60)
     assert scene.step(10).wake_after_s == 50
 
@@ -139,7 +142,7 @@ def test_a_run_that_comes_forward_slowly_is_not_stalled(training):
 
 @pytest.mark.parametrize("tells_ages", [True, False])
 def test_an_evaluation_that_steps_is_progress(training, tells_ages):
-    """An evaluation does not change the training's step count; only its own steps show progress."""
+    """An evaluation does not change the training's step count, so only its own steps show progress."""
     scene, pod = training(stallDeadlineSeconds=60)
     for _ in range(30):
         scene.pass_(60)

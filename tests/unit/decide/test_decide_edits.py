@@ -29,7 +29,7 @@ def test_what_is_as_it_was_made_is_no_edit(training):
     ],
 )
 def test_an_edit_of_a_job_is_said_and_left_alone(change, words, training):
-    """A Job with parallelism 0 creates no pod; without the event nobody would find the cause."""
+    """A Job with parallelism 0 creates no pod, and without the event nobody would find the cause."""
     scene, _ = training()
     scene.job()["spec"] |= change
 

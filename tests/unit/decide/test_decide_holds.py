@@ -117,7 +117,10 @@ def held(scene):
     ],
 )
 def test_a_job_is_held_with_a_reason_and_creates_nothing(make_scene, spec, there, reason, message):
-    """The message has a field, a fact and a remedy; the job stays Pending and starts after the remedy."""
+    """The author can remove the cause, so the job waits.
+
+    The message has the field, the fact and the remedy.
+    """
     scene = make_scene(**spec)
     scene.there = there
 
@@ -234,7 +237,10 @@ def test_a_world_that_goes_away_later_does_not_matter_to_a_running_job(make_scen
 
 
 def test_a_label_that_was_taken_away_keeps_a_new_pod_from_it(make_scene):
-    """The replica whose Job is missing is held; the replica that runs continues."""
+    """A new pod must not use the object, so the replica without a Job is held.
+
+    The other replica runs and continues.
+    """
     scene = make_scene(simulators=WORLD, replicas=2)
     scene.there[("ConfigMap", "worlds")] = config_map({"hall.wbt": WORLD_TEXT})
     scene.settle()

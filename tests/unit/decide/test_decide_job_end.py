@@ -15,7 +15,10 @@ from palaestra_protocol.pod.status import SuccessInterval
     ],
 )
 def test_an_exit_code_that_forbids_another_try_is_the_reason(training, last_word, code, reason, begin):
-    """The message quotes the trainer's termination message."""
+    """Kubernetes does not retry after these exit codes.
+
+    The user reads the cause in the trainer's own words.
+    """
     scene, pod = training()
     scene.end(pod, code, last_word(step=40, reason="Why: because"))
     scene.end_job("Failed", 0, "PodFailurePolicy", "Container trainer ... matching FailJob rule")
@@ -65,7 +68,7 @@ def test_a_spent_backoff_limit_tells_of_the_last_failure(accepted, last_word):
 
 
 def test_a_trainer_that_was_killed_for_its_memory_is_reported_with_its_limit(training):
-    """Exit code 137 alone does not explain the end; the message must name the memory limit."""
+    """Exit code 137 alone does not explain the end, so the message must name the memory limit."""
     scene, pod = training(trainer={"resources": {"limits": {"memory": "2Gi"}}})
     scene.end(pod, 137, reason="OOMKilled")
     scene.end_job("Failed", 0, "BackoffLimitExceeded")
@@ -77,7 +80,7 @@ def test_a_trainer_that_was_killed_for_its_memory_is_reported_with_its_limit(tra
 
 
 def test_a_simulator_that_hung_each_time_is_distinguished_from_a_stalled_run(training, last_word):
-    """Both have exit code 82; only the trainer's termination message has the cause."""
+    """Both have exit code 82, and only the trainer's termination message has the cause."""
     scene, pod = training()
     scene.end(pod, 82, last_word(reason="SimulatorHung: collect-0: no answer within 600 s"))
     scene.end_job("Failed", 0, "BackoffLimitExceeded")

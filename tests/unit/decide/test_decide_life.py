@@ -34,7 +34,7 @@ MUJOCO = [
 
 
 def test_a_newer_release_plans_mujoco_with_the_image_of_the_old_one(make_scene):
-    """MuJoCo follows the same rule as every other image of a job."""
+    """A job keeps its simulator for its whole life, so the image of MuJoCo must not change either."""
     scene = make_scene(simulators=MUJOCO)
     scene.step()
     scene.layout = type(scene.layout)(images=type(scene.layout.images).of_release("2"))
@@ -88,7 +88,7 @@ def test_only_a_replica_that_lacks_an_object_is_planned(accepted):
 
 
 def test_a_job_that_trains_says_so(training):
-    """The phase, the printer columns and the conditions agree."""
+    """Users read the phase and the columns, and programs read the conditions. All of them must agree."""
     scene, _ = training()
 
     held = {each.type.value: each.status.value for each in scene.status.conditions}
@@ -100,7 +100,10 @@ def test_a_job_that_trains_says_so(training):
 
 
 def test_a_job_succeeds_when_all_its_replicas_have(accepted, last_word):
-    """The status has the values that each trainer reported last."""
+    """One successful replica does not complete the job.
+
+    At the end, the status has the values that the trainers reported last.
+    """
     scene = accepted(replicas=2)
     pods = [scene.running_pod(index) for index in (0, 1)]
     scene.settle()
@@ -117,7 +120,10 @@ def test_a_job_succeeds_when_all_its_replicas_have(accepted, last_word):
 
 
 def test_the_last_word_is_waited_for(training, last_word):
-    """The ends of the Job and of its pod come from two watches, in any order."""
+    """The operator may see the Job's end before its pod's end.
+
+    Only the pod has the last values of the trainer.
+    """
     scene, pod = training()
     scene.end_job("Complete")
     decision = scene.step(1)
@@ -157,7 +163,10 @@ def test_a_replica_that_failed_does_not_stop_the_others(accepted):
 
 
 def test_a_job_with_a_failed_replica_fails_when_the_last_has_ended(accepted, last_word):
-    """The message has the number of failed replicas, and the reason of the first one."""
+    """The other replicas may still succeed.
+
+    At the end, the message has the number of failed replicas and the reason of the first one.
+    """
     scene = accepted(replicas=2)
     pods = [scene.running_pod(index) for index in (0, 1)]
     scene.end(pods[0], 81, last_word(reason="Diverged: NaN"))
@@ -198,7 +207,10 @@ def test_a_job_that_somebody_deleted_is_made_again_once_its_pods_are_gone(traini
 
 
 def test_suspending_is_one_patch_of_each_job_that_goes_on(training):
-    """Kubernetes deletes the pods of a suspended Job, and the job's active time stops."""
+    """One patch of the Job is enough, because Kubernetes then deletes the pods.
+
+    The job's active time must stop.
+    """
     scene, _ = training()
     scene.raw["spec"]["suspend"] = True
 
@@ -298,7 +310,7 @@ def test_a_job_is_deleted_when_its_time_to_live_is_over(training, last_word):
 
 
 def test_the_time_to_live_may_be_given_after_the_end(training, last_word):
-    """A user may set this field of an ended job; the status then has the new generation."""
+    """A user may set this field of an ended job, and its status must then have the new generation."""
     scene, pod = training()
     scene.end(pod, 0, last_word(step=100))
     scene.end_job("Complete")
@@ -315,7 +327,7 @@ def test_the_time_to_live_may_be_given_after_the_end(training, last_word):
 def test_a_pod_that_only_says_to_be_the_replicas_is_waited_for(accepted, last_word):
     """The pod has the labels of the replica, but not its owner.
 
-    It may write to the volume, so the operator waits for its end; it ignores the pod's report.
+    The pod may write to the volume, so the operator waits for its end. It must not trust the pod's report.
     """
     scene = accepted()
     pod = scene.running_pod()

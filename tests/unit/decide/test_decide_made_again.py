@@ -36,7 +36,10 @@ def test_a_pod_of_an_earlier_job_holds_up_nothing(make_scene):
 
 
 def test_a_pod_on_the_claim_that_both_name_holds_up_its_own_replica_only(make_scene):
-    """Two pods of one replica number would write to one run directory; the other replicas have their own."""
+    """Two pods of one replica number would write to one run directory.
+
+    The other replicas have their own directories.
+    """
     scene, _ = made_again(make_scene, replicas=2, **SHARED)
 
     assert jobs(scene.settle()) == ["job-1"]

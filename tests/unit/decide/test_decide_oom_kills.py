@@ -52,7 +52,10 @@ def test_a_memory_kill_of_a_simulator_that_is_back_at_once_is_reported(scene_and
 
 
 def test_each_kill_is_counted_once(scene_and_pod):
-    """The count includes all attempts and does not depend on the number of reconciles."""
+    """The count shows how often memory was too small in all attempts.
+
+    A reconcile without a new kill must not raise it.
+    """
     scene, pod = scene_and_pod
     kill(scene, pod)
     first = told(scene.settle(1))
@@ -89,7 +92,7 @@ def test_a_kill_is_one_event_also_where_the_status_has_no_room(scene_and_pod):
 
 
 def test_a_simulator_that_crashed_was_not_killed_for_its_memory(scene_and_pod):
-    """Both have exit code 137; only the reason `OOMKilled` shows a memory kill."""
+    """Both ends have exit code 137, and only the reason `OOMKilled` shows a memory kill."""
     scene, pod = scene_and_pod
     scene.container(pod, "sim-collect-0", waiting="CrashLoopBackOff", code=137, restarts=3)
 
@@ -113,7 +116,7 @@ def test_a_kill_that_is_the_replicas_reason_is_one_event(scene_and_pod):
 
 
 def test_without_a_limit_it_was_its_node_that_ran_short(scene_and_pod):
-    """A webhook may have removed the limits; the message must then name the node's memory as the cause."""
+    """A webhook may have removed the limits. The message must then name the node's memory as the cause."""
     scene, pod = scene_and_pod
     for each in pod["spec"]["initContainers"]:
         del each["resources"]["limits"]
@@ -141,7 +144,7 @@ def test_the_trainers_kills_are_counted_too(training):
 
 
 def test_a_spent_budget_names_the_memory_that_its_simulators_lacked(training, last_word):
-    """The trainer sees only dead simulators; the message must add the memory limit as the cause."""
+    """The trainer sees only dead simulators, so the operator must add the memory limit as the cause."""
     scene, pod = training()
     for each in pod["spec"]["initContainers"]:
         each["resources"] = {"limits": {"memory": "150Mi"}}

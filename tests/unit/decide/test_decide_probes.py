@@ -48,7 +48,7 @@ def test_a_trainer_that_has_not_answered_yet_starts(start_slowly):
 
 @pytest.mark.parametrize("answer", ["to the kubelet", "to the operator"])
 def test_a_trainer_runs_once_it_has_answered(start_slowly, answer):
-    """The trainer responds to the kubelet's probe or to the operator's poll, in any order."""
+    """A response to the kubelet's probe or to the operator's poll proves that the trainer runs."""
     scene, pod = start_slowly()
     if answer == "to the kubelet":
         pod["status"]["containerStatuses"][0]["started"] = True
@@ -71,7 +71,7 @@ def test_the_start_timeout_counts_while_a_trainer_has_not_answered(start_slowly)
 
 @pytest.mark.parametrize(("words", "probe"), [(LIVENESS, "liveness"), (STARTUP, "startup")])
 def test_a_trainer_that_its_probe_ended_says_so_with_the_remedy(training, words, probe):
-    """The pod does not show the sender of the signal; only the kubelet's event does."""
+    """The pod does not show who sent the signal. Only the kubelet's event shows it."""
     scene, pod = training()
     end_by_probe(scene, pod, words)
 
@@ -84,7 +84,10 @@ def test_a_trainer_that_its_probe_ended_says_so_with_the_remedy(training, words,
 
 
 def test_a_trainer_that_its_probe_ended_counts_once_and_evicts_nothing(training):
-    """The Job counts no failure for exit code 75. Without the operator's count it would retry for ever."""
+    """The Job counts no failure for exit code 75.
+
+    Without the operator's count, the Job would retry for ever.
+    """
     scene, pod = training()
     end_by_probe(scene, pod)
 

@@ -273,7 +273,7 @@ def test_deciding_again_says_nothing_new(history):
 @settings(max_examples=30)
 @given(histories)
 def test_an_end_is_an_end(history):
-    """A terminal phase never changes, and the operator never plans an ended replica again."""
+    """Programs act on a terminal phase, so it must never change. An ended replica must not train again."""
     for before, _, _, decision in decisions(history):
         ended = {each.index for each in before.replicas if each.phase in TERMINAL}
         now_ended = {each.index for each in decision.status.replicas if each.phase in TERMINAL}
@@ -288,7 +288,10 @@ def test_an_end_is_an_end(history):
 @settings(max_examples=30)
 @given(histories)
 def test_counts_never_fall_and_always_add_up(history):
-    """The attempt number is one more than the sum of the restarts of all causes."""
+    """Users and metrics rely on the counts.
+
+    The attempt number is one more than the sum of the restarts of all causes.
+    """
     for before, _, _, decision in decisions(history):
         for old, new in zip(before.replicas, decision.status.replicas, strict=False):
             was, now = old.restarts, new.restarts
@@ -310,9 +313,10 @@ def kept(replica):
 @settings(max_examples=30)
 @given(histories)
 def test_phase_and_conditions_tell_the_same(history):
-    """At most one condition of a phase is true, and it belongs to the current phase.
+    """Some programs read the phase, and others the conditions.
 
-    At most one of Reconciling and Stalled is true.
+    At most one condition of a phase is true, and it belongs to the current phase. At most one of Reconciling
+    and Stalled is true.
     """
     for _, _, _, decision in decisions(history):
         status = decision.status

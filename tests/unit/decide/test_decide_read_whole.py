@@ -32,7 +32,7 @@ def observed(scene):
 
 
 def test_a_job_is_read_whole_when_it_is_planned_and_not_before(make_scene, accepted):
-    """The cache holds only digests of large fields; a whole read may transfer a megabyte."""
+    """The cache holds only digests of large fields, and a whole read may transfer a megabyte."""
     to_plan, planned, waits = make_scene(), accepted(), make_scene(simulators=WORLD)
 
     assert wants_whole(*observed(to_plan), Lacking.TEXTS)

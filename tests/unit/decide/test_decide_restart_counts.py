@@ -24,7 +24,7 @@ def test_a_failure_is_a_restart_once_another_pod_is_there(training, last_word):
 
 
 def test_a_pod_that_was_taken_is_a_disruption(training):
-    """The Job does not count a disruption against `backoffLimit`."""
+    """The Job counts no failure for an evicted pod, so `backoffLimit` does not limit evictions."""
     scene, pod = training()
     scene.take(pod)
     scene.pass_(5)
@@ -36,7 +36,7 @@ def test_a_pod_that_was_taken_is_a_disruption(training):
 
 
 def test_a_pod_that_somebody_deleted_is_a_disruption_too(training):
-    """The deleted pod left no record, but a newer pod exists."""
+    """The deleted pod left no record. Only the newer pod shows that an attempt has ended."""
     scene, _ = training()
     scene.objects["pods"].clear()
     scene.pass_(5)
@@ -61,7 +61,7 @@ def test_a_failed_pod_that_somebody_tidied_away_is_still_a_failure(training):
 
 
 def test_a_job_that_is_seen_late_is_not_needed(training, last_word):
-    """Pods and Jobs come from two watches; the failed pod already shows the failure."""
+    """Pods and Jobs come from two watches, but the failed pod alone already shows the failure."""
     scene, pod = training()
     scene.end(pod, 70, last_word())
     scene.pass_(15)
@@ -118,7 +118,10 @@ def test_a_record_that_cannot_be_true_is_not_believed(training):
 
 
 def test_restarts_of_simulators_add_up_over_attempts(training, last_word, simulator):
-    """A trainer counts only its own attempt; its termination message may add restarts since the last poll."""
+    """A trainer counts only its own attempt, so the operator adds the counts of all attempts.
+
+    A termination message may contain restarts since the last poll.
+    """
     scene, pod = training()
     scene.poll(pod, simulators=(simulator(restarts=2), simulator(name="evaluate-0", restarts=1)))
     scene.settle()
@@ -155,7 +158,10 @@ def test_the_last_words_of_pods_that_nobody_saw_run_are_added(training, last_wor
 
 
 def test_a_new_attempt_does_not_show_step_0(training, last_word):
-    """A new trainer reports step 0 until it has read the run directory; the status keeps the known step."""
+    """A new trainer reports step 0 until it has read the run directory.
+
+    Until then the status must keep the known step.
+    """
     scene, pod = training()
     scene.end(pod, 75, last_word(step=50, attempt=1))
     scene.settle(5)

@@ -77,7 +77,7 @@ def test_the_interval_of_the_success_rate_is_kept_as_the_rate_is(training):
 
 
 def test_the_status_lists_simulators(training, simulator):
-    """The last fault of each simulator is shown on one line."""
+    """A user must find the simulator that fails. The last fault of each simulator is shown on one line."""
     scene, pod = training()
     scene.poll(pod, simulators=(simulator(state="failed", last_fault="collect-0:\ngone", restarts=2),))
 
@@ -109,7 +109,10 @@ def test_what_simulators_leave_out_is_in_the_status_of_the_job(accepted):
 
 
 def test_the_status_shows_goodput_and_faults(training, simulator):
-    """The values are in whole seconds, and absent until the trainer reports them."""
+    """A user sees how much time and how many steps the faults have cost.
+
+    The times are in whole seconds, and absent until the trainer reports them.
+    """
     scene, pod = training()
     scene.poll(pod, step=1)
     scene.settle()
@@ -135,7 +138,10 @@ def test_every_cause_and_every_kind_of_fault_has_a_field():
 
 
 def test_a_status_of_two_replicas_stays_small(accepted, simulator):
-    """People read the status and an API server stores it; here every text has its longest value."""
+    """People read the status, and an API server stores it.
+
+    Every text of this status has its longest value.
+    """
     scene = accepted(replicas=2)
     fact = "x" * 500
     faults = tuple(
@@ -162,7 +168,7 @@ def test_a_status_of_two_replicas_stays_small(accepted, simulator):
 
 
 def test_the_status_has_step_and_time_of_the_last_checkpoint(training):
-    """The status has the time that the trainer wrote; a checkpoint with an impossible date is ignored."""
+    """A user sees how much work a crash could cost. A checkpoint with an impossible date is ignored."""
     scene, pod = training()
     scene.poll(pod, last_checkpoint=CheckpointStatus(step=5, time="2026-01-31T11:59:00+01:00"))
     scene.settle()
@@ -175,7 +181,10 @@ def test_the_status_has_step_and_time_of_the_last_checkpoint(training):
 
 
 def test_a_trainer_that_has_ended_leaves_its_replica_running_until_its_pod_has(training, last_word):
-    """Kubernetes still stops the simulators of the pod, so the operator neither retries nor starts a pod."""
+    """Kubernetes still stops the simulators of the pod.
+
+    Until the pod has ended, its replica must not count as ended or be retried.
+    """
     scene, pod = training()
     scene.container(pod, "trainer", code=0, message=last_word(step=100))
 
@@ -220,7 +229,10 @@ def test_only_the_conditions_running_and_reconciling_say_in_full_why_a_job_waits
 
 
 def test_only_the_conditions_failed_and_stalled_say_in_full_why_a_job_failed(accepted, last_word):
-    """`palaestra watch` and the event take the message from these conditions; the others refer to it."""
+    """`palaestra watch` and the event take the message from these conditions.
+
+    The others refer to them, so that `kubectl describe` stays short.
+    """
     scene = accepted()
     scene.end(scene.running_pod(), 81, last_word(reason="Diverged: NaN"))
     scene.end_job("Failed", 0, "PodFailurePolicy")
@@ -261,7 +273,10 @@ def test_an_ephemeral_run_is_named_in_a_condition(accepted):
 
 
 def test_each_action_and_each_change_is_one_event(make_scene):
-    """The creation of all objects of a replica is one event, and no event is repeated."""
+    """Too many events would hide the important ones.
+
+    So the creation of all objects of a replica is one event, and no event is repeated.
+    """
     scene = make_scene()
 
     told = [(each.reason.value, each.replica) for each in scene.settle().events]
@@ -270,7 +285,10 @@ def test_each_action_and_each_change_is_one_event(make_scene):
 
 
 def test_suspending_suspended_and_resumed_are_an_event_each(training):
-    """`Suspending` shows that the pod saves a checkpoint; `Suspended` shows that the pod has ended."""
+    """A user who waits for the checkpoint needs both events.
+
+    `Suspending` means that the pod saves the checkpoint, and `Suspended` means that the pod has ended.
+    """
     scene, _ = training()
     scene.raw["spec"]["suspend"] = True
     suspending = [each.reason.value for each in scene.settle().events]

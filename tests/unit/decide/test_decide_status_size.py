@@ -102,7 +102,7 @@ def test_what_others_have_written_into_the_object_takes_room_too():
 
 
 def test_a_replica_that_failed_keeps_its_log_longest():
-    """A person reads this log to find the cause; a running replica sends its log again."""
+    """A person reads this log to find the cause of the failure. A running replica sends its log again."""
     status = whole([replica(i, "Failed" if i == 7 else "Running") for i in range(100)])
 
     cut = fitted(job(1_000_000), status)
@@ -123,7 +123,10 @@ def test_a_replica_that_failed_keeps_its_log_longest():
 def test_every_status_fits_beside_its_spec_and_keeps_what_is_decided_by(
     phases, simulators, text, kills, taken
 ):
-    """The schema allows any of these statuses. To shorten a shortened status again must change nothing."""
+    """The schema allows any of these statuses.
+
+    If a second shortening changed the status again, each reconcile would write it.
+    """
     status = whole(
         [replica(i, each, simulators=simulators, text=text, kills=kills) for i, each in enumerate(phases)]
     )

@@ -226,7 +226,7 @@ def test_suspending_asks_for_no_label(make_scene):
 
 @pytest.mark.parametrize("annotated", [True, False])
 def test_a_refused_patch_of_a_job_is_sent_again(training, annotated):
-    """The API server may refuse the patch after the status is written; the operator must then retry it."""
+    """The API server may refuse the patch after the status is written, so the operator must retry it."""
     scene, _ = training()
     if not annotated:
         without_annotation(scene)
@@ -288,7 +288,10 @@ def test_a_job_that_is_resumed_before_its_pod_has_ended_does_not_run(training, l
 
 
 def test_a_suspended_pod_on_a_lost_node_is_reported_as_lost(training):
-    """The trainer cannot save; before the job can be resumed, somebody must delete the Node object."""
+    """The trainer on this node cannot save.
+
+    Before the job can be resumed, somebody must delete the Node object.
+    """
     scene, pod = training()
     scene.raw["spec"]["suspend"] = True
     scene.settle()

@@ -128,7 +128,10 @@ def resume(scene):
 
 
 def test_a_suspension_within_the_second_of_its_pod_is_counted(training):
-    """The control plane writes whole seconds, so times cannot decide; the annotation names the ended pod."""
+    """The control plane writes whole seconds, so times cannot decide.
+
+    The annotation on the Job names the pod that the suspension ended.
+    """
     scene, pod = training()
     pause(scene, pod)
     scene.running_pod()

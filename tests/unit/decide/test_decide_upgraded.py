@@ -32,7 +32,7 @@ def upgraded(request, make_scene):
 
 
 def test_a_new_job_like_it_is_not_accepted(upgraded, make_scene):
-    """This test shows that the rule exists; the tests below would pass without the rule."""
+    """If the rule did not exist, the tests below would pass without a meaning."""
     scene = make_scene(**upgraded.raw["spec"])
 
     decision = scene.settle()
@@ -42,7 +42,7 @@ def test_a_new_job_like_it_is_not_accepted(upgraded, make_scene):
 
 
 def test_it_runs_on(upgraded):
-    """The upgraded operator does not touch the job's objects."""
+    """An upgrade must not end a running training, so the operator does not touch the job's objects."""
     upgraded.restart()
 
     decision = upgraded.settle()

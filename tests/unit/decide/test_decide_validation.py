@@ -117,5 +117,8 @@ def test_a_status_that_cannot_be_read_is_left_alone(status):
     ],
 )
 def test_jobs_of_other_controllers_and_of_nobody_are_left_alone(spec, metadata, ours):
-    """The operator also ignores a job that is being deleted, which must not get new objects."""
+    """The author may have left the job to another controller.
+
+    A job that is being deleted must not get new objects.
+    """
     assert managed_here(raw(spec, **metadata)) is ours

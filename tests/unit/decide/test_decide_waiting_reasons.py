@@ -156,7 +156,7 @@ def test_a_pod_that_is_not_gone_when_it_should_be_is_on_a_lost_node(training):
 
 
 def test_a_simulator_that_is_killed_for_its_memory_is_named(training):
-    """The trainer sees only a failed simulator; the memory kill is in the status of the container."""
+    """The trainer sees only a failed simulator, but the status of the container shows the memory kill."""
     group = {"name": "collect", "role": "Collect", "resources": {"limits": {"memory": "512Mi"}}}
     scene, pod = training(simulators=[group, {"name": "evaluate", "role": "Evaluate"}])
     scene.container(
@@ -174,7 +174,7 @@ def test_a_simulator_that_is_killed_for_its_memory_is_named(training):
 
 
 def test_between_two_pods_the_message_says_how_the_last_one_failed(training, last_word):
-    """The message quotes the trainer's termination message."""
+    """While no pod runs, the user reads in this message why the last pod failed."""
     scene, pod = training()
     scene.end(pod, 70, last_word(reason="Unexpected: KeyError"))
     scene.count_failures(1)
@@ -220,7 +220,7 @@ def test_a_pod_that_the_cluster_took_is_no_failure(training):
 
 
 def test_a_trainer_that_stopped_and_nobody_says_why_is_interrupted(training, last_word):
-    """The trainer stopped because the ROS master was lost; the cluster did not evict the pod."""
+    """The trainer stopped because the ROS master was lost, so the status must not report an eviction."""
     scene, pod = training()
     scene.end(pod, 75, last_word(reason="MasterLost: it does not answer"))
 
@@ -241,7 +241,7 @@ def test_a_full_volume_is_reported_between_retries(training, last_word):
 
 
 def test_the_message_about_a_volume_that_does_not_come_quotes_the_cluster(accepted):
-    """Only an event on the pod has the cause; the pod's status only shows that it starts."""
+    """Only an event on the pod has the cause, because the pod's status only shows that the pod starts."""
     scene = accepted()
     pod = scene.new_pod()
     words = 'Multi-Attach error for volume "pvc-1": still attached to node-2'
@@ -264,7 +264,7 @@ def test_the_message_about_a_volume_that_does_not_come_quotes_the_cluster(accept
 
 
 def test_while_its_simulators_start_a_trainer_does_not_train(training):
-    """The trainer reports this phase itself; a trainer without a status counts as training."""
+    """The trainer itself reports that it still starts. A trainer without a status would count as training."""
     scene, pod = training()
     scene.poll(pod, phase="starting")
 

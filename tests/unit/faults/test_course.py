@@ -12,7 +12,7 @@ GET = Asked(verb="get", resource="jobs", name="job-0")
 
 
 def test_the_fault_comes_at_the_request_that_it_is_planned_for_and_once():
-    """The counter ignores requests of other kinds."""
+    """A plan counts the requests of one kind, so the counter must ignore all others."""
     fault = Fault(kind=Kind.DROP, request="write", number=2)
     course = Course(fault)
 

@@ -39,7 +39,7 @@ def test_leaves_are_named_by_what_a_list_member_is_called():
 
 
 def test_what_differs_between_two_undisturbed_runs_is_masked():
-    """A poll changes some fields by chance; the mask is measured, so nobody has to list these fields."""
+    """A poll changes some fields by chance. The mask is measured, so that nobody has to list these fields."""
     masked = mask({"/step": 3, "/phase": "Failed"}, {"/step": 4, "/phase": "Failed"})
 
     assert masked == {"/step"}

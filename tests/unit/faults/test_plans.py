@@ -14,7 +14,7 @@ JOBS = "/apis/batch/v1/namespaces/team/jobs"
 
 @given(st.integers(0, 10_000))
 def test_a_seed_names_the_same_plan_again(seed):
-    """A person can repeat a failure by its seed; consecutive seeds of a workload give different faults."""
+    """A person can repeat a failure by its seed. Consecutive seeds of a workload give different faults."""
     workloads = ("ends", "pauses")
 
     assert plan(seed, workloads) == plan(seed, workloads)

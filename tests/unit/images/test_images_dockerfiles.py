@@ -96,7 +96,7 @@ def test_code_is_compiled_in_the_build_and_not_at_run_time(instructions):
 
 @pytest.mark.parametrize("name", ["stub", "mujoco", "trainer", "notebook"])
 def test_an_image_with_ros_has_the_package_webots_ros(name):
-    """Users' programs import this package; Palaestra's own code has its own copy of the messages."""
+    """Users' programs import this package. Palaestra's own code does not need it."""
     runs = values(parsed(recipes("debian")[name]), "RUN")
 
     distribution, *_ = [run for run in runs if "apt-get" in run]
@@ -123,7 +123,7 @@ def test_what_changes_most_comes_last(instructions):
 
 
 def test_the_notebook_begins_with_the_layers_of_the_trainer():
-    """PyTorch and the trainer's libraries have 1.4 GB; equal layers are built and stored once."""
+    """PyTorch and the trainer's libraries have 1.4 GB, and equal layers are built and stored only once."""
     trainer, notebook = (parsed(recipes("debian")[name]) for name in ("trainer", "notebook"))
     shared = next(n for n, pair in enumerate(trainer) if "/context/requirements.txt" in pair[1]) + 1
 

@@ -55,7 +55,7 @@ def order(tmp_path):
 
 @pytest.mark.parametrize("lacking", ["version", "buildx-version"])
 def test_without_an_engine_or_buildx_there_is_no_docker(docker, lacking):
-    """Many machines have only Docker's client; an old engine cannot mount files during a build."""
+    """Many machines have only Docker's client, and an old engine cannot mount files during a build."""
     docker(" ".join(word for word in EVERYTHING.split() if word != lacking))
 
     assert Docker.here() is None
@@ -80,7 +80,7 @@ def test_a_base_image_that_is_there_is_not_pulled(docker):
 
 
 def test_docker_builds_with_the_arguments_and_saves_the_archive(docker, order):
-    """Comments in the Dockerfiles explain these build arguments."""
+    """A Dockerfile gets the version and the packages of its image from these build arguments."""
     calls = docker(EVERYTHING)
     Docker.here().build(order)
 

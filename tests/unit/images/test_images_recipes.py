@@ -63,14 +63,14 @@ def test_what_python_leaves_behind_changes_nothing(tmp_path):
 
 @pytest.mark.parametrize("recipe", recipes("debian").values(), ids=lambda recipe: recipe.name)
 def test_a_recipe_names_what_is_there(recipe):
-    """This test finds a wrong path at once; a build would fail only after minutes."""
+    """This test finds a wrong path at once, but a build would fail only after minutes."""
     assert (ROOT / recipe.dockerfile).is_file()
     assert all((ROOT / file).is_file() for file in recipe.files)
     assert all((ROOT / package / "pyproject.toml").is_file() for package in recipe.packages)
 
 
 def test_an_image_has_the_name_that_the_plan_asks_for():
-    """The plan's names have no registry; a container engine adds `docker.io/library` to them."""
+    """The plan's names have no registry, and a container engine adds `docker.io/library` to them."""
     from palaestra.plan import Images  # noqa: PLC0415 - only this test needs it
 
     images = Images.of_release("1.2.3")

@@ -155,7 +155,10 @@ def test_it_draws_every_shape_and_moves_what_moves(page, simulator):
 
 @pytest.mark.usefixtures("browser")
 def test_the_newest_picture_of_a_camera_is_shown_while_the_simulator_has_one(page, simulator):
-    """The page shows the image that the policy gets; after a restart the camera may be off."""
+    """The user sees the image that the policy gets.
+
+    After a restart the camera may be off, and an old image would mislead the user.
+    """
     for red in (1, 2):
         simulator.shot = CameraPicture(name="eye", width=2, height=1, pixels=bytes((red, 0, 0)) * 2)
         eventually(lambda red=red: page._picture is not None and page._picture.image[0, 0, 0] == red)
@@ -224,7 +227,7 @@ def test_names_of_a_pod_are_text_and_nothing_else():
 
 
 def test_the_success_rate_is_shown_with_its_interval_and_the_faults():
-    """A rate means little without its interval; a slow step does not count as a fault."""
+    """A success rate means little without its interval. A slow step does not count as a fault."""
     text = "step 12,000 of 50,000 · 2 faults\n\n**success 85 %** (64 to 95 %, 20 episodes)"
 
     assert summarized(RUN) == text
@@ -239,7 +242,7 @@ def test_a_run_without_an_evaluation_has_no_rate_and_one_between_two_attempts_no
 
 
 def test_a_capsule_has_the_height_with_its_caps():
-    """Viser has no capsule shape, so the page draws a mesh."""
+    """Viser has no capsule shape, so the page draws a mesh, which must have the size of the capsule."""
     points, faces = capsule(0.1, 0.6)
 
     assert (points[:, 2].min(), points[:, 2].max()) == pytest.approx((-0.3, 0.3))

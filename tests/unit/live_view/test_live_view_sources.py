@@ -130,7 +130,7 @@ def test_the_sentence_of_a_sidecar_is_passed_on(serve, run, status, error, fact)
 
 
 def test_an_older_sidecar_and_a_dead_one_are_told_apart(serve, run):
-    """An older sidecar will never serve a scene; a dead one may be restarted."""
+    """An older sidecar will never serve a scene, but a dead one may be restarted."""
     (old,) = LocalRun(run(serve(state=answer(MOVED)))).sources()
     with pytest.raises(NotShown, match="is not one of /state"):
         old.scene()
@@ -234,7 +234,10 @@ class FakeClient:
 
 
 def test_a_job_is_read_from_the_newest_pod_of_its_replica():
-    """The health ports of the simulators follow the order of the groups."""
+    """Only the newest pod of a replica still runs.
+
+    The health ports of the simulators follow the order of the groups.
+    """
     content = yaml.safe_load(EXAMPLE.read_bytes())
     content["metadata"]["uid"] = "7d3b8a54-0000-4000-8000-000000000000"
     content["status"] = {"replicas": [{"index": 0, "pod": POD}]}
@@ -273,7 +276,10 @@ def test_the_error_of_a_server_behind_the_api_server_keeps_its_sentence():
     ],
 )
 def test_a_pod_is_read_through_the_api_server(failure, error):
-    """The view opens no port of the pod. If the pod is gone, another pod may follow."""
+    """A user's machine usually cannot reach the network of pods.
+
+    If the pod is gone, another pod may follow.
+    """
     job = ClusterJob(FakeClient(None, {(7200, "scene"): failure, (7200, "watch"): "{}"}), "job", 0)
     source = SidecarSource(
         name="collect-0", fetch=lambda path, most: job._fetch("job-0-abc", 7200, path, most)

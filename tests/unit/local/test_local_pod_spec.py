@@ -36,7 +36,10 @@ def test_every_planned_container_is_read_in_order():
 
 
 def test_probes_are_those_of_the_plan():
-    """The ROS master and the trainer have a startup probe; sidecars and the trainer have a liveness probe."""
+    """A local run must find a dead program as a cluster does.
+
+    The ROS master has a startup probe, a sidecar a liveness probe, and the trainer both.
+    """
     pod = read_pod(template(), "pod-1")
 
     assert pod.init[0].startup.command[0] == "bash"
@@ -51,7 +54,10 @@ def test_the_uid_of_the_pod_is_filled_in_for_each_attempt():
 
 
 def test_what_an_author_writes_reaches_the_program_as_it_stands():
-    """A kubelet expands `$(NAME)` in such texts, so the plan escapes it; `read_pod` removes the escapes."""
+    """A kubelet expands `$(NAME)` in such texts, so the plan escapes them.
+
+    `read_pod` must remove the escapes.
+    """
     texts = ("echo $$ $HOME", "$(ROS_HOME)", "$$(ROS_HOME)", "$")
     written = {"command": list(texts), "env": [{"name": "TEXT", "value": texts[1]}]}
 

@@ -33,7 +33,10 @@ def collecting(**fields):
 
 
 def test_this_machine_can_run_the_minimal_job(request_for):
-    """The checks find no problem and write nothing."""
+    """A false problem would keep every user from a first run.
+
+    The checks must also leave no run directory behind.
+    """
     request = request_for()
 
     preflight.check(request)

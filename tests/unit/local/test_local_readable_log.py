@@ -23,7 +23,7 @@ HEAD = "2026-11-27T17:23:06.142184Z "
     ],
 )
 def test_values_are_progress_and_warnings_are_sentences(line, text):
-    """The terminal shows sentences; the log file has all fields."""
+    """The terminal shows only sentences, because a person reads it. The log file has all fields."""
     assert readable(HEAD + line) == text
 
 

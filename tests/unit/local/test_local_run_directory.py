@@ -36,7 +36,7 @@ def directory(tmp_path):
 
 
 def test_the_uid_of_a_job_follows_from_its_place(tmp_path):
-    """The same command must resume the same run; jobs in two directories must have different uids."""
+    """The same command must resume the same run, and jobs in two directories must not share a uid."""
     here, there = tmp_path / "a", tmp_path / "b"
 
     assert run_directory.uid_of(here) == run_directory.uid_of(here)
@@ -112,7 +112,7 @@ def test_a_job_that_was_wrong_before_its_first_step_may_be_corrected(directory):
 
 
 def test_a_wrong_job_that_runs_again_unchanged_is_no_correction(directory):
-    """The user may have corrected her own code instead of the job; the run directory then stays."""
+    """The user may have corrected her own code instead of the job, so the run directory stays."""
     WRONG.keep(directory)
 
     assert not run_directory.is_correction(directory, record())
@@ -140,7 +140,7 @@ def test_a_run_that_may_have_trained_is_never_corrected(directory, outcome):
 
 
 def test_a_run_with_a_checkpoint_is_never_corrected(directory):
-    """Only the last attempt was refused; an earlier attempt has trained."""
+    """Only the last attempt was refused, and an earlier attempt has trained."""
     WRONG.keep(directory)
     (directory / "checkpoints" / "5000").mkdir(parents=True)
 
@@ -312,7 +312,10 @@ def test_a_directory_without_a_readable_outcome_is_not_finished(directory, conte
 
 
 def test_the_summary_tells_what_was_measured_and_how_to_look_at_it(directory):
-    """The summary leaves out values that were not measured."""
+    """At the end of a run, a user looks for the result and for the next commands.
+
+    Values that were not measured are left out.
+    """
     for name in ("model.zip", "attempts.jsonl"):
         (directory / name).touch()
     (directory / "tensorboard").mkdir()

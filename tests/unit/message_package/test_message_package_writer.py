@@ -126,7 +126,10 @@ def test_a_python_whose_packages_name_it_imports_it(package, tmp_path):
 
 
 def test_an_installed_webots_ros_is_imported_even_if_it_comes_last(package, tmp_path):
-    """Palaestra's virtual environment is searched before the distribution's packages."""
+    """An installed package fits the user's Webots, so it has priority.
+
+    But Palaestra's virtual environment is searched before the distribution's packages.
+    """
     make_importable(package, tmp_path)
     installed = tmp_path / "dist-packages/webots_ros"
     (installed / "srv").mkdir(parents=True)

@@ -99,7 +99,10 @@ def test_a_help_text_is_a_line_that_tells_something(family):
 
 @each_family
 def test_labels_are_bounded_and_not_those_of_a_target(family):
-    """A label has a fixed list of values, or names objects whose number is small."""
+    """Prometheus stores a series for each value of a label.
+
+    So a label has a fixed list of values, or names objects whose number is small.
+    """
     for label in family.labels:
         assert re.fullmatch(r"[a-z][a-z_]*", label.name)
         assert label.name not in OF_TARGETS | {"le", "quantile"}  # le and quantile are Prometheus' own
@@ -117,7 +120,10 @@ def test_a_histogram_has_ascending_buckets_and_nothing_else_has_any(family):
 
 
 def test_the_page_has_every_family_and_no_other():
-    """The page is generated from the same tables; the test reads the page as a person reads it."""
+    """The page is generated from the same tables, but a person reads the page.
+
+    So the test reads the page too.
+    """
     named = re.findall(r"^\| `(palaestra_\w+)` \|", PAGE.read_text(), re.MULTILINE)
 
     assert named == [family.name for family in FAMILIES]

@@ -46,7 +46,7 @@ def test_geoms_have_whole_sizes(simulation):
 
 
 def test_a_state_has_the_bodies_that_joints_move_and_their_positions(simulation):
-    """The state has a pose for the falling ball, but not for the fixed target."""
+    """Only a body that joints move needs a new pose: the falling ball does, but the fixed target does not."""
     before = scene_of(simulation)
     for _ in range(10):
         simulation.step(10)

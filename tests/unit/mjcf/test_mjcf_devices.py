@@ -22,7 +22,10 @@ def value(simulation, name):
 
 
 def test_every_actuator_sensor_and_camera_is_a_device(load):
-    """A model needs no list of devices; a sensor without a name is named after its joint and its type."""
+    """The author of a model need not list its devices.
+
+    A sensor without a name is named after its joint and its type.
+    """
     assert kinds(load()) == {
         "push": "LinearMotor",
         "cart position": "PositionSensor",
@@ -96,7 +99,10 @@ def test_a_force_accelerates_its_joint(load):
 
 
 def test_a_servo_for_a_velocity_turns_at_it_and_to_a_target(load):
-    """A motor of Webots does the same. With an infinite target position the motor turns at its velocity."""
+    """A motor of Webots turns to its target position.
+
+    With an infinite target position it turns at its velocity.
+    """
     simulation = load(VELOCITY)
     motor = simulation.robots[0].motors["push"]
     motor.set_position(math.inf)

@@ -90,7 +90,7 @@ def home(control):
 @pytest.mark.parametrize("velocity", [None, 5.0])
 @pytest.mark.parametrize("reset", [False, True])
 def test_a_servo_holds_the_position_of_the_keyframe_until_it_gets_another(load, velocity, reset):
-    """A velocity is not a target position.
+    """A velocity command is not a target position.
 
     Without this rule a standing robot would move its legs to position 0.
     """
@@ -146,7 +146,10 @@ def test_a_field_does_not_move_what_joints_move(load):
 
 
 def test_a_joint_is_put_within_its_range(load):
-    """The task of a cart-pole starts each episode at a random position."""
+    """A task may request any random position at the start of an episode.
+
+    The joint must stay within its range.
+    """
     simulation = load()
 
     simulation.set_joint_position(simulation.tree.of_def("slider"), 9.0, 1)
@@ -183,7 +186,10 @@ def test_a_body_on_joints_takes_no_velocity(load):
 
 
 def test_contact_points_are_where_a_body_touches(load):
-    """The ball first falls, and then lies on the floor."""
+    """While the ball falls, it touches nothing.
+
+    When it lies on the floor, the contact point is below its center.
+    """
     simulation = load()
     ball = simulation.tree.of_def("ball")
     assert simulation.contact_points(ball, descendants=False) == []

@@ -64,7 +64,10 @@ def place(picture):
 
 
 def test_a_movie_shows_the_robot_drive_in_the_time_of_the_simulation(simulation, tmp_path):
-    """The movie has 25 frames a second; its file gets its name only when the movie is complete."""
+    """At 25 frames a second, the movie must be as long as the drive.
+
+    Its file gets its name only when the movie is complete.
+    """
     path = tmp_path / "drive.mp4"
     assert simulation.movies.ready
     assert simulation.movies.start(movie(path))
@@ -82,7 +85,7 @@ def test_a_movie_shows_the_robot_drive_in_the_time_of_the_simulation(simulation,
 
 
 def test_a_movie_follows_the_viewpoint(tmp_path):
-    """The robot stands still, and a client moves the viewpoint."""
+    """The robot stands still and a client moves the viewpoint, so the robot must move in the picture."""
     simulation = Simulation.load(WORLD.encode(), MujocoPhysics(), "world", Mode.FAST)
     viewpoint = next(node for node in simulation.tree.root.nodes() if node.type_name == "Viewpoint")
     path = tmp_path / "panorama.mp4"
@@ -99,7 +102,10 @@ def test_a_movie_follows_the_viewpoint(tmp_path):
 
 
 def test_a_movie_removes_what_a_killed_simulator_left_of_it(simulation, tmp_path):
-    """The hidden files of other movies stay, and so do files that another simulator is writing."""
+    """The unfinished file of a killed simulator would stay for ever.
+
+    The hidden files of other movies stay, and so do files that another simulator is writing.
+    """
     path = tmp_path / "drive.mp4"
     code = f"""if True:
         import os, signal
@@ -140,7 +146,10 @@ def test_on_a_file_system_without_locks_a_movie_removes_nothing(simulation, tmp_
 
 
 def test_a_movie_may_be_faster_than_the_simulation(simulation, tmp_path):
-    """Four seconds of simulated time are one second of the movie."""
+    """A user can watch a long drive in a short movie.
+
+    Here four seconds of simulated time are one second of the movie.
+    """
     simulation.movies.start(movie(tmp_path / "fast.mp4", acceleration=4))
     simulation.step(1600)
     simulation.movies.stop()
@@ -170,7 +179,10 @@ def test_the_frames_in_a_second_follow_from_the_steps(simulation, tmp_path):
 
 
 def test_a_movie_that_cannot_be_written_fails_at_the_start(simulation, tmp_path, caplog):
-    """The log has one line with the path and the error."""
+    """A user must not learn only at the end that the movie is missing.
+
+    The log has one line with the path and the error.
+    """
     assert not simulation.movies.start(movie(tmp_path / "none" / "it.mp4"))
 
     assert simulation.movies.failed
@@ -178,7 +190,7 @@ def test_a_movie_that_cannot_be_written_fails_at_the_start(simulation, tmp_path,
 
 
 def test_a_movie_without_a_step_fails(simulation, tmp_path, caplog):
-    """A failed movie leaves no file."""
+    """A movie without a frame cannot be played, so it fails and leaves no file."""
     simulation.movies.start(movie(tmp_path / "it.mp4"))
     simulation.movies.stop()
 
@@ -219,7 +231,7 @@ def test_what_cannot_be_recorded_is_refused(simulation, changes, fact):
 
 
 def test_one_movie_is_recorded_at_a_time(simulation, tmp_path):
-    """The second request fails, and the first movie continues."""
+    """A second request must not spoil the movie that is being recorded, so it fails."""
     simulation.movies.start(movie(tmp_path / "it.mp4"))
 
     with pytest.raises(UnsimulatedError, match="stop it first"):
@@ -235,7 +247,7 @@ def test_without_the_library_the_refusal_names_what_to_install(simulation, tmp_p
 
 
 def test_a_simulator_without_pictures_records_none(tmp_path):
-    """Webots with `--no-rendering` does the same; a request to stop is not an error."""
+    """Webots with `--no-rendering` records no movie either. A request to stop one is then not an error."""
     simulation = Simulation.load(WORLD.encode(), StubPhysics(), "world", Mode.FAST)
 
     assert not simulation.movies.start(movie(tmp_path / "it.mp4"))

@@ -87,7 +87,7 @@ def test_a_red_box_ahead_is_in_the_middle_before_the_sky(load):
 
 
 def test_a_color_is_blue_green_red_alpha(load):
-    """Webots has this order of colors; alpha is 255 in every pixel."""
+    """Programs for Webots expect this order of colors. Alpha is 255 in every pixel."""
     picture = look(load(BOX))
     blue, green, red, _ = picture[HEIGHT // 2, WIDTH // 2]
 
@@ -121,7 +121,10 @@ def test_a_distance_outside_of_the_range_is_infinite(load, away_m):
 
 
 def test_distances_have_the_resolution_of_the_finder(load):
-    """A measured distance is a multiple of the field `resolution`."""
+    """A policy must not get more precise distances than the range finder measures.
+
+    Each distance is a multiple of the field `resolution`.
+    """
     seen = depths(load(WALL, FINDER.replace("minRange", "resolution 0.3 minRange")))
 
     assert seen == pytest.approx(np.full((HEIGHT, WIDTH), 2.1), abs=1e-6)
@@ -204,7 +207,7 @@ def test_a_shape_on_a_joint_moves_with_its_motor(load):
     ],
 )
 def test_every_geometry_is_drawn_where_it_is(load, geometry):
-    """MuJoCo moves the origin of a mesh to its center; the renderer must undo this."""
+    """MuJoCo moves the origin of a mesh to its center, so the renderer must move it back."""
     picture = look(load(BOX.replace("Box { size 1 1 1 }", geometry)))
     rows, columns = np.nonzero(reds(picture))
 
@@ -335,7 +338,7 @@ except SimError as error:
     ],
 )
 def test_a_machine_that_cannot_draw_simulates_the_rest(environment, message):
-    """OpenGL is loaded only for the first camera; the error then names the missing packages."""
+    """OpenGL is loaded only for the first camera. The error then names the missing packages."""
     done = subprocess.run(
         [sys.executable, "-c", BLIND % environment], capture_output=True, text=True, check=True
     )

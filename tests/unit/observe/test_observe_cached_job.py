@@ -34,7 +34,7 @@ def raw_job(metadata=None, **spec):
 
 @pytest.mark.parametrize("spec", LARGE.values(), ids=LARGE)
 def test_a_cached_job_is_small_whatever_its_author_wrote(spec):
-    """The cache also holds refused jobs; a few jobs of 1.4 MB each once ended the operator for all users."""
+    """The cache also holds refused jobs. A few jobs of 1.4 MB each once ended the operator for all users."""
     kept = trimmed(raw_job(**spec))
 
     assert len(json.dumps(kept)) < MOST_CHARACTERS
@@ -43,7 +43,7 @@ def test_a_cached_job_is_small_whatever_its_author_wrote(spec):
 
 @pytest.mark.parametrize("spec", LARGE.values(), ids=LARGE)
 def test_what_decides_is_kept_of_every_job(spec):
-    """Each reconcile reads counts, deadlines and `suspend`; only the plan needs the rest of the spec."""
+    """Each reconcile reads counts, deadlines and `suspend`, but only the plan needs the rest of the spec."""
     job = validate({**trimmed(raw_job(**spec)), "status": {}})
 
     assert (job.spec.replicas, job.spec.suspend, job.spec.ttl_seconds_after_finished) == (3, True, 9)

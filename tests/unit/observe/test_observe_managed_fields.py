@@ -11,14 +11,17 @@ def entry(manager, field="f:suspend", time="2026-01-31T12:00:00Z"):
 
 
 def test_the_manager_of_the_field_is_found():
-    """The other managers of the Job have written other fields."""
+    """The user must learn which program suspended the Job.
+
+    The other managers of the Job have written other fields.
+    """
     fields = [entry("palaestra", "f:backoffLimit"), entry("kueue"), entry("kubectl-edit", "f:parallelism")]
 
     assert suspends({"metadata": {"managedFields": fields}}) == "kueue"
 
 
 def test_of_several_managers_it_is_the_last():
-    """Two managers that apply the same value share the ownership of a field."""
+    """Two managers that apply the same value share the ownership of a field. The later one is named."""
     fields = [entry("kueue", time="2026-01-31T12:00:01Z"), entry("palaestra")]
 
     assert suspends({"metadata": {"managedFields": fields}}) == "kueue"

@@ -17,7 +17,10 @@ def pod(look, raw):
 
 
 def test_containers_come_in_the_order_in_which_they_start(look, raw_pod):
-    """The pod's spec gives the kind of each container, and the status gives its state."""
+    """A container that waits delays all later ones, so the order counts.
+
+    The pod's spec gives the kind of each container, and the status gives its state.
+    """
     seen = pod(look, raw_pod)
 
     assert [(each.name, each.kind) for each in seen.containers] == [
@@ -85,14 +88,17 @@ def test_the_words_of_others_are_one_line_and_cut(look, raw_pod):
     ],
 )
 def test_conditions_say_why(look, raw_pod, condition, field, value):
-    """The scheduler, the kubelet and the program that removes a pod each set a condition."""
+    """A user must learn why a pod waits or is removed.
+
+    The scheduler, the kubelet and the program that removes a pod each set a condition with the reason.
+    """
     raw_pod["status"]["conditions"] = [condition]
 
     assert getattr(pod(look, raw_pod), field) == value
 
 
 def test_the_last_word_is_of_our_protocol(look, raw_pod):
-    """The trainer's termination message is JSON of a fixed format."""
+    """Only JSON of this format is the trainer's report, whose numbers go into the status."""
     word = Termination(step=7, reason="Completed", success_rate=0.5, attempt=2, restarts=1)
     ended = {"terminated": {"exitCode": 0, "message": word.to_message()}}
     raw_pod["status"]["containerStatuses"] = [state("trainer", state=ended)]

@@ -81,7 +81,10 @@ def test_an_answer_belongs_to_the_pod_that_gave_it(look, raw_pod):
     ],
 )
 def test_the_end_of_a_job_is_in_its_conditions(look, raw_job, conditions, end):
-    """The conditions before the last pod's end are enough, because on a lost node the pod never ends."""
+    """A Job has one of the conditions before its last pod has ended.
+
+    On a lost node that pod never ends, so the operator must not wait for the later condition.
+    """
     raw_job["status"] = {"conditions": conditions}
 
     assert look(jobs=[raw_job]).replicas[0].job.end is end
@@ -124,7 +127,7 @@ def test_an_event_in_series_is_as_late_as_its_last(look, raw_job):
 
 
 def test_what_is_there_is_known_by_kind_and_name(valid_job):
-    """A ConfigMap and a claim may have the same name."""
+    """A claim and a NetworkPolicy may have the same name."""
     job = valid_job()
     named = {"metadata": {"name": "x", "ownerReferences": [{"uid": job.metadata.uid}]}}
 
@@ -203,7 +206,10 @@ def test_the_pod_that_the_status_names_stays_the_replicas_when_its_job_is_gone(v
 
 
 def test_what_was_refused_is_of_the_replica_or_of_all(valid_job):
-    """The status quotes the message of the API server on one line."""
+    """A refused claim affects one replica; a refused NetworkPolicy affects all of them.
+
+    The status has space for one line.
+    """
     seen = observe(valid_job(replicas=2), Objects(denied={1: "over\nquota"}))
     of_all = observe(valid_job(replicas=2), Objects(denied={None: "no policy"}))
 

@@ -51,7 +51,10 @@ def test_nothing_is_known_of_a_job_that_was_made_again():
 
 
 def test_a_full_memory_takes_nothing_new_and_keeps_what_it_has(full):
-    """If new facts displaced old ones, with 5,000 jobs in turn each fact would be gone before its use."""
+    """A new fact must not evict an old one.
+
+    Otherwise, with more jobs than the limit, each fact would be gone before the next reconcile of its job.
+    """
     assert full.keep(KEY, UID, {"a": 1}) == {}
 
     assert full.known(KEY, UID) == {}

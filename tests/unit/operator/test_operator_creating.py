@@ -78,7 +78,10 @@ def test_a_config_map_that_is_there_already_is_used_only_if_it_is_ours_for_good(
     ids=["ours, which the cache has not heard of", "of an earlier job", "of nobody", "gone by now"],
 )
 def test_a_job_that_is_there_already_is_taken_for_made_only_if_it_is_ours(there, made):
-    """An event must not report the creation of a foreign Job; the next reconcile reads its owner."""
+    """An event must not report the creation of a foreign Job.
+
+    The next reconcile finds out to whom the Job belongs.
+    """
     api = Server(there)
     acting = Executor(api, FencedClient(api, lambda: True), ForeignJobs(api), RejectedCreations())
 

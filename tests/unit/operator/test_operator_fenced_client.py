@@ -75,7 +75,7 @@ def test_what_was_decided_in_one_tenure_is_not_written_in_another(later):
 
 
 def test_a_look_that_begins_after_the_lease_was_regained_may_write():
-    """A reconcile that starts after that time has read the changes of the other operator."""
+    """A reconcile that starts after the lease was regained has read the changes of the other operator."""
     api, terms = Server(), [1]
     writer = FencedClient(api, lambda: terms[-1])
     writer.begin()

@@ -74,7 +74,10 @@ def test_nothing_else_is_served(ask):
     ],
 )
 def test_what_the_operator_counts(line, ask):
-    """The labels have few values; the name of a job is not a label."""
+    """Prometheus stores a series for each value of a label.
+
+    So the labels have few values, and the name of a job is not a label.
+    """
     line = line.replace("VERSION", version("palaestra"))
 
     assert line in ask("/metrics")[1].splitlines()
@@ -91,12 +94,12 @@ def test_the_error_for_a_taken_address_names_the_option():
 
 @pytest.mark.parametrize("text", ["8080", ":8080", "localhost:", "localhost:http", "localhost:65536"])
 def test_what_is_no_address_is_refused(text):
-    """The message has an example of an address."""
+    """The user must see how an address is written, so the message has an example."""
     with pytest.raises(PalaestraError, match=r"write it as 0\.0\.0\.0:8080"):
         address(text)
 
 
 def test_an_address_may_be_of_either_kind():
-    """An IPv6 address is written in brackets."""
+    """An address is of IPv4 or IPv6. In an IPv6 address, brackets separate its colons from the port."""
     assert address("[::1]:8080") == ("::1", 8080)
     assert address("0.0.0.0:0") == ("0.0.0.0", 0)

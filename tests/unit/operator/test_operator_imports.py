@@ -19,7 +19,7 @@ PEOPLES = (
 
 
 def test_an_operator_imports_nothing_that_only_peoples_tools_need():
-    """Modules for tables, `kubectl exec` and kubeconfigs used 20 of 62 MiB."""
+    """Modules for tables, `kubectl exec` and kubeconfigs used 20 of the operator's 62 MiB of memory."""
     done = subprocess.run([sys.executable, "-c", START], capture_output=True, text=True, check=True)
     imported = set(json.loads(done.stderr))
 

@@ -87,7 +87,10 @@ def test_a_refusal_is_no_word_and_no_error(refusal, server):
 
 
 def test_an_api_server_in_trouble_is_asked_again_after_the_pause_and_what_it_said_stays(server):
-    """The error fails one reconcile and is logged; it must not fail the next ones."""
+    """The error fails one reconcile and is logged.
+
+    Until the next request, other reconciles use the last known message.
+    """
     admissions, _ = asked(server, job())
     server.refusal = ServerError(500, "InternalError", "conversion webhook failed")
     server.now += RECHECK_S
@@ -99,7 +102,10 @@ def test_an_api_server_in_trouble_is_asked_again_after_the_pause_and_what_it_sai
 
 
 def test_jobs_in_queues_take_no_place_and_no_turn_from_pods_that_are_refused(server):
-    """Thousands of Jobs may wait in queues for days. Real problems of other pods must still be read."""
+    """Thousands of Jobs may wait in queues for days.
+
+    The operator must still read the events about problems of other pods.
+    """
     admissions, hindrances = (kind(server, lambda: server.now) for kind in (KueueWorkloads, PodEvents))
     for number in range(REMEMBERED):
         admissions.of(("robots", f"job-{number}"), UID, [job(f"u{number}")], [])

@@ -110,7 +110,10 @@ def look_at(hindrances, number):
 
 
 def test_at_most_five_events_lists_a_second_are_asked_for_and_everybody_has_a_turn(server):
-    """The limit holds for all namespaces together. A reconcile before its turn sends no request."""
+    """The API server must not be flooded, so the limit holds for all namespaces together.
+
+    A reconcile before its turn sends no request.
+    """
     hindrances = PodEvents(server, lambda: server.now)
     due = {number: look_at(hindrances, number).again_s for number in range(1500)}
     looks = 0
@@ -239,7 +242,7 @@ def test_a_stranger_is_looked_at_again_until_it_is_gone(server):
 
 
 def test_who_is_in_the_cache_is_no_stranger(server):
-    """The Job belonged to the operator, but was not yet in its cache."""
+    """The operator's own Job had the name, but the cache got that Job only after the refused creation."""
     server.jobs["job-0"] = job()
     strangers = ForeignJobs(server, lambda: server.now)
     strangers.meet(KEY, UID, "job-0")

@@ -50,7 +50,10 @@ def test_each_trainer_is_asked_every_period():
 
 
 def test_silent_pods_do_not_delay_the_trainers_that_answer():
-    """A job has 640 silent pods in the same namespace; after their first poll they delay no other pod."""
+    """A job has 640 silent pods in the same namespace.
+
+    After their first poll, these pods must delay no other pod.
+    """
     ten = targets(10)
 
     asked = simulated([*targets(640, name="silent"), *ten], until_s=200.0)
@@ -90,7 +93,7 @@ def test_no_more_are_asked_at_once_than_there_are_places():
 
 
 def test_the_answer_of_a_pod_that_went_meanwhile_is_not_used():
-    """The pod is deleted during its poll; its slot must become free, and its response is ignored."""
+    """The pod is deleted during its poll. Its slot must become free, and its response must be ignored."""
     schedule = PollSchedule(PERIOD_S, PROMPT_S, lambda: 0.0)
     schedule.follow(targets(1), 0.0)
     (entry,) = schedule.due(0.0)

@@ -64,7 +64,10 @@ def test_a_pod_whose_trainer_runs_is_asked(trainers):
     ],
 )
 def test_any_other_pod_is_not_asked(trainers, other):
-    """Any user can set a label on a pod; an address that is a host name would need a DNS lookup."""
+    """Any user can create a pod with these labels and any address.
+
+    A host name as the address would even cause a DNS lookup.
+    """
     trainers.pod(pod(), exists=True)
     trainers.pod(other, exists=True)
 

@@ -146,7 +146,10 @@ def test_silent_pods_delay_nobody():
 
 
 def test_who_stops_answering_becomes_unknown_again():
-    """An old response does not prove that the trainer still runs; only the trainer can report a stall."""
+    """An old response does not prove that the trainer still runs.
+
+    Only the trainer itself can report a stall.
+    """
     with trainer(OK + BODY) as pod, polling(pod.target()) as poller:
         pod.asked(1)
         before = set(poller.known())
@@ -191,7 +194,7 @@ def test_a_pod_that_lies_for_ever_is_logged_once():
 
 
 def test_a_job_is_looked_at_when_its_trainer_says_something_new_only():
-    """The ages in a response always grow; without progress they must not cause a reconcile."""
+    """The ages in a response always grow, but without progress they must not cause a reconcile."""
     with trainer(OK + BODY) as pod, polling(pod.target()) as poller:
         assert poller.changed.wait(WAIT_S)
         poller.changed.clear()

@@ -110,7 +110,7 @@ def test_a_job_is_changed_only_in_the_version_that_was_decided_about():
     ids=["a TrainingJob whose time to live is over", "a suspended Job"],
 )
 def test_a_deletion_is_of_one_version(action, expected):
-    """Until the deletion a user may change the time to live, and a queue may admit the Job."""
+    """After the decision, a user may still change the time to live, or a queue may admit the Job."""
     api, late, refusing = Server(), Server(version="8"), Server(conflict=True)
 
     assert carry_out(api, action)

@@ -22,7 +22,7 @@ WEBHOOK = "Internal error occurred: failed calling webhook x"
     ],
 )
 def test_a_refusal_that_a_person_has_to_fix_is_kept_until_the_request_succeeds(error):
-    """The status of the replica quotes the message of the API server or the webhook."""
+    """Until the cause is gone, the status must quote the message of the API server or the webhook."""
     denials = RejectedCreations()
 
     denials.learn(KEY, UID, {1: error})

@@ -39,7 +39,7 @@ def test_each_replica_that_waits_counts_with_its_reason():
     ids=["trains", "mends", "ended", "queued", "starts", "list", "empty", "text"],
 )
 def test_no_other_replica_counts(replica):
-    """To wait in a queue is not a problem; a replica that trains or has ended does not wait."""
+    """A wait in a queue is normal, and a replica that trains or has ended does not wait."""
     assert waits(status(replica)) == ()
 
 

@@ -46,7 +46,7 @@ def angle(simulation, name="DOOR"):
 
 
 def test_a_robot_pushes_a_door_open(load, drive):
-    """Without a push the door stays shut in its frame. Its knob moves together with it."""
+    """Without a push the door stays shut in its frame. The knob moves together with the door."""
     simulation = load()
     simulation.step(1920)
     assert angle(simulation) == pytest.approx(0.0, abs=1e-3)
@@ -60,7 +60,10 @@ def test_a_robot_pushes_a_door_open(load, drive):
 
 
 def test_rays_meet_a_door_where_it_is(load):
-    """A supervisor opens a door that has long been at rest, and the door stays open."""
+    """A supervisor opens a door that has long been at rest.
+
+    The robot's infra-red sensor must then measure a longer distance.
+    """
     simulation = load()
     simulation.step(1920)
     ahead = simulation.robots[0].sensors["ir1"]
@@ -136,7 +139,10 @@ def test_an_imported_door_swings_and_another_keeps_its_angle(load, drive):
 
 
 def test_a_pendulum_hangs_from_nothing():
-    """The pendulum's joint is a child of the world itself, and the y axis of this world points up."""
+    """A joint need not belong to a Solid or a Robot.
+
+    Here it is a child of the world itself, whose y axis points up.
+    """
     world = b"""#VRML_SIM R2023b utf8
     WorldInfo { basicTimeStep 8 coordinateSystem "NUE" }
     HingeJoint { jointParameters HingeJointParameters { axis 0 0 1 anchor 0 2 0 dampingConstant 1 }

@@ -80,7 +80,10 @@ def test_sensors_see_a_crate_where_it_is_now(load, drive):
 
 
 def test_a_supervisor_puts_a_crate_elsewhere(load):
-    """The supervisor writes only the translation; the crate rests there and keeps its rotation."""
+    """An environment places objects at each reset.
+
+    The supervisor writes only the translation, and the crate must rest there with its rotation unchanged.
+    """
     simulation = load()
     simulation.step(192)
     node = simulation.tree.of_def("CRATE")
@@ -107,7 +110,10 @@ def test_a_push_moves_a_crate_until_friction_stops_it(load):
 
 
 def test_a_reset_brings_a_crate_back(load, drive):
-    """The reset puts the crate back at rest; the same commands then give the same positions, bit for bit."""
+    """The reset puts the crate back at rest.
+
+    Then the same commands must give the same positions, bit for bit.
+    """
     simulation = load()
 
     def course():
@@ -151,7 +157,7 @@ def test_a_crate_inside_a_pose_is_where_the_pose_puts_it(load):
 
 
 def test_a_crate_that_is_imported_is_loose_too(load, drive):
-    """The imported crate falls; the import does not move the first crate."""
+    """The imported crate must fall, and the import must not move the first crate."""
     simulation = load()
     drive(simulation, 0.3, 0.0, 0.0, steps=10)
     before = position(simulation)
@@ -164,7 +170,7 @@ def test_a_crate_that_is_imported_is_loose_too(load, drive):
 
 
 def test_a_stand_in_with_a_mass_is_loose(tmp_path):
-    """A `WoodenBox` falls if its `mass` is more than 0; with a mass of 0 the box is fixed."""
+    """As in Webots, a `WoodenBox` falls if its `mass` is more than 0, and is fixed if the `mass` is 0."""
     world = tmp_path / "boxes.wbt"
     boxes = b"""
     DEF LIGHT WoodenBox { translation 0 0 2 mass 1 name "light" }
@@ -216,7 +222,10 @@ def test_crates_at_rest_sleep(load):
 
 
 def test_an_obstacle_that_moves_wakes_what_lies_on_it(load):
-    """A crate falls when a supervisor takes its table away; after a reset it falls again, bit for bit."""
+    """A crate must fall when a supervisor takes its table away.
+
+    After a reset it must fall again, bit for bit.
+    """
     table = b"DEF TABLE Solid { translation 1 1.2 0.5 boundingObject Box { size 0.5 0.5 0.1 } }"
     simulation = load(CRATE.replace(b"0.6 0 0.15", b"1 1.2 0.7") + table)
 

@@ -53,7 +53,7 @@ def test_a_torque_speeds_a_cylinder_up(crane):
 
 
 def test_a_torque_is_clamped_and_lasts_until_a_position(crane):
-    """As in Webots, a new velocity does not end the torque; only a new position does."""
+    """As in Webots, a new velocity does not end the torque, but a new position does."""
     simulation, motors = crane
     motors["turn"].set_effort(1000.0)
     motors["turn"].set_velocity(0.0)
@@ -81,7 +81,7 @@ def test_a_force_that_carries_the_weight_keeps_it_at_rest(crane):
 
 
 def test_the_feedback_of_a_lift_is_the_weight_that_it_holds(crane):
-    """The feedback is the force in newtons against gravity; without an available force it is 0."""
+    """The feedback is the motor's force against gravity, in newtons. Without an available force it is 0."""
     simulation, motors = crane
     simulation.step(800)
     assert motors["lift"].feedback_nm == pytest.approx(3.0 * G, rel=1e-6)
@@ -94,7 +94,7 @@ def test_the_feedback_of_a_lift_is_the_weight_that_it_holds(crane):
 
 
 def test_a_motor_publishes_its_feedback(crane):
-    """The service `enable` has the path of the feedback sensor; the topic has the path of the motor."""
+    """The service `enable` has the path of the feedback sensor, but the topic has the path of the motor."""
     simulation, _ = crane
     robot = simulation.robots[0]
     simulation.step(800)

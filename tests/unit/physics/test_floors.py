@@ -24,9 +24,9 @@ CRATE = """DEF CRATE Solid { translation 2 0 -0.5 boundingObject Box { size 0.2 
 
 
 def test_a_ray_meets_the_floor_where_the_world_has_it(physics):
-    """The sensor is 0.5 m above height 0.
+    """The floor of this world is at a height of -1 m.
 
-    Its ray also meets the floor after a supervisor has moved the floor.
+    The ray must meet the floor there, and also after a supervisor has moved the floor.
     """
     simulation = Simulation.load(WORLD.format("").encode(), physics(), "world", Mode.FAST)
     sensor = simulation.robots[0].sensors["down"]

@@ -53,7 +53,10 @@ def test_a_relative_force_turns_with_the_node(thrown):
 
 
 def test_a_force_beside_the_center_turns(thrown):
-    """As in Webots, the offset of the force is in the frame of the node."""
+    """A force at a distance from the center turns the puck.
+
+    As in Webots, the offset is in the frame of the node.
+    """
     _, turning = thrown(
         lambda motion, node: motion.add_force(node, (1.0, 0.0, 0.0), relative=False, offset=(0.1, 0.0, 0.0))
     )
@@ -62,7 +65,7 @@ def test_a_force_beside_the_center_turns(thrown):
 
 
 def test_a_torque_turns_in_place(thrown):
-    """The inertia of a cube of 2 kg with sides of 0.2 m is 1/75 kg m2."""
+    """A torque moves no center of mass. The inertia of a cube of 2 kg with sides of 0.2 m is 1/75 kg m2."""
     velocity, turning = thrown(lambda motion, node: motion.add_torque(node, (0.0, 0.0, 0.5), relative=False))
 
     assert velocity[:2] == pytest.approx((0.0, 0.0), abs=1e-6)
@@ -70,7 +73,7 @@ def test_a_torque_turns_in_place(thrown):
 
 
 def test_a_velocity_of_a_loose_thing_is_what_was_set(thrown):
-    """The velocity that a supervisor sets changes in one step only by the fall."""
+    """One step after a supervisor has set a velocity, only gravity has changed it."""
     velocity, turning = thrown(
         lambda motion, node: motion.set_velocity(node, (1.0, 2.0, 0.0), (0.0, 0.0, math.pi))
     )

@@ -70,7 +70,10 @@ def test_a_weak_motor_does_not_hold_a_rod():
 @settings(max_examples=5, deadline=None)
 @given(length=st.floats(0.3, 1.2), mass_kg=st.floats(0.1, 20.0))
 def test_a_rod_without_a_motor_swings_as_a_pendulum(length, mass_kg):
-    """The period is 2 pi sqrt(2 l / 3 g) for small swings, whatever the mass; 0.1 rad adds 0.1 %."""
+    """For small swings the period is 2 pi sqrt(2 l / 3 g), whatever the mass.
+
+    At 0.1 rad it is 0.1 % longer.
+    """
     simulation, robot = load(arm("", length=length, mass_kg=mass_kg))
     hanging = math.pi / 2.0
     simulation.set_joint_position(simulation.tree.of_def("HINGE"), hanging - 0.1, 1)
@@ -102,7 +105,11 @@ def test_damping_and_friction_slow_a_pendulum():
 
 
 def test_a_spring_holds_a_rod_where_the_torques_are_equal():
-    """The rod rests at the angle a where 100 a equals m g l / 2 times the cosine of a."""
+    """The torques of spring and weight are then equal.
+
+    The spring's torque is 100 times the angle. The weight's torque is m g l / 2 times the cosine of the
+    angle.
+    """
     simulation, robot = load(arm("", parameters="springConstant 100 dampingConstant 10"))
 
     simulation.step(4000)
@@ -220,9 +227,9 @@ def test_rays_pass_the_links_of_their_own_robot():
 
 
 def test_a_supervisor_puts_a_joint_where_it_stays():
-    """A motor holds its joint at the position that a supervisor sets.
+    """An environment sets the joints of an arm for a new episode.
 
-    A joint without a motor falls from there.
+    The motor must then hold the joint there.
     """
     simulation, robot = load(arm())
     simulation.set_joint_position(simulation.tree.of_def("HINGE"), -1.0, 1)

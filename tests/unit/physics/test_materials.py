@@ -43,7 +43,7 @@ def slide(simulation, name, speed=2.0):
 @settings(max_examples=8, deadline=None)
 @given(coefficient=st.floats(0.1, 0.6))
 def test_a_box_slides_as_far_as_its_friction_lets_it(coefficient):
-    """A box that starts with 2 m/s slides v^2 / 2 mu g; it is flat, so it does not tip over."""
+    """A box that starts at v = 2 m/s slides v^2 / (2 mu g). The box is flat, so it does not tip over."""
     flat = box("PUCK", "ice", "0 0 0.025", "0.3 0.3 0.05")
 
     distance = slide(load(flat, contacts=[contact("ice", "default", coefficient)]), "PUCK")
@@ -81,7 +81,7 @@ def test_the_floor_has_a_material():
 
 
 def test_things_fall_as_the_gravity_of_the_world_says():
-    """On the Moon the distance is 1.62 t^2 / 2."""
+    """With the Moon's gravity, an object falls 1.62 t^2 / 2 meters in t seconds."""
     simulation = load(box("STONE", "default", "0 0 5"), info="gravity 1.62")
 
     simulation.step(1000)

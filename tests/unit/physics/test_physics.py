@@ -65,7 +65,7 @@ def test_a_wall_holds_a_robot_and_its_bumper_feels_it(load, drive):
 
 
 def test_a_robot_slides_along_a_wall(load, drive):
-    """The wall stops the motion toward it; the motion along the wall continues."""
+    """The wall stops the motion toward it, but not the motion along it."""
     simulation = load()
     place(simulation, 1.7, -0.5)
 
@@ -76,9 +76,9 @@ def test_a_robot_slides_along_a_wall(load, drive):
 
 
 def test_sensors_see_walls_and_not_their_robot(load):
-    """For the same distance each physics gives the same voltage and draws the same noise.
+    """If the rays met their own robot, all sensors would read about the same.
 
-    The rays do not meet their own robot.
+    Here the sensor that faces the wall reads the highest voltage.
     """
     simulation = load()
     place(simulation, 1.6, 0.0)
@@ -174,7 +174,7 @@ def test_a_reset_forgets_everything(load, drive):
 
 
 def test_an_imported_crate_is_an_obstacle_until_the_reset(load, drive):
-    """The import changes no state of the robot; the reset removes the crate."""
+    """The import must not change the state of the robot, and the reset must remove the crate."""
     simulation = load()
     drive(simulation, 0.2, 0.0, 0.0, steps=2)
     before = simulation.robots[0].place.translation
@@ -221,7 +221,7 @@ def free_pair():
 
 
 def test_mujoco_follows_the_stub_through_each_change_of_speed(drive, free_pair):
-    """A policy trained under one of them then finds the same accelerations under the other."""
+    """A policy that was trained with one of the two physics finds the same accelerations with the other."""
     pair = free_pair()
     for simulation in pair:
         place(simulation, 0.0, 0.0, 2.5)

@@ -42,7 +42,7 @@ def solid(x, y=0.0, z=0.5, fields=BALL):
 
 
 def test_a_target_has_the_distance_azimuth_and_power_of_webots(radar):
-    """The azimuth is positive to the right; the power follows the radar equation, in dBm."""
+    """As in Webots, the azimuth is positive to the right. The power follows the radar equation, in dBm."""
     (echo,) = seen(radar, solid(4, -1))
     wavelength, distance = 299_792_458.0 / 24e9, math.hypot(4, 1)
     power_w = 0.001 * 10**0.1 * 100**2 * wavelength**2 * 2 / ((4 * math.pi) ** 3 * distance**4)
@@ -115,7 +115,10 @@ def test_a_target_is_hidden_only_if_the_radar_knows_occlusion(radar, obstacle):
 
 
 def test_a_speed_is_the_change_of_distance_between_two_samples(radar):
-    """The speed counts also for a Solid that a supervisor moves; it is positive if the target moves away."""
+    """So a Solid that only a supervisor moves has a speed too.
+
+    The speed is positive if the target moves away.
+    """
     simulation, device = radar(f"DEF IT {solid(2)}")
     simulation.step(32)
     assert device.seen[0].speed == 0.0
@@ -174,7 +177,7 @@ def test_noise_is_drawn_for_each_reading(radar):
 
 
 def test_noise_to_a_distance_of_nothing_is_no_error(radar):
-    """With noise the distance can become 0; an infinite received power would end the simulator."""
+    """With noise the distance can become 0, and an infinite received power would end the simulator."""
     simulation, device = radar(solid(0.2), f"{ANY} minRange 0 rangeNoise 0.2")
     readings = []
     for _ in range(50):

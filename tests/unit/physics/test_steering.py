@@ -135,7 +135,10 @@ def test_wheels_that_steer_do_not_make_an_arm_a_wheel(physics):
 
 
 def test_the_car_that_ships_turns_to_the_right_at_a_positive_angle(physics):
-    """In this car the steered hubs are 2.995 m before the rear axle, and 1.628 m apart."""
+    """The expected circle follows from the size of this car.
+
+    Its steered hubs are 2.995 m before the rear axle, and 1.628 m apart.
+    """
     world = """#VRML_SIM R2023b utf8
     WorldInfo { basicTimeStep 16 }
     Solid { boundingObject Plane { size 100 100 } }

@@ -66,7 +66,7 @@ def test_a_pull_is_no_pressure():
 
 
 def test_three_axes_are_published_as_a_wrench():
-    """The wrench has the force and a torque of 0; `get_type` returns 2."""
+    """A wrench has a force and a torque, so the torque is 0. As in Webots, `get_type` returns 2."""
     kind, plate = weigh(scale("force-3d"))
     (topic,) = kind.topics(plate)
     codec = message_type(topic.type_name).codec
@@ -80,7 +80,7 @@ def test_three_axes_are_published_as_a_wrench():
 
 
 def test_a_sensor_without_physics_measures_nothing():
-    """Webots prints a warning for such a sensor; here it reads 0."""
+    """Webots prints a warning for such a sensor. Here the sensor reads 0."""
     assert weigh(scale("force", matter=""))[1].value == 0.0
 
 
@@ -114,7 +114,10 @@ def test_the_stub_refuses_sensors_of_force():
 
 
 def test_the_bumper_of_a_robotino_is_as_before():
-    """The built-in robot's bumper still publishes a bool; other touch sensors publish a wrench."""
+    """Programs for the built-in robot expect that its bumper publishes a bool.
+
+    Other touch sensors publish a wrench.
+    """
     robot = Simulation.load(builtin("arena"), MujocoPhysics()).robots[0]
     kind, bumper = robot.parts.devices.rows["touch sensor"]
 

@@ -48,7 +48,7 @@ def accepted(physics, geometry):
 
 @pytest.mark.parametrize("name", DEVICES)
 def test_a_device_type_has_rows_or_a_reason_to_have_none(name):
-    """A device type without values to compare with would read whatever its author believed to be right."""
+    """Without values from formulas, nobody would notice that a device of this type reads wrong values."""
     has_rows = re.search(rf"\b{name} \{{", ROWS) is not None
 
     assert has_rows != (name in WITHOUT_VALUES), WITHOUT_VALUES.get(name, "add rows to tests/values")

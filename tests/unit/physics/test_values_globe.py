@@ -47,7 +47,7 @@ def test_a_gps_reads_degrees(setting, reference):
 
 @pytest.mark.parametrize("setting", SETTINGS[:1], ids=str)
 def test_the_noise_of_a_gps_is_correlated_from_step_to_step(setting):
-    """A filter must find a drift that lasts minutes; independent noise would average out."""
+    """A filter must find a drift that lasts minutes, but independent noise would average out."""
     kept = 0.48  # correlation of the noise between one step and the next
     correlation = kept ** (1000.0 / STEP_MS)
     fields = f'name "gps" accuracy 2 noiseCorrelation {correlation:.20f}'

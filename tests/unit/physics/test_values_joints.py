@@ -119,7 +119,10 @@ BOXES = [
 
 @pytest.mark.parametrize(("axis", "away", "inertia"), BOXES)
 def test_a_torque_and_a_force_speed_up_what_they_move(axis, away, inertia):
-    """MuJoCo only: half the acceleration times the time squared. The stub rejects torques and forces."""
+    """MuJoCo only: the distance is half the acceleration times the time squared.
+
+    The stub rejects torques and forces.
+    """
     base = "translation 0 0 1 boundingObject Box { size 0.1 0.1 0.1 }"
     simulation = Setting("mujoco").load(robot(HEAVY.format(axis=axis, away=away), base))
     device(simulation, "turn").set_effort(1.5)
@@ -141,9 +144,9 @@ SLEDGE = """SliderJoint {{
 
 @pytest.mark.parametrize("shape", [it for it in SHAPES if it.volume_m3], ids=str)
 def test_a_shape_has_the_mass_of_its_volume(shape):
-    """MuJoCo only: a force of 100 N gives the shape the acceleration for 200 kg/m3.
+    """MuJoCo only: 100 N accelerate the shape as its volume at 200 kg/m3 requires.
 
-    A convex hull would be heavier.
+    Its convex hull would be heavier.
     """
     base = "translation 0 0 1 boundingObject Box { size 0.1 0.1 0.1 }"
     simulation = Setting("mujoco").load(robot(SLEDGE.format(shape.node), base))
@@ -157,7 +160,7 @@ def test_a_shape_has_the_mass_of_its_volume(shape):
 @pytest.mark.parametrize("damping", [0.5, 2.0, 8.0])
 @pytest.mark.parametrize("physics", ["stub", "mujoco"])
 def test_a_brake_limits_a_motor_to_its_torque_over_the_damping(physics, damping):
-    """At the limit the damper takes the motor's whole 20 N m; slower commands are not limited."""
+    """At the limit the damper takes the motor's whole 20 N m. A slower command is not limited."""
     axis, away, _ = BOXES[0]
     base = "translation 0 0 1 boundingObject Box { size 0.1 0.1 0.1 }"
     simulation = Setting(physics).load(robot(HEAVY.format(axis=axis, away=away), base))
@@ -182,7 +185,10 @@ TURNS = [
 
 @pytest.mark.parametrize("mounted", TURNS, ids=lambda it: it.fields[20:])
 def test_a_sensor_of_force_measures_its_own_weight_in_its_own_axes(mounted):
-    """MuJoCo only: `force-3d` reads the weight in the sensor's frame, `force` the part along x."""
+    """MuJoCo only: `force-3d` reads the weight in the sensor's frame.
+
+    `force` reads only the pressure along the x axis.
+    """
     weight = mounted.rotation.T @ [0.0, 0.0, -2.0 * 9.81]
     rotation = mounted.fields.partition("rotation")[2]
     for kind, expected in (("force-3d", weight), ("force", [max(0.0, -weight[0])])):

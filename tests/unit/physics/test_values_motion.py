@@ -139,9 +139,9 @@ def test_wheels_take_a_robot_where_they_roll(base, setting):
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
 @pytest.mark.parametrize("base", BASES)
 def test_sensors_of_motion_read_what_the_circle_gives(base, setting):
-    """The sensors are turned and off the robot's center.
+    """The robot drives along a circle at a constant speed.
 
-    The robot drives along a circle at a constant speed.
+    The sensors are rotated, and mounted off the robot's center.
     """
     simulation = simulation_of(setting, base)
     for start, speeds in zip(STARTS, COMMANDS[base], strict=True):
@@ -183,7 +183,7 @@ BUMPER = """TouchSensor { name "bumper" type "bumper" translation 0.1 0 0.2
 def test_a_bumper_touches_a_wall_where_its_rim_reaches_it(setting):
     """The rim is 0.3 m from the robot's center.
 
-    A wall one millimeter nearer touches it, one millimeter farther does not.
+    A wall at 0.299 m touches the rim, and a wall at 0.301 m does not.
     """
     wheels = " ".join(wheel(f"wheel {index}", *it) for index, it in enumerate(TWO))
     wall = 'DEF WALL Solid { name "wall" boundingObject Box { size 0.2 2 1 } }'

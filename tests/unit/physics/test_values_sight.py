@@ -90,9 +90,10 @@ def expected(name, sensor):
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
 @pytest.mark.parametrize("name", TYPES)
 def test_a_distance_sensor_measures_by_its_type(name, setting):
-    """The value is the average, the single ray, the nearest echo, or the color-weighted average.
+    """Each type of sensor combines its rays in another way.
 
-    Then the lookup table maps the value.
+    The value is the average, the single ray, the nearest echo, or the color-weighted average. Then the lookup
+    table maps the value.
     """
     simulation = simulation_of(setting)
     for sensor in LOOKS:
@@ -160,7 +161,7 @@ def test_each_ray_of_a_lidar_leaves_at_its_azimuth_and_elevation(setting, name):
 
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
 def test_a_rotating_lidar_sees_all_around_within_a_turn(setting):
-    """The head begins ahead and turns to the right; the tilt raises each of its rays."""
+    """The head of the lidar begins ahead and turns to the right. The tilt raises each of its rays."""
     simulation = scanned(setting)
     for sensor in LOOKS:
         move(simulation, "R", setting.put(WALL @ sensor @ MOUNT.inverse))
@@ -255,7 +256,7 @@ def test_a_pixel_of_a_range_finder_is_a_distance_along_the_lens(setting):
 
 @pytest.mark.parametrize("setting", MUJOCO, ids=str)
 def test_a_camera_recognizes_an_object_where_it_is(setting):
-    """MuJoCo only: the camera returns the object's pose in its own frame and the middle in the picture."""
+    """MuJoCo only: the camera returns the object's pose in the camera's frame, and its middle in pixels."""
     simulation = pictures_of(setting)
     starts = [(2.0, 0.3, -0.4), (1.5, -1.0, 0.6), (3.0, 1.0, 1.0)]
     for roll, start in enumerate(starts):

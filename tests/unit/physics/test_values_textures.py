@@ -229,7 +229,7 @@ TRANSFORMS = [
 def test_a_texture_transform_moves_turns_and_scales_the_texture(scale, rotation, center, translation, load):
     """The transform follows X3D.
 
-    Beyond its edges the texture repeats; with `repeatS FALSE` its edge continues.
+    The texture repeats beyond its edges, but with `repeatS FALSE` its edge continues.
     """
     node = f"""TextureTransform {{ scale {scale[0]} {scale[1]} rotation {rotation}
       center {center[0]} {center[1]} translation {translation[0]} {translation[1]} }}"""

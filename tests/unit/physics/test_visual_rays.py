@@ -84,7 +84,10 @@ POSES = [
 
 @for_each("appearance, factor", COLORS)
 def test_a_dark_or_rough_surface_seems_farther(begin, appearance, factor):
-    """The value is distance / (0.2 + 0.8 red (1 - roughness / 2)) in every pose; the opacity scales red."""
+    """As in Webots, the value is distance / (0.2 + 0.8 red (1 - roughness / 2)) in every pose.
+
+    The opacity scales the red value.
+    """
     for pose, distance_m in POSES:
         value = measured(begin(wall(appearance), INFRARED, pose))
         assert value == pytest.approx(distance_m / factor, 1e-6)
@@ -172,7 +175,10 @@ SHAPES = [
 
 @for_each("geometry, turned, distance_m", SHAPES)
 def test_a_lidar_sees_the_shapes(begin, geometry, turned, distance_m):
-    """Webots renders the visible shapes for a lidar; the middle ray of the middle layer points along x."""
+    """Webots renders the visible shapes for a lidar.
+
+    The test reads the middle ray of the middle layer, which points along x.
+    """
     pose = "rotation 0 0 1 0.0872665"  # half of the angle between two rays
     shape = f"Solid {{ translation 2 0 0 {turned} children [ Shape {{ geometry {geometry} }} ] }}"
 
@@ -196,7 +202,10 @@ def test_what_moves_is_seen_where_it_is(begin):
 
 
 def test_rays_pass_the_robot_and_what_is_around_it(begin):
-    """The robot's own parts are often simpler here than in Webots; a surface is not drawn from inside."""
+    """The robot's own parts are often simpler here than in Webots, so its rays pass them.
+
+    The rays also pass a surface from its inside, which Webots does not draw.
+    """
     own = "Solid { translation 0.3 0 0 children [ Shape { geometry Box { size 0.1 1 1 } } ] }"
     around = "Solid { children [ Shape { geometry Sphere { radius 30 } } ] }"
 

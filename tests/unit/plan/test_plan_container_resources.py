@@ -164,7 +164,10 @@ def test_a_job_sets_the_resources_of_the_ros_master(in_cluster):
 
 
 def test_an_installation_sets_the_resources_of_jobs_that_mention_none(valid_job):
-    """The defaults let a minimal job fit a namespace with a quota; a value in the job overrides a default."""
+    """With these defaults a minimal job fits a namespace with a quota.
+
+    A value in the job overrides a default.
+    """
     defaults = resources.Defaults(
         ros_master=Resources(limits={"cpu": "200m"}),
         simulator=Resources(limits={"cpu": "1"}),

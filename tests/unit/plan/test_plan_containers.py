@@ -106,7 +106,7 @@ def test_control_ports_are_on_loopback_only(in_cluster):
 
 
 def test_every_container_knows_master_configuration_run_and_pod(in_cluster):
-    """The programs of a pod read these environment variables."""
+    """Without these variables, a program finds neither the ROS master nor the training.yaml of its run."""
     for container in containers(in_cluster()).values():
         variables = environment(container)
         assert variables["ROS_MASTER_URI"] == "http://127.0.0.1:11311"

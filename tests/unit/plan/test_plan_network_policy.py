@@ -96,7 +96,7 @@ def test_a_job_that_is_made_again_has_a_policy_of_its_own(valid_job):
 
 
 def test_a_job_without_a_uid_has_no_policy(valid_job):
-    """The owner reference needs the uid; without an owner, nobody would delete the policy."""
+    """The owner reference needs the uid, and nobody would delete a policy without an owner."""
     job = valid_job()
     nobody = job.model_copy(update={"metadata": job.metadata.model_copy(update={"uid": None})})
 

@@ -211,7 +211,10 @@ def test_the_pod_is_restricted(in_cluster):
 
 
 def test_a_cluster_may_choose_the_user_of_a_pod(valid_job):
-    """OpenShift rejects a user outside the range of the namespace; the rest of the pod stays restricted."""
+    """OpenShift rejects a user outside the range of the namespace.
+
+    The rest of the pod must stay restricted.
+    """
     security = pod(plan(valid_job(), ClusterLayout(images=LAYOUT.images, user=None)))["securityContext"]
 
     assert security == {

@@ -90,7 +90,10 @@ def test_an_initial_policy_is_read_as_it_was_written_and_absent_unless_set(valid
 
 @pytest.mark.parametrize("cnn", ["small", None])
 def test_the_network_for_images_is_read_as_it_was_written(valid_job, cnn):
-    """The plan leaves out the field if the job does not set it."""
+    """The trainer must build the network that the job describes.
+
+    If the job does not set `cnn`, the plan leaves the field out.
+    """
     job = valid_job(trainer={"algorithm": {"name": "PPO"} | ({"cnn": cnn} if cnn else {})})
 
     assert read_back(job).algorithm.cnn == cnn

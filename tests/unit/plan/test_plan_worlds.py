@@ -59,7 +59,7 @@ def named(planned, replica=0):
 
 
 def calls_of(function, work):
-    """Return how often `work()` calls a function."""
+    """Return the number of times that `work()` calls a function."""
     calls = []
 
     def note(frame, event, _):
@@ -117,7 +117,10 @@ def test_only_the_replicas_that_are_asked_for_are_planned(valid_job):
 
 
 def test_the_trainer_and_the_sidecar_get_the_same_world(in_cluster):
-    """The trainer reads the world's path from training.yaml; the sidecar gets the path as an option."""
+    """The trainer reads the world's path from training.yaml, and the sidecar gets the path as an option.
+
+    Both must name the same file.
+    """
     planned = in_cluster()
     told = [each["world"] for each in training(planned)["simulators"]]
 
@@ -127,7 +130,10 @@ def test_the_trainer_and_the_sidecar_get_the_same_world(in_cluster):
 
 
 def test_a_file_is_left_to_the_sidecar(in_cluster):
-    """The file is in the simulator's image, together with the files to which it refers."""
+    """The plan cannot read this file.
+
+    The file is in the simulator's image, with the files to which it refers.
+    """
     planned = in_cluster(simulators=[group(world={"file": "/worlds/my.wbt"}), EVALUATE])
 
     assert "collect.wbt" not in data(planned)
@@ -163,7 +169,7 @@ def test_a_world_that_no_sidecar_could_name_is_refused_before_anything_is_create
 
 
 def test_worlds_that_fit_nowhere_are_refused(valid_job):
-    """A ConfigMap has a size limit; the message names the images as the place for larger worlds."""
+    """A ConfigMap has a size limit, so the message tells the author to put larger worlds into the images."""
     source = {"configMap": {"name": "worlds", "key": "a.wbt"}}
     huge = ARENA.encode() + b"# " + b"x" * MOST_BYTES
     job = valid_job(simulators=[group(world=source), EVALUATE])
