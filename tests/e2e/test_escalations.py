@@ -1,8 +1,8 @@
 """A user who may write TrainingJobs but not create pods gains no further permission through TrainingJobs.
 
-The user has only the role in manifests/examples/platform/roles.yaml. tests/e2e/escalations.py lists every
-attempt with its possible gain, and these tests check the outcome. No pod has to run for this check: every job
-is suspended, and the tests check the operator's objects.
+The user has only the role in manifests/examples/platform/roles.yaml. tests/e2e/escalations.py and
+pod_metadata.py list every attempt with its possible gain, and these tests check the outcome. No pod has to
+run for this check: every job is suspended, and the tests check the operator's objects.
 """
 
 import itertools
@@ -12,8 +12,9 @@ import pytest
 import yaml
 
 from tests.e2e.cluster import Object, Refused, path
-from tests.e2e.escalations import HELD, METADATA, REFUSED, REQUESTS, UNKNOWN, authors
+from tests.e2e.escalations import HELD, REFUSED, REQUESTS, UNKNOWN, authors
 from tests.e2e.jobs import make_claim
+from tests.e2e.pod_metadata import METADATA
 from tests.e2e.tour import somebody_s
 from tests.jobs import EXAMPLES
 

@@ -8,7 +8,7 @@ import pytest
 from palaestra.api.status import Phase
 from palaestra.decide import Create
 from palaestra.plan import Allowed
-from tests.e2e.escalations import METADATA
+from tests.e2e.pod_metadata import METADATA
 
 INITIAL = {"initialPolicy": {"claim": "runs", "path": "a/model.zip"}}
 OPEN = {"palaestra.dev/for-jobs": "true"}

@@ -20,6 +20,7 @@ from palaestra_sim.scene.loader import Loader
 from palaestra_sim.scene.mode import Mode
 from palaestra_sim.stub.physics import StubPhysics
 from palaestra_sim.world import builtin
+from tests.scenes import load_scene
 
 PENDING = object()
 
@@ -282,6 +283,17 @@ def position():
 
 
 @pytest.fixture
+def field(robot):
+    """`field("TARGET", "translation")` returns the handle of a field of a node with that DEF."""
+
+    def find(def_name, name):
+        node = robot.get("supervisor/get_from_def", name=def_name)
+        return robot.get("supervisor/node/get_field", node=node, fieldName=name)
+
+    return find
+
+
+@pytest.fixture
 def world():
     """`world(objects, robot=...)` returns a world file with these nodes and a robot."""
 
@@ -325,3 +337,26 @@ ROBOT = f"""DEF ROBOTINO Robot {{
 def simple_robot():
     """Return the text of a robot of radius 0.2 m with one ray without noise, whose value is 1 - distance."""
     return ROBOT
+
+
+@pytest.fixture
+def load_with(world, simple_robot):
+    """`load_with(sensor, robot=..., info=...)` returns a simulation with that sensor on a robot of seed 7."""
+
+    def begin(sensor, robot="", info="", objects=""):
+        text = simple_robot.replace("DEF IR", f"{sensor} DEF IR")
+        text = text.replace('name "robotino"', f'{robot} customData "7" name "robotino"', 1)
+        return load_scene(world(objects, robot=text, info=info))
+
+    return begin
+
+
+@pytest.fixture
+def node_with(start, world, simple_robot, ros):
+    """`node_with(sensor)` returns the node of a robot with that sensor."""
+
+    def begin(sensor):
+        start(world(robot=simple_robot.replace("DEF IR", f"{sensor} DEF IR")))
+        return ros.node("robotino")
+
+    return begin

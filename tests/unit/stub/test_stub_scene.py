@@ -1,24 +1,14 @@
-"""Worlds are read; rejections name the line and the column."""
+"""The stub reads robots, obstacles and sensors from a world, and rays measure them."""
 
 import math
-import pickle
 
 import pytest
 
-from palaestra_sim.errors import WorldError, WorldRefusedError
 from palaestra_sim.scene.devices.distance_sensor import DISTANCE_SENSOR
-from palaestra_sim.scene.reader import read_scene
 from palaestra_sim.scene.tree.field_types import FieldType
-from palaestra_sim.scene.tree.scene_tree import SceneTree
 from palaestra_sim.stub.outline import obstacle
-from palaestra_sim.stub.physics import StubPhysics
-from palaestra_sim.world import builtin, parse
-from tests.scenes import load_scene
-
-
-def scene_of(source):
-    """Return the scene of a world file."""
-    return read_scene(SceneTree(parse(source), "my.wbt"), StubPhysics())
+from palaestra_sim.world import builtin
+from tests.scenes import load_scene, scene_of
 
 
 def distance(simulation):
@@ -169,75 +159,6 @@ def test_an_obstacle_may_get_another_size(world):
     assert distance(simulation) == pytest.approx(0.5)  # as in Webots, a reset restores only poses
 
 
-BAD = {
-    "a PROTO": ("RectangleArena { }", "the stub simulates no RectangleArena"),
-    "a loose crate": (
-        'Solid { name "crate" physics Physics { } boundingObject Box { } }',
-        "a Solid with physics moves when it is pushed",
-    ),
-    "a cone": ("Solid { boundingObject Cone { } }", "no Cone as a boundingObject"),
-    "a tilted box": (
-        "Solid { rotation 1 0 0 0.5 boundingObject Box { } }",
-        "a Box that neither stands nor lies",
-    ),
-    "a slope": ("Solid { rotation 1 0 0 0.5 boundingObject Plane { } }", "a Plane that is neither a floor"),
-    "a dangling USE": ("Solid { boundingObject USE NOTHING }", "USE NOTHING has no DEF before it"),
-    "a malformed translation": ("Pose { translation 1 2 }", "Pose.translation is not 3 numbers"),
-    "a place beyond all floats": (
-        "Solid { translation 1e200 0 0 boundingObject Box { } }",
-        r"Solid.translation has a number above 1e\+100",
-    ),
-    "a malformed radius": (
-        'Solid { boundingObject Cylinder { radius "1" } }',
-        "Cylinder.radius is not a number",
-    ),
-}
-
-
-@pytest.mark.parametrize(("objects", "fact"), BAD.values(), ids=BAD.keys())
-def test_what_cannot_be_simulated_is_refused(world, objects, fact):
-    """The stub must not simulate something else in place of such a node."""
-    with pytest.raises(WorldError, match=fact):
-        scene_of(world(objects))
-
-
-BAD_ROBOTS = {
-    "an unknown part": (("DEF IR", "Minotaur { } DEF IR"), "the stub simulates no Minotaur on a robot"),
-    "a leaning robot": (("Robot {", "Robot { rotation 1 0 0 0.3"), "does not stand upright"),
-    "an odd type": (('name "ir1"', 'name "ir1" type "radar"'), "'radar' is not a type of distance sensor"),
-    "a broken table": (("[ 0 1 0,", "[ 0 1,"), "lookupTable does not have rows of three numbers"),
-    "an unsorted table": (("[ 0 1 0,", "[ 2 1 0,"), "the distances of lookupTable do not increase"),
-    "a force sensor": (
-        ('"touch sensor"', '"touch sensor" type "force"'),
-        "a touch sensor that measures force",
-    ),
-    "two devices of a name": (('"ir1"', '"touch sensor"'), "a second device 'touch sensor'"),
-    "a name that ROS refuses": (('"ir1"', '"ir::1"'), "a device 'ir::1', a name that ROS does not accept"),
-    "two names of one topic": (
-        ('"ir1"', '"touch-sensor"'),
-        "devices 'touch-sensor' and 'touch sensor', whose topics are both 'touch_sensor'",
-    ),
-    "an axis of no length": (
-        ("DEF IR", "HingeJoint { jointParameters HingeJointParameters { axis 0 0 0 } } DEF IR"),
-        "a joint with an axis of length 0",
-    ),
-    "a ball joint with devices": (
-        ("DEF IR", "BallJoint { device [ RotationalMotor { } ] } DEF IR"),
-        "the stub simulates no BallJoint with devices",
-    ),
-}
-
-
-@pytest.mark.parametrize(("change", "fact"), BAD_ROBOTS.values(), ids=BAD_ROBOTS.keys())
-def test_a_robot_that_cannot_be_simulated_is_refused(world, simple_robot, change, fact):
-    """The message names the part of the robot that the stub cannot simulate."""
-    source = world(robot=simple_robot.replace(*change, 1 if "HingeJoint" in change[0] else -1))
-    assert source != world()
-
-    with pytest.raises(WorldError, match=fact):
-        scene_of(source)
-
-
 @pytest.mark.parametrize(
     ("rays", "seen"),
     [
@@ -314,12 +235,6 @@ def test_rays_off_the_axis_count_less(world, simple_robot):
     assert measured == pytest.approx(expected, rel=1e-6)
 
 
-def test_a_robot_with_a_body_inside_a_pose_is_refused(world, simple_robot):
-    """The translation of such a robot would be in another frame than the floor."""
-    with pytest.raises(WorldError, match="a robot that drives inside another node"):
-        scene_of(world(robot=f"Pose {{ translation 1 0 0 children [ {simple_robot} ] }}"))
-
-
 def test_a_robot_may_have_its_parts_in_groups_and_its_table_from_the_default(world, simple_robot):
     """A sensor inside a Group is found. Without a table, Webots' default of 0 to 1000 over 10 cm applies."""
     part = 'Group { children [ DistanceSensor { translation 0.2 0 0.05 name "near" } ] }'
@@ -374,52 +289,6 @@ def test_a_position_sensor_may_be_coarse_and_noisy(world, simple_robot):
     assert all(value % 0.25 == 0.0 for value in values)
 
 
-def test_all_that_is_refused_comes_in_one_message_with_a_line_for_each_kind_and_all_places(world):
-    """A person can correct all mistakes of a world at once, and not one after each start."""
-    robot = """Robot { name "r" controller "ros"
-      children [ Theseus { } Minotaur { } ] }"""
-    ball = "Solid { physics Physics { }\nboundingObject Cone { } }"
-    objects = f"Floor {{ }}\nTree {{ }}\nTree {{ }}\n{ball}\nTree {{ }}"
-    with pytest.raises(WorldRefusedError) as caught:
-        scene_of(world(objects, robot))
-
-    elsewhere = "leave it out (--leave-out), or run this world with driver webots"
-    assert str(caught.value).splitlines() == [
-        f"my.wbt:3:1: the stub simulates no Floor; {elsewhere}",
-        f"my.wbt:4:1: the stub simulates no Tree (3 places, in lines 4, 5, 8); {elsewhere}",
-        (
-            "my.wbt:6:1: a Solid with physics moves when it is pushed, which the stub does not simulate;"
-            f" remove physics, {elsewhere}"
-        ),
-        f"my.wbt:7:16: the stub simulates no Cone as a boundingObject; {elsewhere}",
-        "my.wbt:9:1: controllerArgs without --name=; generate the world",
-        "my.wbt:9:1: controllerArgs without --synchronize: the stub steps only on request; add it",
-        f"my.wbt:10:18: the stub simulates no Theseus on a robot; {elsewhere}",
-        f"my.wbt:10:30: the stub simulates no Minotaur on a robot; {elsewhere}",
-    ]
-    assert caught.value.line == 3
-    assert len(caught.value.errors) == 10
-
-
-def test_a_refusal_of_several_things_survives_a_copy(world):
-    """A process pool pickles the error, so that it reaches the parent."""
-    with pytest.raises(WorldRefusedError) as caught:
-        scene_of(world("Floor { }\nTree { }"))
-
-    assert str(pickle.loads(pickle.dumps(caught.value))) == str(caught.value)
-
-
-def test_a_shape_that_is_used_twice_is_refused_once(world):
-    """The shape has one position in the file, so the message has one line about it."""
-    objects = """Solid { boundingObject DEF BALL Cone { } }
-      Solid { boundingObject USE BALL }"""
-
-    with pytest.raises(WorldError) as caught:
-        scene_of(world(objects))
-
-    assert not isinstance(caught.value, WorldRefusedError)
-
-
 def test_a_wheel_may_have_an_outline_and_free_rollers(world, simple_robot):
     """The stub's floor is flat, and a wheel touches nothing else. So its outline has no effect."""
     roller = "HingeJoint { endPoint Solid { boundingObject Cylinder { radius 0.01 height 0.01 } } }"
@@ -428,21 +297,3 @@ def test_a_wheel_may_have_an_outline_and_free_rollers(world, simple_robot):
     scene = scene_of(world(robot=simple_robot.replace("endPoint Solid {", wheel, 1)))
 
     assert scene.robots[0].body.radius == pytest.approx(0.2)
-
-
-@pytest.mark.parametrize("step", ["0.5", "32.5", "0", "-32"])
-def test_the_basic_step_is_whole_milliseconds(world, step):
-    """The real controller uses only the integer part of the basic step as its divisor."""
-    with pytest.raises(WorldError, match="not a whole number of milliseconds"):
-        scene_of(world(info=f"basicTimeStep {step}"))
-
-
-def test_errors_point_at_the_node(world):
-    """The message has the line, the column and the remedy."""
-    with pytest.raises(WorldError) as caught:
-        scene_of(world("Solid {\n  boundingObject Cone { }\n}"))
-
-    assert str(caught.value) == (
-        "my.wbt:4:18: the stub simulates no Cone as a boundingObject;"
-        " leave it out (--leave-out), or run this world with driver webots"
-    )

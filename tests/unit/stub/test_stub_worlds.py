@@ -1,47 +1,24 @@
-"""Users' worlds: PROTOs, stand-ins, robots whose drive follows from geometry, and left-out nodes."""
-
-import math
+"""Users' worlds: PROTOs, stand-ins, scales, and nodes that are left out."""
 
 import pytest
 
 from palaestra_sim.errors import WorldError
 from palaestra_sim.ros_controller.simulator import RunningSimulator
 from palaestra_sim.scene.loader import Loader
-from palaestra_sim.scene.mode import Mode
 from palaestra_sim.scene.nodes import instantiate
 from palaestra_sim.scene.nodes.instantiate import Descriptions
 from palaestra_sim.scene.simulation import Simulation
 from palaestra_sim.scene.validation import LeaveOut
 from palaestra_sim.stub.outline import obstacle
 from palaestra_sim.stub.physics import StubPhysics
-from palaestra_sim.world import builtin_protos, parse, parse_proto
+from palaestra_sim.world import parse, parse_proto
 from palaestra_sim.world.stand_ins import load_stand_ins as load
 from palaestra_sim.world.stand_ins import shipped
+from tests.unit.stub.users_worlds import HEAD, load_world, obstacles
 
-HEAD = "#VRML_SIM R2023b utf8\n"
 STOOL = """PROTO Stool [ field SFVec3f translation 0 0 0 field SFFloat radius 0.2 field MFNode parts [ ] ]
 { Solid { translation IS translation name "stool" children IS parts
   boundingObject DEF SEAT Cylinder { radius IS radius height 0.5 } } }"""
-
-
-def load_world(text, *protos, stand_ins=None, leave_out=None):
-    """Return the simulation of a world that may use these PROTOs and the bundled ones."""
-    own = [parse_proto(f"{HEAD}{proto}".encode(), "Own.proto") for proto in protos]
-    descriptions = Descriptions(
-        protos={**builtin_protos(), **{proto.name: proto for proto in own}},
-        stand_ins=shipped() if stand_ins is None else stand_ins,
-    )
-    world = parse(f"{HEAD}WorldInfo {{ basicTimeStep 16 }} {text}".encode(), "my.wbt")
-    return Simulation.of(world, StubPhysics(), "my.wbt", Mode.FAST, descriptions, leave_out)
-
-
-def obstacles(simulation):
-    """Return the shape, x, y and size of each obstacle, rounded to millimeters."""
-    found = []
-    for shape in simulation.scene.solids:
-        x, y, _ = shape.pose.position
-        found.append((shape.kind, round(x, 3), round(y, 3), tuple(round(it, 3) for it in shape.size)))
-    return found
 
 
 def test_an_instance_of_a_proto_has_its_values_or_the_defaults():
@@ -191,18 +168,6 @@ def test_a_stand_in_that_leans_has_the_outline_of_one_that_stands():
     assert (2.0 * outline.half_x, 2.0 * outline.half_y) == pytest.approx((0.6, 0.4))
 
 
-def test_a_robot_of_webots_stands_still_unless_a_client_drives_it():
-    """The robot's own controller does not run here.
-
-    With controller ros, a client would use motors that are missing.
-    """
-    (shape,) = load_world('Nao { translation 1 0 0.3 controller "soccer" }').scene.solids
-    assert shape.pose.position[:2] == (1.0, 0.0)
-
-    with pytest.raises(WorldError, match="the stub simulates no Nao"):
-        load_world('Nao { controller "ros" controllerArgs [ "--name=nao" "--synchronize" ] }')
-
-
 def test_a_ceiling_is_in_nobody_s_way():
     """A Plane that faces down is a ceiling and not an obstacle."""
     roof = "Solid { translation 0 0 2.4 rotation 1 0 0 3.14 boundingObject Plane { } }"
@@ -341,57 +306,6 @@ def test_a_mesh_as_a_bounding_object_is_refused_by_name_and_can_be_left_out():
     assert len(load_world(world, leave_out=LeaveOut(types=frozenset({"Mesh"}))).scene.solids) == 1
 
 
-def drive(simulation, seconds, **speeds):
-    """Turn the motors of the only robot at these speeds in rad/s, and return the robot's new position."""
-    (robot,) = simulation.robots
-    for name, motor in robot.motors.items():
-        if name.replace(" ", "_") in speeds:
-            motor.set_position(math.inf)
-            motor.set_velocity(speeds[name.replace(" ", "_")])
-    simulation.step(round(seconds * 1000 / 16) * 16)
-    return robot.body
-
-
-@pytest.mark.parametrize(
-    ("robot", "left", "right", "radius", "track"),
-    [
-        ("E-puck", ["left_wheel_motor"], ["right_wheel_motor"], 0.02, 0.052),
-        ("Pioneer3dx", ["left_wheel"], ["right_wheel"], 0.0975, 0.3314),
-        ("TurtleBot3Burger", ["left_wheel_motor"], ["right_wheel_motor"], 0.033, 0.16),
-        (
-            "Pioneer3at",
-            ["front_left_wheel", "back_left_wheel"],
-            ["front_right_wheel", "back_right_wheel"],
-            0.11,
-            0.394,
-        ),
-    ],
-)
-def test_robots_of_webots_drive_by_their_wheels(robot, left, right, radius, track):
-    """The motion follows from the radius of the wheels and from the distance between them."""
-    straight = drive(load_world(f"{robot} {{ }}"), 0.8, **dict.fromkeys([*left, *right], 1.0))
-    assert straight.x == pytest.approx(0.8 * radius, rel=0.02)
-    assert straight.y == pytest.approx(0.0, abs=1e-6)
-
-    speeds = {**dict.fromkeys(left, -1.0), **dict.fromkeys(right, 1.0)}
-    turned = drive(load_world(f"{robot} {{ }}"), 0.8, **speeds)
-    assert turned.heading_rad == pytest.approx(0.8 * 2.0 * radius / track, rel=0.02)
-
-
-def test_a_robotino_of_webots_drives_as_the_one_of_the_arena():
-    """The PROTO's wheels have a radius of 0.063 m and are 120 degrees apart."""
-    body = drive(load_world("Robotino3 { }"), 0.8, wheel0_joint=0.0, wheel1_joint=-1.0, wheel2_joint=1.0)
-
-    assert body.x == pytest.approx(0.8 * 0.063 / math.sqrt(0.75), rel=0.01)
-
-
-def test_a_robot_that_no_client_reaches_needs_no_device_of_the_table():
-    """The robot's own controller does not run here, so the robot is only an obstacle."""
-    statue = 'Robot { controller "patrol" children [ Radar { } ] boundingObject Box { size 1 1 1 } }'
-
-    assert load_world(statue).robots[0].body.radius > 0.4
-
-
 def test_a_world_in_a_project_finds_its_protos(ros, tmp_path):
     """The addresses of the PROTOs are relative to the folder of the world."""
     (tmp_path / "protos").mkdir()
@@ -420,38 +334,3 @@ def test_a_world_in_a_project_finds_its_protos(ros, tmp_path):
         )
         == 1
     )
-
-
-ARM = """Robot { name "arm" children [ HingeJoint {
-  jointParameters HingeJointParameters { axis 0 0 1 position 0.5 minStop -1 maxStop 1 }
-  device [ RotationalMotor { name "m" } PositionSensor { name "s" } ]
-  endPoint Solid { translation 1 0 0 children [
-    DistanceSensor { name "eye" lookupTable [ 0 0 0, 9 9 0 ] }
-    SliderJoint { endPoint DEF TIP Solid { translation 1 0 0 } } ] } } ] }"""
-
-
-def test_a_lidar_of_webots_can_be_mounted_on_any_robot():
-    """The lidar's PROTO is bundled, with the rays of the real device."""
-    robot = 'Robot { controller "ros" controllerArgs [ "--name=r" "--synchronize" ] children [ Sick { } ] }'
-    (found,) = load_world(robot.replace("Sick", "SickLms291")).robots
-
-    (lidar,) = found.parts.devices.rows.values()
-    assert lidar[1].info["horizontalResolution"] == 180
-
-
-def test_a_joint_begins_at_its_position_and_ends_at_its_stop():
-    """The pose of the end in the file belongs to the joint's position in the file."""
-    simulation = load_world(ARM)
-    (robot,) = simulation.robots
-    tip = simulation.tree.of_def("TIP")
-    assert tip.place.world_position == pytest.approx((2.0, 0.0, 0.0))
-
-    robot.motors["m"].set_position(3.0)
-    simulation.step(1600)
-
-    assert robot.sensors["s"].value == 1.0
-    assert tip.place.world_position == pytest.approx((2 * math.cos(0.5), 2 * math.sin(0.5), 0.0))
-
-    simulation.reset()
-    simulation.step(16)
-    assert tip.place.world_position == pytest.approx((2.0, 0.0, 0.0))

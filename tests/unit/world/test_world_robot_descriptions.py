@@ -4,47 +4,12 @@ The numbers here come from Webots' user guide and PROTO files, not from the desc
 """
 
 import math
-import re
-from collections.abc import Iterable
-from pathlib import Path
 from typing import NamedTuple
 
 import pytest
 
-import palaestra_sim.world
 from palaestra_sim.world import Node, World, builtin, parse
-
-PROTOS = Path(palaestra_sim.world.__file__).parent / "protos"
-ROBOTS = ("E-puck", "Pioneer3at", "Pioneer3dx", "Robotino3", "TurtleBot3Burger")
-CARS = ("BmwX5",)
-LIDARS = {
-    "HokuyoUrg04lx": (240, 667, 0.06, 4.095),
-    "HokuyoUrg04lxug01": (240, 667, 0.2, 5.6),
-    "HokuyoUtm30lx": (270, 1080, 0.1, 30),
-    "RpLidarA2": (89.954, 800, 0.2, 12),
-    "SickLms291": (180, 180, None, 80),
-    "SickS300": (270, 540, None, 30),
-    "VelodynePuck": (360, 3600, 1, 100),
-    "VelodyneVLP-16": (360, 3600, 1, 100),
-    "VelodyneHDL-32E": (90, 4500, 1, 70),
-    "VelodyneHDL-64E": (90, 4500, 0.8, 120),
-}
-# The number of layers, the elevations of the highest and the lowest layer in degrees, and the noise in
-# meters.
-LAYERS = {
-    "VelodynePuck": (16, 15, -15, 0.03),
-    "VelodyneVLP-16": (16, 15, -15, 0.03),
-    "VelodyneHDL-32E": (32, 0.7, -40.7, 0.02),
-    "VelodyneHDL-64E": (64, 2, -24.8, 0.02),
-}
-# The range in meters by the data sheet, and the volts at both ends of the range.
-INFRARED = {
-    "SharpGP2D120": ((0.04, 2.72), (0.3, 0.42)),
-    "SharpGP2Y0A02YK0F": ((0.2, 2.51), (1.5, 0.45)),
-    "SharpGP2Y0A41SK0F": ((0.04, 2.72), (0.3, 0.42)),
-    "SharpGP2Y0A710K0F": ((1.0, 2.5), (5.5, 1.37)),
-}
-PARTS = ("CharacterSkin", "E-puckGroundSensors", "Robotino3Webcam", "RobotisLds01", *LIDARS, *INFRARED)
+from tests.unit.world.robot_descriptions import CARS, PARTS, PROTOS, ROBOTS, described, numbers, of_type
 
 COMMON = "translation rotation name controller controllerArgs customData supervisor synchronization"
 FIELDS = {
@@ -117,21 +82,6 @@ PLAIN = TYPES_OF_DEVICES | {
     "Sphere", "Zoom",
 }  # fmt: skip
 
-_FILE = re.compile(r"PROTO (?P<name>\S+) \[\n(?P<fields>.*?)\n\]\n\{\n(?P<body>.*)\}\n\Z", re.DOTALL)
-_FIELD = re.compile(
-    r"field\s+\w+(?:\{[^}]*\})?\s+(?P<name>\w+)\s+(?P<default>[^\n]*?)(?:\s{2}#[^\n]*)?$", re.MULTILINE
-)
-_IS = re.compile(r"\bIS (\w+)")
-
-
-class Description(NamedTuple):
-    """A PROTO file: its name, its fields with their defaults, and its body with these defaults filled in."""
-
-    name: str
-    defaults: dict[str, str]
-    used: set[str]
-    body: World
-
 
 class Drive(NamedTuple):
     """The documented values of a drive, in m, rad/s and kg."""
@@ -153,34 +103,6 @@ DRIVES = {
 }
 
 
-def described(name: str) -> Description:
-    """Return a description, in whose body each `IS` is replaced by the default of the field."""
-    text = (PROTOS / f"{name}.proto").read_text()
-    header, _, _ = text.partition("\n")
-    found = _FILE.search(text)
-    assert found, name
-    defaults = {it["name"]: it["default"] for it in _FIELD.finditer(found["fields"])}
-    body = _IS.sub(lambda match: defaults[match[1]], found["body"])
-    return Description(
-        name=found["name"],
-        defaults=defaults,
-        used=set(_IS.findall(found["body"])),
-        body=parse(f"{header}\n{body}".encode(), name),
-    )
-
-
-def of_type(nodes: Iterable[Node], *types: str) -> list[Node]:
-    """Return the nodes of these types, in source order."""
-    return [node for node in nodes if node.type_name in types]
-
-
-def numbers(node: Node, field: str) -> tuple[float, ...]:
-    """Return the numbers of a field, which the node must have."""
-    found = node.numbers(field)
-    assert found is not None, f"{node.type_name} without {field}"
-    return found
-
-
 def within(node: Node, world: World) -> list[Node]:
     """Return a node and its descendants."""
     start, end = node.span
@@ -194,22 +116,6 @@ def driven(name: str) -> list[tuple[Node, Node]]:
         for joint in of_type(described(name).body.walk(), "HingeJoint")
         if joint.nodes("device")
     ]
-
-
-def headings(name: str, prefix: str) -> list[float]:
-    """Return the azimuths in degrees of the distance sensors with a name prefix, ordered by their number."""
-    found = {}
-    for sensor in of_type(described(name).body.walk(), "DistanceSensor"):
-        number = (sensor.text("name") or "").removeprefix(prefix)
-        found[int(number)] = math.degrees(heading(numbers(sensor, "rotation")))
-    return [found[number] for number in sorted(found)]
-
-
-def heading(rotation: tuple[float, ...]) -> float:
-    """Return the azimuth of the x axis after a rotation, in radians."""
-    x, y, z, angle = rotation
-    cosine, sine = math.cos(angle), math.sin(angle)
-    return math.atan2(x * y * (1 - cosine) + z * sine, x * x * (1 - cosine) + cosine)
 
 
 def test_each_description_is_of_the_proto_that_its_file_is_named_after() -> None:
@@ -259,57 +165,6 @@ def test_descriptions_need_no_other_file_and_draw_nothing(name: str) -> None:
     assert "%<" not in (PROTOS / f"{name}.proto").read_text()
 
 
-def test_the_lidar_of_the_turtlebot_is_described_beside_it() -> None:
-    """The lidar is the default of `extensionSlot`, so a world that does not set the slot has a lidar."""
-    text = (PROTOS / "TurtleBot3Burger.proto").read_text()
-    (address,) = re.findall(r'^EXTERNPROTO "(.*)"$', text, re.MULTILINE)
-    (lidar,) = described("RobotisLds01").body.nodes
-
-    assert (PROTOS / address).is_file()
-    assert (lidar.type_name, lidar.text("name")) == ("Lidar", "LDS-01")
-    assert numbers(lidar, "horizontalResolution") == (360,)
-    assert numbers(lidar, "minRange") + numbers(lidar, "maxRange") == (0.12, 3.5)
-
-
-@pytest.mark.parametrize("name", LIDARS)
-def test_a_lidar_has_the_documented_rays(name: str) -> None:
-    """The values are the field of view in degrees, the number of rays, and the range."""
-    (lidar,) = described(name).body.nodes
-    degrees, rays, nearest, farthest = LIDARS[name]
-
-    assert numbers(lidar, "fieldOfView") == pytest.approx((math.radians(degrees),), abs=1e-4)
-    assert numbers(lidar, "horizontalResolution") == (rays,)
-    assert lidar.numbers("minRange") == (None if nearest is None else (nearest,))
-    assert numbers(lidar, "maxRange") == (farthest,)
-
-
-@pytest.mark.parametrize("name", LAYERS)
-def test_a_lidar_of_many_layers_looks_up_and_down_as_documented(name: str) -> None:
-    """The tilt moves all layers, and the noise is a fraction of the range."""
-    (lidar,) = described(name).body.nodes
-    layers, highest, lowest, noise_m = LAYERS[name]
-    (tilt,), (high,) = lidar.numbers("tiltAngle") or (0.0,), numbers(lidar, "verticalFieldOfView")
-
-    assert numbers(lidar, "numberOfLayers") == (layers,)
-    assert [math.degrees(tilt + it * high) for it in (0.5, -0.5)] == pytest.approx(
-        [highest, lowest], abs=0.05
-    )
-    assert numbers(lidar, "noise")[0] * LIDARS[name][3] == pytest.approx(noise_m, rel=2e-3)
-
-
-@pytest.mark.parametrize("name", INFRARED)
-def test_an_infra_red_sensor_returns_the_volts_of_its_data_sheet(name: str) -> None:
-    """The voltage falls with the distance, also beyond the documented range."""
-    (sensor,) = described(name).body.nodes
-    table = numbers(sensor, "lookupTable")
-    distances, volts = table[::3], table[1::3]
-
-    assert sensor.text("type") is None
-    assert set(INFRARED[name]) <= set(zip(distances, volts, strict=True))
-    assert sorted(distances) == list(distances)
-    assert sorted(volts, reverse=True) == list(volts)
-
-
 @pytest.mark.parametrize("name", ROBOTS + CARS)
 def test_a_robot_has_the_documented_devices(name: str) -> None:
     """A program finds devices by name, so each name occurs once."""
@@ -318,15 +173,6 @@ def test_a_robot_has_the_documented_devices(name: str) -> None:
 
     assert set(names) == DEVICES[name]
     assert len(names) == len(DEVICES[name])
-
-
-def test_the_ground_sensors_of_the_e_puck_look_down_from_left_to_right() -> None:
-    """The ground sensors are part of the robot only if `groundSensorsSlot` contains them."""
-    sensors = of_type(described("E-puckGroundSensors").body.walk(), "DistanceSensor")
-
-    assert [it.text("name") for it in sensors] == ["gs0", "gs1", "gs2"]
-    assert [numbers(it, "translation")[1] for it in sensors] == [0.01, 0, -0.01]
-    assert {numbers(it, "rotation") for it in sensors} == {(0, 1, 0, 1.5708)}
 
 
 @pytest.mark.parametrize("name", ROBOTS)
@@ -379,23 +225,6 @@ def test_motors_and_bodies_have_the_documented_limits_and_masses(name: str) -> N
     assert {numbers(motor, "maxVelocity") for motor, _ in driven(name)} == {(DRIVES[name].max_velocity,)}
     assert numbers(physics, "mass") == (DRIVES[name].mass,)
     assert robot.nodes("boundingObject")
-
-
-def test_infrared_sensors_of_the_e_puck_look_where_the_user_guide_says() -> None:
-    """The user guide counts angles from the negative y axis, in radians."""
-    guide = [1.27, 0.77, 0.0, 5.21, 4.21, math.pi, 2.37, 1.87]
-    expected = [math.remainder(it - math.pi / 2, math.tau) for it in guide]
-
-    assert headings("E-puck", "ps") == pytest.approx([math.degrees(it) for it in expected], abs=0.5)
-
-
-@pytest.mark.parametrize("name", ["Pioneer3at", "Pioneer3dx"])
-def test_sonars_of_the_pioneers_are_20_degrees_apart_and_40_at_the_sides(name: str) -> None:
-    """As in the figure of the user guide, the sonars go clockwise from the left."""
-    front = [90, 50, 30, 10, -10, -30, -50, -90]
-    expected = front + [-180 - it if it <= 0 else 180 - it for it in reversed(front)]
-
-    assert headings(name, "so") == pytest.approx(expected, abs=0.1)
 
 
 def test_the_robotino_is_the_one_of_the_arena() -> None:

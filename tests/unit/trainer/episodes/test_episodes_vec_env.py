@@ -1,64 +1,28 @@
-"""Several simulators as one VecEnv, and its handling of their faults."""
+"""Several simulators as one VecEnv: rows, episodes, seeds, and the interface of Stable-Baselines3."""
 
 from __future__ import annotations
 
-import math
-import threading
 from functools import partial
 
 import numpy as np
 import pytest
-import structlog
 from gymnasium import Wrapper, spaces
 from stable_baselines3.common.vec_env import VecEnv
 
 from palaestra_protocol.scene import TargetMarker
 from palaestra_trainer.episodes.episode_state import EpisodeState
 from palaestra_trainer.episodes.seeds import COLLECT, episode_seed
-from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
-from palaestra_trainer.errors import Diverged, FaultBudgetSpent, MasterLost, SimulatorHung, WrongData
+from palaestra_trainer.errors import SimulatorHung
 from palaestra_trainer.robots.geometry import Pose
 from palaestra_trainer.robots.sight import Sight
-from palaestra_trainer.run.signals import Interrupted
-from palaestra_trainer.simulators.budget import Group, RestartLimit
-from palaestra_trainer.simulators.restarter import Restarter
 from palaestra_trainer.waiting.greenlets import let_others
-
-RIGHT, LEFT = 1, 0
-
-
-@pytest.fixture
-def make_env():
-    """Yield a function that makes a VecEnv of simulators, which is closed at the end."""
-    made = []
-
-    def make(*members, limit=None, run_seed=1, **options):
-        restarters = [Restarter(member, limit) for member in members]
-        env = SimulatorsVecEnv(restarters, run_seed, **options)
-        made.append(env)
-        return env
-
-    yield make
-    for env in made:
-        env.close()
-
-
-def walk(env, steps, action=RIGHT):
-    """Return the rows of some steps with the same action."""
-    return [env.step(np.full(env.num_envs, action)) for _ in range(steps)]
-
-
-def end_of_mending(name):
-    """Wait for the end of the thread that restarts a simulator."""
-    for thread in threading.enumerate():
-        if thread.name == f"restarter-{name}":
-            thread.join(20.0)
+from tests.unit.trainer.episodes.walking import LEFT, RIGHT, walk
 
 
 @pytest.mark.parametrize("members", [1, 3])
-def test_a_step_has_a_row_for_each_member(make_env, make_member, members):
+def test_a_step_has_a_row_for_each_member(make_vec_env, make_member, members):
     """One simulator and several simulators give rows of the same form."""
-    env = make_env(*(make_member(f"collect-{index}") for index in range(members)))
+    env = make_vec_env(*(make_member(f"collect-{index}") for index in range(members)))
 
     first = env.reset()
     observations, rewards, dones, infos = env.step(np.full(members, RIGHT))
@@ -70,9 +34,9 @@ def test_a_step_has_a_row_for_each_member(make_env, make_member, members):
     assert [info["palaestra"]["valid"] for info in infos] == [True] * members
 
 
-def test_an_episode_is_reset_in_its_last_step(make_env, make_member):
+def test_an_episode_is_reset_in_its_last_step(make_vec_env, make_member):
     """Stable-Baselines3 expects the next episode's first observation. The info has the last one."""
-    env = make_env(make_member())
+    env = make_vec_env(make_member())
     env.reset()
 
     observations, rewards, dones, infos = walk(env, 3)[-1]
@@ -86,7 +50,7 @@ def test_an_episode_is_reset_in_its_last_step(make_env, make_member):
     assert rewards[0] == 1.0
 
 
-def test_a_viewer_sees_where_each_member_is_in_its_episode(make_env, make_member):
+def test_a_viewer_sees_where_each_member_is_in_its_episode(make_vec_env, make_member):
     """An environment may return any value as a reward term, so a term that is not a number is left out."""
 
     class Terms(Wrapper):
@@ -96,7 +60,7 @@ def test_a_viewer_sees_where_each_member_is_in_its_episode(make_env, make_member
 
     member = make_member("collect-0")
     member.env = Terms(member.env)
-    env = make_env(member, make_member("collect-1"))
+    env = make_vec_env(member, make_member("collect-1"))
     env.reset()
     walk(env, 2)
 
@@ -107,14 +71,14 @@ def test_a_viewer_sees_where_each_member_is_in_its_episode(make_env, make_member
     assert moments["collect-1"].rewards == {"walk": -0.1}
 
 
-def test_a_viewer_sees_the_target_of_a_robot_on_a_floor(make_env, make_member):
+def test_a_viewer_sees_the_target_of_a_robot_on_a_floor(make_vec_env, make_member):
     """In a world without a target marker, a person would not see where the robot should drive."""
     located, unplaced = make_member("collect-0"), make_member("collect-1")
     for member, target in ((located, (1.0, -0.5)), (unplaced, None)):
         member.sight = partial(
             Sight, pose=Pose(0.0, 0.0, 0.0), target=target, floor=None, radius_m=0.2, period_s=0.1
         )
-    env = make_env(located, unplaced, make_member("collect-2"))
+    env = make_vec_env(located, unplaced, make_member("collect-2"))
     env.reset()
 
     targets = [moment.target for moment in env.moments().values()]
@@ -122,9 +86,9 @@ def test_a_viewer_sees_the_target_of_a_robot_on_a_floor(make_env, make_member):
     assert targets == [TargetMarker(position=(1.0, -0.5, 0.0), radius_m=0.2), None, None]
 
 
-def test_a_time_limit_is_distinguished_from_an_end(make_env, make_member):
+def test_a_time_limit_is_distinguished_from_an_end(make_vec_env, make_member):
     """Only after a time limit is the value of later steps bootstrapped."""
-    env = make_env(make_member())
+    env = make_vec_env(make_member())
     env.reset()
 
     _, _, dones, infos = walk(env, 8, LEFT)[-1]
@@ -133,10 +97,10 @@ def test_a_time_limit_is_distinguished_from_an_end(make_env, make_member):
     assert infos[0]["TimeLimit.truncated"] is True
 
 
-def test_each_episode_has_the_seed_of_its_number(make_env, make_member):
+def test_each_episode_has_the_seed_of_its_number(make_vec_env, make_member):
     """A run can then be repeated and resumed."""
     members = [make_member("collect-0"), make_member("collect-1")]
-    env = make_env(*members, run_seed=5)
+    env = make_vec_env(*members, run_seed=5)
 
     env.resume([EpisodeState(7, None), EpisodeState(0, None)])
     walk(env, 3)
@@ -147,10 +111,10 @@ def test_each_episode_has_the_seed_of_its_number(make_env, make_member):
     assert [info["seed"] for info in env.reset_infos] == [members[i].env.seeds[-1] for i in (0, 1)]
 
 
-def test_each_episode_begins_with_its_number_and_the_progress_of_that_moment(make_env, make_member):
+def test_each_episode_begins_with_its_number_and_the_progress_of_that_moment(make_vec_env, make_member):
     """A curriculum needs the number and the progress; they stay the same during an episode."""
     member = make_member()
-    env = make_env(member)
+    env = make_vec_env(member)
 
     env.reset()
     env.set_training_progress(0.25)
@@ -162,10 +126,10 @@ def test_each_episode_begins_with_its_number_and_the_progress_of_that_moment(mak
     assert env.snapshot()[0].training_progress == 0.25
 
 
-def test_a_replayed_episode_begins_with_the_progress_that_it_had(make_env, make_member):
+def test_a_replayed_episode_begins_with_the_progress_that_it_had(make_vec_env, make_member):
     """With other progress it would be another episode. The next episode gets the current progress."""
     member = make_member()
-    env = make_env(member)
+    env = make_vec_env(member)
     env.set_training_progress(0.5)
 
     env.resume([EpisodeState(7, np.array([RIGHT]), 0.25)])
@@ -176,369 +140,7 @@ def test_a_replayed_episode_begins_with_the_progress_that_it_had(make_env, make_
     assert member.env.options == {"training_progress": 0.5, "episode": 8}
 
 
-def test_a_fault_ends_the_episode_as_truncated_and_invalid(make_env, make_member):
-    """The policy did not cause the fault.
-
-    So it gets no reward and no penalty, and does not learn from the row.
-    """
-    env = make_env(make_member(steps=[2]))
-    env.reset()
-
-    observations, rewards, dones, infos = walk(env, 2)[-1]
-
-    assert dones[0]
-    assert rewards[0] == 0.0
-    assert observations[0][0] == np.float32(0.1)
-    assert infos[0]["palaestra"]["valid"] is False
-    assert infos[0]["TimeLimit.truncated"] is True
-    assert infos[0]["terminal_observation"][0] == np.float32(0.1)
-    assert infos[0]["palaestra"]["sim_fault"]["kind"] == "dead"
-    assert infos[0]["palaestra"]["sim_fault"]["simulator"] == "collect-0"
-    assert infos[0]["palaestra"]["sim_fault"]["step"] == 1
-    assert "recovering" not in infos[0]["palaestra"]
-    assert "episode" not in infos[0]
-
-
-def test_alone_the_step_after_a_fault_waits_and_begins_the_next_episode(make_env, make_member):
-    """No other simulator can step meanwhile, and nothing is learned from this row."""
-    member = make_member(steps=[2], held=True)
-    env = make_env(member)
-    env.reset()
-    walk(env, 2)
-    threading.Timer(0.05, member.release.set).start()
-
-    observations, rewards, dones, infos = walk(env, 1)[0]
-
-    assert member.log == ["restart"]
-    assert (dones[0], rewards[0], observations[0][0]) == (True, 0.0, 0.0)
-    assert (infos[0]["palaestra"]["valid"], infos[0]["palaestra"]["recovering"]) == (False, True)
-    assert "sim_fault" not in infos[0]["palaestra"]
-    assert walk(env, 1)[0][3][0]["palaestra"]["valid"] is True
-
-
-def test_nobody_waits_for_a_member_that_is_mended(make_env, make_member):
-    """The other simulators continue.
-
-    The rows of the broken one are invalid, and do not end or begin an episode.
-    """
-    members = [make_member("collect-0"), make_member("collect-1", steps=[2], held=True)]
-    env = make_env(*members)
-    env.reset()
-    walk(env, 2)
-
-    rows = walk(env, 20, LEFT)
-
-    assert all(infos[0]["palaestra"]["valid"] for _, _, _, infos in rows)
-    assert not any(infos[1]["palaestra"]["valid"] for _, _, _, infos in rows)
-    assert all(infos[1]["palaestra"]["recovering"] for _, _, _, infos in rows)
-    assert not any(dones[1] for _, _, dones, _ in rows)
-    assert not any("sim_fault" in infos[1]["palaestra"] for _, _, _, infos in rows)
-    assert [members[0].log, members[1].log] == [[], ["restart"]]
-
-
-def test_a_mended_member_begins_its_next_episode(make_env, make_member):
-    """The episode has the next seed. One more invalid row ends the previous episode."""
-    members = [make_member("collect-0"), make_member("collect-1", steps=[2], held=True)]
-    env = make_env(*members)
-    env.reset()
-    walk(env, 3)
-    members[1].release.set()
-    end_of_mending("collect-1")
-
-    observations, _, dones, infos = walk(env, 1)[0]
-
-    assert dones[1]
-    assert infos[1]["palaestra"]["valid"] is False
-    assert observations[1][0] == 0.0
-    assert env.reset_infos[1]["seed"] == members[1].env.seeds[-1] == episode_seed(1, COLLECT, 1, 1)
-    assert walk(env, 1)[0][3][1]["palaestra"]["valid"] is True
-
-
-def test_while_all_are_mended_a_step_waits_for_the_first(make_env, make_member):
-    """Rows that are all invalid would only use the processor."""
-    members = [make_member(f"collect-{index}", steps=[1], held=True) for index in range(2)]
-    looks = []
-
-    def check():
-        looks.append(1)
-        if len(looks) == 3:
-            members[1].release.set()
-
-    env = make_env(*members, check=check)
-    env.reset()
-    walk(env, 1)
-
-    _, _, dones, infos = walk(env, 1)[0]
-
-    assert len(looks) >= 3
-    assert dones.tolist() == [False, True]
-    assert [info["palaestra"]["valid"] for info in infos] == [False, False]
-    assert [info["palaestra"]["valid"] for info in walk(env, 1)[0][3]] == [False, True]
-
-
-def test_a_signal_does_not_wait_for_a_member_that_is_mended(make_env, make_member):
-    """A simulator may take a minute to start, but an evicted pod has half a minute."""
-
-    def check():
-        raise Interrupted("SIGTERM received")
-
-    env = make_env(make_member(steps=[1], held=True), check=check)
-    env.reset()
-    walk(env, 1)
-
-    with pytest.raises(Interrupted):
-        walk(env, 1)
-
-
-def test_a_fault_at_a_reset_does_not_spoil_the_step_before(make_env, make_member):
-    """The first episode ended normally. The fault belongs to the next episode, before its first step."""
-    env = make_env(make_member(resets=[2]))
-    env.reset()
-
-    rows = walk(env, 5)
-
-    assert [infos[0]["palaestra"]["valid"] for _, _, _, infos in rows] == [True, True, True, False, True]
-    assert "sim_fault" not in rows[2][3][0]["palaestra"]
-    assert rows[2][0][0][0] == np.float32(0.3)
-    assert rows[3][3][0]["palaestra"]["sim_fault"]["step"] == 0
-    assert rows[3][2][0]
-
-
-def test_before_anything_was_seen_there_is_an_observation_of_nothing(make_env, make_member):
-    """The first reset may fail, but the row still needs an observation of the right shape."""
-    env = make_env(make_member(resets=[1]))
-
-    first = env.reset()
-
-    assert first.tolist() == [[0.0, 0.0]]
-    assert walk(env, 2)[-1][3][0]["palaestra"]["valid"] is True
-
-
-def test_a_reset_leaves_a_member_alone_that_is_mended(make_env, make_member):
-    """REINFORCE resets all simulators, but only the restarter's thread may use a broken one."""
-    members = [make_member("collect-0"), make_member("collect-1", steps=[2], held=True)]
-    env = make_env(*members)
-    env.reset()
-    walk(env, 2)
-
-    observations = env.reset()
-
-    assert observations[:, 0].tolist() == [0.0, np.float32(0.1)]
-    assert [len(member.env.seeds) for member in members] == [2, 1]
-
-
-def test_a_snapshot_has_no_episode_of_a_member_that_is_mended(make_env, make_member):
-    """The steps of the cut episode are lost, so a resumed run begins the simulator's next episode."""
-    members = [make_member("collect-0"), make_member("collect-1", steps=[2], held=True)]
-    env = make_env(*members)
-    env.reset()
-    walk(env, 2)
-
-    states = env.snapshot()
-
-    assert [state.episode for state in states] == [0, 1]
-    assert states[0].actions.tolist() == [RIGHT, RIGHT]
-    assert states[1].actions is None
-
-
-def test_a_member_that_breaks_while_it_is_resumed_begins_the_next_episode(make_env, make_member):
-    """The resume is then not exact for this simulator, but the run continues."""
-    env = make_env(make_member(steps=[2]))
-
-    env.resume([EpisodeState(4, np.array([LEFT, LEFT, LEFT]))])
-
-    assert [(state.episode, state.actions) for state in env.snapshot()] == [(5, None)]
-    _, _, dones, infos = walk(env, 1)[0]
-    assert dones[0]
-    assert infos[0]["palaestra"]["sim_fault"]["episode"] == 4
-    assert env.snapshot()[0].episode == 5
-
-
-def test_every_kind_of_fault_is_reported_by_its_name_and_once(make_env, make_member):
-    """A person who reads the counts looks for a different cause for each type."""
-    faults = {1: SimulatorHung("x", "slow"), 2: WrongData("x", "NaN")}
-    env = make_env(make_member(steps=faults))
-    env.reset()
-
-    rows = walk(env, 5)
-
-    told = [infos[0]["palaestra"].get("sim_fault", {}).get("kind") for _, _, _, infos in rows]
-    assert told == ["hung", None, "wrong_data", None, None]
-
-
-def test_an_observation_that_is_no_number_is_the_environment_s_mistake(make_env, make_member):
-    """The robot has checked its sensors, so NaN comes from the environment, and a restart would not help."""
-    member = make_member()
-    member.env = Wrapper(member.env)
-    env = make_env(member)
-    env.reset()
-    step = member.env.env.step
-    member.env.step = lambda action: (np.array([0.0, np.nan], np.float32), *step(action)[1:])
-
-    with pytest.raises(Diverged) as refusal:
-        walk(env, 1)
-
-    place = "episode 0, step 1: collect-0: environment Corridor: observation[1] is nan"
-    assert str(refusal.value) == f"{place}; fix the environment"
-
-
-def test_an_observation_of_a_reset_that_is_no_number_is_the_environment_s_mistake(make_env, make_member):
-    """The message has the number of the episode, so that the author can repeat it."""
-    member = make_member()
-    member.env._observe = lambda: {"wheels": np.array([[0.0], [math.inf]])}
-    env = make_env(member)
-
-    with pytest.raises(Diverged, match=r"episode 0, reset: .* observation wheels\[1, 0\] is inf"):
-        env.reset()
-
-
-def test_a_sensor_that_is_no_number_is_the_simulator_s_fault(make_env, make_member):
-    """The robot raises the error, and a restart of the simulator may help."""
-    env = make_env(make_member(steps={1: WrongData("ir1", "nan from ir1")}))
-    env.reset()
-
-    _, _, _, infos = walk(env, 1)[0]
-
-    assert infos[0]["palaestra"]["sim_fault"]["kind"] == "wrong_data"
-
-
-def test_a_reward_that_is_no_number_is_nobody_s_fault_but_the_environment_s(make_env, make_member):
-    """A restart would not help, so the run ends, and the message has the reward term."""
-    member = make_member()
-    member.env.step_reward = math.inf
-    env = make_env(member)
-    env.reset()
-
-    with pytest.raises(Diverged) as refusal:
-        walk(env, 1)
-
-    fact = "episode 0, step 1: collect-0: environment Corridor: the reward is inf (term walk)"
-    assert str(refusal.value) == f"{fact}; fix the environment's reward"
-
-
-def test_a_simulator_that_does_not_come_back_is_tried_again(make_env, make_member):
-    """After a simulator ran out of memory, its first restart often fails as well."""
-    member = make_member(steps=[1], starts=[1, 2], resets=[2])
-    env = make_env(member)
-    env.reset()
-
-    rows = walk(env, 4)
-
-    assert member.log == ["restart"] * 4
-    assert [infos[0]["palaestra"]["valid"] for _, _, _, infos in rows] == [False, False, False, True]
-
-
-def test_a_spent_budget_ends_the_run(make_env, make_member):
-    """Endless restarts would look like progress."""
-    env = make_env(make_member(steps=range(1, 100)), limit=RestartLimit(restarts=2))
-    env.reset()
-
-    with pytest.raises(FaultBudgetSpent, match=r"^collect-0: 2 restarts within 600 s .* restart.limit"):
-        walk(env, 6)
-
-
-def test_a_budget_is_spent_within_its_window_only(make_member):
-    """One fault an hour for a week does not spend the budget."""
-    times = iter([0.0, 100.0, 600.0, 650.0])
-    member = make_member(steps=range(1, 100))
-    restarter = Restarter(member, RestartLimit(restarts=2, within_s=600.0), clock=lambda: next(times))
-    env = SimulatorsVecEnv([restarter], 1)
-    env.reset()
-
-    walk(env, 6)
-
-    with pytest.raises(FaultBudgetSpent):
-        walk(env, 2)
-
-
-def test_the_run_goes_on_without_a_simulator_if_enough_are_left(make_member):
-    """Three of four simulators learn as much, but slower. With fewer than needed, the run ends."""
-    group = Group(3, least=2)
-    members = [
-        make_member("collect-0", steps=range(1, 100)),
-        make_member("collect-1"),
-        make_member("collect-2", steps=range(40, 100)),
-    ]
-    restarters = [Restarter(member, RestartLimit(restarts=1), group=group) for member in members]
-    env = SimulatorsVecEnv(restarters, 1)
-    env.reset()
-    for steps in (1, 2):
-        walk(env, steps)
-        end_of_mending("collect-0")
-
-    rows = walk(env, 30)
-
-    assert restarters[0].lost
-    assert members[0].log == ["restart", "stop"]
-    assert all(infos[1]["palaestra"]["valid"] and infos[2]["palaestra"]["valid"] for _, _, _, infos in rows)
-    assert not any(dones[0] or infos[0]["palaestra"]["valid"] for _, _, dones, infos in rows)
-    with pytest.raises(FaultBudgetSpent, match="collect-2: 1 restarts"):
-        walk(env, 500)
-
-
-def test_a_member_is_recycled_between_episodes_without_a_fault(make_env, make_member):
-    """Simulators leak memory, and a planned restart takes less time than a crash."""
-    member = make_member(recycle_after=2)
-    env = make_env(member)
-    env.reset()
-
-    rows = walk(env, 9)
-
-    assert member.log == ["restart"]
-    assert all(infos[0]["palaestra"]["valid"] for _, _, _, infos in rows)
-    assert member.resets == 2
-
-
-def test_recycling_is_logged_once_a_minute_with_the_number_of_all(make_member, clock):
-    """A line every few seconds would hide other lines; the first line shows that the limits work."""
-    restarter = Restarter(make_member(recycle_after=1), clock=clock)
-
-    with structlog.testing.capture_logs() as logs:
-        restarter.reset(seed=1)
-        for clock.now in (0.0, 5.0, 59.0, 61.0, 62.0, 122.0):
-            restarter.reset(seed=1)
-
-    told = [line["times"] for line in logs if line["event"] == "simulator recycled"]
-    assert told == [1, 4, 6]
-
-
-def test_members_are_recycled_at_the_same_time(make_env, make_member):
-    """Simulators that start together reach their limits together; one after the other would take longer."""
-    both = threading.Barrier(2, timeout=20.0)
-    members = [make_member(f"collect-{index}", recycle_after=1) for index in range(2)]
-    for member in members:
-        member.restart = lambda member=member: (both.wait(), setattr(member, "resets", 0))
-    env = make_env(*members)
-    env.reset()
-
-    rows = walk(env, 3)
-
-    assert all(info["palaestra"]["valid"] for _, _, _, infos in rows for info in infos)
-
-
-def test_a_recycling_that_fails_is_a_fault_like_any_other(make_env, make_member):
-    """The simulator is restarted a second time, and then the episode begins."""
-    member = make_member(starts=[1], recycle_after=1)
-    env = make_env(member)
-    env.reset()
-
-    rows = walk(env, 5)
-
-    assert member.log == ["restart", "restart"]
-    assert [infos[0]["palaestra"]["valid"] for _, _, _, infos in rows] == [True, True, True, False, True]
-
-
-def test_an_error_that_is_no_fault_comes_out_when_all_rows_are_done(make_env, make_member):
-    """Without a ROS master nothing can be restarted, and no simulator may be left in the middle of a step."""
-    lost = MasterLost("gone")
-    env = make_env(make_member("collect-0", steps={1: lost}), make_member("collect-1"))
-    env.reset()
-
-    with pytest.raises(MasterLost):
-        walk(env, 1)
-
-
-def test_members_step_at_the_same_time(make_env, make_member):
+def test_members_step_at_the_same_time(make_vec_env, make_member):
     """All requests are sent before the first wait, so four simulators do not take four times as long."""
     members = [make_member(f"collect-{index}") for index in range(4)]
     told = []
@@ -550,7 +152,7 @@ def test_members_step_at_the_same_time(make_env, make_member):
             told.append(("awaited", name))
 
         member.take_step = step
-    env = make_env(*members)
+    env = make_vec_env(*members)
     env.reset()
 
     walk(env, 1)
@@ -560,10 +162,10 @@ def test_members_step_at_the_same_time(make_env, make_member):
 
 
 @pytest.mark.parametrize("members", [1, 2])
-def test_resting_reaches_every_member(make_env, make_member, members):
+def test_resting_reaches_every_member(make_vec_env, make_member, members):
     """Paused simulators leave the processor to the learner."""
     made = [make_member(f"collect-{index}") for index in range(members)]
-    env = make_env(*made)
+    env = make_vec_env(*made)
 
     env.pause()
     env.unpause()
@@ -571,22 +173,22 @@ def test_resting_reaches_every_member(make_env, make_member, members):
     assert [member.log for member in made] == [["pause", "run"]] * members
 
 
-def test_a_broken_member_is_left_for_the_next_step_to_find(make_env, make_member):
+def test_a_broken_member_is_left_for_the_next_step_to_find(make_vec_env, make_member):
     """The pause only saves processor time, so its failure must not end a run."""
     member = make_member()
     member.pause = lambda: (_ for _ in ()).throw(SimulatorHung("collect-0", "no answer"))
-    env = make_env(member)
+    env = make_vec_env(member)
 
     env.pause()
 
     assert env.reset().shape == (1, 2)
 
 
-def test_the_rest_of_the_interface_reaches_the_environments(make_env, make_member):
+def test_the_rest_of_the_interface_reaches_the_environments(make_vec_env, make_member):
     """Callbacks and wrappers of other projects use these methods."""
     members = [make_member("collect-0"), make_member("collect-1")]
     members[0].env = Wrapper(members[0].env)
-    env = make_env(*members)
+    env = make_vec_env(*members)
     env.set_options({"easy": True})
     env.reset()
     env.set_attr("color", "red", indices=1)
@@ -599,7 +201,7 @@ def test_the_rest_of_the_interface_reaches_the_environments(make_env, make_membe
     assert env.seed() == env.seed(9)
 
 
-def test_observations_by_name_are_stacked_by_name(make_env, make_member):
+def test_observations_by_name_are_stacked_by_name(make_vec_env, make_member):
     """A robot with a camera has a Dict as its observation."""
 
     class Named(Wrapper):
@@ -616,7 +218,7 @@ def test_observations_by_name_are_stacked_by_name(make_env, make_member):
     members = [make_member("collect-0"), make_member("collect-1")]
     for member in members:
         member.env = Named(member.env)
-    env = make_env(*members)
+    env = make_vec_env(*members)
 
     assert env.reset()["place"].shape == (2, 2)
     assert walk(env, 1)[0][0]["place"].shape == (2, 2)

@@ -3,112 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
-import errno
-import json
-import os
-import pickle
-import shutil
-import stat
-import zipfile
-from pathlib import Path
 
 import numpy as np
 import pytest
-import structlog
 import torch
 
-from palaestra_trainer.algorithms import buffers, make_model
+from palaestra_trainer.algorithms import make_model
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.job.configuration import Algorithm
 from palaestra_trainer.run import checkpoint
 from palaestra_trainer.simulators.restarter import Restarter
-
-HYPERPARAMETERS = {
-    "DQN": {
-        "learning_starts": 10,
-        "batch_size": 8,
-        "gradient_steps": 1,
-        "buffer_size": 200,
-        "policy_kwargs": {"net_arch": [8]},
-    },
-    "PPO": {"n_steps": 16, "batch_size": 8, "policy_kwargs": {"net_arch": [8]}},
-}
-CHUNK_ROWS = 16
-
-
-@pytest.fixture(autouse=True)
-def _small_chunks(monkeypatch):
-    """Make chunks of a few dozen rows, so that a small buffer has several.
-
-    A row of the corridor has 36 bytes.
-    """
-    monkeypatch.setattr(buffers, "CHUNK_BYTES", 36 * CHUNK_ROWS)
-
-
-class Trained:
-    """A model that was trained for some steps, with its checkpoints."""
-
-    def __init__(self, model, env, configuration, folder):
-        self.model = model
-        self.configuration = configuration
-        self.folder = folder
-        self._env = env
-        self.saver = checkpoint.Saver(folder, keep=3)
-
-    def learn(self, steps):
-        """Continue the training for some steps."""
-        self.model.learn(steps, reset_num_timesteps=False)
-        return self
-
-    def save(self, step=None):
-        """Save a checkpoint, and return whether it was written."""
-        state = checkpoint.TrainingState.of(self.model, self._env.snapshot(), {"returns": [1.5]})
-        step = self.model.num_timesteps if step is None else step
-        return self.saver.save(
-            self.model, state, checkpoint.describe(self.configuration, step, {"episodes": 4})
-        )
-
-    def resume(self):
-        """Restore the model from the newest checkpoint, and return the restored state."""
-        found = checkpoint.newest(self.folder)
-        state = checkpoint.restore(found, self.model)
-        self._env.resume(state.members)
-        state.put_back(self.model)
-        self.saver = checkpoint.Saver(self.folder, keep=3, resumed=found)
-        return state
-
-    def path(self, step):
-        """Return the folder of a checkpoint."""
-        return self.folder / str(step)
-
-    def experience(self, step):
-        """Return the experience files of a checkpoint, by name."""
-        return {file.name: file for file in sorted((self.path(step) / "experience").iterdir())}
-
-
-@pytest.fixture
-def trained(make_member, make_configuration, tmp_path):
-    """Return a function that trains a model for some steps."""
-
-    def make(name="DQN", steps=40):
-        configuration = make_configuration(algorithm={"name": name, "hyperparameters": HYPERPARAMETERS[name]})
-        env = SimulatorsVecEnv([Restarter(make_member())], run_seed=1)
-        model = make_model(configuration.algorithm, env, seed=1)
-        made = Trained(model, env, configuration, tmp_path / "checkpoints")
-        return made.learn(steps) if steps else made
-
-    return make
-
-
-def rows(model):
-    """Return the experience of a model by column."""
-    return {name: column[: model.replay_buffer.size()] for name, column in model.replay_buffer.rows().items()}
-
-
-def equal(one, other):
-    """Return whether two buffers hold the same rows at the same positions."""
-    return all(np.array_equal(column, rows(other)[name]) for name, column in rows(one).items())
+from tests.unit.trainer.run.checkpoint.trained_model import HYPERPARAMETERS, equal
 
 
 @pytest.mark.parametrize("name", ["DQN", "PPO"])
@@ -213,23 +119,6 @@ def test_a_row_that_ends_as_truncated_afterwards_is_written_again(trained):
     assert buffer.changed == {0}
 
 
-def test_chunks_are_copied_where_the_volume_has_no_links(trained, monkeypatch):
-    """Some network volumes have no hard links."""
-    model = trained(steps=100)
-    model.save()
-
-    def refuse(*_paths):
-        raise OSError(errno.EPERM, "Operation not permitted")
-
-    monkeypatch.setattr(os, "link", refuse)
-    model.learn(20).save()
-
-    resumed = trained(steps=0)
-    resumed.resume()
-    assert not model.experience(120)["00000.npy"].samefile(model.experience(100)["00000.npy"])
-    assert equal(model.model, resumed.model)
-
-
 def test_a_chunk_whose_file_is_gone_is_written_again(trained):
     """A user may have deleted the file of the last checkpoint."""
     model = trained(steps=100)
@@ -278,114 +167,6 @@ def test_a_step_is_saved_again(trained):
     assert checkpoint.newest(model.folder).manifest.step == 40
 
 
-def flip(path):
-    """Flip one bit in the middle of a file, as a faulty disk does."""
-    content = bytearray(path.read_bytes())
-    content[len(content) // 2] ^= 1
-    replace(path, bytes(content))
-
-
-def truncate(path):
-    """Cut off the end of a file, as a crash of the machine does."""
-    replace(path, path.read_bytes()[:-10])
-
-
-def replace(path, content):
-    """Replace this file without changing other files that are hard links to the same content."""
-    path.unlink()
-    path.write_bytes(content)
-
-
-FILES = [
-    "manifest.json",
-    "model.zip",
-    "state.json",
-    "state.npz",
-    "experience/00000.npy",
-    "experience/00002.npy",
-]
-
-
-@pytest.mark.parametrize("damage", [truncate, flip, os.remove])
-@pytest.mark.parametrize("file", FILES)
-def test_a_checkpoint_with_a_damaged_file_is_skipped(trained, file, damage):
-    """The log has a warning, and the run resumes from the previous checkpoint."""
-    model = trained()
-    for step in (10, 20):
-        model.save(step)
-    damage(model.path(20) / file)
-
-    with structlog.testing.capture_logs() as logs:
-        found = checkpoint.newest(model.folder)
-
-    assert found.manifest.step == 10
-    assert [(line["event"], line["log_level"]) for line in logs] == [
-        ("damaged checkpoint skipped", "warning")
-    ]
-    checkpoint.restore(found, model.model)
-
-
-@pytest.mark.parametrize("content", ["[]", "{}", '{"format": 1}', "null", '{"format": 99}'])
-def test_a_manifest_that_is_none_is_damage(trained, content):
-    """Without a digest in the manifest, no content is accepted."""
-    model = trained()
-    for step in (10, 20):
-        model.save(step)
-    (model.path(20) / "manifest.json").write_text(content)
-
-    assert checkpoint.newest(model.folder).manifest.step == 10
-
-
-def test_every_bit_of_a_manifest_counts(trained):
-    """The manifest has the step from which a run resumes, and contains its own digest."""
-    model = trained()
-    model.save()
-    path = model.path(40) / "manifest.json"
-    whole = path.read_bytes()
-    compact = json.dumps(json.loads(whole))
-
-    for place in range(len(compact)):
-        damaged = bytearray(compact.encode())
-        damaged[place] ^= 1
-        path.write_bytes(damaged)
-        with pytest.raises(ConfigurationError, match="no checkpoint in it can be read"):
-            checkpoint.newest(model.folder)
-
-
-def test_damage_to_shared_experience_does_not_end_a_run(trained):
-    """Several checkpoints may share the damaged file, but the rows of their other chunks are intact."""
-    model = trained(steps=100)
-    model.save()
-    model.learn(20).save()
-    content = bytearray(model.experience(120)["00001.npy"].read_bytes())
-    content[-1] ^= 1
-    model.experience(120)["00001.npy"].write_bytes(content)
-
-    resumed = trained(steps=0)
-    resumed.resume()
-    left = resumed.model.replay_buffer
-
-    assert resumed.model.num_timesteps == 120
-    assert left.size() == 120 - CHUNK_ROWS
-    expected = np.delete(rows(model.model)["observations"], slice(CHUNK_ROWS, 2 * CHUNK_ROWS), axis=0)
-    assert np.array_equal(rows(resumed.model)["observations"], expected)
-    resumed.learn(10).save()
-    assert not checkpoint.newest(resumed.folder).lost
-
-
-def test_what_is_left_of_a_buffer_that_has_gone_round_is_in_order(trained):
-    """The buffer overwrites its oldest row first, so the remaining rows must be in order."""
-    model = trained(steps=230)
-    model.save()
-    (model.path(230) / "experience/00000.npy").unlink()
-
-    resumed = trained(steps=0)
-    resumed.resume()
-
-    order = [*range(30, 200), *range(CHUNK_ROWS, 30)]
-    assert np.array_equal(rows(resumed.model)["observations"], rows(model.model)["observations"][order])
-
-
 def test_a_checkpoint_of_another_format_is_refused(trained):
     """A new run would throw away the steps of this one.
 
@@ -404,115 +185,6 @@ def test_a_checkpoint_of_another_format_is_refused(trained):
 def test_without_a_checkpoint_there_is_none(tmp_path):
     """The run directory of a new run has no checkpoints."""
     assert checkpoint.newest(tmp_path / "none") is None
-
-
-def fail(number):
-    """Return a function that raises an error of the operating system, with this number."""
-
-    def write(*_args, **_options):
-        raise OSError(number, os.strerror(number))
-
-    return write
-
-
-@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EDQUOT])
-@pytest.mark.parametrize("where", ["model.save", "np.savez", "np.save"])
-def test_a_full_disk_leaves_what_was_there(trained, monkeypatch, where, number):
-    """The training continues without a new checkpoint, and the next checkpoint must be complete again."""
-    model = trained(steps=100)
-    model.save()
-    model.learn(20)
-    with monkeypatch.context() as full:
-        place, name = where.split(".")
-        full.setattr({"model": model.model, "np": np}[place], name, fail(number))
-        written = model.save()
-    left = [path.name for path in model.folder.iterdir()]
-
-    model.learn(20).save()
-
-    resumed = trained(steps=0)
-    resumed.resume()
-    assert (written, left) == (False, ["100"])
-    assert resumed.model.num_timesteps == 140
-    assert equal(model.model, resumed.model)
-
-
-def test_another_failure_to_write_is_not_hidden(trained, monkeypatch):
-    """A read-only volume will not become writable, so the run must end."""
-    model = trained()
-    monkeypatch.setattr(model.model, "save", fail(errno.EROFS))
-
-    with pytest.raises(OSError, match="Read-only"):
-        model.save()
-
-
-@pytest.mark.parametrize("number", [errno.EINVAL, errno.ENOTSUP])
-def test_a_file_system_without_fsync_of_folders_keeps_checkpoints(trained, monkeypatch, number):
-    """gcsfuse, s3fs, SMB and some NFS servers cannot sync folders; files are still synced."""
-    sync, synced = os.fsync, []
-
-    def fsync(descriptor):
-        if stat.S_ISDIR(os.fstat(descriptor).st_mode):
-            raise OSError(number, os.strerror(number))
-        synced.append(descriptor)
-        sync(descriptor)
-
-    monkeypatch.setattr(os, "fsync", fsync)
-    model = trained()
-
-    model.save()
-
-    assert checkpoint.newest(model.folder).manifest.step == 40
-    assert synced
-
-
-@pytest.mark.parametrize("number", [errno.EPERM, errno.ENOTSUP])
-def test_a_file_system_that_renames_no_folders_is_refused_in_a_sentence(trained, monkeypatch, number):
-    """Some object stores cannot rename a folder.
-
-    The error must forbid a retry, because each attempt would fail at its first checkpoint.
-    """
-    rename = Path.rename
-
-    def refuse(path, target):
-        if path.is_dir():
-            raise OSError(number, os.strerror(number))
-        return rename(path, target)
-
-    monkeypatch.setattr(Path, "rename", refuse)
-    model = trained()
-
-    with pytest.raises(ConfigurationError, match=r"its file system cannot rename folders .* use another"):
-        model.save()
-    assert list(model.folder.iterdir()) == []
-
-
-def test_a_draft_is_never_taken_for_a_checkpoint(trained):
-    """The trainer was killed after it had written all files, but before it renamed the folder."""
-    model = trained()
-    model.save(10)
-    model.save(20)
-    model.path(20).rename(model.folder / ".20.draft")
-
-    checkpoint.tidy(model.folder)
-
-    assert checkpoint.newest(model.folder).manifest.step == 10
-    assert [path.name for path in model.folder.iterdir()] == ["10"]
-
-
-@pytest.mark.parametrize("there", [False, True])
-def test_a_kill_while_a_step_is_saved_again_loses_nothing(trained, there):
-    """The kill comes between the renames of the old and the new folder, or after both."""
-    model = trained()
-    model.save()
-    shutil.copytree(model.path(40), model.folder / ".40.replaced")
-    if not there:
-        shutil.rmtree(model.path(40))
-
-    checkpoint.tidy(model.folder)
-
-    assert checkpoint.newest(model.folder).manifest.step == 40
-    assert [path.name for path in model.folder.iterdir()] == ["40"]
 
 
 @pytest.mark.parametrize(
@@ -560,39 +232,3 @@ def test_tensors_of_another_shape_are_a_configuration_error(trained, make_member
 
     with pytest.raises(ConfigurationError, match="does not fit DQN as configured"):
         checkpoint.load_tensors(tmp_path / "model.zip", other)
-
-
-class Bomb:
-    """An object that runs code when it is unpickled."""
-
-    def __reduce__(self):
-        """Return a call that fails the test as the way to rebuild the object."""
-        return (pytest.fail, ("unpickled",))
-
-
-def test_nothing_in_a_model_is_unpickled(trained, tmp_path):
-    """A person who can write to a volume must not be able to run code in the trainer."""
-    model = trained(steps=0).model
-    model.save(tmp_path / "model.zip")
-    with zipfile.ZipFile(tmp_path / "model.zip", "a") as archive:
-        content = {"x": {":type:": "Bomb", ":serialized:": pickle.dumps(Bomb()).hex()}}
-        with pytest.warns(UserWarning, match="Duplicate name"):
-            archive.writestr("data", json.dumps(content))
-
-    checkpoint.load_tensors(tmp_path / "model.zip", model)
-
-
-@pytest.mark.parametrize("file", ["state.npz", "experience/00000.npy"])
-def test_arrays_of_objects_are_refused(trained, file):
-    """NumPy stores arrays of objects as pickles, which can contain code."""
-    model = trained()
-    model.save()
-    found = checkpoint.newest(model.folder)
-    objects = np.array([Bomb()], dtype=object)
-    if file.endswith("npz"):
-        np.savez(found.path / file, observation=objects)
-    else:
-        np.save(found.path / file, objects)
-
-    with pytest.raises(ValueError, match="allow_pickle=False"):
-        checkpoint.restore(found, model.model)
