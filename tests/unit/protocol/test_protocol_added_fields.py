@@ -31,7 +31,7 @@ def test_an_added_field_is_absent_unless_it_is_set() -> None:
 
 
 def test_an_added_field_that_is_set_is_written_within_its_bounds_and_read_back() -> None:
-    """A text that is too long is cut on writing, as for any other field."""
+    """The writer cuts a text that is too long, as it does for every other field."""
     content = Later(step=7, loss=0.5, note="too long").to_json()
 
     assert content == {"step": 7, "loss": 0.5, "note": "too l"}

@@ -71,7 +71,7 @@ def test_a_document_that_is_no_request_is_refused_with_the_fact(document, fact):
 
 
 def test_a_fault_is_raised_with_its_text():
-    """`xmlrpc.client` raises the same error with the same text."""
+    """A program gets the same error and text from `xmlrpc.client`."""
     with pytest.raises(xmlrpc.client.Fault, match="no such call"):
         decode_response(encode_fault("no such call"))
 
@@ -124,7 +124,7 @@ def test_a_call_that_cannot_be_made_is_a_fault(server, method, given):
 
 
 def test_several_calls_of_one_request_are_made_in_order_and_fail_alone(server):
-    """A robot registers hundreds of services with one such request."""
+    """A robot registers hundreds of services in one request, and one bad service must not stop the others."""
     calls = [{"methodName": name, "params": [3]} for name in ("double", "none", "system.multicall", "double")]
 
     with xmlrpc.client.ServerProxy(uri(server())) as proxy:
@@ -232,7 +232,7 @@ def test_a_call_ends_at_its_deadline_however_slowly_the_answer_comes(peer, piece
     ],
 )
 def test_an_answer_that_is_no_response_is_refused(peer, answer):
-    """The call raises the same error for every such response."""
+    """A caller then has to catch only one error, whatever is wrong with the response."""
     with pytest.raises(UnreadableDocument):
         call(peer([answer]), PATIENCE_S, "m")
 

@@ -38,7 +38,7 @@ def test_a_picture_is_written_row_by_row_as_red_green_blue(tmp_path):
 
 
 def test_a_picture_is_loaded_as_it_was_saved(tmp_path):
-    """With `alpha=True` the file keeps the alpha channel."""
+    """A loaded image must look like the saved one; with `alpha=True` this includes the transparency."""
     path, pixels = str(tmp_path / "eye.png"), BLUE + bytes((1, 2, 3, 4))
 
     assert picture_files.save(path, (2, 1), pixels, alpha=True)

@@ -77,7 +77,7 @@ def test_a_pushed_pair_of_wheels_keeps_what_it_can(pair):
 
 
 def test_a_body_without_wheels_stays():
-    """A push of a body without wheels ends with the next step."""
+    """Without wheels the body cannot roll, so a push ends with the next step."""
     body = StubBody(MobileBase(), ROUND)
     body.push(1.0, 0.0, 0.5)
 
@@ -131,7 +131,7 @@ def test_a_fast_turn_does_not_swing_through_a_pole(pair):
 
 
 def test_an_outline_beside_the_origin_goes_along(pair):
-    """The outline is one disc off the origin, which keeps its offset at every heading."""
+    """The robot's outline is one disc away from its origin, and this disc must turn with the robot."""
     body, _ = pair([RoundPart(0.2, 0.1, 0.05)])
 
     body.place(1.0, 2.0, math.pi / 2)
@@ -142,7 +142,7 @@ def test_an_outline_beside_the_origin_goes_along(pair):
 
 
 def test_a_robot_meets_every_disc_of_another(pair):
-    """The other robot reports the contact too."""
+    """The end of a long robot is a disc of its own; both robots report the contact."""
     other = StubBody(MobileBase(), LONG)
     other.place(1.0, 0.5, 0.0)
     body, go = pair(others=[other])

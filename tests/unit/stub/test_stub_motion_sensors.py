@@ -14,7 +14,7 @@ from tests.unit.stub.sensors_in_motion import NORTH, ON_A_TURNTABLE, STEP_MS, dr
 
 
 def test_a_place_on_a_slider_moves_along_its_axis():
-    """The axis of the slider is in the frame of the joint, which is turned here."""
+    """The slider's axis is x of its joint, which is turned by 90 degrees, so the place moves along y."""
     frame = Frame(None, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0, math.pi / 2.0))
     motor = Motor(MotorSpec(name="lift"))
     motor.speed_rad_s = 0.2
@@ -71,7 +71,7 @@ def test_axes_go_through_table_and_resolution_and_one_that_is_off_is_nan(load_wi
 
 
 def test_each_axis_of_a_noisy_table_draws_its_own_noise(load_with):
-    """The random numbers are drawn in the order x, y, z."""
+    """An axis that is switched off draws no random number, so z gets the second number."""
     simulation = load_with(
         "Compass { lookupTable [ -1 -100 0.5, 1 100 0.5 ] yAxis FALSE }", "rotation 0 0 1 0.5"
     )
@@ -222,7 +222,7 @@ def test_an_accelerometer_reads_the_last_basic_step_of_a_long_one(load_with):
 
 
 def test_an_accelerometer_off_the_middle_reads_the_pull_to_the_middle(load_with):
-    """The value is the square of 2 rad/s times 0.3 m, toward the center; it is half a basic step late."""
+    """The value is 2 rad/s squared, times 0.3 m, toward the center; it is half a basic step late."""
     simulation = load_with("Accelerometer { translation 0.3 0 0 }")
 
     drive(simulation, 0.0, 0.0, 2.0)
@@ -288,7 +288,7 @@ def test_an_inertial_unit_rounds_each_number_to_its_resolution(load_with):
 
 
 def test_an_inertial_unit_answers_its_noise(node_with):
-    """The service returns the value of the field."""
+    """A client that filters the readings needs the sensor's noise."""
     assert node_with("InertialUnit { noise 0.25 }").get("inertial_unit/get_noise") == 0.25
 
 
