@@ -142,7 +142,7 @@ def test_an_obstacle_that_is_moved_is_seen_where_it_is(robot, field):
 
 
 def test_a_write_beyond_the_values_that_there_are_is_lost(robot, field):
-    """The call succeeds, but the value is not stored."""
+    """The response is the success of Webots' controller, so a client must check the count itself."""
     handle = field("ROBOTINO", "controllerArgs")
 
     assert robot.get("supervisor/field/set_string", field=handle, index=9, value="x") == 1
@@ -250,7 +250,7 @@ def test_a_value_that_libcontroller_refuses_answers_success(robot, field, bad):
 
 
 def test_a_value_of_the_wrong_type_answers_success(robot, field):
-    """The value is not stored, although the call succeeds."""
+    """Webots' controller responds with success too, so a client does not notice the wrong type."""
     handle = field("TARGET", "translation")
 
     assert robot.get("supervisor/field/set_float", field=handle, value=1.0) == 1

@@ -101,7 +101,7 @@ def test_the_front_sensor_tells_volts_at_a_wall(simulation):
 
 
 def test_the_bumper_tells_every_touch_since_it_was_read(simulation):
-    """A touch in the first of six basic steps is reported, and only once."""
+    """A touch in any basic step of a long step must be reported, and only once."""
     robot = simulation.robots[0]
     robot.body.place(1.76, 0.0, 0.0)
     drive(simulation, 0.5, 0.0, 0.0)
@@ -265,7 +265,7 @@ def test_a_reset_restores_the_places_of_all_solids(simulation):
 
 
 def test_reset_physics_is_at_once_and_keeps_time_and_place(simulation):
-    """The call only stops all motion."""
+    """As in Webots, the call only stops all motion, and needs no step."""
     drive(simulation, 2.0, 0.0, 0.0)
     simulation.step(320)
     place = simulation.robots[0].place.translation

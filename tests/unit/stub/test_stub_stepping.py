@@ -27,7 +27,7 @@ def test_a_multiple_of_the_basic_step_is_simulated(robot, step_ms):
 
 @pytest.mark.parametrize("step_ms", [1, 31, 33, 100, -1, -32, -192])
 def test_any_other_step_is_refused_and_changes_nothing(robot, step_ms):
-    """The response has `success` false, and the time does not advance."""
+    """A client must see from the response that its step was refused, because the time does not advance."""
     assert robot.get("robot/time_step", value=step_ms) is False
     assert robot.get("robot/get_time") == 0.0
 
@@ -219,7 +219,7 @@ class OtherSimulation:
 
 
 def test_any_simulation_can_be_stepped():
-    """Each simulator has the same controllers. A step advances the simulation, and then samples once."""
+    """All simulators share these controllers. A step advances the simulation, and then samples once."""
     simulation, answers = OtherSimulation(), []
     stepping = Stepping(simulation)
 

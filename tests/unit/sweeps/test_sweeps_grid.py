@@ -59,7 +59,7 @@ def test_chance_is_uniform_and_repeats() -> None:
 
 
 def test_more_trials_and_fields_change_no_earlier_value(sweep) -> None:
-    """A sweep may be extended after some trials have ended, whose numbers must keep their values."""
+    """A person may extend a sweep after some trials have ended, and these must keep their values."""
     rate = {RATE: {"low": 1e-5, "high": 1e-2, "log": True}}
     few = list(settings(sweep(random=rate, trials=2)))
     more = list(settings(sweep(random={"seed": {"low": 1, "high": 9}, **rate}, trials=4)))

@@ -202,7 +202,7 @@ def test_a_simulator_that_breaks_while_masks_are_asked_for_ends_its_episode(lear
 
 
 def test_the_vector_offers_masks_only_of_environments_that_have_them(make_member):
-    """sb3-contrib checks this in the same way."""
+    """sb3-contrib decides by `has_attr("action_masks")` whether it asks an environment for masks."""
     answers = []
     for kind in (MaskedTask, FakeTask):
         env = SimulatorsVecEnv([Restarter(with_task(make_member(), task_of(kind)))], 1)

@@ -49,7 +49,7 @@ def test_rows_that_the_run_cannot_fill_need_no_memory():
 
 
 def test_algorithms_without_replay_and_refused_spaces_have_no_size():
-    """The space is rejected later, with its own message."""
+    """PPO has no replay buffer, and a refused space gets a message of its own later."""
     on_policy = replay_size(Algorithm(name="PPO"), spaces.Discrete(2), spaces.Discrete(2), 100)
 
     assert (on_policy, size_of(OBSERVATIONS["Tuple"], ACTIONS["Box"])) == (None, None)

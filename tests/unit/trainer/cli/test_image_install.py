@@ -88,7 +88,7 @@ def refusal(capfd, *arguments):
 
 
 def test_a_bare_folder_of_modules_is_importable_and_compiled(folder, target):
-    """The root file system of a pod is read-only, so byte code is compiled now, or again at each start."""
+    """The root file system of a pod is read-only, so byte code would be compiled again at each start."""
     assert main([str(folder)]) == 0
 
     said = subprocess.run(
@@ -165,7 +165,7 @@ def test_a_module_that_hides_one_of_the_image_is_refused(folder, target, capfd, 
 
 
 def test_a_newer_version_replaces_an_older_one(project, target):
-    """A user may build an image from the user's previous one."""
+    """A user may build an image on top of the previous image."""
     folder = project()
     assert main([str(folder)]) == 0
     file = folder / "pyproject.toml"
