@@ -66,7 +66,7 @@ def test_a_robot_of_your_own_is_named_by_its_module(module):
     ],
 )
 def test_what_is_no_class_of_a_robot_is_refused_before_anything_starts(module, name, fact):
-    """The message has the field, the mistake and the remedy."""
+    """A person waits only seconds for the error, which has the field, the mistake and the remedy."""
     module(
         "from palaestra_trainer.robots import Bumper\n"
         "from palaestra_trainer.robots.differential import TurtleBot3Burger\n"

@@ -170,7 +170,7 @@ def test_a_wrapper_that_cannot_be_used_is_refused_before_a_simulator_starts(wrap
 
 @pytest.mark.usefixtures("registered")
 def test_a_wrapper_that_raises_is_named():
-    """The author of the job may have written the wrapper."""
+    """The author of the job may have written the wrapper, and must find the mistake in it."""
     wrapper = {"name": f"{HERE}:TimeLimit", "options": {"max_episode_steps": -1}}
 
     with pytest.raises(

@@ -108,7 +108,7 @@ def test_a_vector_answers_as_those_of_stable_baselines3(restarters, make, call, 
 @pytest.mark.parametrize("make", VECTORS.values(), ids=VECTORS)
 @pytest.mark.filterwarnings("ignore:.*render:UserWarning")
 def test_a_vector_draws_as_that_of_stable_baselines3(restarters, make, render_mode):
-    """`render` returns one image of all environments, or None without a render mode."""
+    """A video recorder for Stable-Baselines3 gets one image of all environments, or None without a mode."""
     env, reference = make(restarters(render_mode)), DummyVecEnv([lambda: wrapped(render_mode)] * MEMBERS)
 
     assert np.array_equal(env.get_images(), reference.get_images())

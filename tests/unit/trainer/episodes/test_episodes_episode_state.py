@@ -95,7 +95,7 @@ def test_what_follows_a_resume_is_what_would_have_been(make_env, steps):
 
 
 def test_members_are_resumed_where_each_one_was(make_env):
-    """One simulator is further than another, and a third has no episode."""
+    """The simulators are independent, so each may be at another step, and one may have no episode."""
     env, members = make_env({}, {}, {})
 
     observations = env.resume(
