@@ -19,7 +19,7 @@ from tests.unit.trainer.run.checkpoint.trained_model import HYPERPARAMETERS, equ
 
 @pytest.mark.parametrize("name", ["DQN", "PPO"])
 def test_what_is_saved_is_restored(trained, name):
-    """Networks, optimizer, counts, statistics and the state of the episode are compared."""
+    """A value that the checkpoint lacked would change the rest of the run."""
     before, after = trained(name), trained(name, steps=0)
     before.save()
 
@@ -67,7 +67,7 @@ def test_the_replay_buffer_is_restored(trained, steps):
 
 
 def test_a_checkpoint_whose_size_cannot_be_looked_at_is_one_all_the_same(trained):
-    """The size is a value for a dashboard, which must not end a run."""
+    """The size is only a value on a dashboard, so an error must not end the run."""
     it = trained()
     it.save()
     before = it.saver.size_bytes()
