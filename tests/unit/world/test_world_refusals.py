@@ -33,7 +33,7 @@ def test_a_world_without_a_robot_that_speaks_ros_is_refused_with_the_controllers
 
 
 def test_all_refusals_of_a_world_come_at_once(refusal: Callable[..., str]) -> None:
-    """The lines are in the order of the file, one line for each type of mistake."""
+    """A person corrects all mistakes of a world at once; the lines are in the order of the file."""
     text = 'EXTERNPROTO "a.proto"\n' + robot("controllerArgs 5") + "\n" + robot("") + "\n" + robot("")
 
     assert [line.partition(";")[0] for line in refusal(text).splitlines()] == [

@@ -63,7 +63,7 @@ def make_fleet(make_configuration, make_member):
 
 
 def test_all_are_started_and_stopped(make_fleet):
-    """The fleet has a collecting and an evaluating simulator."""
+    """The process of a simulator that was not stopped would outlive the run."""
     fleet, members = make_fleet()
 
     fleet.start()
@@ -127,7 +127,7 @@ def refusals(*numbers, fact="refused a step of 50 ms; use a multiple of the worl
 
 @pytest.mark.parametrize("what", ["starts", "resets", "steps"])
 def test_what_two_processes_refuse_in_the_same_words_is_a_mistake(play, make_configuration, last_word, what):
-    """A period that is not a multiple of the basic step once looked like a simulator that broke ten times."""
+    """A restart cannot help if each process refuses the same request, such as a wrong period."""
     code, members = play(make_configuration(), faults={"collect-0": {what: refusals(1, 2, 3)}})
 
     assert code == ExitCode.CONFIGURATION

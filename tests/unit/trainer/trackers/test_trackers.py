@@ -152,7 +152,7 @@ def wandb_away(monkeypatch):
 def test_wandb_that_cannot_upload_in_time_ends_with_a_warning_and_the_remedy(wandb_away, directory):
     """A pod must end before the library's own timeout.
 
-    Its files are in the run directory, for a later upload.
+    The data is also in the run directory, from which a person can upload it later.
     """
     tracker = wandb_away(mode="online")
     directory.path.mkdir(exist_ok=True)

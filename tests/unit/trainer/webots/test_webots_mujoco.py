@@ -18,7 +18,7 @@ def message(*numbers):
 
 
 def test_numbers_are_an_array_of_all():
-    """The numbers are in the order of MuJoCo."""
+    """The numbers keep MuJoCo's order, by which an environment tells them apart."""
     numbers = read_numbers(message(1.0, -2.5, 0.0))
 
     assert numbers.dtype == np.float64
