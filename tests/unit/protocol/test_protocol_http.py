@@ -226,7 +226,7 @@ def half_open(server, count, host="127.0.0.1"):
 
 
 def test_a_probe_is_answered_while_others_keep_half_open_connections() -> None:
-    """Half-open connections of a few clients once blocked every probe.
+    """Without a limit for each client, half-open connections of a few clients would block every probe.
 
     A kubelet restarts a container that fails its probes.
     """

@@ -43,7 +43,7 @@ def lit(picture):
     ids=["line", "rectangle", "filled rectangle", "oval", "filled oval", "polygon", "filled polygon"],
 )
 def test_a_shape_is_drawn_as_far_as_it_is_on_the_picture(points, rows):
-    """A program may draw beyond the edge of the image; this must neither fail nor change other pixels."""
+    """A program may draw beyond the edge of the image, which must neither fail nor change other pixels."""
     picture = ImageBuffer(width=5, height=5)
     picture.draw(points, RED)
 
@@ -170,7 +170,7 @@ def test_a_picture_is_mixed_with_what_is_there_only_if_it_blends(painter):
 
 
 def test_a_copy_ends_at_the_edge_of_the_display(painter):
-    """Beyond the edge there are no pixels, so a paste of the copy changes only as many as were copied."""
+    """A copy contains no pixels from beyond the edge, so a paste changes nothing in their place."""
     robot, picture = painter
     robot.call("screen/draw_pixel", x1=7, y1=5)
     image = robot.get("screen/image_copy", x=7, y=5, width=4, height=4)

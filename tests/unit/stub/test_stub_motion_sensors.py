@@ -222,7 +222,10 @@ def test_an_accelerometer_reads_the_last_basic_step_of_a_long_one(load_with):
 
 
 def test_an_accelerometer_off_the_middle_reads_the_pull_to_the_middle(load_with):
-    """The value is 2 rad/s squared, times 0.3 m, toward the center; it is half a basic step late."""
+    """The value is 2 rad/s squared, times 0.3 m, toward the center.
+
+    The reading lags by half a basic step.
+    """
     simulation = load_with("Accelerometer { translation 0.3 0 0 }")
 
     drive(simulation, 0.0, 0.0, 2.0)

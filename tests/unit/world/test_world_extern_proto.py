@@ -181,7 +181,10 @@ def test_a_world_without_a_file_has_no_relative_addresses() -> None:
 
 
 def test_files_are_read_from_the_disk(tmp_path: Path) -> None:
-    """By default, the function reads from the disk, which refuses a name with a null byte."""
+    """Without a function for reading, a caller gets the files on the disk.
+
+    A name with a null byte, which no file can have, is refused.
+    """
     (tmp_path / "Stool.proto").write_text(HEADER + proto("Stool"))
     source = f'{HEADER}EXTERNPROTO "Stool.proto"\nEXTERNPROTO "a\0b.proto"'.encode()
     with pytest.raises(WorldError):

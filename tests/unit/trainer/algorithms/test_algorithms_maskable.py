@@ -252,9 +252,9 @@ def test_an_environment_without_masks_is_refused_before_a_simulator_starts(run, 
 
 @pytest.mark.parametrize("given", [{}, {"normalize": {}}, {"name": "sb3_contrib:MaskablePPO"}])
 def test_training_evaluations_and_confirmations_take_only_allowed_actions(run, directory, given):
-    """The task fails at a forbidden action.
+    """The task fails at a forbidden action, so each part of a run must choose among allowed actions.
 
-    This covers `palaestra-eval` too, and an algorithm that is named by its class.
+    `palaestra-eval` is covered too, and an algorithm that is named by its class.
     """
     code, _, (configuration, make_members) = run(task_of, algorithm=given)
     again = measure(configuration, directory.model, make_members, episodes=4, stream="C")

@@ -210,8 +210,8 @@ def test_a_rollout_buffer_of_ones_own_returns_what_it_computes(lab, make):
 def test_a_checkpoint_keeps_what_the_buffer_adds(lab, make, make_configuration, tmp_path, buffer):
     """A resumed run must sample with the same priorities as before.
 
-    The checkpoint has the arrays, tensors and numbers among the buffer's attributes. If the buffer has the method
-    `state_dict`, the checkpoint has its result instead.
+    The checkpoint has the arrays, tensors and numbers among the buffer's attributes. If the buffer has the
+    method `state_dict`, the checkpoint has its result instead.
     """
     del lab
     algorithm = replaying(buffer=buffer)

@@ -38,7 +38,7 @@ def test_every_algorithm_takes_a_schedule(name):
 
 
 def test_plain_stable_baselines_loads_a_schedule_of_points(corridor_model, tmp_path):
-    """The file refers only to a function of NumPy, with the points as arguments, so NumPy is enough."""
+    """The file refers to a function of NumPy, with the points as arguments, and not to this package."""
     corridor_model(Algorithm(name="PPO", hyperparameters=ROLLOUTS | {"learning_rate": POINTS})).save(
         tmp_path / "model.zip"
     )

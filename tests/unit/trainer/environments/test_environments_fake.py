@@ -154,10 +154,7 @@ def test_it_never_leaves_the_floor_and_its_readings_never_leave_their_range(seed
 
 
 def test_it_dies_at_the_steps_that_are_named():
-    """A training test sets the steps at which its simulator dies.
-
-    They count over the simulator's whole life.
-    """
+    """A training test sets the steps at which its simulator dies; the count continues after a restart."""
     robot, _ = fake_arena(deaths=(2, 3))
     robot.advance()
 

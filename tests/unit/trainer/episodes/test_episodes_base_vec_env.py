@@ -164,10 +164,7 @@ def test_a_simulator_that_takes_over_has_the_attributes_that_were_set(restarters
 def test_an_attribute_that_is_set_while_a_simulator_is_mended_is_there_in_its_next_episode(
     restarters, monkeypatch
 ):
-    """During a restart, only the restarter's thread may use the environment.
-
-    So the attribute is set later.
-    """
+    """Only the restarter's thread may use the environment during a restart, so the attribute is set later."""
     [restarter, *_] = restarters()
     env = SimulatorsVecEnv([restarter], 1)
     env.reset()

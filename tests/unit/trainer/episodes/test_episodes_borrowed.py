@@ -176,8 +176,8 @@ def plain(value):
 def test_what_an_environment_does_with_its_objects_changes_nothing(restarter, played, hostile):
     """An environment may return the same array each time, and overwrite the actions that it gets.
 
-    Without copies, the last observation of an episode would be the first of the next one, and a resume would repeat
-    other actions.
+    Without copies, the last observation of an episode would be the first of the next one, and a resume would
+    repeat other actions.
     """
     assert plain(played(restarter(hostile))) == plain(played(restarter(Honest)))
 

@@ -50,7 +50,7 @@ def rejoined(env, saved):
 
 
 def test_simulators_that_repeat_themselves_are_where_they_were(make_env, saved):
-    """The resume is then exact, and there is no warning."""
+    """A warning without a cause would make a person doubt an exact resume."""
     state, warnings = rejoined(make_env(), saved)
 
     assert state is saved

@@ -143,7 +143,7 @@ def test_the_newest_checkpoints_are_kept(trained):
 def test_checkpoints_beyond_the_step_are_removed(trained):
     """The run did not resume from these checkpoints, so they are damaged.
 
-    They must not displace good ones.
+    A damaged checkpoint must not displace a good one.
     """
     model = trained()
     for step in (10, 20, 30):

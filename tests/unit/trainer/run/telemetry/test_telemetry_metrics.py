@@ -152,8 +152,8 @@ def test_simulators_are_counted_by_how_they_stand(progress):
 def test_each_simulator_has_metrics_of_its_steps_and_episodes(progress, make_member, clock):
     """A person finds a slow or broken simulator by its own metrics.
 
-    They count its steps with their durations, its episodes, and the spent part of its restart budget. Simulated time
-    is exported if it is known.
+    They count its steps with their durations, its episodes, and the spent part of its restart budget.
+    Simulated time is exported if it is known.
     """
     restarter = Restarter(make_member(), RestartLimit(restarts=4), progress, clock)
     progress.figures.meters = {"collect-0": restarter.meter}
