@@ -42,7 +42,7 @@ def test_what_is_encoded_is_decoded(values):
 
 @given(st.binary(max_size=60))
 def test_any_bytes_are_a_document_or_refused(data):
-    """The decoder raises `UnreadableDocument` in place of all errors of Python's parser."""
+    """A caller then catches one error instead of all errors of Python's parser."""
     for document in (data, b"<methodCall><methodName>m</methodName><params>" + data):
         with contextlib.suppress(UnreadableDocument):
             decode_request(document)
@@ -116,7 +116,7 @@ def test_a_call_returns_the_value(server):
 
 @pytest.mark.parametrize(("method", "given"), [("none", 1), ("double", {}), ("nothing", 0)])
 def test_a_call_that_cannot_be_made_is_a_fault(server, method, given):
-    """After the fault, the next call on the same connection succeeds."""
+    """A wrong call must not end the connection, so the next call on it succeeds."""
     with xmlrpc.client.ServerProxy(uri(server())) as proxy:
         with pytest.raises(xmlrpc.client.Fault):
             getattr(proxy, method)(given)
@@ -151,7 +151,7 @@ def test_a_connection_without_a_request_is_dropped(server):
 
 
 def test_a_body_that_is_too_long_or_has_no_length_is_refused(server):
-    """The server responds before it reads any of the body."""
+    """The server responds before it reads any of the body, so a huge body takes no memory."""
     for header, status in ((f"Content-Length: {MOST_REQUEST_BYTES + 1}", b"413"), ("X: y", b"411")):
         with dialed(server()) as connection:
             connection.sendall(f"POST / HTTP/1.1\r\n{header}\r\n\r\n".encode())

@@ -137,7 +137,7 @@ def test_a_field_without_effect_is_named_unless_it_has_its_default(type_name, na
 
 
 def test_fields_of_physics_without_effect_are_named_where_forces_act():
-    """The stub computes no forces, so its report does not list `bounce`."""
+    """`bounce` matters only where forces act, so MuJoCo's report lists it and the stub's does not."""
     bouncing = "ContactProperties { bounce 0.9 softCFM 0.001 } ContactProperties { bounce 0 }"
     world = f"#VRML_SIM R2023b utf8\nWorldInfo {{ contactProperties [ {bouncing} ] }}\n".encode()
 

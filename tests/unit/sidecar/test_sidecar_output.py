@@ -28,7 +28,7 @@ def passed_on(capfdbinary):
 
 
 def test_lines_come_out_as_they_went_in(passed_on) -> None:
-    """The output is the same if a line comes in two pieces or is empty."""
+    """A pipe may deliver a line in two pieces, which a reader of the log must not notice."""
     out, last = passed_on(b"one\ntw", b"o\n\nthree\n")
 
     assert out == b"one\ntwo\n\nthree\n"

@@ -257,7 +257,7 @@ def test_a_path_with_dots_means_the_folders_that_it_leads_to(source, named, tmp_
 
 
 def test_relative_addresses_need_no_project(source, named) -> None:
-    """A texture next to the world is found without a project."""
+    """A relative address counts from the folder of the world, so a texture there is found anyway."""
     world = named(source("worlds/a.png", content=RELATIVE))
 
     assert read(world, "a.png") == "worlds/a.png"

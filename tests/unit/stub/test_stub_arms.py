@@ -209,7 +209,7 @@ def test_two_tracks_drive_a_robot_as_two_wheels_do(world):
 
 
 def test_a_track_without_a_motor_is_a_fixed_part_of_its_robot(world):
-    """The boundingObject of the track counts as an obstacle; its wheels and belt are only visual."""
+    """The boundingObject of the track counts as an obstacle; wheels and belt are only visual."""
     (robot,) = load_scene(world(robot=TANK.replace("LinearMotor", "Brake"))).robots
 
     assert robot.body.base.drive is None

@@ -94,7 +94,7 @@ def test_a_drive_wants_one_motor_a_wheel():
 
 @pytest.mark.parametrize(("heading", "half"), [(0.0, 0.3), (math.pi / 2, 0.1), (math.pi, 0.3)])
 def test_a_long_robot_stops_at_a_wall_with_its_own_side(heading, half):
-    """The robot stops at half its length from a wall ahead, and at half its width from a wall to the side."""
+    """With a single disc as its outline, a long robot would stop too early or enter the wall."""
     body = StubBody(MobileBase(), LONG)
     body.face(Neighborhood([Block(1.05, 0.0, 0.0, (0.1, 4.0))], body.radius), ())
     body.place(1.0 - half + 0.02, 0.0, heading)

@@ -91,7 +91,7 @@ def test_a_sensor_without_a_table_answers_an_empty_one(node_with):
 
 
 def test_a_sensor_answers_its_table(node_with):
-    """The response has the rows one after the other, in one list."""
+    """ROS has no lists of lists, so the response has the rows one after the other, in one list."""
     node = node_with("Compass { lookupTable [ -1 -100 0, 1 100 0.5 ] }")
 
     assert node.get("compass/get_lookup_table") == (-1.0, -100.0, 0.0, 1.0, 100.0, 0.5)
@@ -238,7 +238,7 @@ def test_an_accelerometer_off_the_middle_reads_the_pull_to_the_middle(load_with)
 
 
 def test_a_reset_is_no_acceleration(load_with):
-    """The robot drove before the reset and stands after it, but this change is no acceleration."""
+    """A reset changes the velocity without a force, so the accelerometer must not report the change."""
     simulation = load_with("Accelerometer { }")
     drive(simulation, 0.5, 0.0, 0.0)
 

@@ -115,7 +115,7 @@ def test_torque_control_fails(robot):
 
 
 def test_commands_take_effect_with_the_next_step(robot):
-    """Until the next step, the shaft keeps its position."""
+    """No time passes between two steps, so the shaft keeps its position until the next step."""
     sensor = robot.inbox("wheel0_joint_sensor/value")
     robot.call("wheel0_joint_sensor/enable", value=32)
     robot.call("robot/time_step", value=32)

@@ -15,7 +15,7 @@ def find(robot):
 
 
 def test_a_def_that_does_not_exist_is_handle_0(find):
-    """The response is a success with the handle 0, not an error."""
+    """A client may look for a node that is absent, so the response is a success with the handle 0."""
     assert find("NOBODY") == 0
     assert find("") == 0
     assert find("ROBOTINO.NOBODY") == 0
@@ -189,7 +189,7 @@ def test_the_velocity_is_in_world_axes(robot, find, drive):
 
 
 def test_what_stands_has_no_velocity(robot, find):
-    """A fixed node with a frame has the velocity 0."""
+    """A supervisor may request the velocity of any node with a frame, also of a fixed node."""
     velocity = robot.get("supervisor/node/get_velocity", node=find("TARGET"))
 
     assert (velocity.linear.x, velocity.linear.y, velocity.angular.z) == (0.0, 0.0, 0.0)
@@ -229,7 +229,7 @@ def test_get_pose_is_swapped_as_in_webots(robot, find):
 
 
 def test_the_pose_of_a_part_is_constant_in_its_robot(robot, find, drive):
-    """The pose of a part relative to its robot does not change while the robot drives."""
+    """A client may read the pose of a sensor once, and use it for the whole run."""
     sensor = robot.get("supervisor/get_from_device", value="ir3")
     drive(robot, 0.1, 0.1, 0.5)
     robot.call("robot/time_step", value=1920)

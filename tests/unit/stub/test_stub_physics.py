@@ -168,7 +168,7 @@ def test_standing_still_is_exact(build):
 
 
 def test_a_wall_stops_what_drives_straight_into_it(build):
-    """The rim of the robot comes to rest at the surface of the wall."""
+    """The robot must neither enter the wall nor bounce back."""
     body, go = build([Block(1.05, 0.0, 0.0, (0.1, 4.0))])
 
     go(0.5, 0.0, 0.0, 200)

@@ -6,7 +6,7 @@ from palaestra_sim.scene.mode import Mode
 
 
 def test_enable_takes_multiples_of_the_basic_step_before_the_first_step(robot):
-    """For any other period the call returns false, and the sensor stays off."""
+    """A sensor cannot measure between two steps, so for any other period the call returns false."""
     assert robot.get("ir1/enable", value=31) is False
     assert robot.get("ir1/get_sampling_period") == 0
 

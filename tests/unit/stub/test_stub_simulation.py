@@ -46,7 +46,7 @@ def run(simulation, steps=30):
 
 
 def test_it_can_be_driven_without_ros(simulation):
-    """A program can load a world, command motors, step, and read sensors."""
+    """A test needs no ROS to load a world, command motors, step, and read sensors."""
     robot = simulation.robots[0]
     robot.motors["wheel0_joint"].set_position(math.inf)
     robot.motors["wheel0_joint"].set_velocity(2.0)
@@ -123,7 +123,7 @@ def test_only_multiples_of_the_basic_step_can_be_stepped(simulation, duration_ms
 
 
 def test_two_simulations_of_a_world_agree_bit_by_bit():
-    """Both simulations have the same world, commands and seed."""
+    """A person can reproduce a run only if the same world, commands and seed give the same results."""
     assert run(load_scene(builtin("arena"))) == run(load_scene(builtin("arena")))
 
 
@@ -154,7 +154,7 @@ def test_another_seed_is_another_noise(simulation):
 
 
 def test_noise_does_not_depend_on_what_the_rays_meet(simulation):
-    """Each sensor draws one random number per step, whatever its ray meets."""
+    """Each sensor draws one number per step, so another route does not shift the noise of later steps."""
     values = []
     for x in (0.0, 1.7):
         simulation.reset()
@@ -167,7 +167,7 @@ def test_noise_does_not_depend_on_what_the_rays_meet(simulation):
 
 
 def test_every_robot_has_noise_of_its_own():
-    """The `customData` of each robot seeds the robot's noise."""
+    """With common noise, equal robots would measure with the same errors; `customData` seeds each robot."""
     source = builtin("arena")
     robot = source[source.index(b"DEF ROBOTINO Robot") :]
     source += robot.replace(b'name "robotino"', b'name "second" translation 0 1 0 customData "5"', 1)

@@ -20,7 +20,7 @@ def outcome(node, number):
 
 @pytest.mark.parametrize("step_ms", [32, 64, 192, 3200])
 def test_a_multiple_of_the_basic_step_is_simulated(robot, step_ms):
-    """The time advances by exactly the requested duration."""
+    """One control period of a policy may consist of several basic steps."""
     assert robot.get("robot/time_step", value=step_ms) is True
     assert robot.get("robot/get_time") == pytest.approx(step_ms / 1000)
 
@@ -100,7 +100,7 @@ def test_the_world_waits_until_all_synchronised_robots_asked(two_robots, ros):
 
 
 def test_steps_of_different_length_are_served_piece_by_piece(two_robots):
-    """One robot makes six short steps while the other one makes a long step."""
+    """Robots may have different control periods: one makes six short steps during the other's long step."""
     supervisor, robotino = two_robots
     long = supervisor.ask("robot/time_step", value=192)
 

@@ -45,7 +45,7 @@ def test_what_is_drawn_from_a_range_lies_in_it(low, more, share, log) -> None:
 
 @given(st.lists(st.integers(), min_size=1), SHARES)
 def test_a_choice_is_one_of_its_values(choice, share) -> None:
-    """Each value of the list has the same probability."""
+    """Another value could be invalid for the job."""
     assert drawn(Distribution(choice=tuple(choice)), share) in choice
 
 

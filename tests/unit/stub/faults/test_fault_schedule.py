@@ -16,7 +16,7 @@ def happenings(schedule, event=FaultEvent.STEP, numbers=STEPS):
 
 
 def test_a_step_is_one_step(schedule):
-    """Neither the step before nor the step after has the fault."""
+    """A person who reproduces a crash needs the fault at exactly this step."""
     assert happenings(schedule("crash:step=2000")) == [2000]
 
 
@@ -26,7 +26,7 @@ def test_every_means_each_multiple(schedule):
 
 
 def test_steps_and_resets_are_counted_apart(schedule):
-    """The step number does not count resets, and the reset number does not count steps."""
+    """A simulator may fail after a number of resets, however many steps come between them."""
     both = schedule("crash:step=5 crash:reset=7")
 
     assert happenings(both) == [5]

@@ -66,7 +66,7 @@ def test_a_slow_step_is_slow_alone(course):
 
 
 def test_a_service_hangs_from_its_step_on(course):
-    """The other services still respond."""
+    """A client must also cope with a single service that hangs, so the other services still respond."""
     life = course("hang:service=ir1/enable,step=2")
     assert not life.request("robotino", "ir1/enable").lost
     for _ in range(3):
@@ -164,7 +164,7 @@ def test_starts_are_numbered_by_life(course, text, number, refused, delay_s):
 
 
 def test_a_life_without_anything_due_is_unharmed(course):
-    """Requests and messages without a fault pass unchanged."""
+    """Most requests and messages have no fault, and must pass unchanged."""
     life = course("crash:step=1000")
 
     assert life.request("robotino", STEP) == UNHARMED
