@@ -113,7 +113,10 @@ def test_an_episode_longer_than_its_column_keeps_its_last_rows():
 
 @pytest.mark.parametrize("strategy", ["future", "final", "episode"])
 def test_goals_are_places_that_the_same_episode_reached(strategy):
-    """A goal belongs to the same simulator, and the reward is computed for the new goal."""
+    """A place of another simulator would not be a result of these actions.
+
+    The reward is computed for the new goal.
+    """
     buffer = ValidHerReplayBuffer(
         16, SPACE, ACTIONS, judge(), "cpu", 2, goal_selection_strategy=strategy, n_sampled_goal=3
     )

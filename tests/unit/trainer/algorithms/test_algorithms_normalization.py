@@ -121,7 +121,7 @@ def test_a_member_that_cannot_be_reset_shows_nothing_to_the_statistics(make_env)
 
 
 def test_the_end_of_an_episode_is_not_seen_where_the_next_cannot_begin(make_env):
-    """If the reset fails, the row has the last observation of the old episode a second time."""
+    """After a failed reset, the row repeats the old episode's last observation, which must count once."""
     env = ValidNormalize(make_env({"resets": [2]}), Normalize(), GAMMA)
     env.reset()
 

@@ -65,7 +65,7 @@ def test_nothing_is_learned_from_nobody():
 
 @given(st.lists(st.floats(-10, 10), max_size=30), st.floats(0, 1))
 def test_a_return_is_its_reward_and_the_discounted_next_return(rewards, gamma):
-    """The test computes the definition of the return backward."""
+    """REINFORCE weights each action by this return; the test computes it by its definition."""
     returns = returns_to_go(rewards, gamma)
 
     later = [*returns[1:], 0.0][: len(rewards)]

@@ -115,7 +115,10 @@ def test_what_a_training_leaves_behind_stays_out(folder, target):
 
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_a_project_needs_no_index_if_the_image_has_its_dependencies(project, target, backend):
-    """The project's folder is mounted read-only, so the build must not write into it."""
+    """A machine may reach no package index.
+
+    The project's folder is mounted read-only, so the build must not write into it.
+    """
     folder = project("gymnasium>=1", "torch", "stable-baselines3", backend=backend)
     before = sorted(folder.rglob("*"))
 

@@ -107,9 +107,9 @@ class TextReward(Hall):
 )
 @pytest.mark.parametrize("limit", [None, 10])
 def test_a_wrong_environment_is_refused_at_its_first_reset_or_step(made, creator, facts, limit):
-    """The message has the expected and the actual value.
+    """An author sees in the message what was expected and what was returned.
 
-    Gymnasium's time limit reads the result of `step` first.
+    With a time limit, gymnasium's own wrapper reads the result of `step` first.
     """
 
     def first_step():

@@ -65,7 +65,7 @@ def test_a_reward_that_nothing_accepts_is_refused(made):
 
 
 def test_all_options_that_do_not_fit_are_reported_at_once(made):
-    """Each line has the nearest valid name."""
+    """A person corrects all options at once; each line has the nearest name or another remedy."""
 
     class Needy(Hall):
         def __init__(self, robot, scene, width):

@@ -231,7 +231,7 @@ def test_a_step_before_the_first_reset_is_refused(make_env):
 
 @given(seed=st.integers(0, 2**31 - 1), actions=st.lists(st.integers(0, 6), max_size=30))
 def test_every_observation_is_in_the_space_and_every_reward_is_finite(seed, actions):
-    """All actions in all episodes are covered."""
+    """An observation outside the space or an infinite reward would end a training."""
     env = MoveToTargetEnv(*fake_arena())
     observation, _ = env.reset(seed=seed)
 

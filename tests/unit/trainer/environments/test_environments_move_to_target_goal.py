@@ -160,7 +160,7 @@ def test_wrong_options_are_refused(options, fact):
 
 
 def test_the_sheet_has_every_key_with_its_bounds(make_env):
-    """The docstring is a data sheet, which this test compares with the space."""
+    """A user reads the keys and bounds from the docstring, which must agree with the space."""
     space = make_env().observation_space
     rows = [
         line.split("|")[1:-1]

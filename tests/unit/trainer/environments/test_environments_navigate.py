@@ -135,7 +135,7 @@ def test_wrong_options_are_refused(make_env, options):
 
 
 def test_the_data_sheet_has_the_actions():
-    """The table in the docstring is compared with the action space."""
+    """A user reads the velocities of each action from the docstring."""
     rows = [line.split("|") for line in (inspect.getdoc(NavigateEnv) or "").splitlines() if "|" in line]
     actions = [(float(row[3]), float(row[4])) for row in rows if len(row) == 6 and row[1].strip().isdigit()]
 

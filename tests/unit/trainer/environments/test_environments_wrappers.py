@@ -190,7 +190,7 @@ def test_wrappers_with_statistics_are_refused_as_ever(name):
 
 
 def test_without_wrappers_the_environment_stays_as_it_is():
-    """A job without wrappers must get the environment itself."""
+    """A needless wrapper would hide attributes of the environment from a program."""
     env = Count()
 
     assert wrapped(env, Environment(id=NAME)) is env

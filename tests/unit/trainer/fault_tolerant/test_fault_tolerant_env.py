@@ -133,7 +133,7 @@ def test_a_step_without_an_episode_is_a_mistake(make_env):
 
 
 def test_a_step_that_is_interrupted_ends_the_episode(make_env):
-    """After Ctrl-C in a notebook, a response is still unread. The next step would take it for its own."""
+    """After Ctrl-C in a notebook, a response is still unread, and the next step would read it as its own."""
     env, member = make_env()
     env.reset()
 

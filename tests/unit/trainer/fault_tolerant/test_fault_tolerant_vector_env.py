@@ -39,7 +39,10 @@ def walk(env, steps, action=RIGHT):
 
 
 def test_a_vector_is_gymnasium_s_own_in_everything_but_faults(make_env, make_member):
-    """Values, types, shapes and masks are equal; gymnasium's vector is set to reset in the same step too."""
+    """A loop that was written for gymnasium's vectors must work without changes.
+
+    Both vectors reset an environment in the same step.
+    """
     ours, *_ = make_env({}, {})
     theirs = SyncVectorEnv(
         [lambda: make_member("a").env, lambda: make_member("b").env], autoreset_mode=AutoresetMode.SAME_STEP
@@ -167,7 +170,7 @@ def test_closing_a_vector_releases_its_simulators(make_env):
 
 
 def test_stable_baselines3_gets_the_row_that_it_expects(make_env):
-    """Stable-Baselines3 expects a reset in the same step, and the other values in the info."""
+    """Stable-Baselines3 expects a reset in the same step, and the last observation in the info."""
     env, *_ = make_env({}, {}, kind=FaultTolerantVecEnv)
     env.seed(3)
     first = env.reset()

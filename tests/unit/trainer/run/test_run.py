@@ -101,7 +101,7 @@ def test_faults_are_survived_and_counted(play, job, directory, name):
 
 
 def test_simulators_are_recycled_without_a_fault(play, job, directory):
-    """A simulator reports between two episodes that it is due for recycling."""
+    """Recycling comes between two episodes, so no step is lost."""
     code, members = play(job(), {name: {"recycle_after": 5} for name in ("collect-0", "evaluate-0")})
 
     summary = json.loads(directory.summary.read_text())

@@ -198,7 +198,7 @@ sys.exit(code)
 def test_a_thread_that_lives_on_does_not_keep_the_program(name):
     """The program ends soon with its own exit code, and the log has the name of the thread.
 
-    This is so even if signals arrive meanwhile.
+    Signals that arrive meanwhile do not change the exit code.
     """
     with subprocess.Popen(
         [sys.executable, "-c", LIVES_ON, name], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True

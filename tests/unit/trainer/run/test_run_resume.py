@@ -65,7 +65,7 @@ def test_a_long_rollout_does_not_wait_for_its_end_once_a_signal_has_come(play, j
 def test_an_interrupted_run_goes_on_where_it_was(play, job, directory, name):
     """The run ends at the same total and keeps its earlier counts.
 
-    It repeats at most the incomplete rollout.
+    At most the incomplete rollout is repeated.
     """
     configuration = job(name)
     _, before = play(configuration, {"collect-0": {"steps": [5]}}, signal_after(42))

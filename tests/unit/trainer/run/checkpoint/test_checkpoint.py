@@ -93,7 +93,7 @@ def test_only_chunks_that_changed_are_written_again(trained):
 
 
 def test_a_resumed_run_shares_chunks_too(trained):
-    """After a resume, the saver also links the files from which it has read."""
+    """Without links, the first checkpoint after each resume would write the whole buffer again."""
     trained(steps=100).save()
     model = trained(steps=0)
     model.resume()

@@ -178,7 +178,7 @@ def test_counters_go_into_a_checkpoint_and_come_back(progress, clock):
 
 
 def test_a_checkpoint_of_an_older_release_has_fewer_counters():
-    """A counter that the checkpoint lacks starts at zero."""
+    """After an upgrade, a counter that the older checkpoint lacks starts at zero."""
     assert Counters.from_json({"episodes": 7, "seconds": 3.0}) == Counters(episodes=7)
 
 
