@@ -119,7 +119,7 @@ def test_a_world_survives_being_read_and_written_anew(source: bytes) -> None:
 
 @given(source=worlds(), clock=st.booleans())
 def test_only_the_arguments_of_robots_change(source: bytes, *, clock: bool) -> None:
-    """All other bytes stay the same, including comments, commas, line ends and saved states."""
+    """All other bytes belong to the author: comments, commas, line ends and saved states."""
     made = generate(source, IDENTITY, clock=clock)
 
     assert without_arguments(made) == without_arguments(source)

@@ -103,6 +103,6 @@ def test_all_refusals_of_a_world_come_at_once(refusal: Callable[..., str]) -> No
 def test_a_world_that_no_simulator_can_have_is_refused(
     refusal: Callable[..., str], text: str, message: str
 ) -> None:
-    """The message has the position, the fact and the remedy."""
+    """A person finds the mistake by its position, and sees what to write instead."""
     with_robot = text if "controller" in text else text + COMPLETE
     assert refusal(with_robot).startswith(message)

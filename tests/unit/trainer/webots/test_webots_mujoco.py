@@ -42,7 +42,7 @@ def test_a_message_cut_short_anywhere_is_refused():
 
 
 def test_devices_have_their_names_below_mujoco():
-    """The device list of a robot has these names."""
+    """A user finds these names in the device list of the robot."""
     assert MujocoSensor("walker", "hip force").device == "mujoco/hip force"
     actuator = MujocoActuator("walker", "left biceps")
     assert actuator.device == "mujoco/left biceps"
