@@ -60,7 +60,7 @@ def sample(kind, name):
 
 
 def load(type_name, field, physics):
-    """Return the simulation of a robot with a device of that type, which has the field."""
+    """Return the simulation of a robot with a device of that type; the device has the field."""
     kind = DEVICES[type_name]
     device = f"{type_name} {{ {field} }}"
     part = f"HingeJoint {{ device {device} }}" if kind.on_joint else device

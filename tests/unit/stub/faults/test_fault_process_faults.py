@@ -1,4 +1,7 @@
-"""The effects of faults on a process. Faults that end it are tested with real processes elsewhere."""
+"""The effects of faults on a process.
+
+Faults that end the process are tested with real processes elsewhere.
+"""
 
 import pytest
 

@@ -1,7 +1,7 @@
 """Spaces that Stable-Baselines3 would handle wrongly are rejected before a simulator starts.
 
-Stable-Baselines3's own checker rejects them too, or they caused a traceback. Spaces that work are tested in
-the grid of algorithms.
+Stable-Baselines3's own checker rejects them too, or they would cause a traceback. Spaces that work are
+tested in the grid of algorithms.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A run on a claim gets a link with the name of its job; where links are impossible, it still trains."""
+"""A run on a claim gets a link with the name of its job; where links are impossible, the run trains."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ def truncate(path):
 
 
 def replace(path, content):
-    """Replace this file without changing other files that are hard links to the same content."""
+    """Replace a file without changing other files that are hard links to the same content."""
     path.unlink()
     path.write_bytes(content)
 
