@@ -63,7 +63,7 @@ def test_an_item_of_a_list_is_changed_also_if_the_list_is_a_default():
     ],
 )
 def test_a_mistake_is_reported_as_in_a_file(changes, problem):
-    """The message has the field, the fact and the remedy."""
+    """A person gets the same message for a change in Python as for a line in a file."""
     with pytest.raises(SpecErrors) as refused:
         palaestra.changed(TEXT, changes)
 
@@ -71,6 +71,6 @@ def test_a_mistake_is_reported_as_in_a_file(changes, problem):
 
 
 def test_a_document_that_is_no_job_is_refused_as_in_a_file():
-    """The error about the document comes before any error about the changes."""
+    """A change of a document that is not a job has no meaning, so the document is checked first."""
     with pytest.raises(SpecErrors, match="the document is a list, not a mapping"):
         palaestra.changed("- a\n- b\n", {"seed": 1})

@@ -26,12 +26,12 @@ class Later(JsonMessage):
 
 
 def test_an_added_field_is_absent_unless_it_is_set() -> None:
-    """A message that uses no new field looks like a message of the first release."""
+    """Readers of the first release must understand a message that uses no new field."""
     assert Later(step=7).to_json() == First(step=7).to_json() == {"step": 7}
 
 
 def test_an_added_field_that_is_set_is_written_within_its_bounds_and_read_back() -> None:
-    """A text that is too long is cut on writing, as for any other field."""
+    """The writer cuts a text that is too long, as it does for every other field."""
     content = Later(step=7, loss=0.5, note="too long").to_json()
 
     assert content == {"step": 7, "loss": 0.5, "note": "too l"}
@@ -39,7 +39,7 @@ def test_an_added_field_that_is_set_is_written_within_its_bounds_and_read_back()
 
 
 def test_both_releases_read_each_other() -> None:
-    """The images of one job may be of different releases."""
+    """The images of one job may be of different releases, so each must read messages of the other."""
     assert First.from_json(Later(step=7, loss=0.5).to_json()) == First(step=7)
     assert Later.from_json(First(step=7).to_json()) == Later(step=7)
 

@@ -57,7 +57,7 @@ def peered(host, server):
 @pytest.mark.parametrize("host", ["0.0.0.0", "::"])
 @pytest.mark.parametrize("peer", ["127.0.0.1", "::1"])
 def test_every_address_is_one_of_ipv6_and_of_ipv4(host, peer):
-    """In a cluster with IPv6 only, a kubelet probed `[podIP]:8080`, and the server listened on IPv4 only."""
+    """In a cluster with only IPv6, the kubelet's probes failed because the server listened only on IPv4."""
     with Server(Address(host, 0), ROUTES, name="test") as listening, peered(peer, listening) as connection:
         connection.sendall(b"GET /healthz HTTP/1.0\r\n\r\n")
         answer = connection.makefile("rb").read()
@@ -121,7 +121,7 @@ def is_closed(connection, piece):
     ],
 )
 def test_a_route_answers(server, request_, status, content_type, body) -> None:
-    """The head of the response has the length of the body and the name of the server."""
+    """A client needs the length in the head, because it reads that many bytes as the body."""
     answered, head, text = ask(server, request_)
 
     assert (answered, text) == (status, body)
@@ -199,7 +199,7 @@ def test_a_request_that_is_not_complete_at_its_deadline_is_closed_unanswered(pie
 
 
 def test_a_head_without_end_is_closed_unanswered(server) -> None:
-    """The server limits the length of a line, the number of lines, and the size of the whole head."""
+    """No line is too long and the lines are few, so only the limit of the whole head protects the memory."""
     lines = b"".join(b"X-%d: %s\r\n" % (number, b"x" * 50_000) for number in range(10))
     assert len(lines) > MOST_REQUEST_BYTES
 
@@ -226,7 +226,7 @@ def half_open(server, count, host="127.0.0.1"):
 
 
 def test_a_probe_is_answered_while_others_keep_half_open_connections() -> None:
-    """Half-open connections of a few clients once blocked every probe.
+    """Without a limit for each client, half-open connections of a few clients would block every probe.
 
     A kubelet restarts a container that fails its probes.
     """
@@ -254,10 +254,7 @@ def test_a_peer_with_many_connections_takes_no_place_of_another() -> None:
 
 
 def test_a_connection_whose_request_is_answered_keeps_its_place() -> None:
-    """A response may take long.
-
-    If responses are pending on all connections of a client, the server closes a new one of that client.
-    """
+    """A request in progress must not be lost, so the server closes the client's newest connection."""
     begun, going_on = threading.Semaphore(0), threading.Event()
 
     def answer(_):
@@ -281,7 +278,7 @@ def test_a_connection_whose_request_is_answered_keeps_its_place() -> None:
 
 
 def test_an_error_of_a_route_is_logged_and_the_server_goes_on(server, caplog) -> None:
-    """The log has the error, and the next request succeeds. A client that disconnects is not an error."""
+    """A person finds the error in the log, and one broken route must not stop the probes."""
     with caplog.at_level(logging.ERROR):
         assert ask(server, b"GET /wrong HTTP/1.1\r\n\r\n") is None
         assert ask(server, b"GET /healthz HTTP/1.1\r\n\r\n")[0] == 200
@@ -291,7 +288,7 @@ def test_an_error_of_a_route_is_logged_and_the_server_goes_on(server, caplog) ->
 
 
 def test_a_closed_server_frees_its_address() -> None:
-    """The address is free again after `close`, also if the server was never started."""
+    """Otherwise the next server with this address would fail, even if the closed server was never started."""
     server = Server(LOOPBACK, ROUTES, name="palaestra-test")
     address = server.address
     with pytest.raises(OSError, match="Address already in use"):

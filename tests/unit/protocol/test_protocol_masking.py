@@ -38,7 +38,7 @@ def test_no_password_is_left_whatever_it_is_made_of(password):
 
 
 def test_no_text_that_leaves_a_trainer_has_it(capsys):
-    """The trainer's log, its last lines, and its termination message with the faults are masked."""
+    """Everyone who may read the pod's log or status sees these texts, so a password in them would leak."""
     before = structlog.get_config()
     try:
         logs.configure_logs()

@@ -56,10 +56,7 @@ def test_no_json_at_all_breaks_a_reader(messages, shape, data) -> None:
 @given(data=st.data())
 @settings(max_examples=100)
 def test_one_wrong_field_breaks_no_reader(messages, shape, data) -> None:
-    """A message with a single wrong field passes most checks.
-
-    So it finds errors that random JSON does not.
-    """
+    """A message with a single wrong field passes most checks, so it finds bugs that random JSON misses."""
     content = data.draw(messages.bent(shape))
 
     try:
@@ -101,7 +98,7 @@ def test_no_bytes_break_the_decoder(data) -> None:
     ],
 )
 def test_a_refusal_names_the_field_and_the_fact(state, changes, message) -> None:
-    """The person who reads the error can look at the program that sent the message, not at this reader."""
+    """A person who reads the error knows the program that sent the message, but not this reader."""
     with pytest.raises(ProtocolError) as refusal:
         SimulatorState.from_json(state().to_json() | changes)
 
@@ -127,7 +124,7 @@ def test_a_sidecar_of_an_older_release_tells_no_memory(state) -> None:
 
 
 def test_a_field_that_a_newer_release_added_is_ignored_in_an_answer(state) -> None:
-    """The images of one job may be of different releases."""
+    """The images of one job may be of different releases, so a sidecar may send unknown fields."""
     content = state().to_json() | {"color": "green"}
 
     assert SimulatorState.from_json(content) == state()
@@ -147,7 +144,7 @@ def test_a_deadline_is_a_number_of_seconds_within_an_hour(deadline_s) -> None:
 
 
 def test_a_deadline_may_be_now() -> None:
-    """A deadline of 0 kills a simulator that hangs at once."""
+    """With a deadline of 0, the sidecar kills at once a simulator that does not respond."""
     assert StopRequest.from_json({"deadline_s": 0}).to_json() == {"deadline_s": 0.0}
 
 
@@ -215,7 +212,7 @@ def test_a_success_rate_is_a_share(status, share) -> None:
 
 
 def test_an_interval_travels_with_its_rate(status) -> None:
-    """Both /status and the termination message contain the interval of the success rate."""
+    """Without the interval, a success rate of few episodes would look as certain as one of many episodes."""
     interval = SuccessInterval(low=0.25, high=0.75, episodes=20)
     word = Termination(step=1, reason="done", success_interval=interval)
 
@@ -259,7 +256,7 @@ def test_an_age_is_a_number_of_seconds(status, age_s) -> None:
 
 
 def test_a_nested_mistake_says_where_it_is(status) -> None:
-    """The message names the index of the simulator, because the list may have sixteen."""
+    """The list may have sixteen simulators, so the message names the index of the wrong one."""
     good = SimulatorStatus(name="collect-0", role="Collect", state="ready")
     bad = SimulatorStatus(name="collect-1", role="Eval", state="ready")
 
@@ -268,7 +265,7 @@ def test_a_nested_mistake_says_where_it_is(status) -> None:
 
 
 def test_a_trainer_of_an_older_release_is_understood(status) -> None:
-    """The images of one job may be of different releases."""
+    """The images of one job may be of different releases, so a trainer may lack newer fields."""
     simulator = SimulatorStatus(name="collect-0", role="Collect", state="ready")
     running, ended = status(simulators=(simulator,)).to_json(), Termination(step=7, reason="x").to_json()
     for name in ("faults", "goodput", "steps_lost"):
@@ -302,7 +299,7 @@ def test_a_kind_that_a_newer_release_added_is_ignored_in_a_table(status) -> None
     ],
 )
 def test_a_table_says_which_of_its_values_is_wrong(status, changes, message) -> None:
-    """The message names the wrong one of eleven numbers."""
+    """The two tables have a dozen numbers, so a person needs the name of the wrong number."""
     with pytest.raises(ProtocolError, match=message):
         TrainerStatus.from_json(status().to_json() | changes)
 
@@ -323,7 +320,7 @@ def test_kinds_and_causes_are_those_of_the_metrics_and_the_status() -> None:
 
 
 def test_the_exit_codes_are_those_that_a_job_decides_by() -> None:
-    """The podFailurePolicy of every plan has these codes. A change would need a new release of all parts."""
+    """The podFailurePolicy of every plan contains these codes, so trainer and operator must agree on them."""
     assert {code.name: code.value for code in ExitCode} == {
         "DONE": 0,
         "CONFIGURATION": 2,

@@ -1,4 +1,4 @@
-"""Metric families as data, and the time of a count, which happens thousands of times a second."""
+"""Metric families as data, and the time that one count takes; there are thousands of counts a second."""
 
 import time
 
@@ -35,7 +35,7 @@ class Shown(Collector):
 
 
 def test_the_samples_of_a_counter_have_its_labels():
-    """Labels keep their declared order, and the name gets no second suffix."""
+    """Prometheus' client appends `_total` to a counter's name, so the family passes it without the suffix."""
     colors = Label(name="color", values=("red", "blue"))
     family = Family(name="balls_total", kind=MetricType.COUNTER, meaning="Balls.", labels=(colors,))
 
@@ -43,7 +43,7 @@ def test_the_samples_of_a_counter_have_its_labels():
 
 
 def test_a_family_without_a_value_is_there_with_its_meaning():
-    """A metric without a value differs from a value of zero, and a dashboard still finds its name."""
+    """A value of 0 would be false, but a dashboard must still find the metric's name."""
     family = Family(name="height_metres", kind=MetricType.GAUGE, meaning="How high.")
     registry = CollectorRegistry()
     registry.register(Shown(family, {}))
@@ -70,7 +70,7 @@ def test_a_histogram_counts_what_is_up_to_each_bound():
 
 
 def test_a_histogram_of_what_may_be_negative_has_no_sum():
-    """A sum that decreases looks like a restart.
+    """Prometheus takes a sum that decreases for a restart of the process.
 
     The count stays, because OpenTelemetry drops a histogram without a count.
     """
@@ -89,7 +89,7 @@ def test_a_histogram_of_what_may_be_negative_has_no_sum():
     ],
 )
 def test_series_are_counted_by_labels_and_buckets(kind, buckets, series):
-    """The result is the largest number of series that the family can export."""
+    """Prometheus stores a series for each combination of labels, and for each bucket of a histogram."""
     labels = (Label(name="color", values=("red", "blue")), Label(name="child", bound="child"))
     family = Family(name="x", kind=kind, meaning="X.", labels=labels, buckets=buckets)
 
@@ -97,7 +97,7 @@ def test_series_are_counted_by_labels_and_buckets(kind, buckets, series):
 
 
 def test_to_count_a_step_costs_less_than_two_microseconds():
-    """Up to 5,000 steps are counted per second. The best of ten runs counts, in processor time."""
+    """Up to 5,000 steps are counted per second. The test takes the best of ten runs, in processor time."""
     tally = Tally((0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0))
 
     def cost_s():

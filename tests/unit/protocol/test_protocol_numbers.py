@@ -12,7 +12,7 @@ from palaestra_protocol.numbers import milliseconds, seconds, whole
 
 @given(st.integers(), st.integers(-5, 5), st.none() | st.integers(5, 10))
 def test_a_whole_number_is_taken_if_and_only_if_it_is_within_its_bounds(number, least, most):
-    """Each option has a least and perhaps a largest value."""
+    """Each option has a least value, and some have a largest value; another number is a typing error."""
     within = least <= number and (most is None or number <= most)
     try:
         assert whole(least, most)(str(number)) == number

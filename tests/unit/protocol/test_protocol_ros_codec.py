@@ -34,7 +34,7 @@ def as_mapping(value):
 @settings(max_examples=30)
 @given(data=st.data())
 def test_every_value_survives_the_wire(name, data):
-    """The values are numbers, texts, lists and nested messages of any size."""
+    """A subscriber must get numbers, texts, lists and nested messages of any size unchanged."""
     given_values = data.draw(values(MESSAGES[name], find, whole=True))
 
     assert as_mapping(CODECS[name].decode(CODECS[name].encode(given_values))) == given_values
@@ -44,7 +44,7 @@ def test_every_value_survives_the_wire(name, data):
 @settings(max_examples=30)
 @given(data=st.data())
 def test_absent_fields_are_zero_empty_or_false(name, data):
-    """The decoded message has the same bytes when it is encoded again."""
+    """A ROS message always has all its fields, so `encode` adds those that the caller leaves out."""
     encoded = CODECS[name].encode(data.draw(values(MESSAGES[name], find)))
 
     assert CODECS[name].encode(CODECS[name].decode(encoded)._asdict()) == encoded
@@ -54,7 +54,7 @@ def test_absent_fields_are_zero_empty_or_false(name, data):
 @settings(max_examples=30)
 @given(data=st.data())
 def test_a_frame_is_the_length_and_the_message(name, data):
-    """`frame` packs the length and the message in one call where that is faster."""
+    """`frame` packs length and message in one call where that is faster; the bytes must be the same."""
     given_values = data.draw(values(MESSAGES[name], find))
 
     assert CODECS[name].frame(given_values) == frame(CODECS[name].encode(given_values))

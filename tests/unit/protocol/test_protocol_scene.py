@@ -50,7 +50,7 @@ def through_json(message):
 
 @pytest.mark.parametrize("message", [ARENA, DRIVEN, SceneState(time_s=0.0)], ids=["scene", "state", "bare"])
 def test_what_is_written_is_read_back(message) -> None:
-    """A viewer gets the poses of the simulator, rounded to a hundredth of a millimeter."""
+    """A viewer must show what the simulator sent, up to a hundredth of a millimeter."""
     assert through_json(message) == message
 
 

@@ -44,7 +44,7 @@ def test_a_module_of_the_standard_library_is_named_with_the_file_and_the_remedy(
     ],
 )
 def test_a_dependency_is_named_also_one_of_another_or_of_the_distribution(put, tmp_path, name):
-    """Reported are modules of Palaestra, of its direct and indirect dependencies, of an extra, and of ROS."""
+    """A user's file may shadow a module of Palaestra, of ROS, of an extra, or of any dependency."""
     found = put(f"{name}.py")
 
     assert found == [f"{tmp_path / name}.py: shadows the module {name}, which Palaestra needs; rename it"]

@@ -23,7 +23,7 @@ print(event.wait(30), event.by_main)
 
 
 def test_a_signal_sets_the_event_in_a_thread_that_waits_for_nothing_else():
-    """A handler in the main thread would wait for ever if that thread just then begins to wait for the event.
+    """A signal handler runs in the main thread, and would hang if this thread just began to wait.
 
     A ROS master once did not end for that reason. Other signals do not set the event.
     """

@@ -27,7 +27,7 @@ def test_the_last_word_fits_in_a_termination_message(reason) -> None:
 
 
 def test_the_longest_reason_is_cut_and_nothing_else() -> None:
-    """Each character of this reason takes twelve bytes; the other fields are still complete."""
+    """A character of this reason takes twelve bytes in JSON; step and success rate must still be complete."""
     message = Termination(step=7, reason="\U0001f916" * 3000, success_rate=0.5).to_message()
 
     read = Termination.from_message(message)

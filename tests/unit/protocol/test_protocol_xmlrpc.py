@@ -42,7 +42,7 @@ def test_what_is_encoded_is_decoded(values):
 
 @given(st.binary(max_size=60))
 def test_any_bytes_are_a_document_or_refused(data):
-    """The decoder raises `UnreadableDocument` in place of all errors of Python's parser."""
+    """A caller then catches one error instead of all errors of Python's parser."""
     for document in (data, b"<methodCall><methodName>m</methodName><params>" + data):
         with contextlib.suppress(UnreadableDocument):
             decode_request(document)
@@ -71,7 +71,7 @@ def test_a_document_that_is_no_request_is_refused_with_the_fact(document, fact):
 
 
 def test_a_fault_is_raised_with_its_text():
-    """`xmlrpc.client` raises the same error with the same text."""
+    """A program gets the same error and text from `xmlrpc.client`."""
     with pytest.raises(xmlrpc.client.Fault, match="no such call"):
         decode_response(encode_fault("no such call"))
 
@@ -116,7 +116,7 @@ def test_a_call_returns_the_value(server):
 
 @pytest.mark.parametrize(("method", "given"), [("none", 1), ("double", {}), ("nothing", 0)])
 def test_a_call_that_cannot_be_made_is_a_fault(server, method, given):
-    """After the fault, the next call on the same connection succeeds."""
+    """A wrong call must not end the connection, so the next call on it succeeds."""
     with xmlrpc.client.ServerProxy(uri(server())) as proxy:
         with pytest.raises(xmlrpc.client.Fault):
             getattr(proxy, method)(given)
@@ -124,7 +124,7 @@ def test_a_call_that_cannot_be_made_is_a_fault(server, method, given):
 
 
 def test_several_calls_of_one_request_are_made_in_order_and_fail_alone(server):
-    """A robot registers hundreds of services with one such request."""
+    """A robot registers hundreds of services in one request, and one bad service must not stop the others."""
     calls = [{"methodName": name, "params": [3]} for name in ("double", "none", "system.multicall", "double")]
 
     with xmlrpc.client.ServerProxy(uri(server())) as proxy:
@@ -151,7 +151,7 @@ def test_a_connection_without_a_request_is_dropped(server):
 
 
 def test_a_body_that_is_too_long_or_has_no_length_is_refused(server):
-    """The server responds before it reads any of the body."""
+    """The server responds before it reads any of the body, so a huge body takes no memory."""
     for header, status in ((f"Content-Length: {MOST_REQUEST_BYTES + 1}", b"413"), ("X: y", b"411")):
         with dialed(server()) as connection:
             connection.sendall(f"POST / HTTP/1.1\r\n{header}\r\n\r\n".encode())
@@ -232,7 +232,7 @@ def test_a_call_ends_at_its_deadline_however_slowly_the_answer_comes(peer, piece
     ],
 )
 def test_an_answer_that_is_no_response_is_refused(peer, answer):
-    """The call raises the same error for every such response."""
+    """A caller then has to catch only one error, whatever is wrong with the response."""
     with pytest.raises(UnreadableDocument):
         call(peer([answer]), PATIENCE_S, "m")
 

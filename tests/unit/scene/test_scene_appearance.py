@@ -86,7 +86,7 @@ def test_faces_are_triangles_that_shapes_share(simulation):
 
 
 def test_a_state_has_what_moves_and_the_positions_of_motors(simulation):
-    """The state has the leg's pose and its motor's position; nodes that cannot move are absent."""
+    """A viewer needs only the values that may have changed, so the state omits nodes that cannot move."""
     simulation.robots[0].motors["hip"].set_position(math.pi / 2.0)
     for _ in range(20):
         simulation.step(32)

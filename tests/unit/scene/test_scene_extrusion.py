@@ -27,7 +27,7 @@ def test_the_default_spine_gives_a_block_that_stands_on_the_ground():
 
 
 def test_a_bent_spine_tilts_the_cross_section_at_the_bend():
-    """The section at the bend lies between both directions, so the block is as wide as the bend is long."""
+    """As in Webots, the section at the bend keeps its size and lies in the plane that bisects the angle."""
     found = extruded(spine=(0, 0, 0, 0, 0, 2, 2, 0, 2))
     middle = found.points[5:10]
 

@@ -60,7 +60,7 @@ def sample(kind, name):
 
 
 def load(type_name, field, physics):
-    """Return the simulation of a robot with a device of that type, which has the field."""
+    """Return the simulation of a robot with a device of that type; the device has the field."""
     kind = DEVICES[type_name]
     device = f"{type_name} {{ {field} }}"
     part = f"HingeJoint {{ device {device} }}" if kind.on_joint else device
@@ -137,7 +137,7 @@ def test_a_field_without_effect_is_named_unless_it_has_its_default(type_name, na
 
 
 def test_fields_of_physics_without_effect_are_named_where_forces_act():
-    """The stub computes no forces, so its report does not list `bounce`."""
+    """`bounce` matters only where forces act, so MuJoCo's report lists it and the stub's does not."""
     bouncing = "ContactProperties { bounce 0.9 softCFM 0.001 } ContactProperties { bounce 0 }"
     world = f"#VRML_SIM R2023b utf8\nWorldInfo {{ contactProperties [ {bouncing} ] }}\n".encode()
 

@@ -38,7 +38,7 @@ def test_a_picture_is_written_row_by_row_as_red_green_blue(tmp_path):
 
 
 def test_a_picture_is_loaded_as_it_was_saved(tmp_path):
-    """With `alpha=True` the file keeps the alpha channel."""
+    """A loaded image must look like the saved one; with `alpha=True` this includes the transparency."""
     path, pixels = str(tmp_path / "eye.png"), BLUE + bytes((1, 2, 3, 4))
 
     assert picture_files.save(path, (2, 1), pixels, alpha=True)
@@ -60,7 +60,7 @@ def test_a_jpeg_file_has_the_quality_that_was_asked_for(tmp_path):
 
 @pytest.mark.parametrize("data", [None, b"", b"GIF89a", b"\x89PNG\r\n\x1a\n broken"])
 def test_what_is_no_picture_is_not_loaded(tmp_path, data):
-    """The result is None; Webots prints that the file is unreadable."""
+    """Webots only prints an error about such a file, so the result is None and not an exception."""
     path = tmp_path / "logo.png"
     if data is not None:
         path.write_bytes(data)
@@ -69,7 +69,7 @@ def test_what_is_no_picture_is_not_loaded(tmp_path, data):
 
 
 def test_a_picture_that_cannot_be_written_is_a_failure(tmp_path):
-    """Either the folder is missing, or the image has no pixel."""
+    """A client must see that no file was written: the folder is missing, or the image has no pixel."""
     assert not picture_files.save(str(tmp_path / "none" / "eye.png"), (1, 1), BLUE)
     assert not picture_files.save(str(tmp_path / "eye.png"), (0, 0), b"")
 

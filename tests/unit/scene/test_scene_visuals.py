@@ -102,7 +102,7 @@ def test_a_shape_is_in_the_frame_of_the_nearest_place(things):
 
 
 def test_a_scale_makes_a_shape_larger_and_moves_it_away(things):
-    """The frame takes an equal scale on all axes; a scale that differs by axis changes only the shape."""
+    """An equal scale on all axes applies to the frame; an unequal scale changes only the shape."""
     even, uneven = things(
         "Transform { scale 2 2 2 children [ Transform { translation 1 0 0 children [ "
         "Shape { geometry Box { size 1 1 1 } } ] } ] }\n"
@@ -203,7 +203,7 @@ def test_a_grid_of_heights_is_a_mesh(things):
 
 
 def test_a_cylinder_of_an_old_file_stands_along_y(things):
-    """Webots also turns the cylinder when it reads an old file."""
+    """In a file of R2021b the axis of a cylinder is y, and Webots also turns it to z."""
     world = """Solid { children [ Shape { geometry Cylinder { } } ] }"""
     (thing,) = things(world, "#VRML_SIM R2021b utf8\nWorldInfo { }")
 

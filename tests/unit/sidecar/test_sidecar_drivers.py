@@ -86,7 +86,7 @@ def test_webots_always_has_a_user(path, given, user) -> None:
 
 
 def test_a_program_of_ones_own_gets_the_world_where_it_asks_for_it(path) -> None:
-    """`{world}` may also be a part of an argument."""
+    """A user's program may need the world anywhere in its command line, even as a part of an argument."""
     folder = path("my-sim")
     launch = Launch(world=WORLD, options=["--fast"], program=["my-sim", "--scene={world}", "-v"])
 
@@ -96,7 +96,7 @@ def test_a_program_of_ones_own_gets_the_world_where_it_asks_for_it(path) -> None
 
 
 def test_a_missing_program_is_named(tmp_path) -> None:
-    """The sidecar reports this before it starts anything; a retry cannot help."""
+    """The sidecar reports the missing program before it starts anything; a retry cannot help."""
     with pytest.raises(SidecarError, match=r"^--driver webots: program webots not found; install it"):
         command(Driver.WEBOTS, Launch(world=WORLD), {"PATH": str(tmp_path)})
 
@@ -108,7 +108,7 @@ def test_a_driver_without_a_program_says_where_to_put_one() -> None:
 
 
 def test_the_programs_beside_our_own_python_are_found_without_a_path(tmp_path) -> None:
-    """Programs are found in a virtual environment that is not activated."""
+    """A user may start the sidecar from a virtual environment that is not activated."""
     started = command(Driver.STUB, Launch(world=WORLD), {"PATH": str(tmp_path)})
 
     assert Path(started.arguments[0]).name == "palaestra-stub"

@@ -53,7 +53,7 @@ def test_a_simulator_is_not_started_where_one_runs(state) -> None:
 
 @pytest.mark.parametrize("state", [state for state in SidecarState if state is not STARTING])
 def test_only_a_starting_simulator_gets_ready(state) -> None:
-    """Rule 2: a trainer's report from before the simulator's exit proves nothing."""
+    """Rule 2: a trainer's report of readiness may arrive after the simulator has ended."""
     assert lifecycle.step(state, LifecycleEvent.READY) is None
 
 
@@ -99,7 +99,7 @@ def test_every_state_can_be_left_and_reached() -> None:
 
 
 def test_what_the_table_does_not_have_is_refused() -> None:
-    """Rule 6 rejects 15 of the 30 pairs of a state and an event."""
+    """Rule 6 refuses each event that has no meaning in the current state: 15 of the 30 pairs."""
     refused = [pair for pair in product(SidecarState, LifecycleEvent) if lifecycle.step(*pair) is None]
 
     assert len(refused) == 15

@@ -28,7 +28,7 @@ def passed_on(capfdbinary):
 
 
 def test_lines_come_out_as_they_went_in(passed_on) -> None:
-    """The output is the same if a line comes in two pieces or is empty."""
+    """A pipe may deliver a line in two pieces, which a reader of the log must not notice."""
     out, last = passed_on(b"one\ntw", b"o\n\nthree\n")
 
     assert out == b"one\ntwo\n\nthree\n"
@@ -52,7 +52,7 @@ def test_a_line_without_end_is_passed_on_in_pieces(passed_on, end) -> None:
 
 
 def test_every_line_of_one_of_two_simulators_begins_with_its_mark(passed_on) -> None:
-    """Each piece of a long line begins with the mark too, and the mark counts toward the maximum length."""
+    """Two simulators share one log, so each piece of a long line needs the mark too."""
     out, last = passed_on(b"one\n" + b"x" * MOST_LINE + b"\ntwo", mark="b: ")
 
     lines = out.splitlines(keepends=True)

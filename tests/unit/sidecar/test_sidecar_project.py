@@ -86,7 +86,7 @@ def test_a_shipped_world_has_no_project(named, tmp_path) -> None:
 
 
 def test_a_second_simulator_of_a_world_is_in_a_project_too(source, tmp_path) -> None:
-    """The two simulators of a notebook belong to no job, so the second world gets the suffix `_2`."""
+    """Two simulators of a notebook have no job, and the second also needs the project's controllers."""
     content = builtin("arena")
     world = source("controllers/roll/roll.py", content=content)
 
@@ -118,7 +118,7 @@ def test_the_standby_keeps_the_links_of_the_first(source, named) -> None:
 
 
 def test_links_are_renewed_when_the_container_starts_again(source, named) -> None:
-    """After a restart, the copy lacks folders that the source no longer has, and has the new ones."""
+    """Before the restart, folders of the source may have been removed and new ones added."""
     first = named(source("controllers/roll/roll.py", "old/x"))
     old = first.parents[2] / "project" / "old"
     assert old.is_symlink()
@@ -257,7 +257,7 @@ def test_a_path_with_dots_means_the_folders_that_it_leads_to(source, named, tmp_
 
 
 def test_relative_addresses_need_no_project(source, named) -> None:
-    """A texture next to the world is found without a project."""
+    """A relative address counts from the folder of the world, so a texture there is found anyway."""
     world = named(source("worlds/a.png", content=RELATIVE))
 
     assert read(world, "a.png") == "worlds/a.png"
@@ -290,7 +290,7 @@ def test_a_robot_without_a_controller_needs_no_project(source) -> None:
 
 
 def test_a_world_in_its_project_warns_of_nothing(source) -> None:
-    """A PROTO of the project may set the controller, in a folder that only Webots knows."""
+    """In a project, the controller may be in a folder that only Webots knows."""
     assert project.missing_controllers(source("protos/Ball.proto"), BALL, {}) is None
 
 

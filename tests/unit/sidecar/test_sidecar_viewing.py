@@ -158,7 +158,7 @@ def test_the_next_simulator_is_seen_after_a_restart(path, view, now):
 
 
 def test_a_simulator_that_hangs_is_told_in_time(path, view, monkeypatch):
-    """A viewer waits for at most the deadline, and the sidecar's own work does not wait at all."""
+    """A viewer must get an error after the deadline, instead of waiting for a simulator that hangs."""
     monkeypatch.setattr(viewing, "_DEADLINE_S", 0.1)
     with socket.socket(socket.AF_UNIX) as listener:
         folder = path.parent

@@ -95,7 +95,7 @@ def test_what_lies_beside_a_world_lies_beside_its_copy(source, tmp_path) -> None
 
 
 def test_a_container_that_starts_again_finds_its_own_links(source, tmp_path) -> None:
-    """The work folder still exists when a container restarts, so the links of the first start are there."""
+    """The work folder survives a restart of the container, so links of the first start are not an error."""
     world = source(NEIGHBOURS)
     (world.parent / "textures").mkdir()
 
@@ -130,7 +130,7 @@ def test_a_broken_world_says_where_and_leaves_nothing(source, tmp_path) -> None:
 
 
 def test_a_missing_world_is_named(tmp_path) -> None:
-    """The message has the option, the path, the error and the remedy."""
+    """A person who mistyped the path must see it, with the option and the remedy."""
     with pytest.raises(SidecarError, match=r"^--world: .*/no\.wbt: No such file or directory; give a"):
         world_files.named(tmp_path / "no.wbt", tmp_path, IDENTITY, clock=False)
 

@@ -80,7 +80,7 @@ def test_the_devices_of_a_joint_know_each_other_by_name(robot_with):
 
 
 def test_a_brake_limits_the_speed_that_a_motor_reaches(robot_with):
-    """The brake holds 6 N m with 3 N m s/rad at 2 rad/s.
+    """With 3 N m s/rad, the brake balances the motor's 6 N m at 2 rad/s.
 
     Without damping, the motor turns at 5 rad/s again.
     """
@@ -155,7 +155,7 @@ def test_a_camera_zooms_and_focuses_within_its_limits(robot_with):
 
 
 def test_a_camera_without_zoom_and_focus_stays_as_it_is(robot_with):
-    """The camera's services for recognition are missing too."""
+    """A write must not give the camera a zoom or a focus that its world does not have."""
     robot = robot_with('Camera { name "eye" }')
 
     robot.call("eye/set_fov", value=1.0)
@@ -167,7 +167,7 @@ def test_a_camera_without_zoom_and_focus_stays_as_it_is(robot_with):
 
 
 def test_a_range_finder_answers_its_settings_alone(robot_with):
-    """The settings have values, but `enable` fails, as for a camera."""
+    """The stub renders no depth images, so `enable` fails, but a client can read the settings."""
     robot = robot_with('RangeFinder { name "it" maxRange 3 }')
     answer = robot.call("it/get_info")
 
@@ -176,7 +176,7 @@ def test_a_range_finder_answers_its_settings_alone(robot_with):
 
 
 def test_a_skin_has_no_bones_and_whatever_needs_one_fails(robot_with):
-    """The stub loads no meshes, so it has no bones. Webots itself crashes at an unknown bone."""
+    """The stub loads no meshes, so a skin has no bones. Webots itself crashes at an unknown bone."""
     robot = robot_with('Skin { name "anna" }')
 
     assert robot.get("anna/get_bone_count") == 0
@@ -209,7 +209,7 @@ def test_two_tracks_drive_a_robot_as_two_wheels_do(world):
 
 
 def test_a_track_without_a_motor_is_a_fixed_part_of_its_robot(world):
-    """The boundingObject of the track counts as an obstacle; its wheels and belt are only visual."""
+    """The boundingObject of the track counts as an obstacle; wheels and belt are only visual."""
     (robot,) = load_scene(world(robot=TANK.replace("LinearMotor", "Brake"))).robots
 
     assert robot.body.base.drive is None

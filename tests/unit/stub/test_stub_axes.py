@@ -71,7 +71,7 @@ def test_a_robot_drives_and_sees_alike_whichever_axis_points_up(left, right):
 
 
 def test_a_supervisor_places_a_robot_in_the_axes_of_the_file():
-    """A written field reads back the same value; a reset restores the value of the file."""
+    """A supervisor reads back the value that it wrote; a reset restores the value of the file."""
     simulation = load_twin("NUE")
     (robot,) = simulation.robots
     robot.place.translation = (0.5, 0.25, 1.0)

@@ -77,7 +77,7 @@ def test_a_pushed_pair_of_wheels_keeps_what_it_can(pair):
 
 
 def test_a_body_without_wheels_stays():
-    """A push of a body without wheels ends with the next step."""
+    """Without wheels the body cannot roll, so a push ends with the next step."""
     body = StubBody(MobileBase(), ROUND)
     body.push(1.0, 0.0, 0.5)
 
@@ -94,7 +94,7 @@ def test_a_drive_wants_one_motor_a_wheel():
 
 @pytest.mark.parametrize(("heading", "half"), [(0.0, 0.3), (math.pi / 2, 0.1), (math.pi, 0.3)])
 def test_a_long_robot_stops_at_a_wall_with_its_own_side(heading, half):
-    """The robot stops at half its length from a wall ahead, and at half its width from a wall to the side."""
+    """With a single disc as its outline, a long robot would stop too early or enter the wall."""
     body = StubBody(MobileBase(), LONG)
     body.face(Neighborhood([Block(1.05, 0.0, 0.0, (0.1, 4.0))], body.radius), ())
     body.place(1.0 - half + 0.02, 0.0, heading)
@@ -131,7 +131,7 @@ def test_a_fast_turn_does_not_swing_through_a_pole(pair):
 
 
 def test_an_outline_beside_the_origin_goes_along(pair):
-    """The outline is one disc off the origin, which keeps its offset at every heading."""
+    """The robot's outline is one disc away from its origin, and this disc must turn with the robot."""
     body, _ = pair([RoundPart(0.2, 0.1, 0.05)])
 
     body.place(1.0, 2.0, math.pi / 2)
@@ -142,7 +142,7 @@ def test_an_outline_beside_the_origin_goes_along(pair):
 
 
 def test_a_robot_meets_every_disc_of_another(pair):
-    """The other robot reports the contact too."""
+    """The end of a long robot is a disc of its own; both robots report the contact."""
     other = StubBody(MobileBase(), LONG)
     other.place(1.0, 0.5, 0.0)
     body, go = pair(others=[other])

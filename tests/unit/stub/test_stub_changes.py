@@ -65,7 +65,7 @@ def test_several_nodes_are_added_in_their_order_before_the_position(robot, child
 
 
 def test_an_added_solid_is_an_obstacle_until_it_is_removed(start, ros):
-    """From the next step on, rays meet the added wall; after its removal they do not."""
+    """A policy must see the new obstacle with the next step, and must not see a removed obstacle."""
     simulation = start().simulation
     (robot,) = simulation.robots
     node = ros.node("robotino")
@@ -138,7 +138,7 @@ def test_what_cannot_be_added_fails_and_changes_nothing(robot, children, add, te
 
 
 def test_a_place_that_the_field_does_not_have_answers_no_success(robot, children, add):
-    """The position is outside the field, or the field contains numbers instead of nodes."""
+    """A client that checks only the response must notice that no node was added."""
     own = robot.get("supervisor/get_self")
     numbers = robot.get("supervisor/node/get_field", node=own, fieldName="translation")
     before = count(robot, children)
@@ -222,7 +222,7 @@ def test_a_joint_is_put_to_a_position_and_its_motor_holds_it(start, ros, world, 
 
 
 def test_the_sensor_of_a_joint_without_a_motor_measures_where_it_is_put(start, ros, world, simple_robot):
-    """At the start, the sensor reads the joint's position in the world file."""
+    """Nothing else moves such a joint, so it stays where the world file or a client puts it."""
     flap = """DEF FLAP HingeJoint { jointParameters HingeJointParameters { position 0.25 }
       device [ PositionSensor { name "angle" } ] endPoint Solid { } }"""
     simulation = start(world(robot=simple_robot.replace("DEF IR", f"{flap} DEF IR"))).simulation

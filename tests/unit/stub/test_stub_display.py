@@ -43,7 +43,7 @@ def lit(picture):
     ids=["line", "rectangle", "filled rectangle", "oval", "filled oval", "polygon", "filled polygon"],
 )
 def test_a_shape_is_drawn_as_far_as_it_is_on_the_picture(points, rows):
-    """Pixels outside the image are left out; all others are compared one by one."""
+    """A program may draw beyond the edge of the image, which must neither fail nor change other pixels."""
     picture = ImageBuffer(width=5, height=5)
     picture.draw(points, RED)
 
@@ -147,7 +147,7 @@ def test_an_image_that_cannot_be_made_has_the_handle_0(painter, service, request
     ],
 )
 def test_what_cannot_be_drawn_is_refused(painter, service, request_, fact):
-    """The call fails before any pixel is drawn."""
+    """A client must not see half a drawing, and a huge shape must not occupy the simulator."""
     robot, picture = painter
     with pytest.raises(ServiceFailed, match=fact):
         robot.call(f"screen/{service}", **request_)
@@ -170,7 +170,7 @@ def test_a_picture_is_mixed_with_what_is_there_only_if_it_blends(painter):
 
 
 def test_a_copy_ends_at_the_edge_of_the_display(painter):
-    """Pixels beyond the edge of the display are left out."""
+    """A copy contains no pixels from beyond the edge, so a paste changes nothing in their place."""
     robot, picture = painter
     robot.call("screen/draw_pixel", x1=7, y1=5)
     image = robot.get("screen/image_copy", x=7, y=5, width=4, height=4)

@@ -25,7 +25,7 @@ from tests.scenes import load_scene
     ],
 )
 def test_a_field_tells_its_type(robot, field, path, number, type_name, count):
-    """The number of an MF type has 0x10 added; the count of an SF field is -1."""
+    """As in Webots, the number of an MF type has 0x10 added, and the count of an SF field is -1."""
     def_name, name = path.split(".")
     handle = field(def_name, name)
 
@@ -45,7 +45,7 @@ def test_type_numbers_are_those_of_nodes_h(type_name, number):
 
 
 def test_a_kind_of_robot_is_a_kind_of_solid():
-    """A Robot has the fields of a Solid first; a different default replaces the inherited one."""
+    """The fields of a Robot begin with those of a Solid; a default of its own replaces the inherited one."""
     solid, robot = list(field_kinds("Solid")), list(field_kinds("Robot"))
 
     assert robot[: len(solid)] == solid

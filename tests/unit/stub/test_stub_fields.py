@@ -32,7 +32,7 @@ def test_values_of_the_world_file_and_defaults_are_read(robot, field):
 
 
 def test_colors_are_opaque_and_vec2f_travels_as_a_vector(ros, start, world):
-    """The response types are those of the services: a color with alpha, and a vector of three numbers."""
+    """In these response types, a color has an alpha, and a vector has three numbers."""
     start(
         world(
             "DEF LIGHT DirectionalLight { color 1 0.5 0.25 } DEF P Pose { children [ Shape {"
@@ -53,7 +53,7 @@ def test_colors_are_opaque_and_vec2f_travels_as_a_vector(ros, start, world):
 
 
 def test_mf_values_are_read_by_index(robot, field):
-    """A negative index counts from the end."""
+    """As in libController, a negative index counts from the end."""
     handle = field("ROBOTINO", "controllerArgs")
 
     values = [robot.get("supervisor/field/get_string", field=handle, index=index) for index in (0, 1, -1)]
@@ -73,7 +73,7 @@ def test_nodes_of_fields_are_handles(robot, field):
 
 
 def test_a_written_value_is_read_at_once_and_seen_with_the_next_step(robot, field, position):
-    """Writes are queued: `get` of the field returns the queued value, the node still has the current one."""
+    """As in Webots, the field returns the new value at once, but the node moves with the next step."""
     handle = field("TARGET", "translation")
 
     assert robot.get("supervisor/field/set_vec3f", field=handle, value={"x": -1.0, "y": 0.5}) == 1
@@ -85,7 +85,7 @@ def test_a_written_value_is_read_at_once_and_seen_with_the_next_step(robot, fiel
 
 
 def test_the_last_of_several_writes_wins(robot, field, position):
-    """All these writes are made in the same step."""
+    """A client may correct a value before the step, and then the correction must apply."""
     handle = field("TARGET", "translation")
     for x in (0.1, 0.2, 0.3):
         robot.call("supervisor/field/set_vec3f", field=handle, value={"x": x})
@@ -96,7 +96,7 @@ def test_the_last_of_several_writes_wins(robot, field, position):
 
 
 def test_a_robot_is_moved_by_its_translation_and_rotation(robot, field, position):
-    """An environment starts an episode like this."""
+    """An environment places its robot in this way at the start of an episode."""
     robot.call(
         "supervisor/field/set_vec3f",
         field=field("ROBOTINO", "translation"),
@@ -117,7 +117,7 @@ def test_a_robot_is_moved_by_its_translation_and_rotation(robot, field, position
 
 
 def test_the_translation_of_a_robot_is_where_it_is(robot, field, drive):
-    """The field changes while the robot drives."""
+    """An environment reads the robot's position from this field, so the field must follow the robot."""
     drive(robot, 0.1, 0.0, 0.0)
 
     robot.call("robot/time_step", value=3200)
@@ -127,7 +127,7 @@ def test_the_translation_of_a_robot_is_where_it_is(robot, field, drive):
 
 
 def test_an_obstacle_that_is_moved_is_seen_where_it_is(robot, field):
-    """A ray meets the obstacle at its new position."""
+    """An environment may move obstacles between episodes, and the policy must see their new positions."""
     inbox = robot.inbox("ir1/value")
     robot.call("ir1/enable", value=32)
     robot.call(
@@ -142,7 +142,7 @@ def test_an_obstacle_that_is_moved_is_seen_where_it_is(robot, field):
 
 
 def test_a_write_beyond_the_values_that_there_are_is_lost(robot, field):
-    """The call succeeds, but the value is not stored."""
+    """The response is the success of Webots' controller, so a client must check the count itself."""
     handle = field("ROBOTINO", "controllerArgs")
 
     assert robot.get("supervisor/field/set_string", field=handle, index=9, value="x") == 1
@@ -184,7 +184,7 @@ def test_a_write_that_would_be_read_back_and_change_nothing_is_refused(
 
 
 def test_the_sensor_of_a_robot_cannot_be_moved_by_field(robot, simple_robot, ros, start, world):
-    """The rays of a sensor start at the position in the world file."""
+    """The rays of a sensor start at its position in the world file, so a write would have no effect."""
     del robot
     start(world(robot=simple_robot))
     node = ros.node("robotino")
@@ -250,7 +250,7 @@ def test_a_value_that_libcontroller_refuses_answers_success(robot, field, bad):
 
 
 def test_a_value_of_the_wrong_type_answers_success(robot, field):
-    """The value is not stored, although the call succeeds."""
+    """Webots' controller responds with success too, so a client does not notice the wrong type."""
     handle = field("TARGET", "translation")
 
     assert robot.get("supervisor/field/set_float", field=handle, value=1.0) == 1
@@ -261,7 +261,7 @@ def test_a_value_of_the_wrong_type_answers_success(robot, field):
 def test_a_read_of_the_wrong_type_answers_nothing_or_fails(robot, field):
     """The result is 0 or "", as in libController.
 
-    A vector would be a null pointer, which crashes the real controller.
+    For a vector, the real controller would read a null pointer and crash, so this call fails.
     """
     handle = field("TARGET", "translation")
 
@@ -272,7 +272,7 @@ def test_a_read_of_the_wrong_type_answers_nothing_or_fails(robot, field):
 
 
 def test_mf_values_can_be_set_inserted_and_removed(robot, field):
-    """An index outside the field, or an SF field, makes the call return 0."""
+    """A client needs the response 0 to notice a wrong index, or an SF field, which has only one value."""
     root = robot.get("supervisor/get_root")
     children = robot.get("supervisor/node/get_field", node=root, fieldName="children")
     world_info = robot.get("supervisor/field/get_node", field=children, index=0)
@@ -296,7 +296,7 @@ def test_mf_values_can_be_set_inserted_and_removed(robot, field):
 
 
 def test_tracking_of_a_field_is_accepted(robot, field):
-    """Tracking only makes responses of Webots faster."""
+    """Tracking only makes responses of Webots faster, so the stub accepts the call and does nothing."""
     handle = field("TARGET", "translation")
 
     assert robot.get("supervisor/field/enable_sf_tracking", field=handle, sampling_period=32) == 1
@@ -319,7 +319,7 @@ def test_a_rotation_of_zero_cannot_be_written_back(robot, field):
 
 
 def test_the_workaround_writes_a_rotation_of_zero(robot, field):
-    """With a tiny z and w = 1, the angle is exactly 0 and the axis is z."""
+    """With a tiny z and w = 1, the axis is z and the angle exactly 0, so the write takes effect."""
     handle = field("ROBOTINO", "rotation")
     robot.call("supervisor/field/set_rotation", field=handle, value={"z": HALF, "w": HALF})
     robot.call("robot/time_step", value=32)
@@ -342,7 +342,7 @@ def test_a_quaternion_that_is_not_of_length_1_makes_the_angle_nan(w):
     axis=st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda a: math.hypot(*a) > 0.1),
 )
 def test_other_rotations_survive_the_way_there_and_back(angle, axis):
-    """The tolerance is the rounding error of float64 and acos."""
+    """A client may save a rotation and restore it later; only rounding may change the rotation."""
     length = math.hypot(*axis)
     unit = tuple(it / length for it in axis)
     x, y, z, w = axis_angle_to_quaternion((*unit, angle))

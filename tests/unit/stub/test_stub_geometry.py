@@ -55,7 +55,7 @@ def test_a_frame_in_a_frame_carries_points_through_both(outer, inner, point):
 
 @given(rotation=rotations)
 def test_the_axis_stays_where_it_is(rotation):
-    """The points of the axis do not move."""
+    """Otherwise `from_axis_angle` would turn about another axis than that of the world file."""
     axis = rotation[:3]
 
     assert turn(from_axis_angle(rotation), axis) == close(axis)

@@ -63,7 +63,7 @@ def test_a_moved_joystick_publishes_axes_points_of_view_and_pressed_buttons(robo
 
 @pytest.mark.parametrize("values", [[1.0] * 7, [128.0], [float("nan")]])
 def test_a_joystick_cannot_be_turned_beyond_its_range(robot, values):
-    """The service returns False, and the joystick is not moved or connected."""
+    """The joystick has six axes with values from -128 to 127; a wrong value must not connect it."""
     assert robot.get("palaestra/joystick/set_axes", values=values) is False
     assert robot.get("joystick/is_connected") is False
 

@@ -52,7 +52,7 @@ def test_nothing_is_served_that_the_table_does_not_have(robot):
 
 
 def test_a_rotational_motor_has_no_services_for_force(robot):
-    """Services of force belong to linear motors only."""
+    """A client that called such a service of the stub would fail with Webots."""
     assert "wheel0_joint/set_torque" in robot.services
     assert "wheel0_joint/set_force" not in robot.services
 
@@ -141,7 +141,7 @@ def test_a_file_that_no_simulator_writes_fails_with_a_remedy(robot, service, fac
 
 
 def test_the_harmless_rest_answers_as_webots_does(robot):
-    """These services concern a person who types, selects a node or opens a robot window."""
+    """These services are for a person at the window of Webots, which a training does not have."""
     assert robot.get("robot/wait_for_user_input_event", eventType=1, timeout=0) == 0
     assert robot.get("robot/wwi_receive_text") == ""
     assert robot.get("robot/wwi_send_text", value="hello") is True
@@ -150,6 +150,6 @@ def test_the_harmless_rest_answers_as_webots_does(robot):
 
 
 def test_remote_control_mode_is_refused(robot):
-    """The stub has no real robot to control. This `set_mode` does not pause the simulation."""
+    """The stub has no real robot to control. A client that wants to pause calls `simulation_set_mode`."""
     assert robot.get("robot/set_mode", arg=b"", mode=0) == 1
     assert robot.get("robot/set_mode", arg=b"", mode=1) == 0

@@ -51,7 +51,7 @@ def test_the_rays_of_a_layer_go_from_left_to_right(seer):
 
 
 def test_a_scan_has_the_angles_and_times_of_the_controller(seer):
-    """The scan's duration is the sampling period that was enabled."""
+    """As in the real controller, a scan takes as long as the sampling period that the client enabled."""
     scan, older = seen(seer(FLAT), "laser_scan", "laser_scan/layer0")
 
     assert (scan["angle_min"], scan["angle_max"], scan["angle_increment"]) == (-0.75, 0.75, 0.3)
@@ -77,14 +77,14 @@ def test_several_layers_look_up_and_down(seer):
 
 
 def test_nothing_nearer_or_farther_than_the_range_is_seen(seer):
-    """The distance is infinite in both cases."""
+    """A client cannot distinguish the two cases, because the distance is infinite in both."""
     (near,) = seen(seer(FLAT.replace("minRange 0.1", "minRange 2.1")), "laser_scan")
 
     assert list(near["ranges"]) == pytest.approx([1.9 / math.cos(0.6), *[math.inf] * 3, 1.9 / math.cos(0.6)])
 
 
 def test_a_cloud_of_points_comes_while_it_is_enabled(seer):
-    """Each point has x forward, y left and z up, then the layer and the time."""
+    """The 20 bytes of each point are x forward, y left, z up, the layer and the time."""
     robot = seer(FLAT)
     clouds = robot.inbox("eye/point_cloud")
     seen(robot, "range_image")
@@ -127,7 +127,7 @@ def test_the_settings_are_answered(seer):
 
 
 def test_a_lidar_that_is_not_enabled_casts_no_rays(seer):
-    """Rays take time; the image stays as it was at the last step with an enabled lidar."""
+    """Rays take processor time; the image stays as it was at the last step with an enabled lidar."""
     robot = seer(FLAT)
     robot.call("robot/time_step", value=32)
     assert set(floats(robot.get("eye/get_layer_range_image", layer=0).data)) == {math.inf}

@@ -14,7 +14,7 @@ from tests.unit.stub.sensors_in_motion import NORTH, ON_A_TURNTABLE, STEP_MS, dr
 
 
 def test_a_place_on_a_slider_moves_along_its_axis():
-    """The axis of the slider is in the frame of the joint, which is turned here."""
+    """The slider's axis is x of its joint, which is turned by 90 degrees, so the place moves along y."""
     frame = Frame(None, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0, math.pi / 2.0))
     motor = Motor(MotorSpec(name="lift"))
     motor.speed_rad_s = 0.2
@@ -71,7 +71,7 @@ def test_axes_go_through_table_and_resolution_and_one_that_is_off_is_nan(load_wi
 
 
 def test_each_axis_of_a_noisy_table_draws_its_own_noise(load_with):
-    """The random numbers are drawn in the order x, y, z."""
+    """An axis that is switched off draws no random number, so z gets the second number."""
     simulation = load_with(
         "Compass { lookupTable [ -1 -100 0.5, 1 100 0.5 ] yAxis FALSE }", "rotation 0 0 1 0.5"
     )
@@ -91,7 +91,7 @@ def test_a_sensor_without_a_table_answers_an_empty_one(node_with):
 
 
 def test_a_sensor_answers_its_table(node_with):
-    """The response has the rows one after the other, in one list."""
+    """ROS has no lists of lists, so the response has the rows one after the other, in one list."""
     node = node_with("Compass { lookupTable [ -1 -100 0, 1 100 0.5 ] }")
 
     assert node.get("compass/get_lookup_table") == (-1.0, -100.0, 0.0, 1.0, 100.0, 0.5)
@@ -222,7 +222,10 @@ def test_an_accelerometer_reads_the_last_basic_step_of_a_long_one(load_with):
 
 
 def test_an_accelerometer_off_the_middle_reads_the_pull_to_the_middle(load_with):
-    """The value is the square of 2 rad/s times 0.3 m, toward the center; it is half a basic step late."""
+    """The value is 2 rad/s squared, times 0.3 m, toward the center.
+
+    The reading lags by half a basic step.
+    """
     simulation = load_with("Accelerometer { translation 0.3 0 0 }")
 
     drive(simulation, 0.0, 0.0, 2.0)
@@ -235,7 +238,7 @@ def test_an_accelerometer_off_the_middle_reads_the_pull_to_the_middle(load_with)
 
 
 def test_a_reset_is_no_acceleration(load_with):
-    """The robot drove before the reset and stands after it, but this change is no acceleration."""
+    """A reset changes the velocity without a force, so the accelerometer must not report the change."""
     simulation = load_with("Accelerometer { }")
     drive(simulation, 0.5, 0.0, 0.0)
 
@@ -288,7 +291,7 @@ def test_an_inertial_unit_rounds_each_number_to_its_resolution(load_with):
 
 
 def test_an_inertial_unit_answers_its_noise(node_with):
-    """The service returns the value of the field."""
+    """A client that filters the readings needs the sensor's noise."""
     assert node_with("InertialUnit { noise 0.25 }").get("inertial_unit/get_noise") == 0.25
 
 

@@ -68,7 +68,7 @@ def test_a_negative_velocity_needs_an_infinite_target(robot):
 
 
 def test_a_motor_tells_what_the_world_file_says(robot):
-    """Limits and name are those of the file."""
+    """A client has no world file, so it reads limits and names from the motor."""
     assert robot.get("wheel1_joint/get_max_velocity") == pytest.approx(137.46)
     assert robot.get("wheel1_joint/get_acceleration") == -1.0
     assert robot.get("wheel1_joint/get_max_torque") == 10.0
@@ -115,7 +115,7 @@ def test_torque_control_fails(robot):
 
 
 def test_commands_take_effect_with_the_next_step(robot):
-    """Until the next step, the shaft keeps its position."""
+    """No time passes between two steps, so the shaft keeps its position until the next step."""
     sensor = robot.inbox("wheel0_joint_sensor/value")
     robot.call("wheel0_joint_sensor/enable", value=32)
     robot.call("robot/time_step", value=32)
@@ -199,7 +199,7 @@ def test_the_controller_integrates_and_differentiates_the_error(motor):
 
 @pytest.mark.parametrize("gains", [(0.0, 0.0, 0.0), (1.0, -1.0, 0.0), (1.0, 0.0, -1.0), (math.nan, 0.0, 0.0)])
 def test_gains_that_webots_refuses_change_nothing(motor, gains):
-    """The motor keeps all three gains."""
+    """One wrong gain makes the whole call ineffective, so the motor keeps all three gains."""
     motor.set_control_pid(*gains)
 
     assert motor.gains == (10.0, 0.0, 0.0)

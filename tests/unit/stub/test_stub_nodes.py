@@ -15,14 +15,14 @@ def find(robot):
 
 
 def test_a_def_that_does_not_exist_is_handle_0(find):
-    """The response is a success with the handle 0, not an error."""
+    """A client may look for a node that is absent, so the response is a success with the handle 0."""
     assert find("NOBODY") == 0
     assert find("") == 0
     assert find("ROBOTINO.NOBODY") == 0
 
 
 def test_handles_look_like_addresses_and_stay_the_same(find):
-    """A handle stays the same as long as the world is loaded."""
+    """In Webots a handle is the address of a node, so it is large, and a client may keep it."""
     assert find("TARGET") == find("TARGET") > 2**40
     assert find("TARGET") != find("ROBOTINO")
 
@@ -79,7 +79,7 @@ def test_an_instance_of_a_proto_has_the_name_of_the_proto(among_protos, name, pr
 
 
 def test_a_proto_is_looked_into_only_through_an_instance(among_protos):
-    """With `proto`, a client reads fields and a DEF inside an instance. Other nodes have neither."""
+    """With `proto`, a client reads the inside of an instance; for other nodes it gets 0 or -1."""
     puck, find = among_protos
     number = "supervisor/node/get_number_of_fields"
     root = puck.get("supervisor/get_root")
@@ -92,7 +92,7 @@ def test_a_proto_is_looked_into_only_through_an_instance(among_protos):
 
 
 def test_ids_lead_back_to_nodes(robot, find):
-    """An unknown number gives the handle 0."""
+    """A client may have only the number of a node, for example from a contact point."""
     number = robot.get("supervisor/node/get_id", node=find("TARGET"))
 
     assert robot.get("supervisor/get_from_id", id=number) == find("TARGET")
@@ -151,7 +151,7 @@ def test_the_handle_of_a_field_is_no_node(robot, find):
 
 
 def test_positions_are_in_the_world(robot, position, drive):
-    """The position of a robot's part changes while the robot drives."""
+    """A position is in the axes of the world, so that of a robot's part changes while the robot drives."""
     assert position(robot, "CYLINDER_2") == (-0.8, -0.8, 0.2)
     drive(robot, 0.1, 0.0, 0.0)
 
@@ -189,7 +189,7 @@ def test_the_velocity_is_in_world_axes(robot, find, drive):
 
 
 def test_what_stands_has_no_velocity(robot, find):
-    """A fixed node with a frame has the velocity 0."""
+    """A supervisor may request the velocity of any node with a frame, also of a fixed node."""
     velocity = robot.get("supervisor/node/get_velocity", node=find("TARGET"))
 
     assert (velocity.linear.x, velocity.linear.y, velocity.angular.z) == (0.0, 0.0, 0.0)
@@ -229,7 +229,7 @@ def test_get_pose_is_swapped_as_in_webots(robot, find):
 
 
 def test_the_pose_of_a_part_is_constant_in_its_robot(robot, find, drive):
-    """The pose of a part relative to its robot does not change while the robot drives."""
+    """A client may read the pose of a sensor once, and use it for the whole run."""
     sensor = robot.get("supervisor/get_from_device", value="ir3")
     drive(robot, 0.1, 0.1, 0.5)
     robot.call("robot/time_step", value=1920)
@@ -269,7 +269,7 @@ def test_reset_physics_of_a_node_stops_it(robot, find, drive):
 
 
 def test_a_node_can_be_exported_as_written(robot, find):
-    """The exported text is that of the world file."""
+    """A client can import the exported text again, because it is that of the world file."""
     text = robot.get("supervisor/node/export_string", node=find("CYLINDER_0"))
     whole = robot.get("supervisor/node/export_string", node=robot.get("supervisor/get_root"))
 

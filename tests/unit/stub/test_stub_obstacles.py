@@ -45,7 +45,7 @@ def cast(obstacle, x, y, heading, reach=10.0):
 @example(place=(0.0, 0.0), away=(0.0, 2.8e-161), heading=0.0, radius=1.0)
 @pytest.mark.parametrize("block", [False, True], ids=["disc", "block"])
 def test_a_robot_that_was_pushed_out_touches_and_is_not_inside(block, place, away, heading, radius):
-    """The contact has the shortest way out of the obstacle."""
+    """A contact gives the shortest way out of the obstacle, so a robot moved along it still touches."""
     obstacle = Block(*place, heading, (1.0, 2.0)) if block else Disc(*place, 1.0)
     x, y = place[0] + away[0], place[1] + away[1]
     contact = obstacle.contact(x, y, radius)
@@ -68,7 +68,7 @@ def test_there_is_a_contact_exactly_where_the_gap_is_smaller_than_the_radius(obs
 
 @given(obstacle=obstacles, x=places, y=places, heading=angles)
 def test_a_ray_ends_at_the_surface_and_crosses_nothing_before(obstacle, x, y, heading):
-    """By sphere tracing, no point on the way of the ray is inside the obstacle."""
+    """A sensor must measure the first surface, so no point before it may be inside the obstacle."""
     assume(obstacle.gap(x, y) > 1e-6)
     met = cast(obstacle, x, y, heading)
     end = (x + met * math.cos(heading), y + met * math.sin(heading))
@@ -82,7 +82,7 @@ def test_a_ray_ends_at_the_surface_and_crosses_nothing_before(obstacle, x, y, he
 
 @given(obstacle=obstacles, x=places, y=places)
 def test_a_ray_towards_the_middle_meets_the_shape(obstacle, x, y):
-    """From each direction, the ray ends between the robot and the middle of the shape."""
+    """The middle is inside the shape, so such a ray cannot miss the shape."""
     assume(obstacle.gap(x, y) > 1e-6)
 
     met = cast(obstacle, x, y, math.atan2(obstacle.y - y, obstacle.x - x))
@@ -100,7 +100,7 @@ def test_a_ray_away_from_the_shape_does_not_turn_round(obstacle, x, y):
 
 @given(x=places, y=places, heading=angles, ray_heading=angles)
 def test_turning_robot_and_ray_is_turning_the_ray(x, y, heading, ray_heading):
-    """A ray is given in the frame of the robot."""
+    """A ray is given in the frame of the robot, so the headings of robot and ray add up."""
     block = Block(0.3, -0.2, 0.7, (1.0, 0.5))
     assume(block.gap(x, y) > 1e-3)
     distances = [10.0]

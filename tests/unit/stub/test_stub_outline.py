@@ -13,7 +13,7 @@ places = st.floats(-2.0, 2.0)
 
 
 def ahead(box, heading_rad):
-    """Return how far the discs of a box reach from the origin in one direction."""
+    """Return the reach of a box's discs from the origin in one direction."""
     c, s = math.cos(heading_rad), math.sin(heading_rad)
     return max(x * c + y * s + radius for x, y, radius in box)
 

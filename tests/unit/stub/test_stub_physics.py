@@ -104,7 +104,7 @@ def test_driving_and_turning_is_a_circle(build):
 
 
 def test_the_heading_stays_in_half_a_turn_each_way(build):
-    """However often the robot turns, its heading stays within -pi to pi."""
+    """A client compares the heading with angles from atan2, which are in the same range."""
     body, go = build()
 
     for _ in range(300):
@@ -168,7 +168,7 @@ def test_standing_still_is_exact(build):
 
 
 def test_a_wall_stops_what_drives_straight_into_it(build):
-    """The rim of the robot comes to rest at the surface of the wall."""
+    """The robot must neither enter the wall nor bounce back."""
     body, go = build([Block(1.05, 0.0, 0.0, (0.1, 4.0))])
 
     go(0.5, 0.0, 0.0, 200)
@@ -179,7 +179,7 @@ def test_a_wall_stops_what_drives_straight_into_it(build):
 
 
 def test_a_robot_slides_along_a_wall(build):
-    """The velocity along the wall stays the same."""
+    """A wall without friction stops only the motion toward it."""
     body, go = build([Block(1.05, 0.0, 0.0, (0.1, 40.0))])
     body.place(0.8, 0.0, 0.0)
 
@@ -205,7 +205,7 @@ def test_a_robot_slides_round_a_cylinder(build):
 
 
 def test_a_corner_holds(build):
-    """In the corner, the robot has two contacts at a time."""
+    """In the corner the robot has two contacts at a time, and neither may push it into the other wall."""
     walls = [Block(1.05, 0.0, 0.0, (0.1, 4.0)), Block(0.0, 1.05, 0.0, (4.0, 0.1))]
     body, go = build(walls)
 

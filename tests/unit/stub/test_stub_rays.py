@@ -25,7 +25,7 @@ def one(_mean, deviation):
 
 
 def test_rows_answer_their_own_value():
-    """At the distance of a row, the table returns the value of the row."""
+    """A row is a measured pair of distance and voltage, which must hold exactly."""
     table = LookupTable(ROWS)
 
     assert [table.response(row[0], silent) for row in ROWS] == pytest.approx([3.0, 2.0, 1.0])
@@ -39,7 +39,7 @@ def test_between_rows_it_is_linear(distance, volts):
 
 @pytest.mark.parametrize(("distance", "volts"), [(0.0, 3.0), (0.05, 3.0), (0.41, 1.0), (1e9, 1.0)])
 def test_beyond_both_ends_the_end_value_holds(distance, volts):
-    """The table does not extrapolate at either end."""
+    """As in Webots, the table does not extrapolate at either end."""
     assert LookupTable(ROWS).response(distance, silent) == volts
 
 

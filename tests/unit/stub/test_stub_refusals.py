@@ -136,7 +136,7 @@ def test_the_basic_step_is_whole_milliseconds(world, step):
 
 
 def test_errors_point_at_the_node(world):
-    """The message has the line, the column and the remedy."""
+    """A person finds the node by the line and the column, and reads the remedy."""
     with pytest.raises(WorldError) as caught:
         scene_of(world("Solid {\n  boundingObject Cone { }\n}"))
 

@@ -6,7 +6,7 @@ from palaestra_sim.scene.mode import Mode
 
 
 def test_enable_takes_multiples_of_the_basic_step_before_the_first_step(robot):
-    """For any other period the call returns false, and the sensor stays off."""
+    """A sensor cannot measure between two steps, so for any other period the call returns false."""
     assert robot.get("ir1/enable", value=31) is False
     assert robot.get("ir1/get_sampling_period") == 0
 
@@ -36,7 +36,7 @@ def test_negative_multiples_pass_as_in_webots(robot):
 
 
 def test_the_same_period_again_changes_nothing(robot):
-    """The topic still has one publisher, which sends one message per step."""
+    """With a second publisher, each message would arrive twice."""
     robot.call("ir1/enable", value=32)
 
     assert robot.get("ir1/enable", value=32) is True
@@ -175,10 +175,7 @@ def test_an_impatient_client_loses_messages_with_the_fault(ros, start):
 
 
 def test_a_client_that_waits_for_the_message_can_lose_the_next_one(ros, start):
-    """The loop had sent the messages but not yet stored the count.
-
-    So a message does not prove that the loop is ready.
-    """
+    """The loop sends the messages before it stores the count, so a message does not prove it is ready."""
     start(publish_delay_s=0.002, lost_wakeup=True)
     robot = ros.node("robotino")
     inbox = robot.inbox("ir1/value")

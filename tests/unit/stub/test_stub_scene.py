@@ -290,7 +290,7 @@ def test_a_position_sensor_may_be_coarse_and_noisy(world, simple_robot):
 
 
 def test_a_wheel_may_have_an_outline_and_free_rollers(world, simple_robot):
-    """The stub's floor is flat, and a wheel touches nothing else. So its outline has no effect."""
+    """The stub's floor is flat and a wheel touches only the floor, so the wheel's outline has no effect."""
     roller = "HingeJoint { endPoint Solid { boundingObject Cylinder { radius 0.01 height 0.01 } } }"
     wheel = f"endPoint DEF WHEEL Solid {{ children [ {roller} ] "
 

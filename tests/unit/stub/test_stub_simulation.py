@@ -46,7 +46,7 @@ def run(simulation, steps=30):
 
 
 def test_it_can_be_driven_without_ros(simulation):
-    """A program can load a world, command motors, step, and read sensors."""
+    """A test needs no ROS to load a world, command motors, step, and read sensors."""
     robot = simulation.robots[0]
     robot.motors["wheel0_joint"].set_position(math.inf)
     robot.motors["wheel0_joint"].set_velocity(2.0)
@@ -101,7 +101,7 @@ def test_the_front_sensor_tells_volts_at_a_wall(simulation):
 
 
 def test_the_bumper_tells_every_touch_since_it_was_read(simulation):
-    """A touch in the first of six basic steps is reported, and only once."""
+    """A touch in any basic step of a long step must be reported, and only once."""
     robot = simulation.robots[0]
     robot.body.place(1.76, 0.0, 0.0)
     drive(simulation, 0.5, 0.0, 0.0)
@@ -123,7 +123,7 @@ def test_only_multiples_of_the_basic_step_can_be_stepped(simulation, duration_ms
 
 
 def test_two_simulations_of_a_world_agree_bit_by_bit():
-    """Both simulations have the same world, commands and seed."""
+    """A person can reproduce a run only if the same world, commands and seed give the same results."""
     assert run(load_scene(builtin("arena"))) == run(load_scene(builtin("arena")))
 
 
@@ -154,7 +154,7 @@ def test_another_seed_is_another_noise(simulation):
 
 
 def test_noise_does_not_depend_on_what_the_rays_meet(simulation):
-    """Each sensor draws one random number per step, whatever its ray meets."""
+    """Each sensor draws one number per step, so another route does not shift the noise of later steps."""
     values = []
     for x in (0.0, 1.7):
         simulation.reset()
@@ -167,7 +167,7 @@ def test_noise_does_not_depend_on_what_the_rays_meet(simulation):
 
 
 def test_every_robot_has_noise_of_its_own():
-    """The `customData` of each robot seeds the robot's noise."""
+    """With common noise, equal robots would measure with the same errors; `customData` seeds each robot."""
     source = builtin("arena")
     robot = source[source.index(b"DEF ROBOTINO Robot") :]
     source += robot.replace(b'name "robotino"', b'name "second" translation 0 1 0 customData "5"', 1)
@@ -265,7 +265,7 @@ def test_a_reset_restores_the_places_of_all_solids(simulation):
 
 
 def test_reset_physics_is_at_once_and_keeps_time_and_place(simulation):
-    """The call only stops all motion."""
+    """As in Webots, the call only stops all motion, and needs no step."""
     drive(simulation, 2.0, 0.0, 0.0)
     simulation.step(320)
     place = simulation.robots[0].place.translation

@@ -111,7 +111,7 @@ def test_a_reload_reads_the_file_again(ros, start):
 
 
 def test_another_world_can_be_loaded(ros, start, world, tmp_path):
-    """The path of the new world must be absolute."""
+    """A supervisor may load the next world of a curriculum without a restart of the simulator."""
     start()
     other = tmp_path / "other.wbt"
     other.write_bytes(world())
@@ -199,7 +199,7 @@ def test_quit_ends_pending_steps_without_success(two_robots):
 
 
 def test_quitting_twice_keeps_the_first_status(ros, start):
-    """The second request comes after the simulator began to end."""
+    """The simulator already ends when the second request arrives, so only the first status counts."""
     simulator = start()
     robot = ros.node("robotino")
 
@@ -268,7 +268,7 @@ def test_reset_through_the_supervisor_needs_a_step(robot, drive, position):
 
 
 def test_reset_physics_through_the_supervisor_is_at_once(robot, drive):
-    """The call has its effect without a step."""
+    """Unlike `simulation_reset`, this call needs no step."""
     drive(robot, 1.0, 0.0, 0.0)
     robot.call("robot/time_step", value=320)
     handle = robot.get("supervisor/get_self")

@@ -20,14 +20,14 @@ def outcome(node, number):
 
 @pytest.mark.parametrize("step_ms", [32, 64, 192, 3200])
 def test_a_multiple_of_the_basic_step_is_simulated(robot, step_ms):
-    """The time advances by exactly the requested duration."""
+    """One control period of a policy may consist of several basic steps."""
     assert robot.get("robot/time_step", value=step_ms) is True
     assert robot.get("robot/get_time") == pytest.approx(step_ms / 1000)
 
 
 @pytest.mark.parametrize("step_ms", [1, 31, 33, 100, -1, -32, -192])
 def test_any_other_step_is_refused_and_changes_nothing(robot, step_ms):
-    """The response has `success` false, and the time does not advance."""
+    """A client must see from the response that its step was refused, because the time does not advance."""
     assert robot.get("robot/time_step", value=step_ms) is False
     assert robot.get("robot/get_time") == 0.0
 
@@ -100,7 +100,7 @@ def test_the_world_waits_until_all_synchronised_robots_asked(two_robots, ros):
 
 
 def test_steps_of_different_length_are_served_piece_by_piece(two_robots):
-    """One robot makes six short steps while the other one makes a long step."""
+    """Robots may have different control periods: one makes six short steps during the other's long step."""
     supervisor, robotino = two_robots
     long = supervisor.ask("robot/time_step", value=192)
 
@@ -219,7 +219,7 @@ class OtherSimulation:
 
 
 def test_any_simulation_can_be_stepped():
-    """Each simulator has the same controllers. A step advances the simulation, and then samples once."""
+    """All simulators share these controllers. A step advances the simulation, and then samples once."""
     simulation, answers = OtherSimulation(), []
     stepping = Stepping(simulation)
 

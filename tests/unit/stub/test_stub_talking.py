@@ -160,7 +160,7 @@ def test_a_connector_feels_a_fitting_one_that_faces_it(pair, there, presence):
 
 
 def test_a_passive_connector_has_no_sensor_and_every_one_can_be_locked(pair):
-    """A lock without presence of another connector joins nothing."""
+    """A lock without another connector joins nothing, so the stub can accept it."""
     here, _ = pair('Connector { name "socket" type "passive" }', "")
     felt = here.inbox("socket/presence")
     here.call("socket/presence_sensor/enable", value=32)
@@ -188,7 +188,7 @@ def test_a_speaker_loops_a_sound_until_it_is_stopped(pair):
 
 
 def test_a_speaker_knows_the_languages_of_its_engine(pair):
-    """For another language, the response is a failure."""
+    """Each engine has its own languages, and a client must see that its language is missing."""
     here, _ = pair('Speaker { name "horn" }', "")
 
     assert here.get("horn/get_engine") == "pico"

@@ -35,7 +35,7 @@ def publish():
 
 
 def test_a_reading_of_one_number_fills_the_last_field(publish):
-    """The header and the constants keep the values of the template."""
+    """Only the sequence number and the time stamp change too; all other fields keep the template's values."""
     message = publish("sensor_msgs/Range", 0.5, header={"frame_id": "robotino/ir1"}, max_range=3.0)
 
     assert (message.range, message.max_range, message.header.frame_id) == (0.5, 3.0, "robotino/ir1")

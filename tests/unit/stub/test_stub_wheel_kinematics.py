@@ -117,7 +117,7 @@ def test_an_axle_ahead_of_the_origin_swings_the_origin_aside():
 
 
 def test_where_tires_and_rollers_are_mixed_the_tires_hold_sideways():
-    """Two tires at the rear hold the robot sideways. It turns about the rear axle."""
+    """Two tires at the rear hold the robot sideways, so it turns about the rear axle."""
     front = row([(0.3, 0.2), (0.3, -0.2)], 0.05, roller=(1.0, 0.0))
     rear = row([(0.0, 0.2), (0.0, -0.2)], 0.05)
 
@@ -125,7 +125,7 @@ def test_where_tires_and_rollers_are_mixed_the_tires_hold_sideways():
 
 
 def test_a_parallel_row_of_rollers_turns_about_its_middle():
-    """No wheel holds the robot sideways, and no wheel drives it sideways."""
+    """No wheel holds or drives the robot sideways, so it turns about the middle of all wheels."""
     wheels = row([(0.3, 0.2), (-0.1, 0.2), (0.3, -0.2), (-0.1, -0.2)], 0.05, roller=(-1.0, 0.0))
 
     assert find_drive(wheels).twist((-4.0, -4.0, 4.0, 4.0)) == pytest.approx((0.0, -0.1, 1.0))
@@ -140,7 +140,10 @@ def test_a_parallel_row_of_rollers_turns_about_its_middle():
     ],
 )
 def test_a_mecanum_robot_drives_in_every_direction(speeds, expected):
-    """The wheels are front left, front right, rear left and rear right."""
+    """The rollers at 45 degrees add up to any motion.
+
+    The wheels are front left, front right, rear left and rear right.
+    """
     drive = find_drive(mecanum(0.228, 0.172, 0.05))
 
     assert drive.twist(speeds) == pytest.approx(expected)
@@ -169,7 +172,7 @@ def test_four_crossed_wheels_move_in_every_direction():
     velocity=st.tuples(small, small),
 )
 def test_a_pair_of_wheels_follows_all_that_it_can(middle, heading, half, radius, velocity):
-    """For every position of the wheels, forward speed and rotation are recovered."""
+    """A pair of wheels can drive forward and turn, and must follow such a motion exactly."""
     c, s = unit(heading)
     x, y = middle
     pair = [Wheel(x_m=x - i * half * s, y_m=y + i * half * c, axle=(-s, c), radius_m=radius) for i in (1, -1)]
@@ -195,7 +198,7 @@ def test_a_pair_of_wheels_follows_all_that_it_can(middle, heading, half, radius,
     velocity=velocities,
 )
 def test_a_drive_is_finite_and_gives_back_what_it_can_follow(wheels, velocity):
-    """For all wheels, a motion that the drive has once computed is computed again."""
+    """A motion that the drive itself has returned must be one that it can follow exactly."""
     drive = find_drive(wheels)
     assume(drive is not None)
 
@@ -267,7 +270,7 @@ def test_wheels_that_are_no_ring_are_taken_as_they_are(changed):
 
 @given(angle=angles, velocity=velocities)
 def test_a_ring_may_be_turned(angle, velocity):
-    """These are the wheels of the Robotino in a turned frame."""
+    """In a user's world, the front of the same robot may be at another angle."""
     c, s = math.cos(angle), math.sin(angle)
     turned = [
         replace(

@@ -36,7 +36,7 @@ def test_a_world_that_can_start_is_described(check):
 
 
 def test_an_old_world_is_turned_and_the_check_says_so(check):
-    """The axes of a fifth of public worlds are so old, and the stub converts them."""
+    """A fifth of public worlds have such old axes, which the stub converts."""
     old = b"#VRML_SIM R2020a utf8\nWorldInfo { } WoodenBox { }"
 
     code, lines = check(old)
@@ -57,7 +57,7 @@ def test_stand_ins_and_controllers_that_do_not_run_are_named(check):
 
 
 def test_all_that_the_stub_lacks_is_listed_at_once(check):
-    """The exit code is 2, as it would be at a start."""
+    """A person can see all problems before a start; the exit code is that of a failed start."""
     code, lines = check('Colosseum { }\nRobot { controller "ros" children [ Minotaur { } ] }\nColosseum { }')
 
     assert code == 2
@@ -82,7 +82,7 @@ def test_a_name_that_the_sidecar_puts_in_is_not_missed(check):
 
 
 def test_a_node_that_uses_itself_ends_in_one_sentence(check):
-    """Before, a node that uses itself caused a RecursionError."""
+    """Without a limit, such a node would cause a RecursionError with a long traceback."""
     code, lines = check("DEF A Group { children [ USE A ] }")
 
     assert (code, len(lines)) == (2, 1)

@@ -137,7 +137,7 @@ def test_a_robot_for_ros_is_never_replaced_by_a_stand_in():
 
 @pytest.mark.parametrize("leave_out", [LeaveOut(everything=True), LeaveOut(types=frozenset({"Colosseum"}))])
 def test_what_is_left_out_is_not_there_and_is_reported(leave_out):
-    """The log has a line for each left-out node, with the position of the node."""
+    """A person must see what the policy will not meet, so each left-out node is named with its position."""
     simulation = load_world("Colosseum { } WoodenBox { }", leave_out=leave_out)
 
     assert len(simulation.scene.solids) == 1

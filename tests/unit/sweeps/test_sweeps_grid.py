@@ -45,7 +45,7 @@ def test_what_is_drawn_from_a_range_lies_in_it(low, more, share, log) -> None:
 
 @given(st.lists(st.integers(), min_size=1), SHARES)
 def test_a_choice_is_one_of_its_values(choice, share) -> None:
-    """Each value of the list has the same probability."""
+    """Another value could be invalid for the job."""
     assert drawn(Distribution(choice=tuple(choice)), share) in choice
 
 
@@ -59,7 +59,7 @@ def test_chance_is_uniform_and_repeats() -> None:
 
 
 def test_more_trials_and_fields_change_no_earlier_value(sweep) -> None:
-    """A sweep may be extended after some trials have ended, whose numbers must keep their values."""
+    """A person may extend a sweep after some trials have ended, and these must keep their values."""
     rate = {RATE: {"low": 1e-5, "high": 1e-2, "log": True}}
     few = list(settings(sweep(random=rate, trials=2)))
     more = list(settings(sweep(random={"seed": {"low": 1, "high": 9}, **rate}, trials=4)))

@@ -22,7 +22,7 @@ def search(sweep, tmp_path):
 
 
 def test_a_trial_below_the_median_is_pruned(search) -> None:
-    """The median over the seeds is compared at a step that all seeds have reached."""
+    """One fast seed must not decide, so medians are compared at a step that all seeds have reached."""
     found = search()
     found.learn(found.next(), figures({5: 0.8}, {5: 0.9}))  # this trial ended before its first report
     other = found.next()

@@ -149,7 +149,7 @@ def set_up(tmp_path):
 def test_the_size_of_the_download_is_said_before_it_begins(set_up):
     """On a slow line, 3 GB take an hour.
 
-    The page that is named has a smaller PyTorch for machines without a GPU.
+    The printed page explains how to install a smaller PyTorch on a machine without a GPU.
     """
     printed, commands = set_up()
 

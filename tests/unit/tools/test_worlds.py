@@ -25,9 +25,10 @@ def count(folder, capsys):
 
 
 def test_robots_get_the_controller_ros_and_equal_worlds_count_once(folder, capsys):
-    """A world counts as trainable if a robot keeps a motor and a sensor.
+    """Copies of a world would distort the count, and a client can drive only robots with controller ros.
 
-    A file without a world's header is not counted.
+    A world counts as trainable if a robot keeps a motor and a sensor. A file without a world's header is not
+    counted.
     """
     worlds = {
         "arm.wbt": WORLD.replace("CONTROLLER", "mine").replace("PARTS", ARM),

@@ -93,7 +93,7 @@ def test_the_storage_of_the_run_is_shown():
 
 
 def test_events_have_an_age_and_a_count():
-    """The API server may split a message into lines; the view shows it as one line."""
+    """A message may have several lines, and an event may recur, but each event is one line with a count."""
     event = Event(
         time=NOW - timedelta(minutes=3),
         warning=True,
@@ -109,7 +109,7 @@ def test_events_have_an_age_and_a_count():
 
 
 def test_an_event_about_a_container_names_it():
-    """A pod with five containers had five equal lines `Container created`."""
+    """Otherwise a pod with five containers would have five equal lines `Container created`."""
     event = Event(
         time=NOW,
         warning=False,

@@ -13,7 +13,7 @@ from palaestra.view.sparkline import BARS
     [(-3, "0s"), (0.9, "0s"), (59, "59s"), (60, "1m"), (192, "3m12s"), (7500, "2h5m"), (273_600, "3d4h")],
 )
 def test_a_duration_is_shown_in_its_two_largest_units(seconds, told):
-    """For a duration of a week, its seconds do not matter."""
+    """In a duration of a week, seconds do not matter."""
     assert short(seconds) == told
 
 
@@ -28,7 +28,7 @@ def test_the_line_rises_with_the_figures():
 
 
 def test_equal_figures_are_neither_low_nor_high():
-    """Without this rule, equal values would be drawn as noise."""
+    """Equal values have no range, so their bars have a middle height."""
     assert sparkline([5.0, 5.0]) == "▅▅"
 
 

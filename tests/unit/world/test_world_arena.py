@@ -113,7 +113,7 @@ def test_time_goes_in_steps_of_32_ms_and_wheels_slide_sideways(scene: World) -> 
 
 
 def test_the_floor_is_4_by_4_m_with_its_top_at_zero(scene: World) -> None:
-    """The floor is centered on the origin, and its upper side is at height 0."""
+    """Start and target are drawn on this floor, which is centered on the origin."""
     floor = defined(scene, "FLOOR")
     size = defined(scene, "FLOOR_BOX").numbers("size") or ()
 
@@ -228,7 +228,10 @@ def test_the_bumper_is_wider_than_the_body_and_clear_of_the_floor(scene: World) 
 
 
 def test_the_body_weighs_20_kg(scene: World) -> None:
-    """The collision shape of the body equals its visible shape."""
+    """Webots computes the acceleration of the robot from this mass.
+
+    The collision shape of the body equals its visible shape.
+    """
     robot = defined(scene, "ROBOTINO")
     (physics,) = robot.nodes("physics")
     (bounds,) = robot.nodes("boundingObject")

@@ -44,7 +44,7 @@ def test_the_fake_has_the_things_of_the_world(thing) -> None:
 
 
 def test_the_floor_is_that_of_the_fake() -> None:
-    """The floor ends at the inner faces of the walls."""
+    """A policy that learned with the fake must find a floor of the same size."""
     size = defined("FLOOR_SHAPE").numbers("size") or ()
 
     assert size[:2] == (2 * COURT.high[0], 2 * COURT.high[1])

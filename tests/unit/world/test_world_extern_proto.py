@@ -67,7 +67,7 @@ def test_an_address_with_a_scheme_is_a_name_only() -> None:
 
 
 def test_a_file_that_several_name_is_read_once() -> None:
-    """Both spellings of the address lead to the same file."""
+    """Both spellings of the address lead to one file, which must not count as two files of a type."""
     result = found(
         'EXTERNPROTO "../protos/A.proto"\nEXTERNPROTO "../protos/Leg.proto"',
         {
@@ -181,7 +181,10 @@ def test_a_world_without_a_file_has_no_relative_addresses() -> None:
 
 
 def test_files_are_read_from_the_disk(tmp_path: Path) -> None:
-    """By default, the files are read from the disk."""
+    """Without a function for reading, a caller gets the files on the disk.
+
+    A name with a null byte, which no file can have, is refused.
+    """
     (tmp_path / "Stool.proto").write_text(HEADER + proto("Stool"))
     source = f'{HEADER}EXTERNPROTO "Stool.proto"\nEXTERNPROTO "a\0b.proto"'.encode()
     with pytest.raises(WorldError):

@@ -284,7 +284,7 @@ def test_addresses_that_lead_somewhere_from_everywhere_are_fine(
 def test_a_world_beside_its_files_may_name_them_by_relative_addresses(
     world: Make, identity: RunIdentity, refusal: Callable[..., str]
 ) -> None:
-    """All other rules still apply to such a world."""
+    """The addresses lead to files next to the world. All other rules still apply to such a world."""
     text = 'EXTERNPROTO "../Lamp.proto" Mesh { url "a.obj" }' + COMPLETE
 
     made = generate(world(text), identity, clock=False, relative_addresses=True)

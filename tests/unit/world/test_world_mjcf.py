@@ -53,7 +53,7 @@ def test_a_world_without_arguments_gets_them_behind_its_root():
 
 @pytest.mark.parametrize("source", [NAMED, PLAIN])
 def test_the_world_of_a_generated_world_is_the_same(source):
-    """A person may use the world of a simulator that ran as the source of another job."""
+    """A generated world may be the source of another job, so generating it again must change nothing."""
     made = generate(source, IDENTITY, clock=True)
 
     assert generate(made, IDENTITY, clock=True) == made

@@ -100,7 +100,7 @@ def test_every_name_is_legal_and_fits(identity: RunIdentity, robot: str) -> None
 def test_no_two_robots_of_a_job_share_a_name(
     job: str, groups: set[str], robots: set[str], replicas: set[int], indices: set[int]
 ) -> None:
-    """The names differ by replica, group, index, slot and robot."""
+    """Two nodes with one name would unregister each other from the ROS master."""
     names = [
         ros_name(RunIdentity(job=job, replica=r, group=g, index=i, slot=s), robot)
         for r, g, i, s, robot in product(replicas, groups, indices, "ab", robots)

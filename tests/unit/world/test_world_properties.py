@@ -119,7 +119,7 @@ def test_a_world_survives_being_read_and_written_anew(source: bytes) -> None:
 
 @given(source=worlds(), clock=st.booleans())
 def test_only_the_arguments_of_robots_change(source: bytes, *, clock: bool) -> None:
-    """All other bytes stay the same, including comments, commas, line ends and saved states."""
+    """All other bytes belong to the author: comments, commas, line ends and saved states."""
     made = generate(source, IDENTITY, clock=clock)
 
     assert without_arguments(made) == without_arguments(source)
@@ -139,7 +139,7 @@ def test_generating_twice_changes_nothing(source: bytes, *, clock: bool) -> None
     b'Robot { name "r" controller "ros" controllerArgs [ "--name=a"  # c\n"--name=a" "--clock" ] } '
 )
 def test_taking_the_clock_away_later_is_the_same_as_never_allowing_it(source: bytes) -> None:
-    """The clock may be removed in a first or in a second generation, with the same result."""
+    """The sidecar of a second simulator may get a world that was generated with a clock."""
     allowed = generate(source, IDENTITY, clock=True)
 
     assert generate(allowed, IDENTITY, clock=False) == generate(source, IDENTITY, clock=False)
@@ -147,7 +147,7 @@ def test_taking_the_clock_away_later_is_the_same_as_never_allowing_it(source: by
 
 @given(source=worlds(), clock=st.booleans())
 def test_every_robot_has_its_name_and_waits_for_its_client(source: bytes, *, clock: bool) -> None:
-    """The generated world has the robots of the source, in the same order."""
+    """A trainer finds robots by these names, and controls each step only if all robots wait for it."""
     made = robots(generate(source, IDENTITY, clock=clock))
 
     assert [robot.robot for robot in made] == [robot.robot for robot in robots(source)]
@@ -157,7 +157,7 @@ def test_every_robot_has_its_name_and_waits_for_its_client(source: bytes, *, clo
 
 @given(source=worlds(), clock=st.booleans())
 def test_no_world_has_two_clocks_or_two_names(source: bytes, *, clock: bool) -> None:
-    """The world has one clock if it is allowed and the source has at least one."""
+    """Two clocks would publish different times on `/clock`, and of two names only the last one counts."""
     world = parse(generate(source, IDENTITY, clock=clock))
     found = [node.texts("controllerArgs") for node in world.walk() if node.text("controller")]
 
@@ -170,7 +170,7 @@ def test_no_world_has_two_clocks_or_two_names(source: bytes, *, clock: bool) -> 
 def test_no_two_worlds_of_a_job_share_a_ros_name(
     source: bytes, replicas: set[int], indices: set[int]
 ) -> None:
-    """The names differ by replica, group, index and robot."""
+    """Two nodes with one name would unregister each other from the ROS master."""
     names = [
         robot.ros_name
         for replica, group, index in product(replicas, ("collect", "evaluate"), indices)

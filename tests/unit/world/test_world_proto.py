@@ -173,7 +173,7 @@ def test_a_percent_sign_in_a_comment_or_alone_is_no_template() -> None:
 
 
 def test_the_first_line_of_a_proto_is_checked_as_that_of_a_world() -> None:
-    """The message says that the file is meant to be a PROTO."""
+    """A person must see in the message that the file should be a PROTO and not a world."""
     with pytest.raises(WorldError, match="the first line is not the header of a Webots PROTO"):
         parse_proto(b"PROTO Stool [ ] { Solid { } }", "Stool.proto")
     with pytest.raises(WorldError, match="save the PROTO as UTF-8"):

@@ -117,7 +117,10 @@ def test_walk_visits_every_node_parents_first(scene: World) -> None:
 
 
 def test_spans_tell_which_bytes_were_read(scene: World, box: Node) -> None:
-    """A node's bytes go from DEF to the closing brace; a value's bytes include its brackets."""
+    """The generator replaces the bytes of these spans.
+
+    A node's bytes go from DEF to the closing brace; a value's bytes include its brackets.
+    """
     start, end = box.span
     first, last = box.fields["translation"].span
 

@@ -33,7 +33,7 @@ def test_a_world_without_a_robot_that_speaks_ros_is_refused_with_the_controllers
 
 
 def test_all_refusals_of_a_world_come_at_once(refusal: Callable[..., str]) -> None:
-    """The lines are in the order of the file, one line for each type of mistake."""
+    """A person corrects all mistakes of a world at once; the lines are in the order of the file."""
     text = 'EXTERNPROTO "a.proto"\n' + robot("controllerArgs 5") + "\n" + robot("") + "\n" + robot("")
 
     assert [line.partition(";")[0] for line in refusal(text).splitlines()] == [
@@ -103,6 +103,6 @@ def test_all_refusals_of_a_world_come_at_once(refusal: Callable[..., str]) -> No
 def test_a_world_that_no_simulator_can_have_is_refused(
     refusal: Callable[..., str], text: str, message: str
 ) -> None:
-    """The message has the position, the fact and the remedy."""
+    """A person finds the mistake by its position, and sees what to write instead."""
     with_robot = text if "controller" in text else text + COMPLETE
     assert refusal(with_robot).startswith(message)

@@ -135,7 +135,7 @@ def test_a_world_can_set_every_documented_field(name: str) -> None:
 
 @pytest.mark.parametrize("name", ROBOTS + CARS + PARTS)
 def test_a_field_without_effect_is_one_that_chooses_a_variant(name: str) -> None:
-    """The body uses all other fields, so these have the same effect as in Webots."""
+    """All other fields are used in the body, so they have the same effect as in Webots."""
     description = described(name)
     is_light = name in {"RobotisLds01", "SickS300"} or name.startswith(("Hokuyo", "Velodyne"))
     without = ({"enablePhysics"} if is_light else set()) | WITHOUT_EFFECT.get(name, set())

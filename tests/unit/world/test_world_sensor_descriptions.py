@@ -50,7 +50,10 @@ def test_the_lidar_of_the_turtlebot_is_described_beside_it() -> None:
 
 @pytest.mark.parametrize("name", LIDARS)
 def test_a_lidar_has_the_documented_rays(name: str) -> None:
-    """The values are the field of view in degrees, the number of rays, and the range."""
+    """A policy that was trained with such a lidar must fit the real device.
+
+    The values are the field of view in degrees, the number of rays, and the range.
+    """
     (lidar,) = described(name).body.nodes
     degrees, rays, nearest, farthest = LIDARS[name]
 

@@ -86,7 +86,7 @@ def test_every_object_has_a_place_and_a_name() -> None:
 
 
 def test_a_box_has_the_size_of_its_field() -> None:
-    """The size is the default, or the value that the world sets."""
+    """A world sets the size of most boxes; only a box without a size gets the default."""
     assert parts("WoodenBox") == (ShapePart(shape="box", size=(0.6, 0.6, 0.6)),)
     assert parts("WoodenBox", size=(1.0, 2.0, 3.0)) == (ShapePart(shape="box", size=(1, 2, 3)),)
 

@@ -86,7 +86,7 @@ def test_only_quotes_and_backslashes_are_escaped() -> None:
 
 @given(st.text(st.characters(exclude_characters="\n", exclude_categories=["Cs"])))
 def test_a_written_string_reads_as_what_it_was(text: str) -> None:
-    """The reader returns the text that `quoted` wrote."""
+    """A name with quotes or backslashes must come back unchanged from a generated world."""
     (token,) = tokens(quoted(text).decode())
 
     assert unquoted(token) == text

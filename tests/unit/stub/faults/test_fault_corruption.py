@@ -48,9 +48,9 @@ def test_all_numbers_of_a_reading_become_nan():
 
 
 def test_a_reading_in_the_middle_of_a_message_becomes_nan_alone():
-    """A gyro and an accelerometer use the same message type.
+    """Gyro and accelerometer share this message type, so only the gyro's own field becomes NaN.
 
-    In a covariance, -1 means that the sensor has no such reading.
+    In a covariance, -1 means that the sensor has no such reading, so this value must stay.
     """
     fields = {
         "angular_velocity": {"x": 1.0, "y": 2.0, "z": 3.0},
@@ -154,7 +154,7 @@ def test_an_answer_without_floats_keeps_its_values(service, fields):
 
 
 def test_an_answer_cut_short_is_a_whole_frame():
-    """A response of one byte is empty after the cut."""
+    """The length in front stays correct, even if the cut leaves nothing of a response of one byte."""
     codec = service_type("webots_ros/set_int").response
 
     assert damaged_answer(codec, b"\1" + frame(b"\1"), WRONG_SHAPE) == b"\1" + frame(b"")
@@ -162,7 +162,7 @@ def test_an_answer_cut_short_is_a_whole_frame():
 
 @pytest.mark.parametrize("service", ["get_float", "get_string"])
 def test_an_answer_cut_short_has_no_value_to_replace(service):
-    """Both faults may apply to the same response, in either order."""
+    """Both faults may apply to one response; after the cut, the bytes of its value may be missing."""
     codec = service_type(f"webots_ros/{service}").response
     sound = b"\1" + frame(codec.encode({}))
 

@@ -39,7 +39,7 @@ def test_nothing_is_ordered_by_default(read):
 
 
 def test_options_and_environment_add_up(read):
-    """The faults of options come first, then those of the variable."""
+    """A person may add faults to those that a job's variable sets."""
     ordered = read("--fault=crash:step=5", "--fault=exit:step=6", PALAESTRA_STUB_FAULTS="hang:step=4")
 
     assert [it.text for it in ordered.faults] == ["crash:step=5", "exit:step=6", "hang:step=4"]

@@ -78,14 +78,14 @@ def test_messages_of_all_sensors_are_meant_unless_one_is_named():
 
 
 def test_a_crash_can_be_any_signal_that_ends_a_simulator():
-    """The crash of the paper was a bus error; SIGTERM asks for an orderly end, so it is not a crash."""
+    """A real simulator crashed with a bus error. SIGTERM asks for an orderly end, so it is not a crash."""
     assert one("crash:signal=SIGBUS").signal is Signals.SIGBUS
     with pytest.raises(FaultError, match="signal is 'SIGTERM'; give one of SIGABRT, SIGBUS"):
         one("crash:signal=SIGTERM")
 
 
 def test_a_value_may_be_no_number():
-    """The value must fit the narrowest field into which it may be written."""
+    """The narrowest field of a message is a 32-bit float, which can be NaN or infinite, but not 1e300."""
     assert math.isnan(one("wrong_value").value)
     assert one("wrong_value:value=-inf").value == -math.inf
     with pytest.raises(FaultError, match="value is '1e300'; give a number that fits into 32 bits"):

@@ -1,4 +1,7 @@
-"""The effects of faults on a process. Faults that end it are tested with real processes elsewhere."""
+"""The effects of faults on a process.
+
+Faults that end the process are tested with real processes elsewhere.
+"""
 
 import pytest
 
@@ -42,7 +45,7 @@ def endings():
     ],
 )
 def test_faults_happen_in_order_until_one_ends_the_stub(endings, text, done, goes_on):
-    """No further fault follows after the process has ended."""
+    """A process that has ended can have no further fault."""
     assert ProcessFaults(endings).happen(parse(text, "test")) is goes_on
 
     assert endings.done == done

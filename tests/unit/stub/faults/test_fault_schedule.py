@@ -16,7 +16,7 @@ def happenings(schedule, event=FaultEvent.STEP, numbers=STEPS):
 
 
 def test_a_step_is_one_step(schedule):
-    """Neither the step before nor the step after has the fault."""
+    """A person who reproduces a crash needs the fault at exactly this step."""
     assert happenings(schedule("crash:step=2000")) == [2000]
 
 
@@ -26,7 +26,7 @@ def test_every_means_each_multiple(schedule):
 
 
 def test_steps_and_resets_are_counted_apart(schedule):
-    """The step number does not count resets, and the reset number does not count steps."""
+    """A simulator may fail after a number of resets, however many steps come between them."""
     both = schedule("crash:step=5 crash:reset=7")
 
     assert happenings(both) == [5]
@@ -71,7 +71,7 @@ def test_equal_simulators_do_not_fail_together(schedule):
 
 
 def test_another_seed_is_another_course(schedule):
-    """The same seed gives the same faults, and another seed gives others."""
+    """A person repeats an experiment with the same seed, and varies it with another seed."""
     draws = [happenings(schedule("crash:probability=0.01", seed=seed)) for seed in (1, 2, 1)]
 
     assert draws[0] == draws[2] != draws[1]
@@ -96,7 +96,7 @@ def test_the_draws_are_the_same_in_every_release():
 
 @given(st.integers(1, 10**12), st.integers(0, 2**64))
 def test_a_delay_lies_between_latency_and_latency_with_jitter(number, seed):
-    """The delays are distributed uniformly, and none is negative."""
+    """A user reads these bounds from the options: 50 ms, and up to 20 ms more."""
     (fault,) = parse("slow:latency_ms=50,jitter_ms=20", "test")
     schedule = FaultSchedule(faults=[fault], life=Life(seed=seed))
 

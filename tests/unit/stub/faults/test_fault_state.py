@@ -33,7 +33,10 @@ def test_every_way_back_to_the_start_is_a_reset(course, path):
 
 
 def test_a_step_of_two_robots_is_counted_once(course):
-    """Only the robot that stepped first counts. After its controller has ended, another robot counts."""
+    """Each robot requests the same simulation step, so only requests of the robot that stepped first count.
+
+    After its controller has ended, the requests of another robot count.
+    """
     life = course("crash:step=3")
     asked = [life.request(robot, STEP) for robot in ("supervisor", "robotino", "supervisor", "robotino")]
     assert all(it == UNHARMED for it in asked)
@@ -54,7 +57,7 @@ def test_a_robot_that_ends_and_did_not_count_changes_nothing(course):
 
 
 def test_a_slow_step_is_slow_alone(course):
-    """The delays of two faults at the same step add up."""
+    """A delay at one step must not carry over to the next; two delays of the same step add up."""
     life = course("slow:latency_ms=50,every=2 slow:latency_ms=30,step=4")
 
     delays = [life.request("robotino", STEP).delay_s for _ in range(4)]
@@ -63,7 +66,7 @@ def test_a_slow_step_is_slow_alone(course):
 
 
 def test_a_service_hangs_from_its_step_on(course):
-    """The other services still respond."""
+    """A client must also cope with a single service that hangs, so the other services still respond."""
     life = course("hang:service=ir1/enable,step=2")
     assert not life.request("robotino", "ir1/enable").lost
     for _ in range(3):
@@ -74,14 +77,14 @@ def test_a_service_hangs_from_its_step_on(course):
 
 
 def test_a_service_that_hung_at_a_call_never_comes_back(course):
-    """From that call on, the service does not respond for the rest of the run."""
+    """As with a thread that is stuck, retries of a client must not succeed in this run."""
     life = course("hang:service=ir1/enable,call=2")
 
     assert [life.request("robotino", "ir1/enable").lost for _ in range(4)] == [False, True, True, True]
 
 
 def test_a_service_is_slow_at_its_calls(course):
-    """Each call has its own delay."""
+    """The delay of one call must not slow the next call down."""
     life = course("slow:service=ir1/enable,latency_ms=50,every=2")
 
     assert [life.request("robotino", "ir1/enable").delay_s for _ in range(4)] == [0, 0.05, 0, 0.05]
@@ -103,7 +106,7 @@ def test_a_star_counts_the_calls_of_all_its_services_together(course):
 
 
 def test_answers_go_wrong_in_the_order_that_was_written(course):
-    """Here the fault of the value is applied before the fault of the shape."""
+    """The order matters, because a cut can remove the bytes of the value."""
     life = course("wrong_value:service=a wrong_shape:service=a,call=2")
 
     assert len(life.request("robotino", "a").damages) == 1
@@ -154,14 +157,14 @@ def test_a_star_is_no_global_topic(course):
     ],
 )
 def test_starts_are_numbered_by_life(course, text, number, refused, delay_s):
-    """A fault can refuse or delay the start with this number."""
+    """The number of a run is also that of its start, so `start=2` affects only the second start."""
     fault, wait_s = course(text, number=number).start()
 
     assert (fault is not None, wait_s) == (refused, delay_s)
 
 
 def test_a_life_without_anything_due_is_unharmed(course):
-    """Requests and messages without a fault pass unchanged."""
+    """Most requests and messages have no fault, and must pass unchanged."""
     life = course("crash:step=1000")
 
     assert life.request("robotino", STEP) == UNHARMED

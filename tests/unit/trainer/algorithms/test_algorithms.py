@@ -239,7 +239,7 @@ def test_dqn_with_nothing_but_faults_waits_for_a_row(make_env):
 
 @pytest.mark.parametrize("name", DISCRETE)
 def test_a_saved_model_chooses_the_same_actions(make_env, tmp_path, name):
-    """The model is saved and loaded by methods of Stable-Baselines3."""
+    """A person must get from the saved file the policy that was trained."""
     env = make_env()
     model = model_of(name, env).learn(40)
     seen = env.observation_space.sample()
@@ -262,10 +262,7 @@ def test_plain_stable_baselines_loads_what_ours_saved(make_env, tmp_path, name, 
 
 
 def test_several_environments_are_no_reason_to_warn(make_env):
-    """Stable-Baselines3 warns if the interval is less than the number of environments.
-
-    So the interval is raised.
-    """
+    """Stable-Baselines3 warns of an interval below the number of environments, so the trainer raises it."""
     model = model_of("DQN", make_env(members=3), target_update_interval=1)
 
     assert model.target_update_interval == 3

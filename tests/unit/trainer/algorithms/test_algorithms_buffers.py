@@ -70,7 +70,7 @@ def test_a_row_is_valid_unless_it_says_otherwise():
 
 @given(st.lists(st.tuples(st.booleans(), st.booleans()), max_size=20))
 def test_a_replay_buffer_holds_the_newest_valid_rows_in_order(steps):
-    """The valid rows are stored in their order, wherever the invalid rows are."""
+    """An invalid row must leave no gap, and must not displace a valid row."""
     buffer = replay(size=8)
     expected = []
     for number, valid in enumerate(steps):
@@ -96,10 +96,7 @@ def test_the_row_before_a_fault_ends_as_truncated():
 
 
 def test_a_row_that_took_the_place_of_another_member_s_newest_is_not_truncated():
-    """The buffer is full.
-
-    The newest row of the broken simulator has been overwritten by a row of the other one.
-    """
+    """In a full buffer, the other simulator may have overwritten the broken simulator's newest row."""
     buffer = replay(size=4)
     add(buffer, [1.0, 2.0], [True, True])
     for mark in (3.0, 4.0, 5.0):  # row 5.0 replaces row 1.0

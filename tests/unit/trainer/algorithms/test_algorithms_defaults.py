@@ -65,7 +65,7 @@ def test_the_arena_keeps_its_own_defaults(name, environment):
 
 
 def test_what_a_job_gives_precedes_every_default():
-    """A hyperparameter of the job wins, while the others keep their defaults."""
+    """A person sets only the hyperparameters that differ, and the others keep their defaults."""
     given = Algorithm(name="DQN", hyperparameters={"gamma": 0.5})
 
     resolved = resolve(given, ARENA).hyperparameters
@@ -74,7 +74,7 @@ def test_what_a_job_gives_precedes_every_default():
 
 
 def test_a_run_goes_on_with_the_hyperparameters_it_began_with(interrupted, play, directory):
-    """The run began with a release that had another default of the discount."""
+    """A later release may have another default of the discount, but a run keeps the first one."""
     kept = json.loads(directory.hyperparameters.read_text())
     assert kept["gamma"] == discount(directory) == 0.99
     directory.hyperparameters.write_text(json.dumps(kept | {"gamma": 0.5}))
@@ -109,7 +109,7 @@ def test_a_run_whose_hyperparameters_cannot_be_read_is_refused(interrupted, play
 
 
 def test_a_policy_is_measured_with_the_hyperparameters_of_its_run(play, job, directory):
-    """The hyperparameters decide the shape of the policy's network."""
+    """The hyperparameters decide the shape of the network, so with others the policy could not be loaded."""
     hyperparameters = {"learning_starts": 10, "batch_size": 8, "buffer_size": 500}
     configuration = job("DQN", algorithm={"name": "DQN", "hyperparameters": hyperparameters})
     _, members = play(configuration)

@@ -108,7 +108,7 @@ def test_a_job_that_asks_for_no_gpu_trains_on_the_cpu_without_a_word(monkeypatch
     ],
 )
 def test_a_run_goes_on_from_a_checkpoint_of_either_device(make, tmp_path, name, before, after):
-    """Networks, optimizers and noise move to the new device, and the model continues to learn."""
+    """After a preemption, the next node may have no GPU, so all tensors must move to the new device."""
     trained, env, configuration = make(name, before)
     trained.learn(40)
     state = checkpoint.TrainingState.of(trained, env.snapshot(), {"returns": [0.0]})

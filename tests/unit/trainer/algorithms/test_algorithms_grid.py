@@ -186,7 +186,7 @@ def test_the_job_names_the_algorithms_of_the_table():
 
 
 def test_what_is_refused_is_refused_before_a_model_is_made(play):
-    """The error is the sentence that the table in docs/reference/algorithms.md has."""
+    """Such a job can never train, so its exit code is 2, which Kubernetes does not retry."""
     for cell in (("RecurrentPPO", "Box", "MultiBinary"), ("PPO", "Tuple", "Box"), ("CrossQ", "image", "Box")):
         assert play("refused", cell)[0] == 2
 

@@ -113,7 +113,10 @@ def test_an_episode_longer_than_its_column_keeps_its_last_rows():
 
 @pytest.mark.parametrize("strategy", ["future", "final", "episode"])
 def test_goals_are_places_that_the_same_episode_reached(strategy):
-    """A goal belongs to the same simulator, and the reward is computed for the new goal."""
+    """A place of another simulator would not be a result of these actions.
+
+    The reward is computed for the new goal.
+    """
     buffer = ValidHerReplayBuffer(
         16, SPACE, ACTIONS, judge(), "cpu", 2, goal_selection_strategy=strategy, n_sampled_goal=3
     )
@@ -142,7 +145,7 @@ def test_nothing_is_sampled_before_an_episode_is_whole():
 
 
 def test_a_buffer_without_faults_is_that_of_stable_baselines3():
-    """As long as each episode is shorter than a column, the columns are equal, even in a full buffer."""
+    """Without faults, a run must learn as with Stable-Baselines3, if each episode fits into a column."""
     ours = buffer_of(rows=15)
     theirs = HerReplayBuffer(15, SPACE, ACTIONS, env=judge(), device="cpu", n_envs=1)
     random = np.random.default_rng(1)
@@ -167,7 +170,7 @@ def restored(buffer, **changes):
 
 @pytest.mark.parametrize("before", range(9))
 def test_a_restored_buffer_goes_on_as_if_nothing_had_been(before):
-    """Each simulator's open episode continues after the resume."""
+    """A resumed run must learn from the same rows as a run without an interruption."""
     whole = buffer_of(rows=4, members=2)
     steps = [
         ((n, *(["done"] if n % 3 == 2 else [])), (n + 20, *(["done"] if n % 5 == 4 else [])))
@@ -231,7 +234,10 @@ def test_changed_rows_are_marked_for_the_next_checkpoint():
 
 
 def test_its_size_is_computed_before_it_exists():
-    """The computed size includes the start and the length of the episode for each row."""
+    """A buffer that does not fit into memory must be refused before it is made.
+
+    The computed size includes the start and the length of the episode for each row.
+    """
     buffer = buffer_of(rows=10)
     algorithm = Algorithm(
         name="DQN", hyperparameters={"buffer_size": 10, "replay_buffer_class": "HerReplayBuffer"}
@@ -293,13 +299,13 @@ def test_an_algorithm_without_replay_has_no_such_hyperparameter():
     ],
 )
 def test_observations_without_goals_are_refused(space, fact):
-    """The message names an environment with goals as the remedy."""
+    """Hindsight needs goals in the observation; the message names an environment that has them."""
     with pytest.raises(ConfigurationError, match=fact):
         refuse_other_observations(space)
 
 
 def test_the_goal_environment_computes_rewards_for_a_batch():
-    """The vector environment of Stable-Baselines3 computes them in the same way."""
+    """Hindsight replay computes the rewards of a whole batch with one call of the environment."""
     env = DummyVecEnv([lambda: MoveToTargetGoalEnv(*fake_arena())])
     goals = np.zeros((5, 2), np.float32)
 

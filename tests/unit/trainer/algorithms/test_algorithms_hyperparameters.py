@@ -89,7 +89,7 @@ def test_a_misspelled_class_with_its_module_has_the_nearest_one_named():
 
 @pytest.mark.parametrize("name", sorted(ALGORITHMS))
 def test_every_algorithm_takes_a_schedule_of_its_learning_rate(name):
-    """The signature of TQC has a bare Callable, where other algorithms declare its arguments."""
+    """The signature of TQC has a bare Callable, so the check cannot rely on declared arguments."""
     for schedule in ("lin_7.3e-4", [[0, 0.001], [1, 0.0001]]):
         assert check(Algorithm(name=name, hyperparameters={"learning_rate": schedule}))
 
@@ -99,7 +99,10 @@ def test_every_algorithm_takes_a_schedule_of_its_learning_rate(name):
 
 @pytest.mark.parametrize("name", sorted(ALGORITHMS))
 def test_defaults_have_the_types_of_the_signature(name):
-    """As everywhere in YAML, an integer is accepted for a float."""
+    """Each run with a default of a wrong type would be refused.
+
+    As everywhere in YAML, an integer is accepted for a float.
+    """
     check(Algorithm(name=name, hyperparameters=ALGORITHMS[name].defaults))
 
 

@@ -100,7 +100,7 @@ def outcome(directory):
     ids=lambda it: "rewards-normalized" if it == NORMALIZE else it,
 )
 def test_a_run_on_images_that_is_interrupted_ends_as_one_that_was_not(play, name, normalize):
-    """The results are equal to the last bit, although images change their layout inside Stable-Baselines3."""
+    """An interruption must not change the result, although Stable-Baselines3 changes the images' layout."""
     whole, reference = play("whole", name, collectors=2, normalize=normalize)
     interrupted, directory = play("cut", name, collectors=2, signal_at=28, normalize=normalize)
 
@@ -171,7 +171,7 @@ def test_hyperparameters_change_the_small_network(make_seeing):
 
 
 def test_a_run_with_the_small_network_resumes_as_others_do(play):
-    """The results are equal to the last bit, although the trainer unpickles nothing from a checkpoint."""
+    """An interruption must not change the result, although nothing is unpickled from a checkpoint."""
     _, reference = play("whole", "PPO", cnn="small")
     play("cut", "PPO", signal_at=28, cnn="small")
 

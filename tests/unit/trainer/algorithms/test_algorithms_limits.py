@@ -113,7 +113,7 @@ def test_what_is_not_refused_learns(algorithm):
     ],
 )
 def test_a_number_out_of_its_range_is_refused_with_the_range(name, given, line):
-    """The message has the field, the value and the allowed range."""
+    """A person then knows which value to write, without the documentation of the algorithm."""
     assert line in refusal_of(small(name, **given))
 
 
@@ -124,6 +124,6 @@ def test_a_frequency_in_episodes_fits_one_simulator():
 
 @pytest.mark.parametrize("name", ["sb3_contrib:MaskablePPO", "sb3_contrib:RecurrentPPO"])
 def test_a_class_by_its_name_has_the_ranges_of_the_algorithm_that_it_is(name):
-    """The rule for one row applies to PPO under every name of its class."""
+    """The class decides which numbers fail, whatever name the job uses for the class."""
     with pytest.raises(ConfigurationError, match="batch_size: 1 is refused; give a number of at least 2"):
         check(Algorithm(name=name, hyperparameters={"batch_size": 1}))

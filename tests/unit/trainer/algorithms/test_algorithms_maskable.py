@@ -202,7 +202,7 @@ def test_a_simulator_that_breaks_while_masks_are_asked_for_ends_its_episode(lear
 
 
 def test_the_vector_offers_masks_only_of_environments_that_have_them(make_member):
-    """sb3-contrib checks this in the same way."""
+    """sb3-contrib decides by `has_attr("action_masks")` whether it asks an environment for masks."""
     answers = []
     for kind in (MaskedTask, FakeTask):
         env = SimulatorsVecEnv([Restarter(with_task(make_member(), task_of(kind)))], 1)
@@ -252,9 +252,9 @@ def test_an_environment_without_masks_is_refused_before_a_simulator_starts(run, 
 
 @pytest.mark.parametrize("given", [{}, {"normalize": {}}, {"name": "sb3_contrib:MaskablePPO"}])
 def test_training_evaluations_and_confirmations_take_only_allowed_actions(run, directory, given):
-    """The task fails at a forbidden action.
+    """The task fails at a forbidden action, so each part of a run must choose among allowed actions.
 
-    This covers `palaestra-eval` too, and an algorithm that is named by its class.
+    `palaestra-eval` is covered too, and an algorithm that is named by its class.
     """
     code, _, (configuration, make_members) = run(task_of, algorithm=given)
     again = measure(configuration, directory.model, make_members, episodes=4, stream="C")

@@ -15,7 +15,10 @@ from tests.unit.trainer.conftest import TINY
 
 
 def test_noise_on_actions_is_each_members_own(make_member):
-    """Each simulator has its own noise. The hyperparameters have the names of rl-baselines3-zoo."""
+    """With common noise, all simulators would explore in the same way.
+
+    The hyperparameters have the names of rl-baselines3-zoo.
+    """
     members = [make_member(f"collect-{row}") for row in range(2)]
     for member in members:
         member.env.action_space = spaces.Box(-1.0, 1.0, (1,), np.float32)
@@ -41,7 +44,7 @@ def test_noise_on_actions_is_each_members_own(make_member):
     ],
 )
 def test_noise_that_is_half_or_wrong_is_refused(noise, fact):
-    """The message has the field, the mistake and the remedy."""
+    """A job with half a setting would otherwise train without noise, and nobody would notice."""
     with pytest.raises(ConfigurationError, match=fact):
         check(Algorithm(name="SAC", hyperparameters=noise))
 

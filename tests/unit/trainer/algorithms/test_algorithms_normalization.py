@@ -121,7 +121,7 @@ def test_a_member_that_cannot_be_reset_shows_nothing_to_the_statistics(make_env)
 
 
 def test_the_end_of_an_episode_is_not_seen_where_the_next_cannot_begin(make_env):
-    """If the reset fails, the row has the last observation of the old episode a second time."""
+    """After a failed reset, the row repeats the old episode's last observation, which must count once."""
     env = ValidNormalize(make_env({"resets": [2]}), Normalize(), GAMMA)
     env.reset()
 
@@ -142,7 +142,7 @@ def test_a_policy_is_not_used_with_another_epsilon(make_normal):
 
 
 def test_the_replay_buffer_holds_what_was_seen(make_normal):
-    """The buffer has raw observations, which are normalized with the statistics at the time of sampling."""
+    """Statistics change during a run, so stored rows are raw, and are normalized when they are sampled."""
     model = make_normal("DQN").learn(40)
     buffer = model.replay_buffer
     env = model.get_vec_normalize_env()
@@ -245,7 +245,10 @@ def test_a_policy_is_not_used_with_other_eyes(make_normal, make_env, tmp_path, s
 
 @pytest.mark.parametrize(("saved", "wanted"), [({}, {"clipRewards": 5}), ({}, None), (None, {})])
 def test_a_run_is_not_continued_with_another_normalization(make_configuration, tmp_path, saved, wanted):
-    """Hyperparameters follow the same rule. A manifest without normalization lacks the field."""
+    """One run has one normalization, like one set of hyperparameters.
+
+    For a job without `normalize`, the manifest lacks that field, and this counts as a difference too.
+    """
     one, other = ({"name": "PPO", "normalize": normalize} for normalize in (saved, wanted))
     found = checkpoint.SavedCheckpoint(
         path=tmp_path, manifest=checkpoint.describe(make_configuration(algorithm=one), 0, {})
@@ -257,7 +260,7 @@ def test_a_run_is_not_continued_with_another_normalization(make_configuration, t
 
 @pytest.mark.parametrize("name", ["DQN", "PPO"])
 def test_a_run_that_normalizes_is_measured_as_it_was_evaluated(play, job, directory, make_member, name):
-    """`palaestra-eval` reads the statistics from the model's file."""
+    """`palaestra-eval` must measure the same policy, so it reads the statistics from the model's file."""
     normalizing = job(
         name, algorithm={"name": name, "hyperparameters": HYPERPARAMETERS[name], "normalize": {}}
     )

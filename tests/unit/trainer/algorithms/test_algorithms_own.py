@@ -17,7 +17,10 @@ from tests.unit.trainer.conftest import TINY
 
 
 def test_a_class_of_ones_own_learns_from_valid_rows_only(lab, corridor_model):
-    """The class has its own hyperparameter, and passes the others on to its base class."""
+    """Rows that a fault spoiled must not reach an author's loss either.
+
+    The class has its own hyperparameter, and passes the others on to its base class.
+    """
     del lab
     algorithm = Algorithm(name="my_lab:Careful", hyperparameters=ROLLOUTS | {"care": 0.25})
     check(algorithm)
@@ -46,7 +49,7 @@ def test_its_own_hyperparameter_is_checked_by_its_type(lab):
 
 
 def test_a_run_with_a_class_of_ones_own_is_saved_and_resumed(lab, play, job, directory):
-    """The file of the model is loaded by the class itself, without this package."""
+    """An author may load the model with the class itself, on a machine without this package."""
     algorithm = {"name": "my_lab:Eager", "hyperparameters": TINY | {"learning_starts": 10, "batch_size": 8}}
 
     code, _ = play(job(algorithm=algorithm, steps=60), {"collect-0": {"steps": [9]}})
@@ -97,7 +100,7 @@ def test_a_class_that_cannot_be_used_is_refused_in_one_sentence(lab, name, fact)
     ],
 )
 def test_a_class_that_makes_its_own_buffer_is_refused(lab, corridor_model, name, buffer):
-    """The class would learn from rows that a fault spoiled. The model is made before a simulator starts."""
+    """The class would learn from rows that a fault spoiled. The error comes before a simulator starts."""
     del lab
     hyperparameters = {} if "Replay" in name else {"n_steps": 16, "batch_size": 8}
     wanted = Algorithm(name=name, hyperparameters=hyperparameters)
@@ -188,7 +191,7 @@ def test_wrong_parts_are_refused_by_field_and_remedy(lab, algorithm, fact):
 
 
 def test_a_policy_that_the_observation_does_not_fit_is_refused(corridor_model):
-    """Stable-Baselines3 only has an assertion for this case."""
+    """Stable-Baselines3 raises an AssertionError, which would look like a bug of Palaestra."""
     with pytest.raises(ConfigurationError, match="algorithm: PPO refuses its hyperparameters or the envir"):
         corridor_model(Algorithm(name="PPO", policy="CnnPolicy", hyperparameters=ROLLOUTS))
 

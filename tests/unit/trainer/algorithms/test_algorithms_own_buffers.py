@@ -166,7 +166,7 @@ def replaying(name="DQN", buffer="buffer_lab:Prioritized", **options):
 
 
 def test_a_replay_buffer_of_ones_own_stores_valid_rows_one_by_one(lab, make):
-    """`add` gets each valid row separately, whatever the number of simulators."""
+    """The author's `add` need not handle faults or several simulators: it gets one valid row at a time."""
     algorithm = replaying(alpha=0.5)
     check(algorithm)
     model, _ = make(algorithm, faults=(3, 9))
@@ -192,7 +192,7 @@ def test_an_algorithm_of_ones_own_may_bring_its_buffer(lab, make):
 
 
 def test_a_rollout_buffer_of_ones_own_returns_what_it_computes(lab, make):
-    """No batch has rows of a fault, and the losses use the user's advantages."""
+    """The losses must use the advantages of the author's class, but no row of a fault."""
     chosen = {"rollout_buffer_class": "buffer_lab:Greedy", "rollout_buffer_kwargs": {"scale": 2.0}}
     algorithm = Algorithm(name="PPO", hyperparameters=ON_POLICY | chosen)
     check(algorithm)
@@ -208,9 +208,10 @@ def test_a_rollout_buffer_of_ones_own_returns_what_it_computes(lab, make):
 
 @pytest.mark.parametrize("buffer", ["buffer_lab:Prioritized", "buffer_lab:Stated"])
 def test_a_checkpoint_keeps_what_the_buffer_adds(lab, make, make_configuration, tmp_path, buffer):
-    """The checkpoint has the arrays, tensors and numbers among the attributes.
+    """A resumed run must sample with the same priorities as before.
 
-    A class with `state_dict` decides itself.
+    The checkpoint has the arrays, tensors and numbers among the buffer's attributes. If the buffer has the
+    method `state_dict`, the checkpoint has its result instead.
     """
     del lab
     algorithm = replaying(buffer=buffer)
@@ -234,7 +235,7 @@ def test_a_checkpoint_keeps_what_the_buffer_adds(lab, make, make_configuration, 
 
 
 def test_a_run_with_a_buffer_of_ones_own_is_saved_and_resumed(lab, play, job):
-    """The run ends, and a longer run continues from its last checkpoint."""
+    """A person may raise `steps` later, and the run then continues with the same buffer."""
     del lab
     algorithm = replaying().model_dump(exclude_unset=True)
 
@@ -274,7 +275,7 @@ REFUSED = [
 
 @for_each("name, given, fact", REFUSED)
 def test_buffers_that_cannot_be_used_are_refused_before_a_simulator_starts(lab, name, given, fact):
-    """The message has the field, the mistake and the remedy."""
+    """A person waits only seconds for the error, and not for the start of the simulators."""
     del lab
     with pytest.raises(ConfigurationError) as caught:
         check(Algorithm(name=name, hyperparameters=given))

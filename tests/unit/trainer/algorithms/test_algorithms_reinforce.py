@@ -65,7 +65,7 @@ def test_nothing_is_learned_from_nobody():
 
 @given(st.lists(st.floats(-10, 10), max_size=30), st.floats(0, 1))
 def test_a_return_is_its_reward_and_the_discounted_next_return(rewards, gamma):
-    """The test computes the definition of the return backward."""
+    """REINFORCE weights each action by this return; the test computes it by its definition."""
     returns = returns_to_go(rewards, gamma)
 
     later = [*returns[1:], 0.0][: len(rewards)]
@@ -95,7 +95,7 @@ def test_an_episode_that_a_fault_cut_is_dropped():
 
 
 def test_an_update_has_whole_episodes_of_the_current_policy(make_model):
-    """An update has two episodes of each environment; an episode that is open at the update begins again."""
+    """Actions of an older policy would bias the gradient, so open episodes begin again at an update."""
     model, batches = make_model(members=2)
 
     model.learn(20)
@@ -107,7 +107,7 @@ def test_an_update_has_whole_episodes_of_the_current_policy(make_model):
 
 
 def test_training_ends_at_the_first_episode_end_after_the_last_step(make_model):
-    """The last episode is completed, and no further episode begins."""
+    """An episode has no return before its end, so the last episode is completed."""
     model, batches = make_model(episodes_per_update=1000)
 
     model.learn(10)
@@ -117,10 +117,7 @@ def test_training_ends_at_the_first_episode_end_after_the_last_step(make_model):
 
 
 def test_a_fault_is_neither_step_nor_episode(make_model):
-    """Steps 1 to 3 are a complete episode before the fault at step 4.
-
-    The next episode is cut at its first step.
-    """
+    """The fault at step 2 cuts the first episode: its one valid row is a step, but is not learned from."""
     model, batches = make_model(faults=(2,))
 
     model.learn(5)

@@ -49,7 +49,7 @@ def test_rows_that_the_run_cannot_fill_need_no_memory():
 
 
 def test_algorithms_without_replay_and_refused_spaces_have_no_size():
-    """The space is rejected later, with its own message."""
+    """PPO has no replay buffer, and a refused space gets a message of its own later."""
     on_policy = replay_size(Algorithm(name="PPO"), spaces.Discrete(2), spaces.Discrete(2), 100)
 
     assert (on_policy, size_of(OBSERVATIONS["Tuple"], ACTIONS["Box"])) == (None, None)
@@ -64,7 +64,10 @@ def test_checkpoints_share_rows_that_did_not_change(every_steps, bytes_):
 @pytest.mark.parametrize("every_steps", [1, 7, 40, 1000])
 @pytest.mark.parametrize("disk", [3, 50, 100, 400])
 def test_the_largest_buffer_fits_and_one_row_more_does_not(every_steps, disk):
-    """The test covers the limit by disk space; the limit by memory is a plain division."""
+    """A person gets this size as the remedy, so it must fit and be as large as possible.
+
+    The test covers the limit by disk space; the limit by memory is a plain division.
+    """
     most = ReplaySize(rows=1, row_bytes=1).most_rows(10_000, disk, every_steps, keep=3)
 
     assert ReplaySize(rows=most, row_bytes=1).disk_bytes(every_steps, 3) <= disk

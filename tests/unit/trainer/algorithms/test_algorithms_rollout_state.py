@@ -139,7 +139,7 @@ def test_a_rollout_changes_what_is_declared_and_nothing_else(name):
 
 @pytest.mark.parametrize("name", ALGORITHMS)
 def test_every_algorithm_has_an_entry(name):
-    """An algorithm may use the entry of its base class."""
+    """Without an entry, each checkpoint would contain the whole policy; a base class's entry is enough."""
     assert any(cls in ROLLOUT_STATES for cls in ALGORITHMS[name].original.__mro__)
 
 

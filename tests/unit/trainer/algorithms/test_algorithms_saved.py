@@ -90,7 +90,10 @@ def named_in(model):
 @pytest.mark.parametrize("schedules", SCHEDULES)
 @pytest.mark.parametrize("name", ALGORITHMS)
 def test_no_value_is_byte_code_and_none_needs_this_package(save, name, schedules):
-    """The model has a schedule wherever the algorithm accepts one, classes of PyTorch, and noise."""
+    """Another release of Python could not load byte code in the file.
+
+    The model has a schedule wherever the algorithm accepts one, classes of PyTorch, and noise.
+    """
     named = named_in(save(name, options=SCHEDULES[schedules]))
 
     strange = {

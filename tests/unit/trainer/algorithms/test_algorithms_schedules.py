@@ -32,13 +32,13 @@ def test_a_schedule_may_have_points(corridor_model):
 
 @pytest.mark.parametrize("name", ALGORITHMS)
 def test_every_algorithm_takes_a_schedule(name):
-    """Some algorithms declare the learning rate as a bare Callable, without its arguments."""
+    """Some algorithms declare the rate as a bare Callable, so the check cannot rely on its arguments."""
     for rate in ("lin_0.001", POINTS):
         check(Algorithm(name=name, hyperparameters={"learning_rate": rate}))
 
 
 def test_plain_stable_baselines_loads_a_schedule_of_points(corridor_model, tmp_path):
-    """The file refers to a function of NumPy, with the points as its arguments."""
+    """The file refers to a function of NumPy, with the points as arguments, and not to this package."""
     corridor_model(Algorithm(name="PPO", hyperparameters=ROLLOUTS | {"learning_rate": POINTS})).save(
         tmp_path / "model.zip"
     )

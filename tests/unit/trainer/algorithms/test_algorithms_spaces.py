@@ -1,7 +1,7 @@
 """Spaces that Stable-Baselines3 would handle wrongly are rejected before a simulator starts.
 
-Stable-Baselines3's own checker rejects them too, or they caused a traceback. Spaces that work are tested in
-the grid of algorithms.
+Stable-Baselines3's own checker rejects them too, or they would cause a traceback. Spaces that work are
+tested in the grid of algorithms.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ def play(members, make_configuration, tmp_path):
 
 @pytest.mark.parametrize(("seen", "acted", "told"), CASES.values(), ids=CASES)
 def test_a_run_refuses_it_before_a_simulator_starts(play, seen, acted, told):
-    """The exit code is 2, and the message has the space and the remedy."""
+    """A person waits only seconds for the error, which names the space and the remedy."""
     end, members = play(seen, acted)
 
     assert end.code == 2

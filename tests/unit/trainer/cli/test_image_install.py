@@ -88,7 +88,7 @@ def refusal(capfd, *arguments):
 
 
 def test_a_bare_folder_of_modules_is_importable_and_compiled(folder, target):
-    """The root file system of a pod is read-only, so byte code is compiled now, or again at each start."""
+    """The root file system of a pod is read-only, so byte code would be compiled again at each start."""
     assert main([str(folder)]) == 0
 
     said = subprocess.run(
@@ -115,7 +115,10 @@ def test_what_a_training_leaves_behind_stays_out(folder, target):
 
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_a_project_needs_no_index_if_the_image_has_its_dependencies(project, target, backend):
-    """The project's folder is mounted read-only, so the build must not write into it."""
+    """A machine may reach no package index.
+
+    The project's folder is mounted read-only, so the build must not write into it.
+    """
     folder = project("gymnasium>=1", "torch", "stable-baselines3", backend=backend)
     before = sorted(folder.rglob("*"))
 
@@ -165,7 +168,7 @@ def test_a_module_that_hides_one_of_the_image_is_refused(folder, target, capfd, 
 
 
 def test_a_newer_version_replaces_an_older_one(project, target):
-    """A user may build an image from the user's previous one."""
+    """A user may build an image on top of the previous image."""
     folder = project()
     assert main([str(folder)]) == 0
     file = folder / "pyproject.toml"

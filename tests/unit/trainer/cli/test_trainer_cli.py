@@ -36,7 +36,7 @@ def nothing_given(monkeypatch):
     ids=["train", "eval", "compare", "try"],
 )
 def test_help_says_what_is_read_and_written_and_the_exit_codes(program, codes, capsys):
-    """A person must not have to read the source to find these."""
+    """A person must find files and exit codes without reading the source."""
     with pytest.raises(SystemExit) as ended:
         program(["--help"])
 
@@ -83,7 +83,7 @@ def test_an_evaluation_that_is_cut_ends_with_a_line_and_its_own_code(error, code
 
 
 def test_a_wrong_configuration_ends_with_2_and_a_line_for_each_mistake(tmp_path, capsys, monkeypatch):
-    """No traceback is printed, and the termination message has the same lines."""
+    """A traceback would hide the mistakes. The operator reads the same lines from the termination message."""
     monkeypatch.setenv("PALAESTRA_TERMINATION_LOG", str(tmp_path / "word"))
     (tmp_path / "training.yaml").write_text(WRONG)
 
@@ -143,7 +143,7 @@ def test_a_wrong_configuration_is_refused_before_a_learning_library_is_imported(
     ],
 )
 def test_an_option_without_meaning_is_refused_by_its_name(program, arguments, words, capsys):
-    """The error is one line, which names the option and the remedy."""
+    """If the option were ignored, a person would believe that it had an effect."""
     with pytest.raises(SystemExit) as ended:
         program(arguments)
 

@@ -22,14 +22,14 @@ def test_driving_straight_succeeds_until_something_is_in_the_way(make_env):
 
 
 def test_random_movements_hardly_ever_succeed(make_env):
-    """So the success of a policy is not luck."""
+    """Otherwise the success of a trained policy could be luck."""
     assert success_rate(make_env(), random_movement, SEEDS) < 0.1
 
 
 @pytest.mark.parametrize("policy", BASELINES.values(), ids=BASELINES)
 @pytest.mark.parametrize("actions", ["discrete", "continuous"])
 def test_baselines_play_whatever_can_be_configured(make_env, policy, actions):
-    """A baseline reads the situation instead of the observation, and its action is in the action space."""
+    """A baseline can be compared with a policy only if it plays the same task, whatever its options."""
     env = make_env(actions=actions, observe=["time_left"], reward="Sparse")
     env.reset(seed=1)
 

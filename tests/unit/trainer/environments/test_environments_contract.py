@@ -107,9 +107,9 @@ class TextReward(Hall):
 )
 @pytest.mark.parametrize("limit", [None, 10])
 def test_a_wrong_environment_is_refused_at_its_first_reset_or_step(made, creator, facts, limit):
-    """The message has the expected and the actual value.
+    """An author sees in the message what was expected and what was returned.
 
-    Gymnasium's time limit reads the result of `step` first.
+    With a time limit, gymnasium's own wrapper reads the result of `step` first.
     """
 
     def first_step():
@@ -144,7 +144,7 @@ LATER = [
 @pytest.mark.parametrize("limit", [None, 10])
 @pytest.mark.parametrize(("answer", "fact"), [row[1:] for row in LATER], ids=[row[0] for row in LATER])
 def test_a_step_that_breaks_the_contract_later_is_refused_with_its_number(made, answer, fact, limit):
-    """Before this check, a tensor or NumPy raised an error a thousand steps later, or nothing did."""
+    """Without the check, PyTorch or NumPy would raise an error a thousand steps later, or never."""
 
     class Later(Hall):
         steps = resets = 0
@@ -263,5 +263,8 @@ def test_a_simulator_s_fault_passes(made):
     ],
 )
 def test_a_mismatch_is_described_in_words(space, observation, fact):
-    """The text is empty if the value is in the space."""
+    """Gymnasium's `contains` returns only False, but a person needs the reason.
+
+    The text is empty if the value is in the space.
+    """
     assert mismatch(space, observation) == fact

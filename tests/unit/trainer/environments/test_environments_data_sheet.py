@@ -61,7 +61,7 @@ def test_the_sheet_knows_the_parts_in_their_order():
 
 
 def test_the_space_of_every_choice_of_parts_is_the_one_on_the_sheet():
-    """For each selection and order of parts, the length, the order and the bounds are compared."""
+    """A user finds a number of the observation by the sheet, whatever parts the job selects."""
     robot, scene = fake_arena()
     for choice in CHOICES:
         space = MoveToTargetEnv(robot, scene, MoveToTargetOptions(observe=choice)).observation_space
@@ -105,7 +105,7 @@ def test_rewards_are_on_the_sheet_with_their_weights():
     outcome=st.sampled_from(EpisodeOutcome),
 )
 def test_terms_stay_in_the_ranges_on_the_sheet(driven_m, nearest_m, outcome):
-    """The weight of a term is chosen for its range. The robot drives a tenth of a meter per step."""
+    """The weight of a term is chosen for its range. The robot drives at most a tenth of a meter per step."""
     step = Transition(before_m=1.0, after_m=1.0 - driven_m, nearest_m=nearest_m, outcome=outcome)
 
     for row in REWARD:
@@ -116,7 +116,7 @@ def test_terms_stay_in_the_ranges_on_the_sheet(driven_m, nearest_m, outcome):
 
 @pytest.mark.parametrize("distance", [SENSOR_RANGE_M[0], MARGIN_M])
 def test_the_range_of_proximity_is_on_the_sheet(distance):
-    """The sheet has the distance at which the cost begins, and the distance at which it is greatest."""
+    """A user who tunes the reward needs the distances at which the cost begins and is greatest."""
     (row,) = (row for row in REWARD if row["term"] == "proximity")
 
     assert f"{distance:.2f}" in row["is"]
@@ -139,5 +139,5 @@ def test_the_task_is_on_the_sheet_with_its_numbers(constant):
 
 @pytest.mark.parametrize("word", [*(f'actions="{it}"' for it in ACTIONS), "max_steps", "observe", "time_up"])
 def test_options_are_on_the_sheet(word):
-    """The docstring describes each option in the section about its effect."""
+    """A user finds out from the docstring which options a job may set."""
     assert f"`{word}`" in SHEET

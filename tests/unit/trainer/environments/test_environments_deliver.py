@@ -79,7 +79,10 @@ def test_the_mark_moves_to_a_target_far_from_the_last(empty):
 
 
 def test_what_is_left_is_observed(empty):
-    """The last number of an observation is 1, 2/3 or 1/3: the share of targets that are left."""
+    """The policy must see how many targets are left.
+
+    The last number of the observation is their share: 1, 2/3 or 1/3.
+    """
     env, _ = empty
 
     left = [round(float(row[0][-1]), 3) for row in play(env, seed=4)]
@@ -89,7 +92,7 @@ def test_what_is_left_is_observed(empty):
 
 
 def test_the_observation_after_a_delivery_shows_the_next_target(empty):
-    """After a delivery the robot still stands on the old target."""
+    """After a delivery the robot still stands on the old target, which would be 0 m away."""
     env, _ = empty
     env.reset(seed=4)
 

@@ -26,7 +26,7 @@ from palaestra_trainer.testing import conformance as rules
 
 
 def test_the_fake_is_a_robotino():
-    """The conformance suite is the same for the fake, the simulated and the real robot."""
+    """Tests with the fake hold for other robots only if all pass the same conformance suite."""
     check_robot(FakeRobotino())
 
 
@@ -36,7 +36,7 @@ def test_the_fake_with_cameras_is_a_robotino():
 
 
 def test_the_fake_e_puck_is_a_robot_with_a_scene():
-    """The fake e-puck has a smaller floor than the other fakes."""
+    """The floor of the fake e-puck is smaller than that of other fakes, so the suite gets other poses."""
     robot, scene = fake_pen()
 
     check_robot(robot)
@@ -98,7 +98,7 @@ def test_a_bump_is_over_once_the_robot_is_free():
 
 
 def test_speeding_up_takes_time():
-    """In its first control period, a robot that starts covers less distance than in the second."""
+    """As in the simulators, the acceleration is limited, so the first period covers less distance."""
     robot = FakeRobotino()
     robot.move(Movement.FORWARD)
 
@@ -111,7 +111,10 @@ def test_speeding_up_takes_time():
 
 
 def test_infrared_measures_from_the_body_to_the_wall():
-    """With a wall 0.2 m ahead of the body, the front sensor measures 0.2 m, and the left one its maximum."""
+    """Distances count from the body, not from the robot's center.
+
+    No object is near the left sensor, so it returns its maximum.
+    """
     robot, scene = fake_arena()
 
     scene.reset(0, Pose(2.0 - RADIUS_M - 0.2, 0.0, 0.0), (0.0, 0.0))
@@ -135,7 +138,7 @@ def test_infrared_sees_a_cylinder_on_the_left_with_the_sensors_on_the_left():
     heading_rad=st.floats(-math.pi, math.pi, exclude_min=True),
 )
 def test_it_never_leaves_the_floor_and_its_readings_never_leave_their_range(seed, moves, heading_rad):
-    """After every movement, the body touches no wall and no cylinder, and distances are within 3 to 40 cm."""
+    """A policy must not learn from poses that no real robot can have."""
     robot, scene = fake_arena()
     scene.reset(seed, Pose(0.0, 0.0, heading_rad), (0.0, 0.0))
 
@@ -151,10 +154,7 @@ def test_it_never_leaves_the_floor_and_its_readings_never_leave_their_range(seed
 
 
 def test_it_dies_at_the_steps_that_are_named():
-    """A training test sets the steps at which its simulator dies.
-
-    They count over the simulator's whole life.
-    """
+    """A training test sets the steps at which its simulator dies; the count continues after a restart."""
     robot, _ = fake_arena(deaths=(2, 3))
     robot.advance()
 
@@ -169,7 +169,7 @@ def test_it_dies_at_the_steps_that_are_named():
 
 
 def test_the_dead_answer_nothing_until_they_are_restarted():
-    """Reading a sensor or a reset of a dead simulator raises the fault."""
+    """As with a real simulator, every call of a dead simulator raises the fault until its restart."""
     robot, scene = fake_arena(deaths=(1,))
     with pytest.raises(SimulatorDead):
         robot.advance()

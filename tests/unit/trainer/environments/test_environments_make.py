@@ -21,7 +21,7 @@ def refused(made, creator, **task):
 
 
 def test_an_environment_without_reward_works(made):
-    """The field `reward` has a default that only the arena's environments use."""
+    """A job without `reward` still has the field's default, which a user's environment may ignore."""
     env = made(Hall, options={"size": 6.0})
 
     assert env.unwrapped.given["size"] == 6.0
@@ -30,7 +30,7 @@ def test_an_environment_without_reward_works(made):
 
 
 def test_an_environment_gets_what_its_signature_accepts(made):
-    """An environment gets those of robot, scene and reward that its constructor accepts."""
+    """An author declares only the arguments that the environment needs."""
 
     class OnlyRobot(Hall):
         def __init__(self, robot, reward):
@@ -65,7 +65,7 @@ def test_a_reward_that_nothing_accepts_is_refused(made):
 
 
 def test_all_options_that_do_not_fit_are_reported_at_once(made):
-    """Each line has the nearest valid name."""
+    """A person corrects all options at once; each line has the nearest name or another remedy."""
 
     class Needy(Hall):
         def __init__(self, robot, scene, width):
@@ -109,7 +109,7 @@ def test_a_fault_of_a_simulator_in_a_constructor_is_no_mistake_of_the_configurat
     [("Nowhere-v0", "cannot be created"), ("no_such_module:Hall-v0", "cannot be imported")],
 )
 def test_an_unknown_environment_is_refused(name, fact):
-    """The name is wrong, or the module that registers it."""
+    """The job names an environment that is not registered, or a module that does not exist."""
     with pytest.raises(ConfigurationError, match=f"environment.id: {name} {fact}"):
         make_environment(Environment(id=name), *fake_arena())
 

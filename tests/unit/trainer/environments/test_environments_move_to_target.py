@@ -77,9 +77,9 @@ TERMINATED, TRUNCATED = (True, False), (False, True)
 def test_time_is_up_after_max_steps_and_ends_the_episode_as_the_option_or_else_the_reward_says(
     make_env, options, end
 ):
-    """With Sparse, giving up has a price.
+    """With Sparse, running out of time has a cost.
 
-    If the step were truncated, the value of later steps would be added to it.
+    If the episode were truncated, the learner would add the estimated value of later steps to this cost.
     """
     steps = play(make_env(max_steps=3, **options), IN_THE_OPEN, [STOP] * 3)
 
@@ -103,7 +103,7 @@ def test_the_reward_is_the_sum_of_the_terms_it_names(make_env):
 
 
 def test_dense_pays_for_progress_and_sparse_does_not(make_env):
-    """The same step is rewarded by each of the two rewards."""
+    """Dense guides the policy on its way to the target; Sparse pays only at the end."""
     rewards = {
         name: play(make_env(reward=name), IN_THE_OPEN, [FORWARD, FORWARD])[-1][1]
         for name in ("Dense", "Sparse")
@@ -212,7 +212,7 @@ def test_extra_steps_are_reported_and_not_taken_for_speed():
 
 
 def test_a_fault_of_the_simulator_passes_through(make_env):
-    """The environment does not know what a fault means for learning."""
+    """Only the caller of the environment can decide what a fault means for learning."""
     env = make_env(deaths=(2,))
     env.reset(seed=0)
     env.step(STOP)
@@ -231,7 +231,7 @@ def test_a_step_before_the_first_reset_is_refused(make_env):
 
 @given(seed=st.integers(0, 2**31 - 1), actions=st.lists(st.integers(0, 6), max_size=30))
 def test_every_observation_is_in_the_space_and_every_reward_is_finite(seed, actions):
-    """All actions in all episodes are covered."""
+    """An observation outside the space or an infinite reward would end a training."""
     env = MoveToTargetEnv(*fake_arena())
     observation, _ = env.reset(seed=seed)
 

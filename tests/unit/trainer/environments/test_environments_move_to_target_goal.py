@@ -120,7 +120,7 @@ def test_time_that_is_up_far_from_the_target_is_no_success(make_env):
 
 
 def test_a_collision_ends_the_episode(make_env):
-    """No more reward follows a collision, so it is worse than continuing."""
+    """No more reward follows a collision, so a collision is worse than continuing."""
     env = make_env()
     env.reset(seed=1, options={"start": (-1.7, 0.0, 3.14159), "target": (0.0, 0.0)})
 
@@ -160,7 +160,7 @@ def test_wrong_options_are_refused(options, fact):
 
 
 def test_the_sheet_has_every_key_with_its_bounds(make_env):
-    """The docstring is a data sheet, which this test compares with the space."""
+    """A user reads the keys and bounds from the docstring, which must agree with the space."""
     space = make_env().observation_space
     rows = [
         line.split("|")[1:-1]

@@ -89,7 +89,7 @@ def test_time_up_truncates(make_env):
 
 
 def test_the_target_is_given_by_distance_and_bearing(make_env):
-    """For a target on the left, the cosine of the bearing is 0 and the sine is 1."""
+    """An angle would jump at pi, so the bearing is a cosine and a sine: 0 and 1 for a target on the left."""
     env = make_env()
 
     seen, _ = env.reset(seed=1, options={"start": (0.0, -0.1, 0.0), "target": (0.0, 0.9)})
@@ -129,13 +129,13 @@ def test_a_robot_without_a_scanner_is_refused():
 
 @pytest.mark.parametrize("options", [{"actions": "both"}, {"max_steps": 0}, {"movements": ["STOP"]}])
 def test_wrong_options_are_refused(make_env, options):
-    """The message has the name of each wrong option."""
+    """The message names the option, because a job may have several options."""
     with pytest.raises(ConfigurationError, match=next(iter(options))):
         make_env(**options)
 
 
 def test_the_data_sheet_has_the_actions():
-    """The table in the docstring is compared with the action space."""
+    """A user reads the velocities of each action from the docstring."""
     rows = [line.split("|") for line in (inspect.getdoc(NavigateEnv) or "").splitlines() if "|" in line]
     actions = [(float(row[3]), float(row[4])) for row in rows if len(row) == 6 and row[1].strip().isdigit()]
 
@@ -169,7 +169,10 @@ def test_a_wheel_that_would_run_too_fast_slows_both():
     heading_rad=st.floats(-math.pi, math.pi, exclude_min=True),
 )
 def test_the_fake_never_drives_into_a_thing(seed, moves, heading_rad):
-    """The distances of its scanner stay in range as well."""
+    """A policy must not learn from poses that no real robot can have.
+
+    The distances of the scanner stay in range as well.
+    """
     robot, scene = fake_court()
     robot.use_scanner()
     scene.reset(seed, Pose(0.0, 0.0, heading_rad), (1.0, 0.0))

@@ -88,7 +88,7 @@ def test_a_number_beyond_its_bound_is_cut_off(part):
 
 @pytest.mark.parametrize("parts", list(itertools.combinations(PARTS, 2)), ids="-".join)
 def test_parts_follow_each_other_in_the_order_they_are_named(parts):
-    """So the index in the data sheet gives the position of a number in the observation."""
+    """The index in the data sheet then gives the position of a number in the observation."""
     seen = observe(SITUATION, parts, space(parts))
 
     assert seen.tolist() == [*numbers(parts[0]), *numbers(parts[1])]

@@ -22,7 +22,7 @@ PLACES = FreePlaces(layout=ARENA, radius_m=OUTLINE_M)
 
 @given(seed=seeds)
 def test_every_task_can_be_done(seed):
-    """Start and target leave space for the robot, and are far enough apart."""
+    """In an episode that begins at the target or in an obstacle, a policy learns nothing."""
     task = PLACES.draw_task(np.random.default_rng(seed))
 
     assert ARENA.gap(task.start.x_m, task.start.y_m) >= OUTLINE_M + CLEARANCE_M

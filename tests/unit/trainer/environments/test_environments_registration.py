@@ -78,7 +78,7 @@ def test_a_robot_that_cannot_be_copied_can_be_used():
 
 @pytest.mark.parametrize("mode", ["sync", "async"])
 def test_many_are_made_at_once_each_with_a_simulator_of_its_own(mode):
-    """`simulator` is called once for each environment."""
+    """Two environments of one simulator would move the same robot, so each gets its own simulator."""
     envs = gymnasium.make_vec(NAME, num_envs=2, vectorization_mode=mode, simulator=fake_arena)
 
     observations, infos = envs.reset(seed=[1, 2])

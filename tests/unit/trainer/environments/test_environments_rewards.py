@@ -62,14 +62,14 @@ def test_proximity_grows_as_things_come_nearer(nearest_m, worth):
     ],
 )
 def test_a_term_about_the_end_is_one_for_its_own_outcome_only(term, outcome):
-    """The term of one outcome is 0 for all other outcomes."""
+    """If a term were paid for another outcome too, a policy would be rewarded for a wrong end."""
     paid = {it: term(transition(outcome=it)) for it in SINGLE}
 
     assert paid == {it: float(it is outcome) for it in SINGLE}
 
 
 def test_every_step_has_the_same_duration():
-    """The duration does not depend on what happened in the step."""
+    """The weight of this term is a cost per step, so the term must be the same in every step."""
     assert {rewards.duration(transition(outcome=it)) for it in EpisodeOutcome} == {1.0}
 
 
@@ -98,7 +98,7 @@ def test_sparse_pays_at_the_end_only():
 
 @pytest.mark.parametrize("reward", WEIGHTS)
 def test_each_of_several_targets_is_worth_as_much_as_a_single_one(reward):
-    """The episode continues after each target but the last one."""
+    """With other weights, a policy might prefer some targets. Only the last target ends the episode."""
     delivered, reached = (
         reward_terms(reward, transition(outcome=it))
         for it in (EpisodeOutcome.DELIVERED, EpisodeOutcome.REACHED)

@@ -54,7 +54,10 @@ def test_a_refusal_names_the_robot_the_task_and_what_is_missing():
 
 
 def test_a_refusal_is_a_mistake_of_the_configuration_and_about_a_sensor():
-    """The exit code forbids a retry. Code that catches the older error class of cameras still works."""
+    """A retry cannot help, so the error is one of the configuration.
+
+    Code that catches the older class for errors of cameras still works.
+    """
     assert issubclass(MissingCapability, ConfigurationError)
     assert issubclass(MissingCapability, NoSuchSensor)
 

@@ -31,7 +31,7 @@ def module(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_a_robot_that_ships_has_a_short_name(name):
-    """The short name of a built-in robot is the name of its class."""
+    """A person writes `Robotino` in a job, and not the module of the class."""
     assert robot_class(name).__name__ == name
 
 
@@ -66,7 +66,7 @@ def test_a_robot_of_your_own_is_named_by_its_module(module):
     ],
 )
 def test_what_is_no_class_of_a_robot_is_refused_before_anything_starts(module, name, fact):
-    """The message has the field, the mistake and the remedy."""
+    """A person waits only seconds for the error, which has the field, the mistake and the remedy."""
     module(
         "from palaestra_trainer.robots import Bumper\n"
         "from palaestra_trainer.robots.differential import TurtleBot3Burger\n"
@@ -98,7 +98,7 @@ def sorting():
 
 
 def test_an_environment_is_not_made_for_a_robot_that_does_not_fit(sorting):
-    """The message has the environment's name as the job has it."""
+    """An author must find the name from the job in the message, and not only that of a class."""
     with pytest.raises(MissingCapability, match="FakeRobotino has no Joints, which Sorting-v0 needs"):
         make_environment(Environment(id=sorting), *fake_arena())
 

@@ -71,7 +71,7 @@ OBSERVATION, REWARD = tables()
 
 @pytest.mark.parametrize("frames", [1, 3])
 def test_the_space_is_the_one_on_the_sheet(make_env, frames):
-    """Shape, bounds and type of the space depend on the number of frames."""
+    """A user reads the shape for each number of frames from the docstring."""
     space = make_env(frames=frames).observation_space
 
     assert isinstance(space, spaces.Box)
@@ -170,7 +170,7 @@ def test_an_observation_is_what_the_camera_sees(make_env):
 
 
 def test_an_observation_stays_as_it_was_after_the_next_step():
-    """The facade's own array does change, because the next image is written into the same memory."""
+    """A learner may keep an observation, but the facade writes the next image into the same memory."""
 
     class Reusing(FakeSeeingRobotino):
         buffer = np.zeros(IMAGE, np.uint8)
@@ -236,7 +236,7 @@ def test_a_start_in_a_cylinder_is_refused_only_where_there_is_one(make_env):
 
 
 def test_a_robot_without_a_camera_is_refused_before_the_first_episode():
-    """The error is a mistake of the configuration, and comes before the first step."""
+    """A job with such a robot can never train, so the error comes before the first step."""
     with pytest.raises(MissingCapability, match="FakeRobotino has no Cameras, which SeeTargetEnv needs"):
         make_seeing(*fake_arena())
 
@@ -293,7 +293,7 @@ def test_a_step_before_the_first_reset_is_refused(make_env):
 
 
 def test_closing_releases_the_simulator_once_it_is_asked():
-    """`on_close` gives the simulator of a configuration back."""
+    """No other environment can use a simulator that was not given back."""
     closed = []
     env = SeeTargetEnv(*fake_seeing(), on_close=lambda: closed.append(True))
 

@@ -170,7 +170,7 @@ def test_a_wrapper_that_cannot_be_used_is_refused_before_a_simulator_starts(wrap
 
 @pytest.mark.usefixtures("registered")
 def test_a_wrapper_that_raises_is_named():
-    """The author of the job may have written the wrapper."""
+    """The author of the job may have written the wrapper, and must find the mistake in it."""
     wrapper = {"name": f"{HERE}:TimeLimit", "options": {"max_episode_steps": -1}}
 
     with pytest.raises(
@@ -190,7 +190,7 @@ def test_wrappers_with_statistics_are_refused_as_ever(name):
 
 
 def test_without_wrappers_the_environment_stays_as_it_is():
-    """A job without wrappers must get the environment itself."""
+    """A needless wrapper would hide attributes of the environment from a program."""
     env = Count()
 
     assert wrapped(env, Environment(id=NAME)) is env

@@ -108,7 +108,7 @@ def test_a_vector_answers_as_those_of_stable_baselines3(restarters, make, call, 
 @pytest.mark.parametrize("make", VECTORS.values(), ids=VECTORS)
 @pytest.mark.filterwarnings("ignore:.*render:UserWarning")
 def test_a_vector_draws_as_that_of_stable_baselines3(restarters, make, render_mode):
-    """`render` returns one image of all environments, or None without a render mode."""
+    """A video recorder for Stable-Baselines3 gets one image of all environments, or None without a mode."""
     env, reference = make(restarters(render_mode)), DummyVecEnv([lambda: wrapped(render_mode)] * MEMBERS)
 
     assert np.array_equal(env.get_images(), reference.get_images())
@@ -164,10 +164,7 @@ def test_a_simulator_that_takes_over_has_the_attributes_that_were_set(restarters
 def test_an_attribute_that_is_set_while_a_simulator_is_mended_is_there_in_its_next_episode(
     restarters, monkeypatch
 ):
-    """During a restart, only the restarter's thread may use the environment.
-
-    So the attribute is set later.
-    """
+    """Only the restarter's thread may use the environment during a restart, so the attribute is set later."""
     [restarter, *_] = restarters()
     env = SimulatorsVecEnv([restarter], 1)
     env.reset()

@@ -174,9 +174,10 @@ def plain(value):
 @pytest.mark.parametrize("played", [collected, tolerated, vectorized, alone, evaluated])
 @pytest.mark.parametrize("hostile", [Hostile, Frozen])
 def test_what_an_environment_does_with_its_objects_changes_nothing(restarter, played, hostile):
-    """Otherwise the last observation would be the next episode's first.
+    """An environment may return the same array each time, and overwrite the actions that it gets.
 
-    A resume would repeat other actions.
+    Without copies, the last observation of an episode would be the first of the next one, and a resume would
+    repeat other actions.
     """
     assert plain(played(restarter(hostile))) == plain(played(restarter(Honest)))
 
@@ -225,7 +226,7 @@ class Rising(Honest):
 
 
 def test_an_attribute_is_set_once_and_what_the_environment_makes_of_it_stays(restarter):
-    """Before, a level that a curriculum had set once returned to that value at each reset."""
+    """If the attribute were set at each reset, a level that the environment raises would fall back."""
     env = SimulatorsVecEnv([restarter(Rising)], 1)
     env.reset()
     words = ["first"]

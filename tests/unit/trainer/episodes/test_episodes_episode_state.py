@@ -78,7 +78,7 @@ def test_a_snapshot_stays_as_it_was(make_env):
 
 @pytest.mark.parametrize("steps", range(12))
 def test_what_follows_a_resume_is_what_would_have_been(make_env, steps):
-    """From each step of an episode, observations, rewards, ends, returns and lengths are equal."""
+    """An exact resume must give the same observations, rewards, ends, returns and lengths."""
     actions = [RIGHT, LEFT, RIGHT, RIGHT, LEFT, RIGHT, RIGHT, RIGHT, LEFT, RIGHT, RIGHT, RIGHT] * 2
     env, _ = make_env({}, {})
     env.reset()
@@ -95,7 +95,7 @@ def test_what_follows_a_resume_is_what_would_have_been(make_env, steps):
 
 
 def test_members_are_resumed_where_each_one_was(make_env):
-    """One simulator is further than another, and a third has no episode."""
+    """The simulators are independent, so each may be at another step, and one may have no episode."""
     env, members = make_env({}, {}, {})
 
     observations = env.resume(
@@ -122,7 +122,7 @@ def test_an_episode_that_ends_early_when_it_is_played_again_is_left(make_env):
 
 @pytest.mark.parametrize("action", [1, np.int64(1), np.float32(0.5), np.zeros((2, 3), np.float32)])
 def test_a_log_keeps_actions_as_they_are(action):
-    """The type of the actions is kept, also when the log grows beyond its first size."""
+    """Actions of another type could be refused when the episode is played again."""
     log = ActionLog()
     early = log.taken()
     for _ in range(40):

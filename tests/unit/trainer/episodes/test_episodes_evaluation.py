@@ -78,7 +78,7 @@ def test_a_spent_budget_ends_an_evaluation(make_member):
 
 @pytest.mark.parametrize("evaluators", [1, 2, 3, 5])
 def test_several_simulators_share_the_episodes(make_member, evaluators):
-    """The result and its order do not depend on the number of simulators."""
+    """More evaluators only save time; they must not change the result or its order."""
     restarters = [Restarter(make_member(f"evaluate-{index}")) for index in range(evaluators)]
 
     evaluation = evaluate_on_all(Walker(), restarters, [10, 21, 32, 43])

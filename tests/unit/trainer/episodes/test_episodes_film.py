@@ -79,7 +79,7 @@ def test_a_long_episode_takes_no_more_space_than_a_short_one(looks):
 
 
 def test_a_member_that_is_on_no_floor_is_not_recorded(make_member):
-    """The report has all its other parts."""
+    """A robot without a pose cannot be filmed; the report then has only its other parts."""
     [episode] = evaluate(RightWalker(), make_member(), [10]).episodes
 
     assert episode.film is None
@@ -87,7 +87,7 @@ def test_a_member_that_is_on_no_floor_is_not_recorded(make_member):
 
 
 def test_an_evaluation_records_its_episodes_from_the_reset_to_the_end(make_member):
-    """The first pose is the one right after the reset."""
+    """A person must see where the robot starts and where it ends."""
     member = make_member()
     member.sight = Walked().sight
 

@@ -97,7 +97,7 @@ def test_episodes_with_equal_results_are_no_evidence_of_a_difference(pairs):
 def test_whoever_looks_after_each_batch_sees_the_true_difference_inside(chances):
     """A person may look after each batch.
 
-    In at most 5 % of comparisons may the true difference ever be outside.
+    In at most 5 % of the comparisons, the true difference is outside the interval at any of these looks.
     """
     random = np.random.default_rng(1)
     missed = 0

@@ -51,7 +51,7 @@ def test_members_are_recycled_at_the_same_time(make_vec_env, make_member):
 
 
 def test_a_recycling_that_fails_is_a_fault_like_any_other(make_vec_env, make_member):
-    """The simulator is restarted a second time, and then the episode begins."""
+    """A planned restart may fail too, and then another restart comes before the next episode."""
     member = make_member(starts=[1], recycle_after=1)
     env = make_vec_env(member)
     env.reset()

@@ -62,7 +62,10 @@ def test_an_evaluation_has_all_its_episodes_whichever_simulator_is_left(play, po
 
 
 def test_too_few_simulators_end_the_run(play, pool, last_word):
-    """The message has the simulator, its last fault and the remedy."""
+    """With fewer simulators a run takes longer, so a job sets the least number.
+
+    The message has the simulator, its last fault and the remedy.
+    """
     code, _ = play(pool("DQN", least=2), {"collect-1": {"steps": range(10, 1000)}})
 
     assert code == 80

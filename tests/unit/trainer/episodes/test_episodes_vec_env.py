@@ -21,7 +21,7 @@ from tests.unit.trainer.episodes.walking import LEFT, RIGHT, walk
 
 @pytest.mark.parametrize("members", [1, 3])
 def test_a_step_has_a_row_for_each_member(make_vec_env, make_member, members):
-    """One simulator and several simulators give rows of the same form."""
+    """A training loop works with any number of simulators only if their rows have the same form."""
     env = make_vec_env(*(make_member(f"collect-{index}") for index in range(members)))
 
     first = env.reset()

@@ -22,7 +22,7 @@ from tests.unit.trainer.episodes.walking import LEFT, RIGHT, end_of_restart, wal
 def test_a_fault_ends_the_episode_as_truncated_and_invalid(make_vec_env, make_member):
     """The policy did not cause the fault.
 
-    So it gets no reward and no penalty, and does not learn from the row.
+    So the policy gets no reward and no penalty, and does not learn from the row.
     """
     env = make_vec_env(make_member(steps=[2]))
     env.reset()

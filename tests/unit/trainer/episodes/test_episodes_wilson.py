@@ -40,7 +40,7 @@ def test_the_interval_is_a_part_of_all_rates_and_holds_the_share(share):
 
 @given(shares())
 def test_more_episodes_say_more(share):
-    """With the same share, four times as many episodes give a narrower interval."""
+    """A person who plays more episodes with the same share of successes must get a narrower interval."""
     successes, episodes = share
 
     few, many = wilson(successes, episodes), wilson(4 * successes, 4 * episodes)

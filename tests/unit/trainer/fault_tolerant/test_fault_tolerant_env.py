@@ -38,7 +38,7 @@ def make_env(make_players, make_member):
 
 
 def test_a_healthy_episode_is_that_of_the_environment(make_env):
-    """All values of the episode are the environment's own."""
+    """Without faults, a loop must see the same values as with the environment alone."""
     env, member = make_env()
 
     first, info = env.reset(seed=7)
@@ -109,7 +109,7 @@ def test_a_fault_in_a_reset_begins_the_same_episode_again(make_env):
 def test_without_a_seed_the_episodes_are_those_of_the_last_seed(make_env):
     """As in gymnasium, later episodes follow from the last seed.
 
-    A standby's environment has another generator.
+    The environment of a standby has another generator, so the wrapper itself draws the seeds.
     """
     env, member = make_env()
     for seed in (3, None, None, 3, None, None):
@@ -133,7 +133,7 @@ def test_a_step_without_an_episode_is_a_mistake(make_env):
 
 
 def test_a_step_that_is_interrupted_ends_the_episode(make_env):
-    """After Ctrl-C in a notebook, a response is still unread. The next step would take it for its own."""
+    """After Ctrl-C in a notebook, a response is still unread, and the next step would read it as its own."""
     env, member = make_env()
     env.reset()
 

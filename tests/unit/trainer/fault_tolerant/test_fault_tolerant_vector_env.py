@@ -39,7 +39,10 @@ def walk(env, steps, action=RIGHT):
 
 
 def test_a_vector_is_gymnasium_s_own_in_everything_but_faults(make_env, make_member):
-    """Values, types, shapes and masks are equal; gymnasium's vector is set to reset in the same step too."""
+    """A loop that was written for gymnasium's vectors must work without changes.
+
+    Both vectors reset an environment in the same step.
+    """
     ours, *_ = make_env({}, {})
     theirs = SyncVectorEnv(
         [lambda: make_member("a").env, lambda: make_member("b").env], autoreset_mode=AutoresetMode.SAME_STEP
@@ -83,7 +86,7 @@ def test_the_step_of_a_fault_waits_and_begins_the_next_episode(make_env):
 
 
 def test_several_simulators_that_break_in_one_step_are_mended_at_once(make_env):
-    """Each simulator is restarted by its own thread."""
+    """Restarts one after the other would take longer, so each simulator is restarted by its own thread."""
     env, members, _ = make_env({"steps": [2]}, {"steps": [2], "resets": [2]}, {})
     env.reset(seed=1)
 
@@ -95,7 +98,7 @@ def test_several_simulators_that_break_in_one_step_are_mended_at_once(make_env):
 
 
 def test_no_row_of_many_steps_with_faults_is_invalid(make_env):
-    """All values come from a simulator and are inside the observation space."""
+    """A loop without code for faults learns from each row, so each row must be valid."""
     env, members, _ = make_env(
         {"steps": range(5, 100, 7), "resets": [3]}, {"steps": range(3, 100, 11)}, restarts=40
     )
@@ -128,7 +131,7 @@ def test_episodes_have_the_seeds_of_their_member(make_env):
 
 
 def test_options_reach_every_environment(make_env):
-    """`start` and `target` are such options."""
+    """With the options `start` and `target`, for example, a program chooses an episode."""
     env, members, _ = make_env({}, {})
 
     env.reset(options={"easy": True})
@@ -157,7 +160,7 @@ def test_gymnasium_s_wrappers_for_vectors_can_be_put_around_it(make_env):
 
 
 def test_closing_a_vector_releases_its_simulators(make_env):
-    """Each simulator is released exactly once."""
+    """Another vector can then use the simulators; a second `close` changes nothing."""
     env, _, players = make_env({}, {})
 
     env.close()
@@ -167,7 +170,7 @@ def test_closing_a_vector_releases_its_simulators(make_env):
 
 
 def test_stable_baselines3_gets_the_row_that_it_expects(make_env):
-    """Stable-Baselines3 expects a reset in the same step, and the other values in the info."""
+    """Stable-Baselines3 expects a reset in the same step, and the last observation in the info."""
     env, *_ = make_env({}, {}, kind=FaultTolerantVecEnv)
     env.seed(3)
     first = env.reset()

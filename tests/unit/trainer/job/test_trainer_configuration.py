@@ -104,7 +104,7 @@ def test_an_unknown_field_is_logged_with_its_place_and_ignored():
 
 
 def test_an_unknown_field_hides_no_mistake_of_another():
-    """A mistake that involves several fields is still reported."""
+    """The check of several fields together must run, even if another field is unknown."""
     with pytest.raises(ConfigurationError, match="none has role Collect"):
         parse(MINIMAL | {"ofTomorrow": 1, "simulators": [MINIMAL["simulators"][0] | {"role": "Evaluate"}]})
 

@@ -28,7 +28,7 @@ def test_attempts_are_counted(directory):
 
 
 def test_a_line_that_a_crash_tore_is_left_out(tmp_path):
-    """The lines before and after the torn line are complete."""
+    """A run continues after a crash, so the lines before and after the torn line must be readable."""
     path = tmp_path / "lines.jsonl"
     append_line(path, {"step": 1})
     with path.open("a") as file:
@@ -59,7 +59,7 @@ def test_a_file_is_replaced_as_a_whole_or_not_at_all(tmp_path):
 
 
 def test_a_summary_makes_a_run_finished(directory, make_configuration):
-    """With more steps in its job, the same run is not finished."""
+    """A person may raise the steps of the job, and then the run is not finished any more."""
     before = finished(directory, make_configuration(steps=100))
     write_summary(directory, summarise(directory, Progress(100, [])))
 

@@ -56,7 +56,7 @@ def written(tmp_path, monkeypatch):
 @pytest.mark.parametrize("source", BROKEN)
 @pytest.mark.parametrize("field", FIELDS)
 def test_a_module_that_cannot_be_imported_is_a_mistake_of_the_job(written, tmp_path, field, source):
-    """For any exception, the exit code is 2.
+    """A retry would fail in the same way, so any exception is a mistake of the configuration.
 
     The message has the field, the mistake, the line and the remedy.
     """

@@ -61,7 +61,7 @@ def test_a_folder_that_is_not_a_run_is_named(tmp_path, capsys):
 
 
 def test_a_place_that_cannot_be_written_is_named(tmp_path, capsys):
-    """The message asks for another file with `--out`."""
+    """The folder may be missing or read-only, so the message asks for another file with `--out`."""
     (tmp_path / "training.yaml").write_text("job: arena\n")
 
     code = main([str(tmp_path), "--out", str(tmp_path / "none" / "report.html")])
@@ -84,7 +84,7 @@ def test_the_best_episode_is_written_as_an_animated_gif(run, tmp_path, capsys):
 
 
 def test_the_best_episode_is_written_as_a_video_that_plays_as_fast_as_it_was(run, tmp_path):
-    """Each recorded pose is one frame of the video."""
+    """Each recorded pose is a frame that lasts 0.2 s, so the video has 5 frames per second."""
     assert main([str(run), "--film", str(tmp_path / "best.mp4")]) == 0
 
     with av.open(str(tmp_path / "best.mp4")) as film:

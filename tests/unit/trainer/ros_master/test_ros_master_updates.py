@@ -56,7 +56,7 @@ def refused(update):
 
 
 def test_updates_of_one_node_arrive_in_order_and_only_the_newest_of_a_subject(slave):
-    """A slow node would never catch up otherwise; only the newest list of publishers matters."""
+    """A slow node would never catch up with all updates, and only the newest list matters."""
     node, updates = slave(), Updates(refused)
     node.free.clear()
     updates.add([node.publishers("/first", "http://a")])

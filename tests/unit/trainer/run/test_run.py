@@ -32,7 +32,7 @@ def test_a_run_ends_with_its_steps_a_model_and_a_summary(play, job, directory, n
 
 
 def test_evaluations_are_lines_of_equal_episodes(play, job, directory):
-    """Each evaluation plays the same seeds, at fixed intervals and at the end."""
+    """Results can be compared over time only if each evaluation plays the same episodes."""
     _, members = play(job())
 
     lines = list(read_lines(directory.evaluations))
@@ -43,7 +43,10 @@ def test_evaluations_are_lines_of_equal_episodes(play, job, directory):
 
 
 def test_simulators_rest_while_nobody_needs_them(play, job):
-    """Evaluators run only in evaluations and in the confirmation, collectors at all other times."""
+    """Paused simulators leave the processor to the others.
+
+    Evaluators run only in evaluations and in the confirmation, collectors at all other times.
+    """
     _, members = play(job())
 
     assert members["evaluate-0"].log == ["start", "pause", *(["run", "pause"] * 4), "stop"]
@@ -98,7 +101,7 @@ def test_faults_are_survived_and_counted(play, job, directory, name):
 
 
 def test_simulators_are_recycled_without_a_fault(play, job, directory):
-    """A simulator reports between two episodes that it is due for recycling."""
+    """Recycling comes between two episodes, so no step is lost."""
     code, members = play(job(), {name: {"recycle_after": 5} for name in ("collect-0", "evaluate-0")})
 
     summary = json.loads(directory.summary.read_text())
@@ -161,7 +164,7 @@ def test_a_mistake_is_reported_before_a_simulator_is_made(play, job, last_word, 
 
 
 def test_missing_members_are_reported(job, directory, last_word):
-    """The function that makes the simulators has left one out."""
+    """The function that makes the simulators may have a bug, which must not look like a fault."""
     code = attempt.run(job(), directory, lambda _: [])
 
     assert code == 2
@@ -178,7 +181,7 @@ def test_missing_members_are_reported(job, directory, last_word):
     ids=["type", "value", "space"],
 )
 def test_an_algorithm_that_does_not_fit_is_refused_before_a_simulator_starts(play, job, algorithm):
-    """The signature of the algorithm shows the mistake, or the algorithm's own check."""
+    """Such a job can never train, so no simulator is started in vain."""
     code, members = play(job(algorithm=algorithm))
 
     assert code == 2
@@ -230,7 +233,7 @@ def test_a_last_word_has_the_last_faults(play, job, last_word):
 
 
 def test_a_summary_says_what_the_wall_clock_went_into(play, job, directory):
-    """The times add up to the duration, and give the share of it that trained."""
+    """A person sees which share of the duration trained; the times must add up to the duration."""
     play(job("PPO"), {"collect-0": {"steps": [50]}})
 
     summary = json.loads(directory.summary.read_text())
@@ -252,7 +255,10 @@ def test_an_unexpected_error_ends_with_1_and_stops_every_simulator(play, job, la
 
 
 def test_tensorboard_has_the_tags_that_people_look_for(play, job, directory):
-    """The tags are those of Stable-Baselines3, and one with the name of each reward term."""
+    """Scripts of other projects expect the tags of Stable-Baselines3.
+
+    Each reward term has a tag with its name.
+    """
     play(job("A2C", steps=600))
 
     events = EventAccumulator(str(directory.tensorboard))
@@ -323,7 +329,7 @@ def test_a_policy_is_measured_where_it_collected_if_nobody_evaluates(play, job, 
 
 
 def test_a_restored_policy_is_the_policy_that_was_saved(play, job, directory, make_member):
-    """The zip file is read without unpickling, with the configuration of the run."""
+    """If a tensor were lost, the restored policy would get another success rate."""
     play(job())
 
     result = measure(

@@ -77,7 +77,7 @@ def test_without_confirmations_an_evaluation_alone_ends_training(play, job, dire
 
 
 def test_the_best_policy_is_confirmed_at_the_end_and_the_last_one_is_kept(play, job, directory):
-    """model.zip has the confirmed policy, while the newest checkpoint has the last policy."""
+    """A person uses the best policy, which is in model.zip, but a longer run continues from the last one."""
     play(job("REINFORCE", steps=600, evaluation={"everySteps": 50, "episodes": 4, "confirmEpisodes": 7}))
 
     [line] = read_lines(directory.confirmations)

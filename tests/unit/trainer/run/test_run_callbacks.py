@@ -285,7 +285,7 @@ def test_a_wrong_callback_is_refused_with_field_fact_and_remedy(module, name, op
 def test_all_wrong_callbacks_are_reported_at_once_before_a_simulator_starts(
     play, with_callbacks, last_word, directory
 ):
-    """The exit code is 2, and no attempt is recorded."""
+    """A person corrects all names at once, before an attempt is counted or a simulator starts."""
     code, members = play(with_callbacks({"stopat": 1}, {}, {"wrd": ""}))
 
     assert code == 2

@@ -151,7 +151,7 @@ def test_a_buffer_that_does_not_fit_is_refused_with_the_largest_that_does(memory
 def test_a_run_whose_buffer_does_not_fit_ends_with_2_before_a_simulator_starts(
     play, job, last_word, monkeypatch, tmp_path
 ):
-    """A second run with the size from the message is accepted."""
+    """A person copies the size from the message, so a run with this size must be accepted."""
     room = Capacity(memory_bytes=3000, memory_limit=True, disk_bytes=GB)
     monkeypatch.setattr(attempt, "capacity_now", lambda _: room)
 

@@ -201,7 +201,7 @@ def test_each_verdict_is_a_sentence(pairs, verdict, sentence):
 
 
 def test_a_batch_is_a_line_and_the_end_an_object():
-    """The line and the JSON object have the bounds of the same interval."""
+    """A person reads the line and a program the object, so both have the same interval."""
     pairs = Pairs(both=14, only_a=4, only_b=1, neither=1)
     comparison = Comparison(pairs=pairs, verdict=Verdict.UNDECIDED, faults=2, ended=True)
 

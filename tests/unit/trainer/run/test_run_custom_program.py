@@ -171,7 +171,7 @@ def test_a_worker_process_has_a_progress_that_is_not_served(make_configuration, 
 
 
 def test_faults_and_restarts_of_a_program_s_simulators_are_in_its_status():
-    """The built-in training loop shows them in the same fields."""
+    """The operator reads the same fields of each trainer, whether its loop is built in or a user's."""
     progress = ProgramReport(100, [])
     progress.add("collect-0", Role.COLLECT)
     progress.add("collect-0", Role.COLLECT)

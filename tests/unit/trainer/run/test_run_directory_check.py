@@ -131,7 +131,7 @@ def content_of(folder: Path):
 def test_a_damage_ends_the_attempt_before_anything_starts_or_is_deleted(
     begun, play, job, last_word, name, damage
 ):
-    """Before, there was a traceback, a new run over the old files, or a failure hours later."""
+    """Without the check, an attempt would end with a traceback, replace old files, or fail hours later."""
     damage(begun)
     before = content_of(begun.path)
 
@@ -169,7 +169,7 @@ def test_what_a_crash_may_leave_is_no_damage(begun, play, job, damage):
 def test_no_checkpoint_and_none_that_can_be_read_are_two_answers(begun):
     """With no checkpoint a new run begins.
 
-    Over damaged checkpoints it must not, because it would replace them.
+    Over damaged checkpoints no run may begin, because it would replace them.
     """
     in_each_checkpoint("model.zip", b"PK")(begun)
 
@@ -179,7 +179,7 @@ def test_no_checkpoint_and_none_that_can_be_read_are_two_answers(begun):
 
 
 def test_appending_a_line_reads_no_more_of_a_longer_file(tmp_path, monkeypatch):
-    """Before, two thousand evaluations read 11 GiB in total."""
+    """If each append read the file, two thousand evaluations would read 11 GiB in total."""
     path = tmp_path / "evaluations.jsonl"
     monkeypatch.setattr(Path, "read_bytes", None)
     monkeypatch.setattr(Path, "read_text", None)

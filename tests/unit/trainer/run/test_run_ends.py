@@ -114,7 +114,7 @@ def test_a_sigint_that_was_ignored_at_the_start_stays_ignored():
 
 
 def test_a_stall_is_reported_and_ends_the_process():
-    """The process ends with its own exit code, after the deadline and not before."""
+    """A process that hangs does nothing by itself, so the watchdog ends it after the deadline."""
     left, words = threading.Event(), []
     codes = []
 
@@ -129,7 +129,7 @@ def test_a_stall_is_reported_and_ends_the_process():
 
 
 def test_a_run_that_moves_is_left_alone():
-    """The watchdog checks the idle time again and again."""
+    """A run that makes progress must not end, however often the watchdog looks."""
     asked = threading.Semaphore(0)
 
     def idle_s():
@@ -212,7 +212,7 @@ def log(capsys):
 
 
 def test_the_last_ten_lines_of_the_log_are_kept(log, capsys):
-    """The lines are in the order of the log, with the newest last."""
+    """The termination message has these lines, for a person without access to the log."""
     for number in range(12):
         log.info("line", number=number)
 

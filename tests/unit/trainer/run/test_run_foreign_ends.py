@@ -127,7 +127,7 @@ def play(make_member, make_configuration, tmp_path, monkeypatch):
     ],
 )
 def test_an_environment_that_fails_to_close_changes_no_end(play, amid, at_close, code, reason):
-    """The other environments are still closed."""
+    """The end was decided before `close`, and the other environments must still be closed."""
     found, word, tasks = play(amid, at_close)
 
     assert found == code
@@ -163,7 +163,7 @@ def test_an_environment_that_hangs_when_it_is_closed_does_not_keep_the_run():
 
 
 def test_nobody_watches_for_steps_while_everything_is_stopped(play):
-    """Before, a `close` that took longer than `stallDeadlineSeconds` made a complete run a stalled one."""
+    """Otherwise a `close` of more than `stallDeadlineSeconds` would end a complete run as stalled."""
     watching = []
 
     def close():
@@ -198,7 +198,7 @@ sys.exit(code)
 def test_a_thread_that_lives_on_does_not_keep_the_program(name):
     """The program ends soon with its own exit code, and the log has the name of the thread.
 
-    This is so even if signals arrive meanwhile.
+    Signals that arrive meanwhile do not change the exit code.
     """
     with subprocess.Popen(
         [sys.executable, "-c", LIVES_ON, name], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True

@@ -40,7 +40,7 @@ def test_a_signal_ends_a_run_with_a_checkpoint_and_75(play, job, directory, last
 
 @pytest.mark.parametrize("name", ["DQN", "PPO"])
 def test_a_long_rollout_does_not_wait_for_its_end_once_a_signal_has_come(play, job, directory, name):
-    """The rollout is dropped and repeated after the resume."""
+    """A pod has little time after SIGTERM, so the rollout is dropped, and repeated after the resume."""
     long = {"DQN": {"train_freq": 3000, "buffer_size": 50}, "PPO": {"n_steps": 4000, "batch_size": 50}}
     configuration = job(
         name,
@@ -65,7 +65,7 @@ def test_a_long_rollout_does_not_wait_for_its_end_once_a_signal_has_come(play, j
 def test_an_interrupted_run_goes_on_where_it_was(play, job, directory, name):
     """The run ends at the same total and keeps its earlier counts.
 
-    It repeats at most the incomplete rollout.
+    At most the incomplete rollout is repeated.
     """
     configuration = job(name)
     _, before = play(configuration, {"collect-0": {"steps": [5]}}, signal_after(42))
@@ -238,7 +238,7 @@ def test_an_evaluation_that_was_cut_is_made_up_for(play, job, directory, every, 
 
 
 def test_no_evaluation_is_made_twice(play, job, directory):
-    """The evaluations of the first attempt are in the run directory."""
+    """The evaluations of the first attempt are in the run directory, so they need not be played again."""
     play(job(), on_step=signal_after(70))
 
     play(job())

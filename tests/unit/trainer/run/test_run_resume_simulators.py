@@ -50,7 +50,7 @@ def rejoined(env, saved):
 
 
 def test_simulators_that_repeat_themselves_are_where_they_were(make_env, saved):
-    """The resume is then exact, and there is no warning."""
+    """A warning without a cause would make a person doubt an exact resume."""
     state, warnings = rejoined(make_env(), saved)
 
     assert state is saved
@@ -84,7 +84,7 @@ def test_a_simulator_that_breaks_meanwhile_begins_its_next_episode(make_env, sav
 
 
 def test_a_simulator_that_was_broken_begins_the_episode_it_was_about_to(make_env, saved):
-    """That episode had no step yet, so the simulator begins it now."""
+    """The checkpoint is from before the first step of that episode, so the episode begins now."""
     broken = [EpisodeState(saved.members[0].episode + 1, None), saved.members[1]]
 
     state, warnings = rejoined(make_env(), checkpoint.TrainingState(**fields(saved) | {"members": broken}))

@@ -1,4 +1,4 @@
-"""A run on a claim gets a link with the name of its job; where links are impossible, it still trains."""
+"""A run on a claim gets a link with the name of its job; where links are impossible, the run trains."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def test_replicas_that_start_at_once_are_all_linked(start, volume):
 
 
 def test_a_restart_leaves_the_link_as_it_is(start, volume):
-    """Each start makes the link again if it was deleted."""
+    """TensorBoard may read the link at this moment, so a restart must not replace it."""
     start()
     made = os.lstat(volume / "tensorboard/corridor-0d1f3e5a/0")
 
@@ -88,7 +88,7 @@ def test_a_restart_leaves_the_link_as_it_is(start, volume):
 
 
 def test_a_link_that_leads_elsewhere_is_replaced(start, volume):
-    """The name and the UID of the job determine the target."""
+    """The name of the link has the UID of the job, so only the run of this job is its right target."""
     (volume / "tensorboard/corridor-0d1f3e5a").mkdir(parents=True)
     (volume / "tensorboard/corridor-0d1f3e5a/0").symlink_to("../../gone")
 

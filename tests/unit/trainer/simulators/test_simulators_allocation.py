@@ -149,7 +149,7 @@ def test_a_scratch_folder_without_locks_is_named(monkeypatch, scratch, number):
 
 
 def test_a_scratch_folder_that_cannot_be_written_is_named(monkeypatch, scratch):
-    """The message has the file and the remedy."""
+    """A person may have set the variable to a folder that does not exist."""
     monkeypatch.setenv("ROS_LOG_DIR", str(scratch / "missing"))
 
     with pytest.raises(ConfigurationError, match=r"missing/palaestra-claim.*ROS_LOG_DIR"):

@@ -19,7 +19,7 @@ DEAD, HUNG = SimulatorDead("robotino", "closed the connection"), SimulatorHung("
 def test_the_message_tells_flapping_from_an_accident():
     """A person reads the message hours later.
 
-    So it has the types of faults, the time window and the remedy.
+    So the message has the types of faults, the time window and the remedy.
     """
     budget = RestartBudget("collect-0", RestartLimit(restarts=10), clock=lambda: 0.0)
     for fault in [DEAD] * 9 + [HUNG]:

@@ -10,7 +10,7 @@ REFEREE = RobotName(robot="referee", ros_name="referee", supervisor=True, defini
 
 
 def test_a_class_drives_the_robot_that_it_names():
-    """Two equal robots have devices with equal names, so only the robot's name distinguishes them."""
+    """Two equal robots have devices with equal names, so only their DEF names distinguish them."""
     assert driven_robot([GATE, FIRST, SECOND, REFEREE], "ROVER_2") is SECOND
 
 
@@ -20,7 +20,7 @@ def test_a_class_may_name_the_supervisor():
 
 
 def test_a_class_without_a_name_drives_the_first_robot_that_is_no_supervisor():
-    """A class whose name no robot has drives this robot too, because the name may be only in a PROTO."""
+    """A class with a DEF name that no robot has drives this robot too; the DEF may be only in a PROTO."""
     assert driven_robot([REFEREE, GATE, FIRST], "") is GATE
     assert driven_robot([REFEREE, GATE, FIRST], "ROVER_9") is GATE
     assert driven_robot([REFEREE], "") is None

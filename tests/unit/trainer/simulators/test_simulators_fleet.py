@@ -63,7 +63,7 @@ def make_fleet(make_configuration, make_member):
 
 
 def test_all_are_started_and_stopped(make_fleet):
-    """The fleet has a collecting and an evaluating simulator."""
+    """The process of a simulator that was not stopped would outlive the run."""
     fleet, members = make_fleet()
 
     fleet.start()
@@ -112,7 +112,7 @@ def test_a_misfit_that_the_next_process_does_not_repeat_is_mended(make_fleet, st
 
 
 def test_a_run_that_has_stepped_before_mends_misfits_like_other_faults(make_fleet):
-    """The run has stepped before, so its worlds have all nodes."""
+    """The worlds of such a run have all nodes, so the misfit must have another cause."""
     fleet, members = make_fleet(starts=misfit_starts(1, 2, 3))
 
     fleet.start(stepped=True)
@@ -127,7 +127,7 @@ def refusals(*numbers, fact="refused a step of 50 ms; use a multiple of the worl
 
 @pytest.mark.parametrize("what", ["starts", "resets", "steps"])
 def test_what_two_processes_refuse_in_the_same_words_is_a_mistake(play, make_configuration, last_word, what):
-    """A period that is not a multiple of the basic step once looked like a simulator that broke ten times."""
+    """A restart cannot help if each process refuses the same request, such as a wrong period."""
     code, members = play(make_configuration(), faults={"collect-0": {what: refusals(1, 2, 3)}})
 
     assert code == ExitCode.CONFIGURATION
@@ -315,7 +315,7 @@ def test_a_member_that_is_mended_neither_rests_nor_runs(make_fleet):
 def test_a_resting_member_is_recycled_in_the_background_and_awaited_before_it_runs(make_member):
     """The other simulators collect meanwhile.
 
-    If it were paused during the restart, it would step while paused.
+    The restarted simulator is paused and unpaused only after its restart.
     """
     member = make_member(recycle_after=1, held=True)
     restarter = Restarter(member)

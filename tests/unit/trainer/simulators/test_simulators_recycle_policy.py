@@ -50,7 +50,7 @@ def test_without_limits_nothing_is_ever_due(clock):
 
 @pytest.mark.parametrize(("resets", "due"), [(23, None), (24, "24 resets"), (25, "25 resets")])
 def test_due_by_resets(clock, resets, due):
-    """The simulator of the paper died at its 25th reset.
+    """A real simulator died at its 25th reset.
 
     After 24 resets, the next reset is the first of a new simulator.
     """

@@ -46,7 +46,7 @@ class Memory(Tracker):
 
 @pytest.fixture
 def memory(monkeypatch):
-    """Return the tracker without data, which replaces the class of each callback."""
+    """Return the tracker, without data and in place of the class of each callback."""
     for name in ("begun", "points", "ended"):
         monkeypatch.setattr(Memory, name, [])
     monkeypatch.setattr(callbacks, "_class", lambda *_: Memory)
@@ -130,9 +130,9 @@ class UnreachableService(types.ModuleType):
         """Do nothing, because no metric is shown."""
 
     def finish(self):
-        """Raise the timeout that the library raises if it has a deadline.
+        """Check that a deadline was set; raise the timeout that the library raises after it.
 
-        Without one it would wait for ever.
+        Without a deadline, the library would wait for ever.
         """
         assert self.settings["finish_timeout"] > 0
         assert self.settings["finish_timeout_raises"]
@@ -152,7 +152,7 @@ def wandb_away(monkeypatch):
 def test_wandb_that_cannot_upload_in_time_ends_with_a_warning_and_the_remedy(wandb_away, directory):
     """A pod must end before the library's own timeout.
 
-    Its files are in the run directory, for a later upload.
+    The data is also in the run directory, from which a person can upload it later.
     """
     tracker = wandb_away(mode="online")
     directory.path.mkdir(exist_ok=True)

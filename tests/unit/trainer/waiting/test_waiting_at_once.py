@@ -14,7 +14,10 @@ PATIENCE_S = 20.0
 
 
 def test_the_results_are_in_the_order_of_the_works():
-    """Each function waits for the other, so they must have run at the same time."""
+    """A caller assigns each result to its function by the order.
+
+    Each function waits for the other, so both must run at the same time.
+    """
     together = threading.Barrier(2, timeout=PATIENCE_S)
 
     def work(name):

@@ -173,7 +173,7 @@ def test_a_wait_of_all_is_nobody_s_turn(connections):
 
 
 def test_the_slow_wait_beside_each_other_too(connections):
-    """In any order of requests, a step of 50 ms takes that long for each task."""
+    """Both tasks wait in the same 50 ms, so each step takes 50 ms, whatever the order of the requests."""
     began, waited = time.perf_counter(), waited_s()
     found = []
 

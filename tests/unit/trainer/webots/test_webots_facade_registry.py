@@ -48,7 +48,7 @@ def test_a_facade_has_one_environment_at_a_time(make):
 
 
 def test_a_facade_that_was_closed_is_offered_no_more(make):
-    """An environment may give the facade back later, which must not offer it again."""
+    """An environment may give back a closed facade later, and the registry must not offer it again."""
     facade = make()
     open_facades.take(facade)
     open_facades.withdraw(facade)

@@ -82,7 +82,7 @@ def test_the_array_has_shape_and_type_of_the_sensor(kind):
 
 
 def test_no_pixel_is_copied(kind):
-    """The array is a read-only view of the message's memory."""
+    """A copy of each image would take time, so the array is a read-only view of the message's memory."""
     read, make_message, _ = kind
     message = make_message()
 

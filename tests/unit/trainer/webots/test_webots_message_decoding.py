@@ -95,7 +95,7 @@ def test_what_is_no_finite_number_is_refused_with_the_device(kind, read, wrong):
 
 
 def test_a_reading_of_several_numbers_is_a_tuple():
-    """The numbers are in the order of the message."""
+    """An environment finds x, y and z by their positions in the tuple."""
     point = message_type("geometry_msgs/PointStamped").codec.encode({"point": {"x": 1.0, "y": 2.0, "z": 3.0}})
 
     assert PickedReading("gps", POINT, (0, 1, 2))(point) == (1.0, 2.0, 3.0)

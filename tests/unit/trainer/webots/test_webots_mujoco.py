@@ -18,7 +18,7 @@ def message(*numbers):
 
 
 def test_numbers_are_an_array_of_all():
-    """The numbers are in the order of MuJoCo."""
+    """The numbers keep MuJoCo's order, by which an environment tells them apart."""
     numbers = read_numbers(message(1.0, -2.5, 0.0))
 
     assert numbers.dtype == np.float64
@@ -42,7 +42,7 @@ def test_a_message_cut_short_anywhere_is_refused():
 
 
 def test_devices_have_their_names_below_mujoco():
-    """The device list of a robot has these names."""
+    """A user finds these names in the device list of the robot."""
     assert MujocoSensor("walker", "hip force").device == "mujoco/hip force"
     actuator = MujocoActuator("walker", "left biceps")
     assert actuator.device == "mujoco/left biceps"

@@ -154,7 +154,7 @@ def test_each_key_is_an_action_and_others_have_no_effect(typing):
 
 @pytest.mark.parametrize(("key", "end"), [(b"n", EndEpisode), (b"q", EndTry)])
 def test_a_key_ends_the_episode_or_all(typing, key, end):
-    """Both keys work in the middle of an episode."""
+    """A person who has seen a problem need not play the episode to its end."""
     keyboard, typed, _ = typing
     typed.write(key)
 

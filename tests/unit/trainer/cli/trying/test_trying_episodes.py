@@ -66,7 +66,10 @@ def tried(make_member):
 
 
 def test_a_right_environment_has_figures_and_no_problem(tried):
-    """Each episode has three steps and a return of 3."""
+    """A false problem would make a person search for a bug that does not exist.
+
+    Each episode has three steps with a reward of 1.
+    """
     found = tried()
 
     lines = summary(found)

@@ -19,7 +19,7 @@ from tests.unit.trainer.run.checkpoint.trained_model import HYPERPARAMETERS, equ
 
 @pytest.mark.parametrize("name", ["DQN", "PPO"])
 def test_what_is_saved_is_restored(trained, name):
-    """Networks, optimizer, counts, statistics and the state of the episode are compared."""
+    """A value that the checkpoint lacked would change the rest of the run."""
     before, after = trained(name), trained(name, steps=0)
     before.save()
 
@@ -67,7 +67,7 @@ def test_the_replay_buffer_is_restored(trained, steps):
 
 
 def test_a_checkpoint_whose_size_cannot_be_looked_at_is_one_all_the_same(trained):
-    """The size is a value for a dashboard, which must not end a run."""
+    """The size is only a value on a dashboard, so an error must not end the run."""
     it = trained()
     it.save()
     before = it.saver.size_bytes()
@@ -93,7 +93,7 @@ def test_only_chunks_that_changed_are_written_again(trained):
 
 
 def test_a_resumed_run_shares_chunks_too(trained):
-    """After a resume, the saver also links the files from which it has read."""
+    """Without links, the first checkpoint after each resume would write the whole buffer again."""
     trained(steps=100).save()
     model = trained(steps=0)
     model.resume()
@@ -143,7 +143,7 @@ def test_the_newest_checkpoints_are_kept(trained):
 def test_checkpoints_beyond_the_step_are_removed(trained):
     """The run did not resume from these checkpoints, so they are damaged.
 
-    They must not displace good ones.
+    A damaged checkpoint must not displace a good one.
     """
     model = trained()
     for step in (10, 20, 30):

@@ -29,7 +29,7 @@ def truncate(path):
 
 
 def replace(path, content):
-    """Replace this file without changing other files that are hard links to the same content."""
+    """Replace a file without changing other files that are hard links to the same content."""
     path.unlink()
     path.write_bytes(content)
 
@@ -47,7 +47,7 @@ FILES = [
 @pytest.mark.parametrize("damage", [truncate, flip, os.remove])
 @pytest.mark.parametrize("file", FILES)
 def test_a_checkpoint_with_a_damaged_file_is_skipped(trained, file, damage):
-    """The log has a warning, and the run resumes from the previous checkpoint."""
+    """The previous checkpoint is only a little older, so one damaged file must not end the run."""
     model = trained()
     for step in (10, 20):
         model.save(step)

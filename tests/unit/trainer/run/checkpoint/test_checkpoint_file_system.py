@@ -115,7 +115,7 @@ def test_a_file_system_that_renames_no_folders_is_refused_in_a_sentence(trained,
 
 
 def test_a_draft_is_never_taken_for_a_checkpoint(trained):
-    """The trainer was killed after it had written all files, but before it renamed the folder."""
+    """A trainer may be killed after it has written all files and before it renames the folder."""
     model = trained()
     model.save(10)
     model.save(20)

@@ -57,7 +57,7 @@ def saved(model, path):
 
 
 def test_all_tensors_of_the_policy_are_the_files(tmp_path):
-    """Only the policy is loaded: the number of steps is 0 and the optimizer is new."""
+    """A new run begins at step 0 with a new optimizer, so only the policy is taken from the file."""
     trained = model_of(seed=1)
     trained.learn(16)
     model = model_of(seed=2)
@@ -126,7 +126,7 @@ def test_a_normalizer_on_one_side_only_is_logged(tmp_path, before, now):
     ids=["another shape", "more layers", "fewer layers"],
 )
 def test_a_mismatch_names_the_tensor_with_both_shapes(tmp_path, changes, message):
-    """After the error, the model has its own tensors as before."""
+    """A person finds the wrong layer by its name and shapes. The model keeps its own tensors."""
     path = saved(model_of(), tmp_path / "model.zip")
     model = model_of(**changes)
     before = [tensor.clone() for tensor in model.policy.state_dict().values()]
@@ -149,7 +149,10 @@ class Bomb:
 
 @pytest.mark.parametrize("member", ["policy.pth", "data"])
 def test_nothing_is_unpickled(tmp_path, member):
-    """The object is in place of the tensors, or among the settings of Stable-Baselines3."""
+    """The file may come from somebody else, so no code in it may run.
+
+    The object is in place of the tensors, or among the settings of Stable-Baselines3.
+    """
     model, path, content = model_of(), tmp_path / "model.zip", io.BytesIO()
     torch.save(Bomb(tmp_path / "exploded"), content)
     with zipfile.ZipFile(saved(model, path)) as archive:
@@ -209,7 +212,7 @@ def changed(model, path, change):
     ids=["nan", "infinite", "complex", "sparse"],
 )
 def test_weights_that_are_no_plain_numbers_are_refused(tmp_path, change, fact):
-    """Before, NaN was loaded, an imaginary part was dropped, and a sparse tensor caused a traceback."""
+    """Without the check, PyTorch would load NaN, drop imaginary parts, and fail at sparse tensors."""
     path = changed(model_of(seed=1), tmp_path / "model.zip", change)
 
     with pytest.raises(ConfigurationError, match=fact):
@@ -218,7 +221,7 @@ def test_weights_that_are_no_plain_numbers_are_refused(tmp_path, change, fact):
 
 @pytest.mark.parametrize("inner", [False, True], ids=["in the zip", "in PyTorch's own zip"])
 def test_a_file_that_unpacks_to_gigabytes_is_refused_before_it_does(tmp_path, inner):
-    """Before this check, a file of two megabytes took four gigabytes of memory."""
+    """Without the check, a file of two megabytes could take four gigabytes of memory."""
     bomb = io.BytesIO()
     with zipfile.ZipFile(bomb, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("archive/data/0", bytes(64 << 20))

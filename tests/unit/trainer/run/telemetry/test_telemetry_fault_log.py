@@ -51,7 +51,7 @@ def test_a_fault_is_written_at_once_and_its_end_when_the_simulator_is_up(progres
 
 
 def test_a_recycled_simulator_had_no_fault(progress, tmp_path):
-    """The restart of a recycled simulator is planned."""
+    """The restart of a recycled simulator is planned, so it is not in the file of faults."""
     progress.restarted("collect-1", recycled=True)
 
     assert [*read_lines(tmp_path / "faults.jsonl")] == []

@@ -169,7 +169,7 @@ def play(goodput, clock, move):
 
 @given(st.lists(moves, max_size=6))
 def test_every_second_belongs_to_exactly_one_cause(course):
-    """However causes are nested, their seconds add up exactly to the duration."""
+    """A person adds the seconds of all causes, and the sum must be exactly the duration."""
     clock = Clock()
     goodput, began = clock.ledger(), clock.now
     for move in course:

@@ -64,7 +64,10 @@ def test_every_family_is_there_before_anything_happened(progress):
 
 
 def test_episodes_fall_into_the_buckets_of_their_returns_and_lengths(progress):
-    """The quantiles are those of the last hundred episodes."""
+    """A mean hides rare failures, so a dashboard needs the distribution of returns and lengths.
+
+    The quantiles are those of the last hundred episodes.
+    """
     progress.collected(7, [episode(number) for number in range(1, 6)])
 
     returns = values(progress, "palaestra_trainer_episode_return_bucket", "le")
@@ -147,8 +150,9 @@ def test_simulators_are_counted_by_how_they_stand(progress):
 
 
 def test_each_simulator_has_metrics_of_its_steps_and_episodes(progress, make_member, clock):
-    """Metrics count steps with their duration, episodes and remaining restarts.
+    """A person finds a slow or broken simulator by its own metrics.
 
+    They count its steps with their durations, its episodes, and the spent part of its restart budget.
     Simulated time is exported if it is known.
     """
     restarter = Restarter(make_member(), RestartLimit(restarts=4), progress, clock)
@@ -208,7 +212,7 @@ def train(job, directory, make_member):
 
 
 def test_a_run_tells_of_its_checkpoints_and_losses(train):
-    """The metrics are the time, the duration and the size of checkpoints, and the losses."""
+    """A person sees from these metrics whether checkpoints still succeed, and whether the loss falls."""
     progress = train()
 
     size = values(progress, "palaestra_trainer_checkpoint_size_bytes")[()]

@@ -178,7 +178,7 @@ def test_counters_go_into_a_checkpoint_and_come_back(progress, clock):
 
 
 def test_a_checkpoint_of_an_older_release_has_fewer_counters():
-    """A counter that the checkpoint lacks starts at zero."""
+    """After an upgrade, a counter that the older checkpoint lacks starts at zero."""
     assert Counters.from_json({"episodes": 7, "seconds": 3.0}) == Counters(episodes=7)
 
 
@@ -258,7 +258,10 @@ def test_a_simulator_that_was_given_up_is_reported_and_no_longer_missed(progress
 
 
 def test_the_status_has_the_current_state_of_a_spare(progress):
-    """A simulator without a standby has no such field."""
+    """A person must see whether a standby could take over now.
+
+    A simulator without a standby has no such field.
+    """
     spare = ["starting"]
     progress.has_standby("collect-0", lambda: spare[0])
     first = progress.status().simulators
@@ -299,7 +302,7 @@ def test_the_steps_after_the_checkpoint_that_a_run_goes_on_from_are_lost(progres
 
 
 def test_time_and_faults_are_drawn_over_the_steps(progress, clock):
-    """TensorBoard shows the time by cause, and the faults by type."""
+    """In TensorBoard, a person compares a drop of the return with the faults at the same step."""
     clock.now = 2.0
     progress.fault("collect-0", SimulatorDead("collect-0", "gone"), steps_lost=0)
     progress.slow("collect-0", 0.4)
@@ -337,7 +340,7 @@ def test_status_is_the_protocol_s(progress):
 
 
 def test_metrics_are_the_same_numbers(progress):
-    """Values that are unknown are absent from the metrics."""
+    """Status and dashboards must not contradict each other; unknown values are absent from the metrics."""
     progress.collected(7, [{"episode": {"r": 2.0, "l": 3}}])
     progress.fault("collect-0", SimulatorDead("collect-0", "gone"), steps_lost=0)
     with status_server("127.0.0.1:0", progress) as server:

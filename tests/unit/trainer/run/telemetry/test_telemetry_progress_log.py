@@ -39,7 +39,7 @@ def test_a_line_has_the_figures_as_fields():
 
 
 def test_it_is_due_at_once_and_then_at_intervals():
-    """The training loop checks at each step whether a line is due."""
+    """The training loop asks at each step, but a line for each step would fill the log."""
     progress = ProgressLog(every_s=60.0)
     first = progress.due
     progress.write(STATUS)
