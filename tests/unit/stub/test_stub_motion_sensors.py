@@ -73,16 +73,16 @@ def test_axes_go_through_table_and_resolution_and_one_that_is_off_is_nan(load_wi
 def test_each_axis_of_a_noisy_table_draws_its_own_noise(load_with):
     """An axis that is switched off draws no random number, so z gets the second number."""
     simulation = load_with(
-        "Compass { lookupTable [ -1 -100 0.5, 1 100 0.5 ] yAxis FALSE }", "rotation 0 0 1 0.5"
+        "Compass { lookupTable [ -1 0 0.5, 1 100 0.5 ] yAxis FALSE }", "rotation 0 0 1 0.5"
     )
     first, third = draws(2)
 
     simulation.step(STEP_MS)
 
     x, y, z = value_of(simulation, "compass")
-    assert x == pytest.approx(100.0 * math.sin(0.5) * (1.0 + 0.5 * first))
+    assert x == pytest.approx(50.0 * (1.0 + math.sin(0.5)) * (1.0 + 0.5 * first))
     assert math.isnan(y)
-    assert z == pytest.approx(0.0 * third)
+    assert z == pytest.approx(50.0 * (1.0 + 0.5 * third))
 
 
 def test_a_sensor_without_a_table_answers_an_empty_one(node_with):
