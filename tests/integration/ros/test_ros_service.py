@@ -211,8 +211,8 @@ def test_another_type_is_refused(service):
         service("get_time", "webots_ros/set_int")(value=1)
 
 
-def test_a_service_known_to_the_master_can_be_asked_for_its_type(peer):
-    """`rosservice type` looks up this address at the master, and then requests the type from the node."""
+def test_the_master_knows_the_address_of_a_service(peer):
+    """`rosservice type` gets this address from the master, and then requests the type from the node."""
     host, port = Master("/probe").service_address(f"/{peer.name}/double")
 
     assert (host, port > 0) == (os.environ["ROS_HOSTNAME"], True)
