@@ -30,20 +30,25 @@ from palaestra_trainer.webots.motion_sensors import (
 from palaestra_trainer.webots.mujoco import MujocoActuator, MujocoSensor
 from palaestra_trainer.webots.observer import Mode, Observer
 from palaestra_trainer.webots.obstacles import FLOOR, Thing
+from palaestra_trainer.webots.outputs import LED, Brake, Connector, Emitter, OutputDevice, Pen, Speaker
 from palaestra_trainer.webots.simulation import Actuator, Stepper
 from palaestra_trainer.webots.supervisor import Supervisor
 
 __all__ = [
     "FLOOR",
     "GPS",
+    "LED",
     "Accelerometer",
     "Actuator",
     "Altimeter",
     "Attached",
+    "Brake",
     "Camera",
     "Command",
     "Compass",
+    "Connector",
     "DistanceSensor",
+    "Emitter",
     "Gyro",
     "InertialUnit",
     "JointMotor",
@@ -56,9 +61,12 @@ __all__ = [
     "MujocoActuator",
     "MujocoSensor",
     "Observer",
+    "OutputDevice",
+    "Pen",
     "PositionSensor",
     "RangeFinder",
     "Sensor",
+    "Speaker",
     "Stepper",
     "Supervisor",
     "Thing",
