@@ -79,6 +79,19 @@ def test_sensors_see_a_crate_where_it_is_now(load, drive):
     assert simulation.contact_points(crate, descendants=False)
 
 
+def test_a_crate_that_came_to_rest_still_has_contact_points(load):
+    """MuJoCo leaves the contacts of bodies at rest out of its steps, but the crate still stands on the table."""
+    table = b'Solid { translation 3 0 -0.05 name "table" boundingObject Box { size 1 1 0.1 } }'
+    simulation = load(CRATE.replace(b"0.6 0 0.15", b"3 0 0.15") + table)
+    node = simulation.tree.of_def("CRATE")
+    numbers = []
+    for _ in range(3):
+        simulation.step(1600)
+        numbers.append(len(simulation.contact_points(node, descendants=False)))
+
+    assert min(numbers) >= 4
+
+
 def test_a_supervisor_puts_a_crate_elsewhere(load):
     """An environment places objects at each reset.
 

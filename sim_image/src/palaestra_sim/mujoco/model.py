@@ -143,6 +143,16 @@ class Built:
             torque += np.cross(np.array(push.point) - self.data.xipos[number], push.force)
         self.data.xfrc_applied[number] += np.concatenate((push.force, torque))
 
+    def collide(self) -> None:
+        """Compute all current contacts, also those of bodies that sleep, which a step leaves out."""
+        options = self.model.opt
+        usual = options.enableflags
+        options.enableflags = usual & ~int(mujoco.mjtEnableBit.mjENBL_SLEEP)
+        try:
+            mujoco.mj_collision(self.model, self.data)
+        finally:
+            options.enableflags = usual
+
     def settle(self) -> None:
         """Compute the poses of all bodies from the positions of joints and obstacles."""
         mujoco.mj_kinematics(self.model, self.data)

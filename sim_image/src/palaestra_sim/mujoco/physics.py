@@ -163,9 +163,9 @@ class MujocoPhysics:
         return MujocoVideo(movie)
 
     def contacts(self) -> Iterator[ContactPoint]:
-        """Yield the current contact points of robots with obstacles and with each other."""
+        """Yield the current contact points of robots, dynamic solids and obstacles with each other."""
         self._settle()
-        mujoco.mj_collision(self._built.model, self._built.data)
+        self._built.collide()
         contacts = self._built.data.contact
         for pair, position in zip(contacts.geom.tolist(), contacts.pos.tolist(), strict=True):
             sides = [self._built.geoms.get(geom) for geom in pair]

@@ -32,7 +32,7 @@ from palaestra_trainer.webots.observer import Mode, Observer
 from palaestra_trainer.webots.obstacles import FLOOR, Thing
 from palaestra_trainer.webots.outputs import LED, Brake, Connector, Emitter, OutputDevice, Pen, Speaker
 from palaestra_trainer.webots.simulation import Actuator, Stepper
-from palaestra_trainer.webots.supervisor import Supervisor
+from palaestra_trainer.webots.supervisor import Supervisor, ViewLabel
 
 __all__ = [
     "FLOOR",
@@ -71,6 +71,7 @@ __all__ = [
     "Supervisor",
     "Thing",
     "TouchSensor",
+    "ViewLabel",
     "Webots",
     "ensure_node",
     "require_node",

@@ -13,6 +13,9 @@ from palaestra_trainer.ros import RosService, is_served
 from palaestra_trainer.webots.obstacles import ObstacleReader, Thing
 from palaestra_trainer.webots.services import Services
 
+Vector = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+
 _Data = TypeVar("_Data", VisibleScene, SceneState)
 
 _SCENE: Final = "palaestra/scene"
@@ -98,6 +101,34 @@ class Observer:
             raise WrongData(self.node_name, f"the pose of {name} is {pose}")
         return pose
 
+    def full_pose(self, name: str) -> tuple[Vector, Quaternion]:
+        """Return position and rotation, in the world, of the node with DEF `name`.
+
+        The position is x, y, z in meters. The rotation is a quaternion: x, y, z, w.
+        """
+        node = self.node(name)
+        at, turn = (service(node=node) for service in self._pose_services())
+        position = at.position.x, at.position.y, at.position.z
+        rotation = turn.orientation.x, turn.orientation.y, turn.orientation.z, turn.orientation.w
+        if not all(map(math.isfinite, (*position, *rotation))):
+            raise WrongData(self.node_name, f"the pose of {name} is {position}, {rotation}")
+        return position, rotation
+
+    def contact_points(self, name: str) -> tuple[Vector, ...]:
+        """Return the points at which the node with DEF `name`, or a part of it, touches other objects.
+
+        The points are x, y, z in meters, in the world. The stub and MuJoCo give no points on a floor, and the
+        stub gives only those of robots.
+        """
+        service = self._services.get("supervisor/node/get_contact_points", "node_get_contact_points")
+        found = service(node=self.node(name), include_descendants=True).contact_points
+        return tuple((it.point.x, it.point.y, it.point.z) for it in found)
+
+    def type_name(self, name: str) -> str:
+        """Return the type of the node with DEF `name`, such as Solid, or the name of its PROTO."""
+        service = self._services.get("supervisor/node/get_type_name", "node_get_name")
+        return str(service(node=self.node(name)).name)
+
     def translation(self, name: str) -> tuple[float, float, float]:
         """Return the translation field, in meters, of the node with DEF `name`."""
         field = self.field(name, "translation")
@@ -125,9 +156,13 @@ class Observer:
     def node(self, name: str) -> int:
         """Return the handle of the node with DEF `name`, which is valid until the world is reloaded.
 
+        The name "" stands for the node that contains the whole world.
+
         Raises:
             WrongData: the world has no such node.
         """
+        if not name and name not in self._nodes:
+            self._nodes[name] = int(self._services.ask("supervisor/get_root", "get_uint64"))
         if name not in self._nodes:
             answer = self._services.get("supervisor/get_from_def", "supervisor_get_from_def")(name=name)
             self._nodes[name] = self._known(answer.node, f"no node DEF {name}")

@@ -3,14 +3,37 @@
 from __future__ import annotations
 
 import contextlib
+from dataclasses import dataclass
+from pathlib import Path
 
 from palaestra_trainer.errors import SimulatorDead, WrongData
 from palaestra_trainer.ros import call_together
 from palaestra_trainer.webots.fields import Value, encoded, kind_of, turn_about_z
-from palaestra_trainer.webots.observer import Mode, Observer
+from palaestra_trainer.webots.observer import Mode, Observer, Vector
 from palaestra_trainer.webots.services import Services
 
-Vector = tuple[float, float, float]
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ViewLabel:
+    """A text over the view of a world.
+
+    Attributes:
+        text: the text; "" removes the label.
+        number: the number of the label, 0 or more.
+        at: x and y of its upper left corner, 0 to 1 of the view, from the upper left corner of the view.
+        size: the height of the font, 0 to 1 of the view.
+        rgb: the color, 0xRRGGBB.
+        transparency: 0 to 1.
+        font: the name of a font of Webots.
+    """
+
+    text: str
+    number: int = 0
+    at: tuple[float, float] = (0.0, 0.0)
+    size: float = 0.1
+    rgb: int = 0xFF0000
+    transparency: float = 0.0
+    font: str = "Arial"
 
 
 class Supervisor:
@@ -143,13 +166,128 @@ class Supervisor:
     def set_velocity(self, name: str, linear: Vector, angular: Vector = (0.0, 0.0, 0.0)) -> None:
         """Set the linear (m/s) and angular (rad/s) velocity of the node with DEF `name`, in world axes."""
         service = self._services.get("supervisor/node/set_velocity", "node_set_velocity")
-        wanted = {
-            "linear": dict(zip("xyz", linear, strict=True)),
-            "angular": dict(zip("xyz", angular, strict=True)),
-        }
+        wanted = {"linear": _xyz(linear), "angular": _xyz(angular)}
         service(node=self._observer.node(name), velocity=wanted)
+
+    def add_force(
+        self, name: str, force: Vector, *, offset: Vector | None = None, relative: bool = False
+    ) -> None:
+        """Push the node with DEF `name` with a force in N during the next basic step.
+
+        Args:
+            name: the DEF name of a Solid or robot with physics.
+            force: x, y, z in N.
+            offset: the point at which the force acts, in meters in the axes of the node; None: the center of
+                mass.
+            relative: whether the force is in the axes of the node; if not, it is in those of the world.
+
+        Raises:
+            WrongData: also if the simulator does not simulate forces, as the stub.
+        """
+        push = {"node": self._observer.node(name), "force": _xyz(force), "relative": relative}
+        if offset is None:
+            self._confirm("node/add_force", "node_add_force_or_torque", name, **push)
+        else:
+            self._confirm(
+                "node/add_force_with_offset", "node_add_force_with_offset", name, **push, offset=_xyz(offset)
+            )
+
+    def add_torque(self, name: str, torque: Vector, *, relative: bool = False) -> None:
+        """Turn the node with DEF `name` with a torque in N m during the next basic step; see `add_force`."""
+        wanted = {"node": self._observer.node(name), "force": _xyz(torque), "relative": relative}
+        self._confirm("node/add_torque", "node_add_force_or_torque", name, **wanted)
+
+    def save_state(self, name: str, state: str = "saved") -> None:
+        """Save the poses of the node with DEF `name` and of the nodes inside it, for `load_state`."""
+        self._confirm(
+            "node/save_state", "node_set_string", name, node=self._observer.node(name), state_name=state
+        )
+
+    def load_state(self, name: str, state: str = "saved") -> None:
+        """Restore the poses that `save_state` has saved; the nodes are then at rest.
+
+        The state `__init__` is that of the world file.
+
+        Raises:
+            WrongData: also if no such state was saved.
+        """
+        self._confirm(
+            "node/load_state", "node_set_string", name, node=self._observer.node(name), state_name=state
+        )
+
+    def insert_node(self, name: str, field: str, text: str, index: int = -1) -> None:
+        """Insert nodes, as text of a world file, into a field of the node with DEF `name`.
+
+        Args:
+            name: the DEF name of the node; "": the world itself.
+            field: the field, such as "children".
+            text: the nodes.
+            index: the position in the field; -1: after the last node.
+
+        Raises:
+            WrongData: also if the text is wrong, or the simulator cannot add such nodes.
+        """
+        self._confirm(
+            "field/import_node_from_string",
+            "field_import_node_from_string",
+            f"{name}.{field}",
+            field=self._observer.field(name, field),
+            position=index,
+            nodeString=text,
+        )
+        self._observer.forget_handles()
+
+    def remove_node(self, name: str) -> None:
+        """Remove the node with DEF `name`; a reset does not restore it.
+
+        Raises:
+            WrongData: also if the simulator cannot continue without the node.
+        """
+        self._confirm("node/remove", "node_remove", name, node=self._observer.node(name))
+        self._observer.forget_handles()
+
+    def save_image(self, path: str | Path, quality: int = 90) -> None:
+        """Save the view of the world as a PNG or JPEG file on the simulator's machine.
+
+        Args:
+            path: the file; an absolute path.
+            quality: 1 to 100, for JPEG.
+
+        Raises:
+            WrongData: also if the simulator does not render, as the stub, or cannot write the file.
+        """
+        self._confirm("export_image", "save_image", path, filename=str(path), quality=quality)
+
+    def set_label(self, label: ViewLabel) -> None:
+        """Show a text over the view of the world; a label of the same number is replaced."""
+        self._confirm(
+            "set_label",
+            "supervisor_set_label",
+            repr(label.text),
+            id=label.number,
+            label=label.text,
+            xpos=label.at[0],
+            ypos=label.at[1],
+            size=label.size,
+            color=label.rgb,
+            transparency=label.transparency,
+            font=label.font,
+        )
 
     def close(self) -> None:
         """Close the connections and reset `paused`."""
         self.paused = False
         self._services.close()
+
+    def _confirm(self, path: str, type_name: str, subject: object, **request: object) -> None:
+        """Call a service that only confirms; `subject` is the object of the call, for the message.
+
+        Raises:
+            WrongData: the simulator does not confirm.
+        """
+        if not self._services.get(f"supervisor/{path}", type_name)(**request).success:
+            raise WrongData(self.node_name, f"refuses {path.rpartition('/')[2]} for {subject}")
+
+
+def _xyz(vector: Vector) -> dict[str, float]:
+    return dict(zip("xyz", vector, strict=True))

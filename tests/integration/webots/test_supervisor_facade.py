@@ -1,0 +1,187 @@
+"""The supervisor's facade changes a world, and the observer's facade reads it, in each simulator."""
+
+import pytest
+from PIL import Image
+
+from palaestra_trainer.errors import WrongData
+from palaestra_trainer.robots.simulated import SimulatedRobot
+from palaestra_trainer.webots import ViewLabel, Webots
+from tests.values.frames import frame, quaternion
+from tests.values.worlds import PHYSICS, STEP_MS, Setting, robot
+
+DEADLINE_S = 60.0
+MASS_KG = 2.0
+FORCE_N = (3.0, -1.0, 0.5)
+BOX = frame((1.0, 2.0, 0.5), (0.0, 0.0, 1.0), 0.6)
+WALL = frame((-2.0, 0.0, 0.4))
+# Without gravity, the box keeps its place in each simulator.
+WORLD = f"""DEF WALL Solid {{ {WALL.fields} name "wall" boundingObject Box {{ size 0.2 1 0.8 }} }}
+DEF BOX Solid {{ {BOX.fields} name "box" boundingObject Box {{ size 0.4 0.4 0.4 }} PHYSICS }}
+"""
+PHYSICS_NODE = f"physics Physics {{ density -1 mass {MASS_KG} }}"
+
+
+class Onlooker(SimulatedRobot):
+    """A supervisor without devices."""
+
+    definition = ""
+    period_ms = STEP_MS
+    target = None
+
+
+@pytest.fixture(scope="module", params=PHYSICS)
+def simulator(request):
+    """Return the name of a simulator."""
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def world(simulator, master, tmp_path_factory):
+    """Yield a facade and a robot in a running simulator; only MuJoCo simulates the mass of the box."""
+    del master
+    text = WORLD.replace("PHYSICS", PHYSICS_NODE if simulator == "mujoco" else "")
+    path = tmp_path_factory.mktemp("world") / "box.wbt"
+    path.write_text(Setting(simulator).text(text + robot(""), "gravity 0"))
+    webots = Webots("r", path, driver=simulator, start_deadline_s=DEADLINE_S)
+    onlooker = Onlooker(webots)
+    try:
+        with webots:
+            onlooker.connect()
+            onlooker.advance()
+            yield webots, onlooker
+    finally:
+        onlooker.close()
+        webots.close()
+
+
+def test_the_full_pose_of_a_node_is_that_of_the_world_file(world):
+    """`pose` has only x, y and the heading, which is not enough for an arm or a drone."""
+    webots, _ = world
+
+    position, rotation = webots.observer.full_pose("BOX")
+
+    assert position == pytest.approx(BOX.position)
+    assert rotation == pytest.approx(quaternion(BOX.rotation))
+    assert webots.observer.type_name("BOX") == "Solid"
+
+
+def test_a_force_moves_a_mass(world, simulator):
+    """The speed after one basic step is F t / m; the stub, which has no forces, refuses the call."""
+    webots, onlooker = world
+    if simulator == "stub":
+        with pytest.raises(WrongData):
+            webots.supervisor.add_force("BOX", FORCE_N)
+        return
+
+    webots.supervisor.add_force("BOX", FORCE_N)
+    onlooker.advance()
+    linear, angular = webots.supervisor.velocity("BOX")
+    webots.supervisor.stop_inertia("BOX")
+
+    assert linear == pytest.approx([force * STEP_MS / 1000.0 / MASS_KG for force in FORCE_N], rel=0.01)
+    assert angular == pytest.approx((0.0, 0.0, 0.0), abs=1e-6)
+
+
+def test_a_torque_turns_a_mass(world, simulator):
+    """A cube with the edge a has the inertia m a^2 / 6 about each axis through its middle."""
+    webots, onlooker = world
+    if simulator == "stub":
+        with pytest.raises(WrongData):
+            webots.supervisor.add_torque("BOX", (0.0, 0.0, 0.1))
+        return
+
+    webots.supervisor.add_torque("BOX", (0.0, 0.0, 0.1))
+    onlooker.advance()
+    _, angular = webots.supervisor.velocity("BOX")
+    webots.supervisor.stop_inertia("BOX")
+
+    assert angular[2] == pytest.approx(0.1 * STEP_MS / 1000.0 / (MASS_KG * 0.4**2 / 6.0), rel=0.01)
+
+
+def test_a_saved_state_is_restored(world):
+    """An experiment may begin again and again in the same state of one object."""
+    webots, onlooker = world
+    webots.supervisor.save_state("WALL")
+    webots.supervisor.set_field("WALL", "translation", (0.0, -3.0, 0.4))
+    onlooker.advance()
+    moved, _ = webots.observer.full_pose("WALL")
+
+    webots.supervisor.load_state("WALL")
+    onlooker.advance()
+
+    assert moved == pytest.approx((0.0, -3.0, 0.4))
+    assert webots.observer.full_pose("WALL")[0] == pytest.approx(WALL.position)
+
+
+def test_nodes_are_inserted_and_removed(world):
+    """A program may build its world while the simulation runs."""
+    webots, onlooker = world
+    text = (
+        'DEF POST Solid { translation 4 4 0.5 name "post" boundingObject Cylinder { radius 0.1 height 1 } }'
+    )
+
+    webots.supervisor.insert_node("", "children", text)
+    onlooker.advance()
+    there = webots.observer.full_pose("POST")[0]
+    webots.supervisor.remove_node("POST")
+
+    assert there == pytest.approx((4.0, 4.0, 0.5))
+    assert not webots.observer.exists("POST")
+
+
+def test_a_wrong_node_is_refused(world):
+    """The program learns at once that the world did not change."""
+    webots, _ = world
+
+    with pytest.raises(WrongData):
+        webots.supervisor.insert_node("", "children", "Solid { translation 1 }}")
+
+
+def test_the_view_is_saved_where_the_simulator_renders(world, simulator, tmp_path):
+    """The stub renders nothing, and an empty picture would mislead."""
+    webots, _ = world
+    picture = tmp_path / "view.png"
+    if simulator == "stub":
+        with pytest.raises(WrongData):
+            webots.supervisor.save_image(picture)
+        return
+
+    webots.supervisor.save_image(picture)
+
+    with Image.open(picture) as image:
+        assert image.size == (800, 600)
+
+
+def test_a_label_is_accepted(world):
+    """Only Webots draws labels; a program that shows one must run in each simulator."""
+    webots, _ = world
+
+    webots.supervisor.set_label(ViewLabel(text="episode 3", at=(0.1, 0.9), rgb=0x00FF00))
+    webots.supervisor.set_label(ViewLabel(text=""))
+
+
+def test_a_box_on_a_table_touches_it_at_its_corners(simulator, master, tmp_path):
+    """The contact points of MuJoCo are those of its physics; the stub has contacts of robots only."""
+    del master
+    if simulator == "stub":
+        pytest.skip("in the stub, no object rests on another")
+    resting = frame((0.0, 0.0, 0.1)).fields
+    table = 'Solid { translation 0 0 -0.05 name "table" boundingObject Box { size 1 1 0.1 } }'
+    box = f"DEF BOX Solid {{ {resting} boundingObject Box {{ size 0.4 0.4 0.2 }} {PHYSICS_NODE} }}"
+    path = tmp_path / "resting.wbt"
+    path.write_text(Setting(simulator).text(table + box + robot("")))
+    webots = Webots("r", path, driver=simulator, start_deadline_s=DEADLINE_S)
+    onlooker = Onlooker(webots)
+    try:
+        with webots:
+            onlooker.connect()
+            for _ in range(20):
+                onlooker.advance()
+            points = webots.observer.contact_points("BOX")
+    finally:
+        onlooker.close()
+        webots.close()
+
+    assert len(points) == 4
+    for x, y, z in points:
+        assert (abs(x), abs(y), z) == pytest.approx((0.2, 0.2, 0.0), abs=0.01)
