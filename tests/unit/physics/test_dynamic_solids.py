@@ -80,7 +80,7 @@ def test_sensors_see_a_crate_where_it_is_now(load, drive):
 
 
 def test_a_crate_that_came_to_rest_still_has_contact_points(load):
-    """MuJoCo leaves the contacts of bodies at rest out of its steps, but the crate still stands on the table."""
+    """MuJoCo's steps leave out contacts of bodies at rest, but the crate still stands on the table."""
     table = b'Solid { translation 3 0 -0.05 name "table" boundingObject Box { size 1 1 0.1 } }'
     simulation = load(CRATE.replace(b"0.6 0 0.15", b"3 0 0.15") + table)
     node = simulation.tree.of_def("CRATE")
