@@ -126,7 +126,7 @@ def test_requests_act_for_the_user_that_the_kubeconfig_names(secure, tmp_path):
             {"exec": {"apiVersion": V1, "command": "x", "interactiveMode": "Never", "env": [1]}},
             "env is not a list",
         ),
-        ({"auth-provider": {"name": "gcp"}}, "auth-provider: 'gcp' is not known any more"),
+        ({"auth-provider": {"name": "gcp"}}, "auth-provider: 'gcp' is no longer supported"),
         ({"client-certificate-data": "AAAA"}, "client-key is missing"),
         ({"client-certificate-data": "?", "client-key-data": "?"}, "client-certificate-data is not base64"),
         ({"client-certificate-data": "AAAA", "client-key-data": "AAAA"}, "cannot be used together"),

@@ -68,7 +68,7 @@ def test_a_file_too_large_for_what_it_should_be_is_refused_by_its_size(fails, tm
     [line] = fails(*command, file)
 
     assert re.fullmatch(
-        rf"{file}: has more than (8|64) MiB, more than such a file can have; name another one", line
+        rf"{file}: is larger than (8|64) MiB, the limit for such a file; name another file", line
     )
 
 
@@ -278,7 +278,7 @@ def test_a_replica_that_the_job_does_not_have_is_refused(job, tmp_path, fails):
     """The message lists the replicas that the job has."""
     [line] = fails("run", job, "--replica", "2", "--dir", tmp_path / "runs")
 
-    assert line == "--replica 2: the job has 2; use 0 to 1, or raise spec.replicas"
+    assert line == "--replica 2: the job has 2 replicas; use 0 to 1, or raise spec.replicas"
 
 
 def test_an_operator_that_cannot_be_is_not_started(fails):
@@ -327,7 +327,7 @@ def test_what_is_tried_here_is_not_an_option_of_a_cluster(job, fails, option):
     """A person who forgets `--local` would otherwise start the trial in a cluster."""
     [line] = fails("try", job, option)
 
-    assert line == "--agent, --episodes, --json: are for --local; add it, or leave them out"
+    assert line == "--agent, --episodes, --json: work only with --local; add --local, or remove them"
 
 
 def test_a_simulator_of_ones_own_cannot_be_tried_here(job, fails):
@@ -342,7 +342,7 @@ def test_a_simulator_of_ones_own_cannot_be_tried_here(job, fails):
     [line] = fails("try", "--local", job)
 
     assert line.startswith(
-        "spec.simulators[0].driver: command cannot be tried here; set stub, mujoco or webots"
+        "spec.simulators[0].driver: episodes cannot be tried with command; set stub, mujoco or webots"
     )
 
 

@@ -102,5 +102,5 @@ def _always(header: str | None) -> Authorization:
 def _one_line(text: object, field: str) -> str:
     found = str(text).strip()
     if not found or not found.isascii() or not found.isprintable():
-        raise NotConfigured(f"{field} is not one line of text; write it as it was given")
+        raise NotConfigured(f"{field} is not one line of text; copy it again, on one line")
     return found

@@ -103,7 +103,9 @@ class Plugin:
                 check=False,
             )
         except subprocess.TimeoutExpired as error:
-            raise self._failure(f"did not respond within {WAIT_S:.0f} s; run it by hand") from error
+            raise self._failure(
+                f"did not respond within {WAIT_S:.0f} s; run it by hand to see the reason"
+            ) from error
         except (OSError, ValueError) as error:
             raise self._failure(f"cannot be run ({error})") from error
         if ended.returncode:

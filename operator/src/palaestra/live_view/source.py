@@ -199,7 +199,9 @@ class SidecarSource:
         try:
             return kind.from_json(decoded(body, most_bytes))
         except ProtocolError as error:
-            raise NotShown(f"{self.name}: its sidecar answered /{path} with {error}") from error
+            raise NotShown(
+                f"{self.name}: its sidecar sent an invalid response to /{path}: {error}"
+            ) from error
 
 
 def at_address(host: str, port: int) -> Fetch:

@@ -67,7 +67,9 @@ def read_pod(template: Mapping[str, Any], uid: str) -> Pod:
     spec = template["spec"]
     main, *others = spec["containers"]
     if others:
-        raise RunRefused(f"container {others[0]['name']}: a pod is run here with one main container only")
+        raise RunRefused(
+            f"container {others[0]['name']}: a pod that runs on this machine can have only one main container"
+        )
     return Pod(
         uid=uid,
         init=tuple(_container(container, uid) for container in spec.get("initContainers", ())),
