@@ -144,7 +144,7 @@ def test_nonsense_of_a_pod_is_refused(serve, run):
     """A program in a pod may send any response."""
     (source,) = LocalRun(run(serve(scene=answer(MOVED)))).sources()
 
-    with pytest.raises(NotShown, match="answered /scene with world: is missing"):
+    with pytest.raises(NotShown, match="invalid response to /scene: world: is missing"):
         source.scene()
 
 

@@ -217,7 +217,7 @@ def test_an_update_of_one_row_whose_advantage_is_to_be_normalized_is_refused(mak
     with pytest.raises(ConfigurationError) as refusal:
         model_of(name, make_env(), n_steps=1, normalize_advantage=True)
 
-    line = "algorithm.hyperparameters.n_steps: 1 step of 1 collecting simulator is 1 row"
+    line = "algorithm.hyperparameters.n_steps: 1 step in 1 collecting simulator gives 1 row"
     assert str(refusal.value).startswith(line)
     assert str(refusal.value).endswith("raise n_steps, add a simulator, or set normalize_advantage: false")
 
@@ -473,7 +473,7 @@ def test_layers_that_policy_and_value_shared_have_their_form_of_today():
     """Half of the examples on the web use the old form, so the message shows the present form."""
     old = {"policy_kwargs": {"net_arch": [{"pi": [8], "vf": [8]}]}}
 
-    with pytest.raises(ConfigurationError, match=r"before 1\.8, .* write \{pi: \[\.\.\.\], vf"):
+    with pytest.raises(ConfigurationError, match=r"removed in 1\.8; write \{pi: \[\.\.\.\], vf"):
         check(Algorithm(name="PPO", hyperparameters=old))
 
 

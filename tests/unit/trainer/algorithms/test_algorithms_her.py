@@ -199,7 +199,7 @@ def test_an_episode_that_does_not_continue_after_a_resume_is_never_sampled():
 
 def test_a_run_with_another_number_of_simulators_is_refused():
     """The columns would belong to other simulators."""
-    with pytest.raises(ConfigurationError, match="the run has 2 columns, not 1; use as many simulators"):
+    with pytest.raises(ConfigurationError, match="the checkpoint has 2 columns, not 1; use the number"):
         buffer_of().positions = buffer_of(members=2).positions
 
 

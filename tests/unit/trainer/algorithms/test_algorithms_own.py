@@ -222,7 +222,7 @@ REFUSED = [
     ("sb3_contrib:ARS", "sb3_contrib:ARS cannot be used: ARS learns from whole returns, which rows of"),
     (
         "my_lab:Search",
-        "Search is neither an OnPolicyAlgorithm nor an OffPolicyAlgorithm, so rows that a fault",
+        "Search is neither an OnPolicyAlgorithm nor an OffPolicyAlgorithm, so it would learn from rows",
     ),
     ("HER", "HER cannot be used: HER is a replay buffer; use SAC"),
     ("my_lab:Doubled", "my_lab:Doubled is not a subclass of BaseAlgorithm; name a class that is one"),
@@ -256,7 +256,7 @@ def test_a_class_that_makes_its_own_buffer_is_refused(lab, make, name, buffer):
     wanted = Algorithm(name=name, hyperparameters=hyperparameters)
     check(wanted)
 
-    fact = rf"^algorithm\.name: {name.partition(':')[2]} creates its own {buffer}, which learns from rows"
+    fact = rf"^algorithm\.name: {name.partition(':')[2]} creates its own {buffer}, which would keep rows"
     with pytest.raises(ConfigurationError, match=fact):
         make(wanted)
 

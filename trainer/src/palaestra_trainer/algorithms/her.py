@@ -112,8 +112,9 @@ class ValidHerReplayBuffer(ValidDictReplayBuffer, HerReplayBuffer):
     def positions(self, positions: Positions) -> None:
         if len(positions.columns) != self.n_envs:
             raise ConfigurationError(
-                f"simulators: {NAME} has a column for each collecting simulator, and the run has "
-                f"{len(positions.columns)} columns, not {self.n_envs}; use as many simulators"
+                f"simulators: {NAME} has a column for each collecting simulator; the checkpoint has "
+                f"{len(positions.columns)} columns, not {self.n_envs}; use the number of simulators that it "
+                "was saved with"
             )
         self._next = [row for row, _ in positions.columns]
         self._filled = [filled for _, filled in positions.columns]

@@ -88,7 +88,7 @@ def _evaluate(chosen: argparse.Namespace) -> None:
     in_pod = CONFIG_VARIABLE in os.environ
     if in_pod and chosen.drivers is not None:
         raise ConfigurationError(
-            "--in: the simulators are those of the pod; leave it out, or evaluate elsewhere"
+            "--in: a pod evaluates in its own simulators; remove the option, or evaluate on your machine"
         )
     if in_pod:
         configuration = configuration.model_copy(update={"simulators": load().simulators})
@@ -118,7 +118,7 @@ def _drivers(text: str) -> tuple[str, ...]:
     names = tuple(dict.fromkeys(text.split(",")))
     for name in names:
         if name not in DRIVERS:
-            raise argparse.ArgumentTypeError(f"{name!r} is not a simulator; choose of {', '.join(DRIVERS)}")
+            raise argparse.ArgumentTypeError(f"{name!r} is not a simulator; choose from {', '.join(DRIVERS)}")
     return names
 
 

@@ -180,8 +180,8 @@ def _check_requirements(staged: Path) -> None:
             found = _found(requirement, there)
             raise ConfigurationError(
                 f"{distribution.name}: needs {requirement.name}{requirement.specifier}, and the image has "
-                f"{found.version if found else 'none'}; choose a version that fits the image, "
-                "or name the package in your dependencies"
+                f"{found.version if found else 'no version'}; choose a version that fits the image, "
+                "or add the package to your dependencies"
             )
 
 

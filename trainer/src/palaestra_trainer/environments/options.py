@@ -210,7 +210,7 @@ def parse_as(kind: type[_Chosen], given: Mapping[str, Any]) -> _Chosen:
 def _movements(given: Sequence[Movement | str]) -> tuple[Movement, ...]:
     known = Movement.__members__
     if unknown := [str(it) for it in given if it not in known and it not in known.values()]:
-        raise ConfigurationError(f"movements: {', '.join(unknown)} not known; use {', '.join(known)}")
+        raise ConfigurationError(f"movements: {', '.join(unknown)} are not known; use {', '.join(known)}")
     return tuple(known[it] if isinstance(it, str) else Movement(it) for it in given)
 
 

@@ -89,7 +89,7 @@ def _difference(
     return float((apart / span).max())
 
 
-_REMEDY = "nothing was written; use load_policy where this policy is needed"
+_REMEDY = "nothing was written; use load_policy in the program that needs this policy"
 _NOTHING = "so a comparison would show nothing; normalize observations, train it longer, or use load_policy"
 
 

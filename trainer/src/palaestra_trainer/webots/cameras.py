@@ -31,7 +31,7 @@ class _Rendered(Sensor):
     def _array(self) -> NDArray[Any]:
         array: NDArray[Any] | None = self.value
         if array is None:
-            raise NoReading(f"{self.device} has sent nothing yet; let a period pass")
+            raise NoReading(f"{self.device} has sent no reading yet; step the simulation first")
         return array
 
 

@@ -95,7 +95,7 @@ class Observer:
         heading = 2.0 * math.atan2(turn.z, turn.w)
         pose = (position.position.x, position.position.y, math.remainder(heading, 2.0 * math.pi))
         if not all(map(math.isfinite, pose)):
-            raise WrongData(self.node_name, f"the pose of {name} is {pose}")
+            raise WrongData(self.node_name, f"the pose of {name} is not finite: {pose}")
         return pose
 
     def translation(self, name: str) -> tuple[float, float, float]:
@@ -130,7 +130,7 @@ class Observer:
         """
         if name not in self._nodes:
             answer = self._services.get("supervisor/get_from_def", "supervisor_get_from_def")(name=name)
-            self._nodes[name] = self._known(answer.node, f"no node DEF {name}")
+            self._nodes[name] = self._known(answer.node, f"the world has no node DEF {name}")
         return self._nodes[name]
 
     def field(self, name: str, field: str) -> int:
@@ -175,9 +175,9 @@ class Observer:
         try:
             return kind.from_json(decoded(text.encode(), most_bytes))
         except ProtocolError as error:
-            raise WrongData(self.node_name, f"answered {path} with {error}") from error
+            raise WrongData(self.node_name, f"sent an invalid response to {path}: {error}") from error
 
     def _known(self, handle: Any, fact: str) -> int:
         if not handle:
-            raise WrongData(self.node_name, f"the world has {fact}")
+            raise WrongData(self.node_name, fact)
         return int(handle)
