@@ -41,8 +41,14 @@ def test_help_says_what_it_reads_and_writes_and_how_it_ends() -> None:
         (["--standby"], "--standby: two simulators need different ROS names; give --job and --work"),
         (["--job=j", "--work=/proc/x"], "--work: /proc/x: No such file or directory; give a folder"),
         (["--driver=command"], "--driver command: has no program; add it after --, as in -- sim {world}"),
-        (["--driver=command", "--", "no-such"], "--driver command: program no-such not found; install"),
-        (["--", "sim"], "--driver stub: takes no program; use --driver command"),
+        (
+            ["--driver=command", "--", "no-such"],
+            "--driver command: the program no-such was not found; install",
+        ),
+        (
+            ["--", "sim"],
+            "--driver stub: does not take a program; remove the program, or use --driver command",
+        ),
         (["--speed=2"], "unrecognized arguments: --speed=2; see --help"),
     ],
 )

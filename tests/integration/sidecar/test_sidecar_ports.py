@@ -128,7 +128,7 @@ def test_the_metrics_know_the_processor_time_of_the_whole_family(sidecar) -> Non
         ({"deadline": 1}, "deadline: is not a field of this request"),
         ({}, "deadline_s: is missing"),
         ([], "body: a list is not an object"),
-        ({"deadline_s": -1}, "deadline_s: is not within 0 to 3600"),
+        ({"deadline_s": -1}, "deadline_s: is not between 0 and 3600"),
     ],
 )
 def test_a_wrong_body_is_named_and_changes_nothing(sidecar, waits, body, error) -> None:

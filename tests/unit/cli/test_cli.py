@@ -307,7 +307,7 @@ A_KEY = "use a key such as example.com/team, or a domain such as example.com/"
             "operator --node-selector=gpu",
             "--node-selector: 'gpu' is not a label; use a label such as kubernetes.io/arch=amd64",
         ),
-        ("try FILE --within=0", "--within: 0 is refused; give more than 0"),
+        ("try FILE --within=0", "--within: 0 is refused; give a number above 0"),
         ("delete a --timeout=soon", "--timeout: 'soon' is not a number"),
         ("logs a --tail=-3", "--tail: -3 is refused; give 0 or more"),
         ("fetch a --replica=1.5", "--replica: '1.5' is not a whole number"),

@@ -154,7 +154,7 @@ def test_a_folder_that_is_no_run_is_refused_with_the_one_to_give(run, tmp_path):
         LocalRun(tmp_path)
 
     first, second = run("127.0.0.1:9"), run("127.0.0.1:9", replica="1")
-    with pytest.raises(NoRun, match=f"give one of {first}, {second}"):
+    with pytest.raises(NoRun, match=f"name one of their folders: {first}, {second}"):
         LocalRun(first.parent)
 
 

@@ -177,7 +177,9 @@ def test_a_work_folder_around_the_project_of_the_world_is_refused(source, tmp_pa
     """The sidecar would write the generated world among the sources and replace them by links."""
     world = source("x").parents[1].rename(tmp_path / "project") / "worlds" / "arena.wbt"
 
-    with pytest.raises(SidecarError, match=r"^--work: .*: has the project of the world; give another"):
+    with pytest.raises(
+        SidecarError, match=r"^--work: .*: contains the source project of the world; give another"
+    ):
         world_files.named(world, tmp_path, IDENTITY, clock=True, as_project=True)
     assert [path.name for path in world.parent.iterdir()] == ["arena.wbt"]
 

@@ -269,7 +269,7 @@ def test_other_controllers_are_left_alone(generated: Callable[..., str], text: s
                 'my.wbt:3:1: no robot has the controller "ros": there are'
                 ' "khepera" (controller "braitenberg"), "EPuck" (controller "<generic>"),'
                 ' "robot" (controller "<generic>");'
-                ' set controller "ros" on those to be trained, and supervisor TRUE on one'
+                ' set controller "ros" on the robots to be trained, and supervisor TRUE on one of them'
             ),
         ),
     ],

@@ -103,7 +103,9 @@ def prepare(given: argparse.Namespace) -> tuple[SupervisedSimulator, ...]:
         raise SidecarError(f"--control: {given.control} is not a loopback address; use 127.0.0.1 or [::1]")
     driver = Driver(given.driver)
     if given.program and driver is not Driver.COMMAND:
-        raise SidecarError(f"--driver {driver}: takes no program; use --driver command")
+        raise SidecarError(
+            f"--driver {driver}: does not take a program; remove the program, or use --driver command"
+        )
     if given.standby and given.job is None:
         raise SidecarError("--standby: two simulators need different ROS names; give --job and --work")
     slots = world_files.SLOTS if given.standby else world_files.SLOTS[:1]

@@ -49,7 +49,7 @@ def no_robot_speaks_ros(candidate: Candidate) -> Iterator[WorldError]:
     )
     more = f" and {len(others) - _MOST_NAMED} others" if len(others) > _MOST_NAMED else ""
     fact = f'no robot has the controller "ros": there are {named}{more}'
-    remedy = 'set controller "ros" on those to be trained, and supervisor TRUE on one'
+    remedy = 'set controller "ros" on the robots to be trained, and supervisor TRUE on one of them'
     yield candidate.source.error(others[0].span[0], fact, remedy)
 
 

@@ -172,7 +172,7 @@ class ActuatorMotor(Motor):
             raise UnsimulatedError(f"{self._what()}; {remedy}")
 
     def _what(self) -> str:
-        return f"the actuator of {self.name!r} takes a {self._actuator.control.value}"
+        return f"the actuator of {self.name!r} is controlled by {self._actuator.control.value}"
 
 
 def control_of(model: Any, index: int) -> tuple[Control, float] | None:

@@ -133,7 +133,9 @@ class SupervisorServices:
     def _get_from_device(self, request: Any) -> Fields:
         node = self._robot.parts.devices.nodes.get(request.value)
         if node is None:
-            raise ServiceFailed(f"no device {request.value!r}; get_device_list lists the names")
+            raise ServiceFailed(
+                f"the robot has no device {request.value!r}; get_device_list lists the devices"
+            )
         return {"node": self._handles.of(node)}
 
 

@@ -53,7 +53,7 @@ def without_data(found: Description) -> Iterator[WorldError]:
     for tag in ("text", "numeric"):
         for element in found.root.named("custom", tag):
             if not element.attributes.get("name") or not element.attributes.get("data", "").strip():
-                fact = f"a {tag} in <custom> without {'name' if element.attributes.get('data') else 'data'}"
+                fact = f"a {tag} in <custom> has no {'name' if element.attributes.get('data') else 'data'}"
                 yield found.source.error(element.start, fact, "write both")
 
 
