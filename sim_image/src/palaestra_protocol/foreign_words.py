@@ -9,7 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-_MEMORY = "a run stores next observations, as with false, because rows of all simulators lie in one line"
+_MEMORY = (
+    "a run stores next observations, as with false, because rows of all simulators share one buffer column"
+)
 _VECTOR = "a run makes the vector environment itself; write wrappers of one as trainer.environment.wrappers"
 _EVALUATION = "write trainer.evaluation"
 _COUNT = "write the count of a group of spec.simulators with role Collect"
@@ -73,7 +75,8 @@ _HINDSIGHT = (
 # Values: the reason and the remedy.
 NO_ALGORITHM: Mapping[str, str] = MappingProxyType(
     {
-        "ars": "ARS learns from whole returns, which rows of broken simulators would enter; use another one",
+        "ars": "ARS learns from whole returns, which would include rows of broken simulators; use another "
+        "one",
         "her": _HINDSIGHT,
     }
 )

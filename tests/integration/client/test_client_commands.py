@@ -279,7 +279,7 @@ def test_restart_refuses_a_job_that_has_lost_nothing(typed, place, tell):
     code, out, [line] = typed("restart", "a")
 
     assert (code, out) == (1, [])
-    assert line.startswith("job a: no replica has the reason RunLost, so none is restarted; ")
+    assert line.startswith("job a: no replica has the reason RunLost, so no run is restarted; ")
     assert "annotations" not in place.get(TRAINING_JOBS, "a")["metadata"]
 
 

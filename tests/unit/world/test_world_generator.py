@@ -348,7 +348,7 @@ def test_robots_are_described_as_the_world_has_them(world: Make) -> None:
         ),
         pytest.param(
             robot('controllerArgs [ "__name:=other" ]'),
-            'my.wbt:2:59: "__name:=other" overrules the generated ROS name; remove it',
+            'my.wbt:2:59: "__name:=other" overrides the generated ROS name; remove it',
             id="a remapping of the node's name",
         ),
         pytest.param(

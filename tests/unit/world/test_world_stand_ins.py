@@ -224,7 +224,10 @@ def test_a_users_file_is_what_the_manual_shows() -> None:
             "mine.toml: A: shape: it has 0 shapes; write one of box, cylinder, plane, ring, sphere, wall",
         ),
         ("[A]\nbox = [1, 1, 1]\nsphere = 1", "mine.toml: A: shape: it has 2 shapes; write one of"),
-        ("[A]\nsize = 1", "mine.toml: A: size: it is not a key here; choose from at, box, cylinder, origin"),
+        (
+            "[A]\nsize = 1",
+            "mine.toml: A: size: it is not a key of a stand-in; choose from at, box, cylinder, origin",
+        ),
         (
             "[A]\nbox = [1, 1]",
             "mine.toml: A: box: it does not have 3 lengths; write them in a list, or the name of a field",

@@ -96,7 +96,7 @@ def test_an_environment_that_the_file_does_not_name_gets_the_default_with_a_note
     result = convert(FILE, "ppo.yml", env="Own-v0")
 
     assert load(result.text).spec.trainer.steps == 1_000_000
-    assert "--env: ppo.yml does not name Own-v0; as in Zoo, it gets the entry default" in result.notes
+    assert "--env: ppo.yml has no entry Own-v0; as in Zoo, the job uses the entry default" in result.notes
 
 
 def test_every_note_is_a_comment_in_the_job():
@@ -134,7 +134,7 @@ def test_the_algorithm_is_the_given_one_else_the_files(file, algorithm, name):
             "--env: atari is not an environment in ppo.yml; use one of Reach",
         ),
         (OFF_POLICY, "sac.yml", {"env": "a-v2"}, "a-v2 is not an environment in sac.yml; did you mean a-v1?"),
-        (OFF_POLICY, "ars.yml", {}, "ars cannot be used: ARS learns from whole returns, which rows of"),
+        (OFF_POLICY, "ars.yml", {}, "ars cannot be used: ARS learns from whole returns, which would include"),
         (
             OFF_POLICY,
             "mine.yml",

@@ -98,7 +98,7 @@ def renamed_behind_its_name(candidate: Candidate) -> Iterator[WorldError]:
     for value in _argument_values(candidate):
         for token in _strings(candidate.world, value):
             if _ROS_REMAPPING.match(unquoted(token)):
-                fact = f"{token.text.decode()} overrules the generated ROS name"
+                fact = f"{token.text.decode()} overrides the generated ROS name"
                 yield candidate.source.error(token.start, fact, "remove it")
 
 

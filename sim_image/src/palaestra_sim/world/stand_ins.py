@@ -165,7 +165,9 @@ class _Entry:
         unknown = sorted(table.keys() - LENGTHS.keys() - _OPTIONS)
         if unknown:
             self._refuse(
-                prefix + unknown[0], "it is not a key here", f"choose from {_words({*LENGTHS, *_OPTIONS})}"
+                prefix + unknown[0],
+                "it is not a key of a stand-in",
+                f"choose from {_words({*LENGTHS, *_OPTIONS})}",
             )
         if len(shapes) != 1:
             fact = f"it has {len(shapes)} shapes"

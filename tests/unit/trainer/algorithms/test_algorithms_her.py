@@ -251,7 +251,10 @@ def test_its_size_is_computed_before_it_exists():
         ),
         ({"replay_buffer_kwargs": {}}, "has no effect without replay_buffer_class"),
         ({"replay_buffer_kwargs": 4}, "replay_buffer_kwargs: 4 is refused; give a mapping"),
-        ({"replay_buffer_kwargs": {"copy_info_dict": True}}, "copy_info_dict: is not an option here"),
+        (
+            {"replay_buffer_kwargs": {"copy_info_dict": True}},
+            "copy_info_dict: is not an option of this buffer",
+        ),
         ({"replay_buffer_kwargs": {"n_sampled_goals": 4}}, "did you mean n_sampled_goal?"),
         (
             {"replay_buffer_kwargs": {"n_sampled_goal": 0}},

@@ -219,7 +219,10 @@ def test_a_run_with_a_class_of_ones_own_is_saved_and_resumed(lab, play, job, dir
 
 
 REFUSED = [
-    ("sb3_contrib:ARS", "sb3_contrib:ARS cannot be used: ARS learns from whole returns, which rows of"),
+    (
+        "sb3_contrib:ARS",
+        "sb3_contrib:ARS cannot be used: ARS learns from whole returns, which would include rows",
+    ),
     (
         "my_lab:Search",
         "Search is neither an OnPolicyAlgorithm nor an OffPolicyAlgorithm, so it would learn from rows",

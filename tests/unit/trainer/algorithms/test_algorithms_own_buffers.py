@@ -259,12 +259,12 @@ REFUSED = [
     (
         "DQN",
         {"replay_buffer_class": "buffer_lab:Prioritized", "replay_buffer_kwargs": {"alfa": 1}},
-        "replay_buffer_kwargs.alfa: is not an option here; did you mean alpha?",
+        "replay_buffer_kwargs.alfa: is not an option of this buffer; did you mean alpha?",
     ),
     (
         "DQN",
         {"replay_buffer_class": "buffer_lab:ForDict", "replay_buffer_kwargs": {"depth": 1}},
-        "its class adds none, so remove it",
+        "the class of the buffer has no options of its own",
     ),
     ("PPO", {"rollout_buffer_class": "buffer_lab:Ordered"}, "Ordered overrides get, so"),
     ("PPO", {"rollout_buffer_class": "Greedy"}, "write module:Class"),

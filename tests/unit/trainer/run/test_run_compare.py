@@ -168,7 +168,7 @@ def test_options_that_differ_are_told(written):
     other = written("b", environment={"id": "Corridor-v0", "options": {"max_steps": 5}})
 
     assert list(notes(written("a"), other)) == [
-        "environment.options differ (max_steps): each policy plays with those of its own job"
+        "environment.options differ (max_steps): each policy plays with the options of its own job"
     ]
 
 

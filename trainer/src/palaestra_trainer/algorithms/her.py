@@ -44,7 +44,7 @@ def mistakes(options: Mapping[str, Any], field: str) -> Iterator[str]:
     """Yield a message with field, fact and remedy for each wrong option of the buffer."""
     for name, value in options.items():
         if name not in OPTIONS:
-            yield f"{field}.{name}: is not an option here; {nearest(str(name), list(OPTIONS))}"
+            yield f"{field}.{name}: is not an option of this buffer; {nearest(str(name), list(OPTIONS))}"
         elif name == OPTIONS[0] and not _is_count(value):
             yield f"{field}.{name}: {value!r} is refused; give a whole number above 0"
         elif name == OPTIONS[1] and value not in STRATEGIES:

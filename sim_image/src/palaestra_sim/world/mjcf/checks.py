@@ -62,7 +62,7 @@ def renamed_behind_its_name(found: Description) -> Iterator[WorldError]:
     for argument in found.arguments:
         if _ROS_REMAPPING.match(argument):
             element = found.texts["controllerArgs"]
-            fact = f"{argument} in controllerArgs overrules the generated ROS name"
+            fact = f"{argument} in controllerArgs overrides the generated ROS name"
             yield found.source.error(element.start, fact, "remove it")
 
 
