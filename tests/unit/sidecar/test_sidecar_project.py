@@ -206,8 +206,11 @@ def test_files_above_the_project_are_found_from_the_generated_world(source, tmp_
 @pytest.mark.parametrize(
     ("root", "refusal"),
     [
-        ("source/lab", "source/lab: the world names files above it; name "),
-        ("source/shared", r"source/shared: is not above .*arena\.wbt; name a folder that holds the world"),
+        ("source/lab", "source/lab: the world refers to files outside of this folder; name "),
+        (
+            "source/shared",
+            r"source/shared: is not a folder above .*arena\.wbt; name a folder that contains the world",
+        ),
     ],
 )
 def test_a_root_that_does_not_hold_all_is_refused(source, tmp_path, root, refusal) -> None:

@@ -51,7 +51,7 @@ def problem(attempt: Callable[[], object]) -> WorldError | None:
         ("DEF Robot { }", "2:11: found { where the type of a node should be"),
         ("DEF { }", "2:5: found { where a DEF name after DEF should be"),
         ("USE { }", "2:5: found { where a DEF name after USE should be"),
-        ("Robot { name IS name }", "2:14: IS outside a PROTO file; write the value of name"),
+        ("Robot { name IS name }", "2:14: found IS outside a PROTO file; write the value of name"),
         ("PROTO Robot [ ] { }", "2:1: found PROTO where the type of a node should be"),
         ("EXTERNPROTO Robot", "2:13: found Robot where the address of an EXTERNPROTO should be"),
         ("EXTERNPROTO", "2:12: found the end of the file where the address of an EXTERNPROTO should be"),

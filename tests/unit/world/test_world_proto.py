@@ -90,7 +90,9 @@ def test_is_refers_to_a_field_of_the_proto() -> None:
 
 def test_a_world_still_has_no_is() -> None:
     """IS refers to a field that a PROTO declares, and a world declares no fields."""
-    with pytest.raises(WorldError, match="2:21: IS outside a PROTO file; write the value of translation"):
+    with pytest.raises(
+        WorldError, match="2:21: found IS outside a PROTO file; write the value of translation"
+    ):
         parse(f"{HEADER}Solid {{ translation IS place }}".encode())
 
 
@@ -143,7 +145,10 @@ def test_a_world_still_has_no_is() -> None:
             declaring("field MFString a [ 1 ]"),
             '3:18: the default of a is not of type MFString; write [ "text" ]',
         ),
-        (declaring("field SFBool a IS b"), "3:16: IS outside the body of the PROTO; write the value of a"),
+        (
+            declaring("field SFBool a IS b"),
+            "3:16: found IS outside the body of the PROTO; write the value of a",
+        ),
         (declaring("field SFBool a TRUE\nfield SFBool a TRUE"), "4:1: Stool declares the field a twice"),
         (
             "PROTO Stool [ ] {\n Solid { translation IS place } }",

@@ -40,7 +40,7 @@ _CALLBACKS: Mapping[str, str] = {
     "EvalCallback": "a run evaluates; set trainer.evaluation",
     "ProgressBarCallback": "palaestra run and palaestra watch show the progress",
     "StopTrainingOnMaxEpisodes": "training ends by steps; set trainer.steps",
-    "StopTrainingOnNoModelImprovement": "it works inside EvalCallback only; write a callback of your own",
+    "StopTrainingOnNoModelImprovement": "it works only inside EvalCallback; write a callback of your own",
     "StopTrainingOnRewardThreshold": "a run stops by success; set trainer.evaluation.stopAtSuccessRate",
 }
 

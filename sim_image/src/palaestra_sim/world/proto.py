@@ -118,7 +118,7 @@ class _ProtoReader(Reader):
 
     def proto(self) -> Proto:
         """Read `file := extern* "PROTO" name "[" declaration* "]" "{" node "}"`."""
-        self._is_refused = "IS outside the body of the PROTO"
+        self._is_refused = "found IS outside the body of the PROTO"
         externs = []
         while self._peek().text in (b"IMPORTABLE", b"EXTERNPROTO"):
             externs.append(self._extern())
@@ -135,7 +135,7 @@ class _ProtoReader(Reader):
 
     def fields(self, proto: str) -> dict[str, ProtoField]:
         """Read `declaration*` to the end of the text."""
-        self._is_refused = "IS outside the body of the PROTO"
+        self._is_refused = "found IS outside the body of the PROTO"
         self._access_needed = False
         fields: dict[str, ProtoField] = {}
         while (token := self._peek()).kind != "end":

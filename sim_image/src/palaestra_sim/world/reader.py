@@ -54,7 +54,7 @@ class Reader:
         self._coming = iter(tokens)
         self._next = next(self._coming)
         self._taken_up_to = 0  # the byte after the last token taken
-        self._is_refused: str | None = "IS outside a PROTO file"  # None where IS is allowed
+        self._is_refused: str | None = "found IS outside a PROTO file"  # None where IS is allowed
         self._last_counts = False  # whether a field may occur twice: then the last value counts
 
     def world(self, header: str) -> World:

@@ -228,7 +228,7 @@ REFUSED = [
         "Search is neither an OnPolicyAlgorithm nor an OffPolicyAlgorithm, so it would learn from rows",
     ),
     ("HER", "HER cannot be used: HER is a replay buffer; use SAC"),
-    ("my_lab:Doubled", "my_lab:Doubled is not a subclass of BaseAlgorithm; name a class that is one"),
+    ("my_lab:Doubled", "my_lab:Doubled is not a subclass of BaseAlgorithm; name a subclass"),
     ("my_lab:no_class", "my_lab:no_class is not a subclass of BaseAlgorithm"),
     ("my_lab:Missing", "my_lab:Missing cannot be imported .* has no attribute 'Missing'"),
     ("no_lab:Any", "no_lab:Any cannot be imported .* install its package in the image, or add its folder"),

@@ -196,7 +196,7 @@ def test_a_module_that_a_newer_version_lacks_is_gone(project, target):
 def test_a_folder_without_a_module_is_refused(tmp_path, target, capfd):
     """An image without any installed module would look like a success."""
     assert f"{target}: holds neither a module nor a package" in refusal(capfd, target)
-    assert "is not a folder; name the one with your project" in refusal(capfd, tmp_path / "missing")
+    assert "is not a folder; name the folder with your project" in refusal(capfd, tmp_path / "missing")
 
 
 def test_a_folder_that_is_itself_a_package_is_refused(folder, target, capfd):

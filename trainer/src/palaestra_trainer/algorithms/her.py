@@ -67,7 +67,7 @@ def refuse_other_observations(observation: spaces.Space[Any]) -> None:
     if parts[GOALS[0]].shape != parts[GOALS[1]].shape:
         raise ConfigurationError(
             f"environment.id: its achieved_goal has the shape {parts[GOALS[0]].shape} and its desired_goal "
-            f"{parts[GOALS[1]].shape}; give both the same"
+            f"{parts[GOALS[1]].shape}; give both the same shape"
         )
 
 

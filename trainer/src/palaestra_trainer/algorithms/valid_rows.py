@@ -172,7 +172,7 @@ def with_valid_rows(cls: type[BaseAlgorithm]) -> type[BaseAlgorithm]:
     else:
         raise ConfigurationError(
             f"algorithm.name: {cls.__name__} is neither an OnPolicyAlgorithm nor an OffPolicyAlgorithm, so "
-            "it would learn from rows that a fault made invalid; use a class that is one of them"
+            "it would learn from rows that a fault made invalid; use a subclass of one of them"
         )
     made = type(cls.__name__, (rows, cls), {"__doc__": cls.__doc__, "__module__": cls.__module__})
     return cast("type[BaseAlgorithm]", made)

@@ -151,4 +151,6 @@ class RosSubscriber:
         match answer.value:
             case [str(), str(host), int(port)]:
                 return host, port
-        raise WrongData(self.simulator, f"{self.name} is published at {answer.value!r}, not an address")
+        raise WrongData(
+            self.simulator, f"{self.name} is published at {answer.value!r}, which is not an address"
+        )

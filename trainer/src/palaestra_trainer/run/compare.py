@@ -100,12 +100,12 @@ def _differences(a: Configuration, b: Configuration) -> Iterator[str]:
     """Yield the reasons why the success rates of two policies cannot be compared."""
     if a.environment.id != b.environment.id:
         yield (
-            f"environment.id: A learned {a.environment.id}, and B {b.environment.id}; "
+            f"environment.id: A learned {a.environment.id}, but B learned {b.environment.id}; "
             "compare policies of one environment"
         )
     robots = [configuration.robot or DEFAULT_ROBOT for configuration in (a, b)]
     if robots[0] != robots[1]:
-        yield f"robot: A drives {robots[0]}, and B {robots[1]}; compare policies of one robot"
+        yield f"robot: A drives {robots[0]}, but B drives {robots[1]}; compare policies of one robot"
 
 
 def notes(a: Path, b: Path) -> Iterator[str]:
