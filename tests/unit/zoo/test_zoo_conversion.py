@@ -185,7 +185,7 @@ NOTED = [
         "env_wrapper: a run counts returns outside of the wrappers, and Zoo inside of them",
     ),
     ("env_wrapper: rl_zoo3.wrappers.FrameSkip", "rl_zoo3.wrappers.FrameSkip needs the package rl_zoo3"),
-    ("env_wrapper: [{a.Own: 1, b: 2}]", "is left out; it is not one class; check the indentation"),
+    ("env_wrapper: [{a.Own: 1, b: 2}]", "is left out, because it does not name a class"),
     ("vec_env_wrapper: a.Own", "vec_env_wrapper: a.Own is left out; a run makes the vector environment"),
     ("vec_env_wrapper: [{b.VecFrameStack: {n_stack: 2, channels_order: first}}]", "is left out; a run makes"),
     ("callback: stable_baselines3.common.callbacks.EvalCallback", "set trainer.evaluation"),

@@ -102,7 +102,7 @@ def _value(container: str, entry: Mapping[str, Any], uid: str) -> str:
     if source.get("fieldRef", {}).get("fieldPath") == "metadata.uid":
         return uid
     raise RunRefused(
-        f"env {entry['name']} of container {container}: its value is in an object of a cluster; "
+        f"env {entry['name']} of container {container}: its value is in an object that only a cluster has; "
         "give it as `value` to run the job here"
     )
 

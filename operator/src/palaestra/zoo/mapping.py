@@ -285,7 +285,9 @@ def _classes(draft: Draft, word: str, value: Any) -> Iterator[tuple[str, dict[st
                 name, options = next(iter(item.items()))
                 yield name, dict(options or {})
             case _:
-                draft.note(word, f"{item!r} is left out; it is not one class; check the indentation")
+                draft.note(
+                    word, f"{item!r} is left out, because it does not name a class; check the indentation"
+                )
 
 
 def _schedule(draft: Draft, word: str, value: str) -> Any:

@@ -144,11 +144,11 @@ def _accept(_request: Any) -> Fields:
 
 
 def _no_saving(_request: Any) -> Fields:
-    raise ServiceFailed("worlds are not saved here; use driver webots")
+    raise ServiceFailed("this simulator saves no worlds; use driver webots")
 
 
 def _no_animation(_request: Any) -> Fields:
-    raise ServiceFailed("no animations are recorded here; record a movie, or use driver webots")
+    raise ServiceFailed("this simulator records no animations; record a movie, or use driver webots")
 
 
 def _refuse_get(_request: Any) -> Fields:

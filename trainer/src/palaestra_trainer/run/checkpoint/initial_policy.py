@@ -89,7 +89,7 @@ def _refuse_larger(path: Path, members: Iterable[zipfile.ZipInfo], most: int) ->
 
 def _mistakes(tensors: Any, own: Mapping[str, torch.Tensor]) -> Iterator[str]:
     if not isinstance(tensors, Mapping):
-        yield f"{POLICY} holds no tensors by name"
+        yield f"{POLICY} has no tensors with names"
         return
     for name, tensor in own.items():
         there = tensors.get(name)
