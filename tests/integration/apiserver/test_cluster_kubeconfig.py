@@ -240,7 +240,7 @@ def test_a_plugin_may_give_a_certificate(authority, tmp_path):
         ("echo 7", {}, "returned output that is not an ExecCredential"),
         (f"echo '{given()}'", {}, "returned neither a token nor a certificate"),
         (f"echo '{given(clientKeyData='k')}'", {}, "returned neither"),
-        (f"echo '{given(clientCertificateData='c')}'", {}, "returned a certificate without its key"),
+        (f"echo '{given(clientCertificateData='c')}'", {}, "returned only one of certificate and key"),
         (f"echo '{given(clientCertificateData='c', clientKeyData='k')}'", {}, "cannot be used together"),
         (f"echo '{given(token='t', expirationTimestamp='soon')}'", {}, "is not a time: 'soon'"),
         (f"echo '{given(token='t').replace('/v1', '/v1beta1')}'", {}, "returned apiVersion"),

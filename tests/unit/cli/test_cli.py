@@ -158,7 +158,7 @@ def test_world_without_a_job_is_refused(tmp_path, fails):
 
     [line] = fails("world", path, "--group", "g")
 
-    assert line == "--job and --group: at least one is missing; give both, or --check"
+    assert line == "--job and --group: at least one of them is missing; give both, or use --check"
 
 
 def test_world_can_be_checked_by_each_simulator(tmp_path, capsys):

@@ -150,7 +150,7 @@ def test_the_algorithm_is_the_given_one_else_the_files(file, algorithm, name):
         ),
         ("a-v1: {gamma: 1}", "sac.yml", {}, "sac.yml: the entry a-v1 has no n_timesteps; add it"),
         ("a-v1: [1]", "sac.yml", {}, "sac.yml: the entry a-v1 is not a mapping"),
-        ("- 1", "sac.yml", {}, "sac.yml: has no entries by environment"),
+        ("- 1", "sac.yml", {}, "sac.yml: has no entries with names of environments"),
         ("a: b: c", "sac.yml", {}, "sac.yml:1:5: not YAML"),
         ("!!python/object/apply:collections.OrderedDict []", "config.yml", {}, "config.yml that Zoo wrote"),
     ],
@@ -199,7 +199,7 @@ NOTED = [
     ),
     (
         "optimize_memory_usage: true",
-        "optimize_memory_usage: left out; a run stores next observations, as with",
+        "optimize_memory_usage: left out; in a run, its value is always false",
     ),
     ("noise_std: 0.1", "noise_std: 0.1 is left out; without noise_type it has no effect"),
     ("n_steps: 3", "n_steps: 3 is left out; rows of several simulators share a buffer, so only 1 works"),
@@ -213,7 +213,7 @@ NOTED = [
     ('policy_kwargs: "dict(a=Own, gamma=1)"', "policy_kwargs.a: left out; Own does not name a module"),
     ('policy_kwargs: "open(1)"', "policy_kwargs: left out; open(1) is not a mapping"),
     ("policy_kwargs: 3", "policy_kwargs: left out; 3 is not a mapping"),
-    ("verbose: 1", "verbose: left out; the log of a run has every figure"),
+    ("verbose: 1", "verbose: left out; the log of a run contains all figures"),
 ]
 
 

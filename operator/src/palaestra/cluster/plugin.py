@@ -138,7 +138,7 @@ class Plugin:
         if not token and not certificate:
             raise self._failure("returned neither a token nor a certificate")
         if bool(certificate) is not bool(key):
-            raise self._failure("returned a certificate without its key, or a key without its certificate")
+            raise self._failure("returned only one of certificate and key")
         if token and not (token.isascii() and token.isprintable()):
             raise self._failure("returned a token that is not one line of text")
         return Credentials(

@@ -185,7 +185,7 @@ class SidecarSource:
                 raise NotNow(f"{self.name}: its process does not run on this machine")
             os.kill(pid, number)
         except (OSError, http.client.HTTPException, ProtocolError) as error:
-            raise NotNow(f"{self.name}: has no process to signal ({error})") from error
+            raise NotNow(f"{self.name}: no signal could be sent to its process ({error})") from error
 
     def _read(self, kind: type[_Data], path: str, most_bytes: int) -> _Data:
         try:

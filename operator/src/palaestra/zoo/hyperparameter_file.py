@@ -53,7 +53,8 @@ def read_file(text: str, name: str) -> Mapping[str, Any]:
         raise ZooError(error.problem) from None
     if not isinstance(data, dict) or not data:
         raise ZooError(
-            f"{name}: has no entries by environment; name a file such as Zoo's hyperparams/ppo.yml"
+            f"{name}: has no entries with names of environments; name a file such as Zoo's "
+            "hyperparams/ppo.yml"
         )
     return data
 

@@ -149,7 +149,9 @@ def _world(given: argparse.Namespace, slot: str) -> Path:
     if given.job is None and not given.suffix:
         return Path(given.world).absolute()
     if given.work is None:
-        raise SidecarError("--work: is missing; with --job, give the folder for the generated world")
+        raise SidecarError(
+            "--work: is missing, but required with --job; give the folder for the generated world"
+        )
     work, as_project = given.work.absolute(), Driver(given.driver) is Driver.WEBOTS
     if given.job is None:
         return world_files.renamed(given.world, work, given.suffix, as_project=as_project, root=given.root)

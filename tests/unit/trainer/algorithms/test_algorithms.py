@@ -444,7 +444,7 @@ def test_words_of_other_projects_are_refused_with_their_place_here():
         (
             "DQN",
             "optimize_memory_usage",
-            "is not a hyperparameter here; a run stores next observations, as with",
+            "is not a hyperparameter here; in a run, its value is always false",
         ),
         ("REINFORCE", "rollout_buffer_class", "REINFORCE has no such hyperparameter, unlike PPO, A2C, TRPO"),
         ("PPO", "log_std_init", "is an argument of the policy; write it in policy_kwargs.log_std_init"),

@@ -137,7 +137,7 @@ def test_a_wrong_configuration_is_refused_before_a_learning_library_is_imported(
     ("program", "arguments", "words"),
     [
         (evaluate, ["run", "--in", "stub,gazebo"], "'gazebo' is not a simulator; choose from stub, mujoco"),
-        (evaluate, ["run", "--json"], "--json: without --in the output is JSON already; leave it out"),
+        (evaluate, ["run", "--json"], "--json: has an effect only with --in; without --in"),
         (compare, ["a", "b", "--margin", "5"], "'5' is not a number between 0 and 1, such as 0.05"),
         (compare, ["a", "b", "--in", "gazebo"], "argument --in: invalid choice"),
     ],

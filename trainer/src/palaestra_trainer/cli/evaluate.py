@@ -67,7 +67,9 @@ def evaluate(arguments: Sequence[str] | None = None) -> int:
     chosen = options.parse_args(arguments)
     require_linux("palaestra-eval")
     if chosen.json and chosen.drivers is None:
-        options.error("--json: without --in the output is JSON already; leave it out")
+        options.error(
+            "--json: has an effect only with --in; without --in the output is always JSON; remove --json"
+        )
     configure_logs()
     try:
         _evaluate(chosen)

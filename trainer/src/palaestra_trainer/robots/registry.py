@@ -34,7 +34,7 @@ def robot_class(name: str) -> type[SimulatedRobot]:
             "palaestra_trainer.robots.simulated.SimulatedRobot or one of its subclasses"
         )
     if missing := sorted(getattr(found, "__abstractmethods__", ())):
-        raise ConfigurationError(f"trainer.robot: {name} lacks the method {missing[0]}; implement it")
+        raise ConfigurationError(f"trainer.robot: {name} does not implement the method {missing[0]}; add it")
     return found
 
 
