@@ -192,8 +192,8 @@ def test_a_port_in_use_is_one_clear_line_and_nothing_is_started(sidecar, argumen
 
     assert (second.returncode, second.stdout) == (2, "")
     assert second.stderr == (
-        f"palaestra-sidecar: --control: {taken}: Address already in use; choose another, or 0 for a "
-        "free one\n"
+        f"palaestra-sidecar: --control: {taken}: Address already in use; choose another port, or 0 for a "
+        "free port\n"
     )
 
 

@@ -323,7 +323,7 @@ def test_robots_are_described_as_the_world_has_them(world: Make) -> None:
         pytest.param(
             f"DEF A {robot('')}\nUSE A",
             'my.wbt:3:1: USE A repeats the robot "robotino" and its ROS name; '
-            "write the node out, with its own name",
+            "write the node out, with another name",
             id="a robot used again",
         ),
         pytest.param(
@@ -333,7 +333,7 @@ def test_robots_are_described_as_the_world_has_them(world: Make) -> None:
         ),
         pytest.param(
             robot("") + "\n" + robot(""),
-            'my.wbt:3:1: a second robot is called "robotino"; give it a name of its own',
+            'my.wbt:3:1: a second robot is called "robotino"; give it another name',
             id="two robots of one name",
         ),
         pytest.param(

@@ -70,7 +70,7 @@ def robot_used_twice(candidate: Candidate) -> Iterator[WorldError]:
         if node.uses in containers:
             robot = glance(robot_name(containers[node.uses]))
             fact = f'USE {node.uses} repeats the robot "{robot}" and its ROS name'
-            yield candidate.source.error(node.span[0], fact, "write the node out, with its own name")
+            yield candidate.source.error(node.span[0], fact, "write the node out, with another name")
 
 
 def robots_of_one_name(candidate: Candidate) -> Iterator[WorldError]:
@@ -80,7 +80,7 @@ def robots_of_one_name(candidate: Candidate) -> Iterator[WorldError]:
         name = robot_name(robot)
         if name in seen:
             fact = f'a second robot is called "{name}"'
-            yield candidate.source.error(robot.span[0], fact, "give it a name of its own")
+            yield candidate.source.error(robot.span[0], fact, "give it another name")
         seen.add(name)
 
 

@@ -110,7 +110,9 @@ class LidarPoints(Sensor):
         """
         super().enable(period_ms)
         if not self._cloud(value=True).success:
-            raise WrongData(self.robot, f"{self.device} refuses to make a point cloud; use its ranges")
+            raise WrongData(
+                self.robot, f"{self.device} refuses to send a point cloud; use its ranges instead"
+            )
 
     def close(self) -> None:
         """Close the connections."""

@@ -76,7 +76,7 @@ class Display:
         if camera is None or self.camera is not None:
             return camera is not None
         if not isinstance(camera, Camera):
-            raise UnsimulatedError(f"{name} is not a Camera; attach one")
+            raise UnsimulatedError(f"{name} is not a Camera; attach a Camera")
         if camera.eye is None:
             raise UnsimulatedError(f"{name} has no image in this simulator; use driver mujoco or webots")
         size = self.picture.width, self.picture.height
