@@ -142,9 +142,9 @@ def test_a_servo_for_a_position_goes_there_at_the_commanded_velocity(load):
         (
             VELOCITY,
             lambda motor: motor.set_available_torque(1.0),
-            "whose force the model limits; write forcerange",
+            "only forcerange in the model can limit its force",
         ),
-        (POSITION, lambda motor: motor.set_acceleration(1.0), "whose acceleration MuJoCo does not limit"),
+        (POSITION, lambda motor: motor.set_acceleration(1.0), "MuJoCo cannot limit its acceleration"),
     ],
 )
 def test_a_command_that_the_actuator_cannot_follow_fails(load, actuator, command, message):
