@@ -182,8 +182,8 @@ def _old_hindsight(word: str) -> Callable[[Draft, Any], None]:
 
 
 def _memory(draft: Draft, value: Any) -> None:
-    same = "as with false" if value else "the same"
-    draft.note("optimize_memory_usage", f"left out; a run stores next observations, {same}")
+    same = "unlike in the file" if value else "as in the file"
+    draft.note("optimize_memory_usage", f"left out; in a run, its value is always false, {same}")
 
 
 def _noise_type(draft: Draft, value: Any) -> None:

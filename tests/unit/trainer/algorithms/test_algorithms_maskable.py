@@ -299,7 +299,7 @@ def test_an_episode_that_is_played_again_ends_before_a_forbidden_action(learn):
     saved = [EpisodeState(0, np.zeros(6, np.int64)), EpisodeState(4, np.array([1]))]
     env = learn(task_of())[2]
 
-    with pytest.raises(AssertionError, match="action 0 is forbidden"):
+    with pytest.raises(AssertionError, match="action 0 is not allowed"):
         env.resume(saved)
     env.resume(saved, masked=True)
 
