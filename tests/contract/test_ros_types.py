@@ -62,5 +62,5 @@ def test_a_field_that_python_reserves_gets_an_underscore():
 
 def test_bytes_of_another_length_are_refused():
     """The message of a node with another definition must not be read as zeros."""
-    with pytest.raises(ValueError, match="3 bytes for 4"):
+    with pytest.raises(ValueError, match="3 bytes instead of 4"):
         service_type("webots_ros/set_int").request.decode(b"abc")

@@ -69,5 +69,5 @@ def test_an_existing_file_is_not_replaced(tmp_path, capsys):
 
     assert main(["from-zoo", str(tmp_path / "ppo.yml"), "--out", str(tmp_path / "ppo.yml")]) == 2
 
-    assert "exists; name a new file, or remove it" in capsys.readouterr().err
+    assert "already exists; name another file, or remove this one" in capsys.readouterr().err
     assert (tmp_path / "ppo.yml").read_text() == FILE

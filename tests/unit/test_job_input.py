@@ -58,7 +58,7 @@ def test_an_item_of_a_list_is_changed_also_if_the_list_is_a_default():
         ({"trainer.step": 1}, "spec.trainer.step: is not a field; did you mean steps?"),
         ({"seed": -1}, "spec.seed: -1 is less than 0; use 0 or more"),
         ({"seed.x": 1}, "spec.seed: a mapping is not a whole number; write one"),
-        ({"simulators[2].count": 1}, "spec.simulators[2]: the list has 2 entries; use a number below that"),
+        ({"simulators[2].count": 1}, "spec.simulators[2]: the list has 2 entries; use an index below 2"),
         ({"a..b": 1}, "'a..b': is not the path of a field; write it as in spec.trainer.steps"),
     ],
 )

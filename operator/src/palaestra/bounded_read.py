@@ -28,5 +28,5 @@ def read_bounded(file: Path, most_bytes: int) -> bytes:
             if len(found) <= most_bytes:
                 return found
     raise TooLarge(
-        f"{file}: has more than {most_bytes >> 20} MiB, more than such a file can have; name another one"
+        f"{file}: is larger than {most_bytes >> 20} MiB, the limit for such a file; name another file"
     )

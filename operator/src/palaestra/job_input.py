@@ -95,7 +95,7 @@ def _put(data: Any, text: str, value: Any) -> str | None:
         return f"{text!r}: is not the path of a field; write it as in spec.trainer.steps"
     for end, (piece, next_piece) in enumerate(zip(path, (*path[1:], None), strict=True), start=1):
         if isinstance(piece, int) and piece >= len(data):
-            return f"{shown(path[:end])}: the list has {len(data)} entries; use a number below that"
+            return f"{shown(path[:end])}: the list has {len(data)} entries; use an index below {len(data)}"
         if next_piece is None:
             data[piece] = value
             return None

@@ -125,7 +125,7 @@ class Fields:
         if not isinstance(value, int) or isinstance(value, bool):
             raise self.error(name, f"{_kind(value)} is not an integer")
         if not least <= value <= most:
-            raise self.error(name, f"is not within {least} to {most}")
+            raise self.error(name, f"is not between {least} and {most}")
         return value
 
     def number(self, name: str, least: float = -math.inf, most: float = math.inf) -> float:
@@ -140,7 +140,7 @@ class Fields:
         if not math.isfinite(number):
             raise self.error(name, "is not finite")
         if not least <= number <= most:
-            raise self.error(name, f"is not within {least:g} to {most:g}")
+            raise self.error(name, f"is not between {least:g} and {most:g}")
         return number
 
     def flag(self, name: str) -> bool:
@@ -193,9 +193,9 @@ def _text(value: object, path: str, most: int, least: int = 0) -> str:
     if not isinstance(value, str):
         raise ProtocolError(f"{path}: {_kind(value)} is not text")
     if not least <= len(value) <= most:
-        raise ProtocolError(f"{path}: has {len(value)} characters, not {least} to {most}")
+        raise ProtocolError(f"{path}: has {len(value)} characters; allowed are {least} to {most}")
     if any("\ud800" <= character <= "\udfff" for character in value):
-        raise ProtocolError(f"{path}: holds half a character")
+        raise ProtocolError(f"{path}: contains an unpaired surrogate")
     return value
 
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-_MEMORY = "a run stores next observations, as with false, because rows of all simulators lie in one line"
-_VECTOR = "a run makes the vector environment itself; write wrappers of one as trainer.environment.wrappers"
+_MEMORY = "in a run, its value is always false, because rows of all simulators share one buffer"
+_VECTOR = "a run makes the vector environment itself; write wrappers as trainer.environment.wrappers"
 _EVALUATION = "write trainer.evaluation"
 _COUNT = "write the count of a group of spec.simulators with role Collect"
 _STEPS = "write trainer.steps"
@@ -21,19 +21,19 @@ _NORMALIZE = "write trainer.algorithm.normalize"
 # replaces. The values are the remedies.
 ELSEWHERE: Mapping[str, str] = MappingProxyType(
     {
-        "_init_setup_model": "a run sets its model up itself; leave it out",
+        "_init_setup_model": "a run sets up its model itself; leave it out",
         "action_noise": "write noise_type and noise_std",
         "callback": "write trainer.algorithm.callbacks",
         "clip_obs": "write trainer.algorithm.normalize.clipObservations",
         "clip_reward": "write trainer.algorithm.normalize.clipRewards",
-        "device": "the trainer takes the GPU that its resources ask for; leave it out",
+        "device": "the trainer uses a GPU if its resources request one; leave it out",
         "env": "write trainer.environment",
         "env_kwargs": "write trainer.environment.options",
         "env_wrapper": "write trainer.environment.wrappers",
         "eval_episodes": f"{_EVALUATION}.episodes",
         "eval_freq": f"{_EVALUATION}.everySteps",
         "frame_stack": "write trainer.environment.frameStack",
-        "log_interval": "the log of a run has every figure; leave it out",
+        "log_interval": "the log of a run contains all figures; leave it out",
         "max_episode_steps": "write trainer.environment.options.max_episode_steps",
         "max_steps": "write trainer.steps, or trainer.environment.options for the steps of an episode",
         "monitor_kwargs": "a run records return, length and is_success of every episode; leave it out",
@@ -54,7 +54,7 @@ ELSEWHERE: Mapping[str, str] = MappingProxyType(
         "timesteps": _STEPS,
         "total_timesteps": _STEPS,
         "vec_env_wrapper": _VECTOR,
-        "verbose": "the log of a run has every figure; leave it out",
+        "verbose": "the log of a run contains all figures; leave it out",
     }
 )
 # The names in this table that occur only in files of RL-Baselines3-Zoo.
@@ -73,7 +73,8 @@ _HINDSIGHT = (
 # Values: the reason and the remedy.
 NO_ALGORITHM: Mapping[str, str] = MappingProxyType(
     {
-        "ars": "ARS learns from whole returns, which rows of broken simulators would enter; use another one",
+        "ars": "ARS learns from whole returns, which would include rows of broken simulators; use another "
+        "one",
         "her": _HINDSIGHT,
     }
 )

@@ -180,7 +180,7 @@ class _Handler(BaseHTTPRequestHandler):
         if route is not None:
             self._send(self._called(route, body))
         elif any(known == path for _, known in routes):
-            fact = f"{path}: does not take {self.command}"
+            fact = f"{path}: does not accept {self.command}"
             self._send(error_response(HTTPStatus.METHOD_NOT_ALLOWED, fact))
         else:
             known = ", ".join(sorted({known for _, known in routes}))

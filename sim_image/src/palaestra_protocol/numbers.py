@@ -29,7 +29,7 @@ def seconds(text: str) -> float:
     """Return the number of seconds in `text`, finite and above 0; for argparse's `type`."""
     number = _finite(text)
     if number <= 0.0:
-        raise ArgumentTypeError(f"{text} is refused; give more than 0")
+        raise ArgumentTypeError(f"{text} is refused; give a number above 0")
     return number
 
 

@@ -85,9 +85,9 @@ class Triangles:
         flat = _numbers(fields, "points", 3 * MOST_POINTS)
         corners = fields.parts("triangles", _index, 3 * MOST_TRIANGLES)
         if len(flat) % 3 or len(corners) % 3:
-            raise ProtocolError(f"{path or 'body'}: points or triangles are not in threes")
+            raise ProtocolError(f"{path or 'body'}: the number of points or triangles is not a multiple of 3")
         if corners and max(corners) >= len(flat) // 3:
-            raise fields.error("triangles", "names a point that is missing")
+            raise fields.error("triangles", "refers to a point that does not exist")
         return cls(
             points=tuple(zip(flat[::3], flat[1::3], flat[2::3], strict=True)),
             triangles=tuple(zip(corners[::3], corners[1::3], corners[2::3], strict=True)),
@@ -247,11 +247,11 @@ class VisibleScene:
         names = [node.name for node in self.nodes]
         shapes = [shape for node in self.nodes for shape in node.shapes]
         if len(set(names)) != len(names):
-            raise ProtocolError(f"{path or 'body'}.nodes: two have the same name")
+            raise ProtocolError(f"{path or 'body'}.nodes: two nodes have the same name")
         if len(shapes) > MOST_SHAPES or sum(len(mesh.points) for mesh in self.meshes) > MOST_POINTS:
             raise ProtocolError(f"{path or 'body'}: more than {MOST_SHAPES} shapes or {MOST_POINTS} points")
         if any(shape.mesh is not None and shape.mesh >= len(self.meshes) for shape in shapes):
-            raise ProtocolError(f"{path or 'body'}.nodes: a shape names a mesh that is missing")
+            raise ProtocolError(f"{path or 'body'}.nodes: a shape refers to a mesh that does not exist")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -120,7 +120,13 @@ class Program:
             if not is_mjcf(read_bounded(world_path)):
                 return wbt(world_path, mode)
             if self.mjcf is None:
-                raise WorldError(world_path.name, 1, 1, f"{self.name} simulates no MJCF", "use driver mujoco")
+                raise WorldError(
+                    world_path.name,
+                    1,
+                    1,
+                    f"{self.name} cannot load MJCF, and the world is a model of MuJoCo",
+                    "use driver mujoco",
+                )
             return self.mjcf(world_path, mode, leave_out, options.root)
 
         return load
@@ -174,7 +180,7 @@ class _Process:
 
     def lose_master(self) -> None:
         """Exit as if the ROS master no longer responded."""
-        log.warning("no ROS master at %s: a fault", self._master_uri)
+        log.warning("an injected fault: the ROS master at %s counts as lost", self._master_uri)
         for node in self._nodes.values():
             if isinstance(node, faults.FaultyNode):
                 node.lose_master()

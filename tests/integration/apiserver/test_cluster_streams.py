@@ -75,7 +75,7 @@ def test_output_without_the_word_about_success_is_not_whole(rude, ends):
     """A failing node also closes its connections properly, so only the last message proves success."""
     rude.script.calls = [command(b"\x01half", ends=ends)]
 
-    with pytest.raises(Unreachable, match="broke off"):
+    with pytest.raises(Unreachable, match="ended early"):
         run(rude.api)
 
 

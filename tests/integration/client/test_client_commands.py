@@ -119,7 +119,7 @@ def test_options_that_exclude_each_other_are_2(typed):
     code, _, [line] = typed("get", "a", "-A")
 
     assert code == 2
-    assert line == "NAME: cannot be combined with -A and -l; remove one of them"
+    assert line == "NAME: cannot be combined with -A or -l; remove NAME or the options"
 
 
 def test_describe_tells_status_and_events(typed, place, tell):
@@ -288,7 +288,7 @@ def test_restart_refuses_a_job_that_has_lost_nothing(typed, place, tell):
     code, out, [line] = typed("restart", "a")
 
     assert (code, out) == (1, [])
-    assert line.startswith("job a: no replica has the reason RunLost, so none is restarted; ")
+    assert line.startswith("job a: no replica has the reason RunLost, so no run is restarted; ")
     assert "annotations" not in place.get(TRAINING_JOBS, "a")["metadata"]
 
 

@@ -183,7 +183,7 @@ def test_mistakes_are_raised_before_anything_is_started(job, tmp_path):
     """The call that contains the mistake must raise the exception."""
     with pytest.raises(SpecErrors, match=r"spec.seed: -1 is less than 0"):
         palaestra.run(job(END, seed=-1), runs=tmp_path)
-    with pytest.raises(RunRefused, match="choose one with replica="):
+    with pytest.raises(RunRefused, match="choose it with replica="):
         palaestra.run(job(END, replicas=2), runs=tmp_path)
     with pytest.raises(RunRefused, match="use 0 to 1"):
         palaestra.run(job(END, replicas=2), replica=2, runs=tmp_path)

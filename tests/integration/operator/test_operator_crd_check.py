@@ -57,7 +57,7 @@ def test_an_outdated_definition_is_logged_and_measured(older, tmp_path):
     kubeconfig = older.kubeconfig_of(USER, "system:serviceaccounts")
     operator = RunningOperator(kubeconfig, tmp_path / "operator.log", "--no-leader-elect")
     try:
-        [said] = eventually(lambda: operator.said("definition outdated"))
+        [said] = eventually(lambda: operator.said("CustomResourceDefinition outdated"))
 
         types = "status.conditions[].type: lacks Reconciling, Stalled"
         assert sorted(said["lacks"]) == [types, "status.running: is missing"]
@@ -75,4 +75,4 @@ def test_the_definition_of_this_release_is_asked_for_once(place, start, installe
     eventually(lambda: f"{OUTDATED} 0.0" in operator.ask("/metrics").splitlines())
     asked = [line for line in operator.ask("/metrics").splitlines() if 'resource="openapi"' in line]
     assert asked == ['palaestra_operator_requests_total{code="200",resource="openapi",verb="get"} 1.0']
-    assert operator.said("definition outdated") == []
+    assert operator.said("CustomResourceDefinition outdated") == []

@@ -41,7 +41,7 @@ def test_a_process_returns_the_verdicts_on_several_worlds() -> None:
     found = WorldCheckProcess().check([FINE, wrong])
 
     assert found[FINE.digest] == WorldVerdict()
-    assert found[wrong.digest].problem.startswith(f"{FIELD}:2:1: }} where the type of a node should be")
+    assert found[wrong.digest].problem.startswith(f"{FIELD}:2:1: found }} where the type of a node should be")
 
 
 @pytest.mark.parametrize(

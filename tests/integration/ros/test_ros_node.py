@@ -183,16 +183,16 @@ def test_a_request_that_cannot_be_read_fails_alone(peer, dial):
     refused = (read_exactly(connection, 1), read_frame(connection))
     answered = (read_exactly(connection, 1), read_frame(connection))
 
-    assert refused == (b"\x00", b"3 bytes for 8")
+    assert refused == (b"\x00", b"3 bytes instead of 8")
     assert answered == (b"\x01", b"\x01")
 
 
 @pytest.mark.parametrize(
     ("header", "fact"),
     [
-        ({"service": "/nobody/here", "md5sum": "*"}, "no such service /nobody/here"),
-        ({"topic": "/nobody/value", "md5sum": "*"}, "no such topic /nobody/value"),
-        ({}, "no such topic None"),
+        ({"service": "/nobody/here", "md5sum": "*"}, "this node has no service /nobody/here"),
+        ({"topic": "/nobody/value", "md5sum": "*"}, "this node has no topic /nobody/value"),
+        ({}, "this node has no topic None"),
     ],
 )
 def test_a_wrong_header_is_answered_with_an_error(dial, header, fact):

@@ -127,7 +127,7 @@ def test_arguments_rename_our_node_as_they_rename_rospys(arguments, name):
 
 def test_a_name_that_no_node_can_have_is_refused():
     """The master would accept the name, but tools would not find the node."""
-    with pytest.raises(ConfigurationError, match="__name:=my robot: is not a name of ROS; begin"):
+    with pytest.raises(ConfigurationError, match="__name:=my robot: is not a valid ROS name; begin"):
         full_name("tester", ["__name:=my robot"], {})
 
 

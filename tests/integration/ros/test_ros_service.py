@@ -144,7 +144,7 @@ def test_a_failed_call_is_wrong_data_with_the_servers_words(service):
 
 def test_a_service_that_does_not_answer_hangs(service):
     """A proxy of rospy would wait forever here, and training would stop."""
-    with pytest.raises(SimulatorHung, match=r"does not answer within 0\.2 s"):
+    with pytest.raises(SimulatorHung, match=r"does not respond within 0\.2 s"):
         service("never", deadline_s=0.2)(ask=True)
 
 

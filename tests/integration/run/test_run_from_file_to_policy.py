@@ -210,7 +210,9 @@ def test_a_finished_run_is_reported_and_not_repeated(finished):
     code, output = finished.run.start().end()
 
     assert code == 0
-    assert "finished already; more spec.trainer.steps prolong it, --fresh starts a new run" in output
+    assert (
+        "already finished; to prolong it, raise spec.trainer.steps; to start a new run, add --fresh" in output
+    )
     assert (finished.run.directory / "attempts.jsonl").read_text() == before
 
 

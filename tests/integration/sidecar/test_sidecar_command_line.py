@@ -37,12 +37,18 @@ def test_help_says_what_it_reads_and_writes_and_how_it_ends() -> None:
         (["--control=7100"], "argument --control: '7100' is not an address such as 127.0.0.1:7100; see"),
         (["--control=0.0.0.0:0"], "--control: 0.0.0.0:0 is not a loopback address; use 127.0.0.1 or [::1]"),
         (["--health=203.0.113.1:0"], "--health: 203.0.113.1:0: Cannot assign requested address; "),
-        (["--job=j"], "--work: is missing; with --job, give the folder for the generated world"),
+        (["--job=j"], "--work: is missing, but required with --job; give the folder"),
         (["--standby"], "--standby: two simulators need different ROS names; give --job and --work"),
         (["--job=j", "--work=/proc/x"], "--work: /proc/x: No such file or directory; give a folder"),
         (["--driver=command"], "--driver command: has no program; add it after --, as in -- sim {world}"),
-        (["--driver=command", "--", "no-such"], "--driver command: program no-such not found; install"),
-        (["--", "sim"], "--driver stub: takes no program; use --driver command"),
+        (
+            ["--driver=command", "--", "no-such"],
+            "--driver command: the program no-such was not found; install",
+        ),
+        (
+            ["--", "sim"],
+            "--driver stub: does not take a program; remove the program, or use --driver command",
+        ),
         (["--speed=2"], "unrecognized arguments: --speed=2; see --help"),
     ],
 )

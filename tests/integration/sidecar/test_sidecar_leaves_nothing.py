@@ -116,7 +116,9 @@ def test_a_killed_reaper_is_a_fault_and_leaves_no_process(sidecar, family, left,
     os.kill(reaper, signal.SIGKILL)
     failed = it.until(SidecarState.FAILED)
 
-    assert failed.detail.startswith("the simulator ended: its reaper ended before it")
+    assert failed.detail.startswith(
+        "the simulator ended: the reaper of the simulator ended before the simulator"
+    )
     eventually_true(lambda: left() == {it.process.pid})
     assert it.start().starts == 2
 

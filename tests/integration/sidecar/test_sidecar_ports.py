@@ -128,7 +128,7 @@ def test_the_metrics_know_the_processor_time_of_the_whole_family(sidecar) -> Non
         ({"deadline": 1}, "deadline: is not a field of this request"),
         ({}, "deadline_s: is missing"),
         ([], "body: a list is not an object"),
-        ({"deadline_s": -1}, "deadline_s: is not within 0 to 3600"),
+        ({"deadline_s": -1}, "deadline_s: is not between 0 and 3600"),
     ],
 )
 def test_a_wrong_body_is_named_and_changes_nothing(sidecar, waits, body, error) -> None:
@@ -192,8 +192,8 @@ def test_a_port_in_use_is_one_clear_line_and_nothing_is_started(sidecar, argumen
 
     assert (second.returncode, second.stdout) == (2, "")
     assert second.stderr == (
-        f"palaestra-sidecar: --control: {taken}: Address already in use; choose another, or 0 for a "
-        "free one\n"
+        f"palaestra-sidecar: --control: {taken}: Address already in use; choose another port, or 0 for a "
+        "free port\n"
     )
 
 

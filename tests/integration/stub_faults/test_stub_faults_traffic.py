@@ -95,7 +95,7 @@ def test_an_answer_cut_short_cannot_be_read(connected):
     _, service = connected("wrong_shape:service=robot/get_basic_time_step,call=1")
     ask = service("robot/get_basic_time_step")
 
-    with pytest.raises(WrongData, match="4 bytes for 8"):
+    with pytest.raises(WrongData, match="4 bytes instead of 8"):
         ask(ask=True)
     assert ask(ask=True).value == 32.0
 

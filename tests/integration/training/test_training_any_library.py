@@ -120,7 +120,7 @@ def test_an_environment_without_a_name_needs_a_job():
         ConfigurationError, match="environment: none was given, and PALAESTRA_CONFIG is not set"
     ):
         palaestra_trainer.make_env()
-    with pytest.raises(ConfigurationError, match=r"options were given without it \(max_steps\)"):
+    with pytest.raises(ConfigurationError, match=r"its options were given \(max_steps\)"):
         palaestra_trainer.make_vec_env(max_steps=3)
     with pytest.raises(ConfigurationError, match="num_envs: 0 is not a number"):
         palaestra_trainer.make_vec_env(TASK, 0)

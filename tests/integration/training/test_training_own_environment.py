@@ -68,7 +68,7 @@ def test_an_own_environment_without_reward_trains(train):
         ("size=1", "self.SEEN", "accepts neither robot nor scene"),
         ("robot, scene", "np.zeros(3, np.float32)", "shape (3,), not (2,)"),
         ("robot, scene", "np.zeros(2)", "dtype float64, not float32"),
-        ("robot, scene", "self.SEEN + 2", "2.0 at [0], not within -1.0 and 1.0"),
+        ("robot, scene", "self.SEEN + 2", "2.0 at [0], not between -1.0 and 1.0"),
     ],
     ids=["signature", "shape", "dtype", "range"],
 )

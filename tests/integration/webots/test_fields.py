@@ -55,17 +55,17 @@ def test_one_of_several_values_is_chosen_by_its_index(arena):
 @pytest.mark.parametrize(
     ("node", "field", "value", "fact"),
     [
-        ("TARGET", "translation", (0.5, 0.5), r"TARGET.translation: holds x, y, z, not \(0.5, 0.5\)"),
-        ("TARGET", "translation", 1.0, "TARGET.translation: holds x, y, z, not 1.0"),
-        ("TARGET", "translation", (0.5, 0.5, math.nan), "TARGET.translation: holds x, y, z, not "),
+        ("TARGET", "translation", (0.5, 0.5), r"TARGET.translation: \(0.5, 0.5\) does not fit; give x, y, z"),
+        ("TARGET", "translation", 1.0, "TARGET.translation: 1.0 does not fit; give x, y, z"),
+        ("TARGET", "translation", (0.5, 0.5, math.nan), "TARGET.translation: .* does not fit; give x, y, z"),
         (
             "TARGET",
             "rotation",
             (0.0, 0.0, 0.0, 1.0),
             "TARGET.rotation: holds x, y, z of an axis and an angle",
         ),
-        ("ROBOTINO", "customData", 3, "ROBOTINO.customData: holds text, not 3"),
-        ("BODY", "radius", True, "BODY.radius: holds a finite number, not True"),
+        ("ROBOTINO", "customData", 3, "ROBOTINO.customData: 3 does not fit; give text"),
+        ("BODY", "radius", True, "BODY.radius: True does not fit; give a finite number"),
         ("TARGET", "children", "x", "TARGET.children: holds nodes, not values"),
     ],
 )
@@ -88,7 +88,7 @@ def test_a_node_or_field_that_is_not_there_is_named(arena):
     """A request with the handle 0 would have no effect, so the error must name the missing node."""
     with pytest.raises(WrongData, match="the world has no node DEF NOTHING"):
         arena.scene.supervisor.get_field("NOTHING", "translation")
-    with pytest.raises(WrongData, match="the world has TARGET has no field color"):
+    with pytest.raises(WrongData, match="TARGET has no field color"):
         arena.scene.supervisor.get_field("TARGET", "color")
 
 

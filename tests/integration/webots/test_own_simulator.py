@@ -132,7 +132,7 @@ def test_a_facade_s_simulator_that_breaks_is_mended_where_it_broke(webots):
     *_, truncated, info = webots.run(lambda: env.step(0))
 
     assert truncated
-    assert "was restarted during an episode" in info["palaestra"]["sim_fault"]["fact"]
+    assert "was restarted during the episode" in info["palaestra"]["sim_fault"]["fact"]
     webots.run(lambda: env.reset(seed=1))
     assert not webots.run(lambda: env.step(0))[3]
     env.close()

@@ -141,7 +141,7 @@ def test_a_world_with_a_separate_supervisor_works_too(start):
 @pytest.mark.parametrize("ask", [Robotino.distances, Robotino.bumped])
 def test_readings_are_asked_for_in_vain_before_the_first_period(arena, ask):
     """Without a reading, `False` would be a guess, and a TypeError would not explain the cause."""
-    with pytest.raises(NoReading, match=r"let a period pass by advance\(\)"):
+    with pytest.raises(NoReading, match=r"call advance\(\) first"):
         ask(arena.robot)
 
     arena.robot.advance()

@@ -135,7 +135,7 @@ def test_a_simulator_that_runs_is_used_with_an_attached_launcher_only(make):
 
     with guest:
         assert guest.observer.time() == owner.observer.time()
-    with pytest.raises(ConfigurationError, match="only attached to this simulator; stop it where"):
+    with pytest.raises(ConfigurationError, match="cannot stop a simulator; stop it where"):
         guest.stop()
 
     assert owner.available()

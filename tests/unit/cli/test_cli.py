@@ -68,7 +68,7 @@ def test_a_file_too_large_for_what_it_should_be_is_refused_by_its_size(fails, tm
     [line] = fails(*command, file)
 
     assert re.fullmatch(
-        rf"{file}: has more than (8|64) MiB, more than such a file can have; name another one", line
+        rf"{file}: is larger than (8|64) MiB, the limit for such a file; name another file", line
     )
 
 
@@ -161,7 +161,7 @@ def test_world_without_a_job_is_refused(tmp_path, fails):
 
     [line] = fails("world", path, "--group", "g")
 
-    assert line == "--job and --group: at least one is missing; give both, or --check"
+    assert line == "--job and --group: at least one of them is missing; give both, or use --check"
 
 
 def test_world_can_be_checked_by_each_simulator(tmp_path, capsys):
@@ -281,7 +281,7 @@ def test_a_replica_that_the_job_does_not_have_is_refused(job, tmp_path, fails):
     """A user may count the replicas from 1, so the message shows the numbers that exist."""
     [line] = fails("run", job, "--replica", "2", "--dir", tmp_path / "runs")
 
-    assert line == "--replica 2: the job has 2; use 0 to 1, or raise spec.replicas"
+    assert line == "--replica 2: the job has 2 replicas; use 0 to 1, or raise spec.replicas"
 
 
 def test_an_operator_that_cannot_be_is_not_started(fails):
@@ -310,7 +310,7 @@ A_KEY = "use a key such as example.com/team, or a domain such as example.com/"
             "operator --node-selector=gpu",
             "--node-selector: 'gpu' is not a label; use a label such as kubernetes.io/arch=amd64",
         ),
-        ("try FILE --within=0", "--within: 0 is refused; give more than 0"),
+        ("try FILE --within=0", "--within: 0 is refused; give a number above 0"),
         ("delete a --timeout=soon", "--timeout: 'soon' is not a number"),
         ("logs a --tail=-3", "--tail: -3 is refused; give 0 or more"),
         ("fetch a --replica=1.5", "--replica: '1.5' is not a whole number"),
@@ -330,7 +330,7 @@ def test_what_is_tried_here_is_not_an_option_of_a_cluster(job, fails, option):
     """A person who forgets `--local` would otherwise start the trial in a cluster."""
     [line] = fails("try", job, option)
 
-    assert line == "--agent, --episodes, --json: are for --local; add it, or leave them out"
+    assert line == "--agent, --episodes, --json: work only with --local; add --local, or remove them"
 
 
 def test_a_simulator_of_ones_own_cannot_be_tried_here(job, fails):
@@ -345,7 +345,7 @@ def test_a_simulator_of_ones_own_cannot_be_tried_here(job, fails):
     [line] = fails("try", "--local", job)
 
     assert line.startswith(
-        "spec.simulators[0].driver: command cannot be tried here; set stub, mujoco or webots"
+        "spec.simulators[0].driver: episodes cannot be tried with command; set stub, mujoco or webots"
     )
 
 

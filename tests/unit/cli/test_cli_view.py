@@ -27,14 +27,17 @@ def test_a_missing_library_is_named_with_the_command_that_installs_it(run, monke
 
     assert main(["view", run]) == 2
     assert capsys.readouterr().err == (
-        "viser is not installed, which a view needs; install it: pip install 'palaestra[view]'\n"
+        "a view needs the package viser, which is not installed; install it: pip install 'palaestra[view]'\n"
     )
 
 
 def test_another_simulator_is_refused_with_the_known_ones(run, capsys):
     """The user must learn which simulators the run has."""
     assert main(["view", run, "--simulator", "collect-7"]) == 2
-    assert capsys.readouterr().out == "--simulator collect-7: the run has collect-0\n"
+    assert (
+        capsys.readouterr().out
+        == "--simulator collect-7: the run has no such simulator; use one of collect-0\n"
+    )
 
 
 def test_a_folder_without_a_run_is_refused(tmp_path, capsys):

@@ -144,7 +144,7 @@ def test_nonsense_of_a_pod_is_refused(serve, run):
     """A program in a pod may send any response."""
     (source,) = LocalRun(run(serve(scene=answer(MOVED)))).sources()
 
-    with pytest.raises(NotShown, match="answered /scene with world: is missing"):
+    with pytest.raises(NotShown, match="invalid response to /scene: world: is missing"):
         source.scene()
 
 
@@ -154,7 +154,7 @@ def test_a_folder_that_is_no_run_is_refused_with_the_one_to_give(run, tmp_path):
         LocalRun(tmp_path)
 
     first, second = run("127.0.0.1:9"), run("127.0.0.1:9", replica="1")
-    with pytest.raises(NoRun, match=f"give one of {first}, {second}"):
+    with pytest.raises(NoRun, match=f"name one of their folders: {first}, {second}"):
         LocalRun(first.parent)
 
 

@@ -180,7 +180,7 @@ def test_a_nearly_full_disk_is_refused(request_for, monkeypatch):
     """The run would fail later, while it writes a checkpoint."""
     monkeypatch.setattr(preflight, "LEAST_FREE", 2**62)
 
-    with pytest.raises(RunRefused, match=r"MiB are free and a run takes .*--dir"):
+    with pytest.raises(RunRefused, match=r"MiB are free, but a run needs .*--dir"):
         preflight.check(request_for())
 
 

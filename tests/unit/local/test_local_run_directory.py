@@ -64,7 +64,7 @@ def test_more_steps_prolong_a_run_and_change_nothing_else(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "line"),
     [
-        ({}, "spec.trainer.steps: was 100, is 50; raise it to prolong the run, it cannot be lowered"),
+        ({}, "spec.trainer.steps: was 100, is 50; it can only be raised, to prolong the run"),
         ({"seed": 2}, "spec.seed: was 1, is 2"),
     ],
     ids=["fewer steps", "another seed"],
@@ -144,7 +144,7 @@ def test_a_run_with_a_checkpoint_is_never_corrected(directory):
     WRONG.keep(directory)
     (directory / "checkpoints" / "5000").mkdir(parents=True)
 
-    with pytest.raises(RunRefused, match="holds a run of the job as it was"):
+    with pytest.raises(RunRefused, match="has a run of an earlier version of the job"):
         run_directory.refuse_another_job(directory, record(seed=2))
 
 

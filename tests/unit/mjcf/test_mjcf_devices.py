@@ -134,15 +134,23 @@ def test_a_servo_for_a_position_goes_there_at_the_commanded_velocity(load):
 @pytest.mark.parametrize(
     ("actuator", "command", "message"),
     [
-        (FORCE, lambda motor: motor.set_position(1.0), "takes a force; set a force or torque, or write"),
-        (FORCE, lambda motor: motor.set_velocity(1.0), "takes a force; set a force or torque"),
-        (POSITION, lambda motor: motor.set_effort(1.0), "takes a position; set a position or velocity"),
+        (
+            FORCE,
+            lambda motor: motor.set_position(1.0),
+            "is controlled by force; set a force or torque, or write",
+        ),
+        (FORCE, lambda motor: motor.set_velocity(1.0), "is controlled by force; set a force or torque"),
+        (
+            POSITION,
+            lambda motor: motor.set_effort(1.0),
+            "is controlled by position; set a position or velocity",
+        ),
         (
             VELOCITY,
             lambda motor: motor.set_available_torque(1.0),
-            "whose force the model limits; write forcerange",
+            "only forcerange in the model can limit its force",
         ),
-        (POSITION, lambda motor: motor.set_acceleration(1.0), "whose acceleration MuJoCo does not limit"),
+        (POSITION, lambda motor: motor.set_acceleration(1.0), "MuJoCo cannot limit its acceleration"),
     ],
 )
 def test_a_command_that_the_actuator_cannot_follow_fails(load, actuator, command, message):

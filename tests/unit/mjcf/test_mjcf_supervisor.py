@@ -238,9 +238,9 @@ def test_nothing_is_added_to_or_removed_from_a_model(load):
     simulation = load()
     root = simulation.tree.field_of(simulation.tree.root, "children", simulation)
 
-    with pytest.raises(UnsimulatedError, match="keeps its bodies while it runs"):
+    with pytest.raises(UnsimulatedError, match="cannot change while it runs"):
         simulation.add("Solid { }", root, -1)
-    with pytest.raises(UnsimulatedError, match="keeps its bodies while it runs"):
+    with pytest.raises(UnsimulatedError, match="cannot change while it runs"):
         simulation.remove(simulation.tree.of_def("ball"))
 
 

@@ -334,7 +334,7 @@ except SimError as error:
     ("environment", "message"),
     [
         ({"PYOPENGL_PLATFORM": "glx"}, "install the Debian packages libegl1 libgl1-mesa-dri libopengl0"),
-        ({"MUJOCO_GL": "glfw"}, "MUJOCO_GL=glfw draws no pictures; use egl or osmesa"),
+        ({"MUJOCO_GL": "glfw"}, "MUJOCO_GL=glfw cannot draw pictures; use egl or osmesa"),
     ],
 )
 def test_a_machine_that_cannot_draw_simulates_the_rest(environment, message):

@@ -190,7 +190,7 @@ def test_a_pod_that_lies_for_ever_is_logged_once():
     with trainer(OK + b"[]") as pod, capture_logs() as logs, polling(pod.target()):
         pod.asked(5)
 
-    assert [each["event"] for each in logs if each["log_level"] == "warning"] == ["answer refused"]
+    assert [each["event"] for each in logs if each["log_level"] == "warning"] == ["response refused"]
 
 
 def test_a_job_is_looked_at_when_its_trainer_says_something_new_only():

@@ -46,5 +46,5 @@ def test_both_releases_read_each_other() -> None:
 
 def test_an_added_field_with_a_wrong_value_is_refused() -> None:
     """The field may be absent, but a wrong value is an error, as for any other field."""
-    with pytest.raises(ProtocolError, match=r"^loss: is not within 0 to inf$"):
+    with pytest.raises(ProtocolError, match=r"^loss: is not between 0 and inf$"):
         Later.from_json({"step": 7, "loss": -1})

@@ -30,7 +30,7 @@ def test_the_largest_picture_fits_into_a_response():
     ("changes", "problem"),
     [
         ({"width": 3}, "pixels: is not 3 by 1 pixels"),
-        ({"height": MOST_SIDE + 1}, "height: is not within 1 to 320"),
+        ({"height": MOST_SIDE + 1}, "height: is not between 1 and 320"),
         ({"pixels": "?"}, "pixels: is not compressed"),
         ({"pixels": base64.b64encode(b"raw").decode()}, "pixels: is not compressed"),
         ({"pixels": base64.b64encode(zlib.compress(bytes(10**7))).decode()}, "pixels: is not 2 by 1 pixels"),

@@ -138,11 +138,11 @@ def test_a_route_answers(server, request_, status, content_type, body) -> None:
             404,
             "path: is not one of /echo, /healthz, /readyz, /status, /wrong",
         ),
-        (b"GET /echo HTTP/1.1\r\n\r\n", 405, "/echo: does not take GET"),
+        (b"GET /echo HTTP/1.1\r\n\r\n", 405, "/echo: does not accept GET"),
         (
             b"POST /healthz HTTP/1.1\r\nContent-Length: 0\r\n\r\n",
             405,
-            "/healthz: does not take POST",
+            "/healthz: does not accept POST",
         ),
         (b"POST /echo HTTP/1.1\r\n\r\n", 411, "Content-Length: is missing"),
         (

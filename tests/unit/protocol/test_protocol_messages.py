@@ -78,22 +78,22 @@ def test_no_bytes_break_the_decoder(data) -> None:
     [
         ({"state": "happy"}, "state: 'happy' is not one of idle, starting, ready, stopping, failed"),
         ({"state": 3}, "state: a number is not text"),
-        ({"world": "x" * 5000}, "world: has 5000 characters, not 0 to 4096"),
-        ({"detail": "\ud800"}, "detail: holds half a character"),
-        ({"pid": 0}, "pid: is not within 1 to 4194304"),
+        ({"world": "x" * 5000}, "world: has 5000 characters; allowed are 0 to 4096"),
+        ({"detail": "\ud800"}, "detail: contains an unpaired surrogate"),
+        ({"pid": 0}, "pid: is not between 1 and 4194304"),
         ({"pid": True}, "pid: true or false is not an integer"),
         ({"starts": 1.0}, "starts: a number is not an integer"),
-        ({"faults": -1}, "faults: is not within 0 to 9007199254740992"),
-        ({"faults": 10**6000}, "faults: is not within 0 to 9007199254740992"),
-        ({"rss_bytes": -1}, "rss_bytes: is not within 0 to 9007199254740992"),
+        ({"faults": -1}, "faults: is not between 0 and 9007199254740992"),
+        ({"faults": 10**6000}, "faults: is not between 0 and 9007199254740992"),
+        ({"rss_bytes": -1}, "rss_bytes: is not between 0 and 9007199254740992"),
         ({"robots": {}}, "robots: an object is not a list"),
         ({"robots": [{}] * 33}, "robots: has 33 entries, more than 32"),
         ({"robots": [7]}, "robots[0]: a number is not an object"),
-        ({"robots": [{"robot": "r", "ros_name": ""}]}, "robots[0].ros_name: has 0 characters, not 1"),
+        ({"robots": [{"robot": "r", "ros_name": ""}]}, "robots[0].ros_name: has 0 characters; allowed are 1"),
         ({"left_out": "Drone"}, "left_out: text is not a list"),
-        ({"left_out": ["x" * 201]}, "left_out[0]: has 201 characters, not 0 to 200"),
+        ({"left_out": ["x" * 201]}, "left_out[0]: has 201 characters; allowed are 0 to 200"),
         ({"left_out": ["x"] * 17}, "left_out: has 17 entries, more than 16"),
-        ({"last_exit": {"code": 256}}, "last_exit.code: is not within 0 to 255"),
+        ({"last_exit": {"code": 256}}, "last_exit.code: is not between 0 and 255"),
         ({"last_exit": {"code": 1, "expected": 1}}, "last_exit.expected: a number is not true or"),
     ],
 )
@@ -207,7 +207,7 @@ def test_a_number_that_json_cannot_say_is_not_known(status) -> None:
 @pytest.mark.parametrize("share", [-0.01, 1.01])
 def test_a_success_rate_is_a_share(status, share) -> None:
     """A reader would take a rate in percent for the rate of a very good policy."""
-    with pytest.raises(ProtocolError, match=r"^success_rate: is not within 0 to 1$"):
+    with pytest.raises(ProtocolError, match=r"^success_rate: is not between 0 and 1$"):
         TrainerStatus.from_json(status(success_rate=share).to_json())
 
 
@@ -223,8 +223,8 @@ def test_an_interval_travels_with_its_rate(status) -> None:
 @pytest.mark.parametrize(
     ("changes", "mistake"),
     [
-        ({"low": -0.1}, "low: is not within"),
-        ({"high": 2}, "high: is not within"),
+        ({"low": -0.1}, "low: is not between"),
+        ({"high": 2}, "high: is not between"),
         ({"episodes": 0}, "episodes"),
     ],
 )
@@ -292,9 +292,9 @@ def test_a_kind_that_a_newer_release_added_is_ignored_in_a_table(status) -> None
     ("changes", "message"),
     [
         ({"faults": [1]}, r"^faults: a list is not an object$"),
-        ({"faults": {"dead": -1}}, r"^faults\.dead: is not within"),
+        ({"faults": {"dead": -1}}, r"^faults\.dead: is not between"),
         ({"goodput": {"learning": "long"}}, r"^goodput\.learning: text is not a number$"),
-        ({"goodput": {"learning": -0.1}}, r"^goodput\.learning: is not within"),
+        ({"goodput": {"learning": -0.1}}, r"^goodput\.learning: is not between"),
         ({"steps_lost": 1.5}, r"^steps_lost: a number is not an integer$"),
     ],
 )

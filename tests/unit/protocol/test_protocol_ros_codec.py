@@ -185,7 +185,7 @@ def test_a_value_that_does_not_fit_its_field_is_refused(text, value):
 
 def test_a_field_that_the_type_does_not_have_is_refused():
     """A mistyped field name would otherwise send an empty value."""
-    with pytest.raises(ValueError, match="demo/Test: no field vale"):
+    with pytest.raises(ValueError, match="demo/Test: the type has no field vale"):
         codec("string value").encode({"vale": "text"})
 
 

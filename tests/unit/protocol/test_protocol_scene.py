@@ -85,13 +85,16 @@ def test_a_number_that_is_not_finite_is_written_as_none() -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"nodes": [FLOOR.to_json()] * 2}, "body.nodes: two have the same name"),
-        ({"meshes": [{"points": [0.0], "triangles": []}]}, "meshes[0]: points or triangles are not in"),
-        ({"meshes": [{"points": [0.0] * 3, "triangles": [0, 0, 1]}]}, "meshes[0].triangles: names a point"),
+        ({"nodes": [FLOOR.to_json()] * 2}, "body.nodes: two nodes have the same name"),
+        ({"meshes": [{"points": [0.0], "triangles": []}]}, "meshes[0]: the number of points or triangles"),
+        (
+            {"meshes": [{"points": [0.0] * 3, "triangles": [0, 0, 1]}]},
+            "meshes[0].triangles: refers to a point",
+        ),
         ({"sky": [0.0, 0.0, 2.0]}, "sky: is not 3 numbers from 0 to 1"),
         (
             {"nodes": [FLOOR.to_json() | {"shapes": [BOX.to_json() | {"kind": "mesh", "mesh": 1}]}]},
-            "body.nodes: a shape names a mesh",
+            "body.nodes: a shape refers to a mesh",
         ),
         ({"nodes": [ROBOT.to_json() | {"pose": [0.0]}]}, "nodes[0].pose: is not 7 numbers"),
     ],

@@ -97,7 +97,7 @@ def test_a_program_of_ones_own_gets_the_world_where_it_asks_for_it(path) -> None
 
 def test_a_missing_program_is_named(tmp_path) -> None:
     """The sidecar reports the missing program before it starts anything; a retry cannot help."""
-    with pytest.raises(SidecarError, match=r"^--driver webots: program webots not found; install it"):
+    with pytest.raises(SidecarError, match=r"^--driver webots: the program webots was not found; install it"):
         command(Driver.WEBOTS, Launch(world=WORLD), {"PATH": str(tmp_path)})
 
 

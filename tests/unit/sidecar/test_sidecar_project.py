@@ -177,7 +177,9 @@ def test_a_work_folder_around_the_project_of_the_world_is_refused(source, tmp_pa
     """The sidecar would write the generated world among the sources and replace them by links."""
     world = source("x").parents[1].rename(tmp_path / "project") / "worlds" / "arena.wbt"
 
-    with pytest.raises(SidecarError, match=r"^--work: .*: has the project of the world; give another"):
+    with pytest.raises(
+        SidecarError, match=r"^--work: .*: contains the source project of the world; give another"
+    ):
         world_files.named(world, tmp_path, IDENTITY, clock=True, as_project=True)
     assert [path.name for path in world.parent.iterdir()] == ["arena.wbt"]
 
@@ -204,8 +206,11 @@ def test_files_above_the_project_are_found_from_the_generated_world(source, tmp_
 @pytest.mark.parametrize(
     ("root", "refusal"),
     [
-        ("source/lab", "source/lab: the world names files above it; name "),
-        ("source/shared", r"source/shared: is not above .*arena\.wbt; name a folder that holds the world"),
+        ("source/lab", "source/lab: the world refers to files outside of this folder; name "),
+        (
+            "source/shared",
+            r"source/shared: is not a folder above .*arena\.wbt; name a folder that contains the world",
+        ),
     ],
 )
 def test_a_root_that_does_not_hold_all_is_refused(source, tmp_path, root, refusal) -> None:

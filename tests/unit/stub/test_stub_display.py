@@ -82,7 +82,9 @@ def test_what_was_copied_can_be_pasted(painter):
     assert lit(picture)[4:] == ["......#.", "........"]
 
     assert robot.get("screen/image_delete", ir=image) == 1
-    with pytest.raises(ServiceFailed, match=f"no image {image}; make one with image_new or image_copy"):
+    with pytest.raises(
+        ServiceFailed, match=f"the image {image} does not exist; make one with image_new or image_copy"
+    ):
         robot.call("screen/image_paste", ir=image, x=0, y=0, blend=1)
 
 
@@ -141,9 +143,13 @@ def test_an_image_that_cannot_be_made_has_the_handle_0(painter, service, request
 @pytest.mark.parametrize(
     ("service", "request_", "fact"),
     [
-        ("image_new", {"width": 5000, "height": 1, "data": [0], "format": 3}, "width is beyond 4096"),
-        ("fill_oval", {"cx": 0, "cy": 0, "a": 1 << 30, "b": 1}, "a is beyond 4096"),
-        ("draw_polygon", {"x": [0, 5000], "y": [0, 0], "size": 2}, "x is beyond 4096"),
+        (
+            "image_new",
+            {"width": 5000, "height": 1, "data": [0], "format": 3},
+            "width has a number above 4096",
+        ),
+        ("fill_oval", {"cx": 0, "cy": 0, "a": 1 << 30, "b": 1}, "a has a number above 4096"),
+        ("draw_polygon", {"x": [0, 5000], "y": [0, 0], "size": 2}, "x has a number above 4096"),
     ],
 )
 def test_what_cannot_be_drawn_is_refused(painter, service, request_, fact):
@@ -221,6 +227,6 @@ def test_only_a_camera_that_sees_is_attached(start, world, ros):
     assert robot.get("screen/attach_camera", value="nose") is False
     with pytest.raises(ServiceFailed, match="lamp is not a Camera"):
         robot.call("screen/attach_camera", value="lamp")
-    with pytest.raises(ServiceFailed, match="eye has no image here"):
+    with pytest.raises(ServiceFailed, match="eye has no image in this simulator"):
         robot.call("screen/attach_camera", value="eye")
     assert robot.get("screen/detach_camera") is True

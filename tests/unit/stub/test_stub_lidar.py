@@ -111,7 +111,7 @@ def test_a_layer_can_be_asked_for(seer):
     image = robot.get("eye/get_layer_range_image", layer=1)
     assert (image.height, image.width) == (1, 3)
     assert floats(image.data)[1] == pytest.approx(1.9)
-    with pytest.raises(ServiceFailed, match="no layer 3; use one of 0 to 2"):
+    with pytest.raises(ServiceFailed, match="has no layer 3; use a layer from 0 to 2"):
         robot.call("eye/get_layer_range_image", layer=3)
 
 

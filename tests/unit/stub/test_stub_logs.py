@@ -31,5 +31,5 @@ def test_a_higher_level_silences_it(robot):
 
 def test_an_unknown_level_is_refused(robot):
     """A person who mistypes a level needs the list of the five levels of ROS."""
-    with pytest.raises(ServiceFailed, match="no level 'loud'; use debug, info, warn, error, fatal"):
+    with pytest.raises(ServiceFailed, match="'loud' is not a level; use debug, info, warn, error, fatal"):
         robot.call("set_logger_level", logger="ros", level="loud")

@@ -89,7 +89,9 @@ def test_available_torque_is_kept_within_the_limit(robot, asked, kept):
 
 def test_a_part_of_the_torque_of_a_wheel_is_refused(robot):
     """The stub has no masses, so it cannot compute how a robot drives with less torque."""
-    with pytest.raises(Exception, match="a part of the torque of 'wheel0_joint' is not simulated; set 0, or"):
+    with pytest.raises(
+        Exception, match="'wheel0_joint' cannot use a part of its torque in this simulator; set 0, or"
+    ):
         robot.call("wheel0_joint/set_available_torque", value=4.0)
 
 

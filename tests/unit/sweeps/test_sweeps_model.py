@@ -25,11 +25,11 @@ def test_the_job_is_inline_or_a_file_beside_the_sweep(sweep, tmp_path):
         ({**MATRIX, **RANDOM}, "spec: needs either matrix or random; give one of them"),
         (
             {**MATRIX, "trials": 3},
-            "spec.trials: is the number of random trials; give it with random, and only there",
+            "spec.trials: is the number of random trials; set it if random is set, and only then",
         ),
         (
             {**MATRIX, "optuna": {}},
-            "spec.optuna: searches in random; replace matrix by random, or remove optuna",
+            "spec.optuna: searches only in random; replace matrix by random, or remove optuna",
         ),
         ({"matrix": {"seed": []}}, "spec.matrix.seed: has no entry; give one or remove the line"),
         ({"matrix": {"a..b": [1]}}, "'a..b': is not the path of a field; write it as in spec.trainer.steps"),
@@ -51,7 +51,7 @@ def test_the_job_is_inline_or_a_file_beside_the_sweep(sweep, tmp_path):
         ),
         (
             {"random": {"seed": {"low": 0, "high": 1, "log": True}}, "trials": 1},
-            "spec.random.seed: log needs a low of more than 0; raise low, or remove log",
+            "spec.random.seed: log needs a low above 0; raise low, or remove log",
         ),
         ({**MATRIX, "seed": "x"}, 'spec.seed: "x" is text; write a whole number without quotes'),
         ({**MATRIX, "sedes": 1}, "spec.sedes: is not a field; use job, matrix, random, trials, seed, seeds"),

@@ -16,7 +16,7 @@ def test_more_trials_are_the_same_sweep_and_other_values_are_not(sweep, tmp_path
     trial_log.begin(folder, sweep(**RANDOM, trials=5))
 
     with pytest.raises(
-        RunRefused, match=r"spec\.random, spec\.seed: differs from that of the sweep in .*; change"
+        RunRefused, match=r"spec\.random, spec\.seed: differs from the sweep whose runs are in .*; undo"
     ):
         trial_log.begin(folder, sweep(random={"seed": {"low": 2, "high": 9}}, seed=2, trials=5))
 
@@ -29,7 +29,7 @@ def test_another_objective_compares_the_same_trials_unless_optuna_has_learned_fr
     trial_log.begin(tmp_path / "s", sweep(**RANDOM, trials=3, objective="MeanReturn"))
     trial_log.begin(tmp_path / "o", sweep(**RANDOM, trials=3, optuna={}))
 
-    with pytest.raises(RunRefused, match=r"spec\.objective: differs from that of the sweep"):
+    with pytest.raises(RunRefused, match=r"spec\.objective: differs from the sweep whose"):
         trial_log.begin(tmp_path / "o", sweep(**RANDOM, trials=3, optuna={}, objective="MeanReturn"))
 
 

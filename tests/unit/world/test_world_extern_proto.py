@@ -142,7 +142,7 @@ def test_a_file_that_is_no_proto_is_refused_under_its_type() -> None:
 
     assert refusals(result)["A"].startswith("/project/worlds/A.proto:2:15: this PROTO has a template")
     assert refusals(result)["B"].endswith(
-        "the file B.proto declares the PROTO Other; give file and PROTO the same name"
+        "the file B.proto declares the PROTO Other; give the file and the PROTO the same name"
     )
     assert list(result.local) == ["C"]
 

@@ -90,7 +90,7 @@ def test_the_end_of_the_file_name_follows_from_the_content():
             r"world:1:\d+: the file has a document type .*; remove it",
         ),
         (b"<a>" * 300 + b"</a>" * 300, "elements are nested more than 200 deep; use fewer"),
-        (with_custom(b'<text name="a"/>'), "a text in <custom> without data; write both"),
+        (with_custom(b'<text name="a"/>'), "a text in <custom> has no data; write both"),
         (with_custom(b'<text name="a" data="1"/>' * 2), "a second text is called 'a'; remove one"),
         (with_custom(b'<text name="controllerArgs" data="__name:=x"/>'), "__name:=x in controllerArgs"),
         (

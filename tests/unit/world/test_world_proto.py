@@ -90,28 +90,48 @@ def test_is_refers_to_a_field_of_the_proto() -> None:
 
 def test_a_world_still_has_no_is() -> None:
     """IS refers to a field that a PROTO declares, and a world declares no fields."""
-    with pytest.raises(WorldError, match="2:21: IS outside a PROTO file; write the value of translation"):
+    with pytest.raises(
+        WorldError, match="2:21: found IS outside a PROTO file; write the value of translation"
+    ):
         parse(f"{HEADER}Solid {{ translation IS place }}".encode())
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "2:1: the end of the file where PROTO should be; a PROTO file has one PROTO"),
-        ("Solid { }", "2:1: Solid where PROTO should be"),
-        ("PROTO { }", "2:7: { where the type of the PROTO should be"),
-        ("PROTO Stool { Solid { } }", "2:13: { where [ should be; the fields of a PROTO are declared in"),
+        ("", "2:1: found the end of the file where PROTO should be; a PROTO file has one PROTO"),
+        ("Solid { }", "2:1: found Solid where PROTO should be"),
+        ("PROTO { }", "2:7: found { where the type of the PROTO should be"),
+        (
+            "PROTO Stool { Solid { } }",
+            "2:13: found { where [ should be; the fields of a PROTO are declared in",
+        ),
         ("PROTO Stool [", '2:13: the "[" of Stool is never closed; add the missing "]"'),
-        ("PROTO Stool [ ] Solid { }", "2:17: Solid where { should be; the body of a PROTO is written"),
-        ("PROTO Stool [ ] { }", "2:19: } where the type of a node should be"),
-        ("PROTO Stool [ ] { USE A }", "2:19: a USE where the node of Stool should be; write the node out"),
-        ("PROTO Stool [ ] { Solid { } Solid { } }", "2:29: Solid where } should be; a PROTO has one node"),
-        ("PROTO Stool [ ] { Solid { } } PROTO", "2:31: PROTO after the end of the PROTO; remove it"),
-        ("EXTERNPROTO Leg PROTO Stool [ ] { }", "2:13: Leg where the address of an EXTERNPROTO should be"),
-        (declaring("exposedField SFBool a TRUE"), "3:1: exposedField where a field of Stool should be decl"),
-        (declaring("field SFVec4f a 0"), "3:7: SFVec4f where the type of a field of Stool should be; write"),
-        (declaring("field SFBool 1 TRUE"), "3:14: 1 where the name of a SFBool of Stool should be"),
-        (declaring('field SFString{"a" x "b"'), '3:22: "b" where the "{" of x should be'),
+        ("PROTO Stool [ ] Solid { }", "2:17: found Solid where { should be; the body of a PROTO is written"),
+        ("PROTO Stool [ ] { }", "2:19: found } where the type of a node should be"),
+        (
+            "PROTO Stool [ ] { USE A }",
+            "2:19: found a USE where the node of Stool should be; write the node out",
+        ),
+        (
+            "PROTO Stool [ ] { Solid { } Solid { } }",
+            "2:29: found Solid where } should be; a PROTO has one node",
+        ),
+        ("PROTO Stool [ ] { Solid { } } PROTO", "2:31: found PROTO after the end of the PROTO; remove it"),
+        (
+            "EXTERNPROTO Leg PROTO Stool [ ] { }",
+            "2:13: found Leg where the address of an EXTERNPROTO should be",
+        ),
+        (
+            declaring("exposedField SFBool a TRUE"),
+            "3:1: found exposedField where a field of Stool should be decl",
+        ),
+        (
+            declaring("field SFVec4f a 0"),
+            "3:7: found SFVec4f where the type of a field of Stool should be; write",
+        ),
+        (declaring("field SFBool 1 TRUE"), "3:14: found 1 where the name of a SFBool of Stool should be"),
+        (declaring('field SFString{"a" x "b"'), '3:22: found "b" where the "{" of x should be'),
         ('PROTO Stool [ field SFString{"a"', '2:29: the "{" of SFString is never closed'),
         (declaring("field SFVec3f a 0 0"), "3:17: the default of a is not of type SFVec3f; write 0 0 0"),
         (declaring("field SFVec3f a [ 0 0 0 ]"), "3:17: the default of a is not of type SFVec3f"),
@@ -125,7 +145,10 @@ def test_a_world_still_has_no_is() -> None:
             declaring("field MFString a [ 1 ]"),
             '3:18: the default of a is not of type MFString; write [ "text" ]',
         ),
-        (declaring("field SFBool a IS b"), "3:16: IS outside the body of the PROTO; write the value of a"),
+        (
+            declaring("field SFBool a IS b"),
+            "3:16: found IS outside the body of the PROTO; write the value of a",
+        ),
         (declaring("field SFBool a TRUE\nfield SFBool a TRUE"), "4:1: Stool declares the field a twice"),
         (
             "PROTO Stool [ ] {\n Solid { translation IS place } }",

@@ -96,7 +96,7 @@ def test_an_environment_that_the_file_does_not_name_gets_the_default_with_a_note
     result = convert(FILE, "ppo.yml", env="Own-v0")
 
     assert load(result.text).spec.trainer.steps == 1_000_000
-    assert "--env: ppo.yml does not name Own-v0; as in Zoo, it gets the entry default" in result.notes
+    assert "--env: ppo.yml has no entry Own-v0; as in Zoo, the job uses the entry default" in result.notes
 
 
 def test_every_note_is_a_comment_in_the_job():
@@ -134,18 +134,23 @@ def test_the_algorithm_is_the_given_one_else_the_files(file, algorithm, name):
             "--env: atari is not an environment in ppo.yml; use one of Reach",
         ),
         (OFF_POLICY, "sac.yml", {"env": "a-v2"}, "a-v2 is not an environment in sac.yml; did you mean a-v1?"),
-        (OFF_POLICY, "ars.yml", {}, "ars cannot be used: ARS learns from whole returns, which rows of"),
-        (OFF_POLICY, "mine.yml", {}, "mine.yml: its name is not an algorithm; give one as --algorithm: DQN"),
+        (OFF_POLICY, "ars.yml", {}, "ars cannot be used: ARS learns from whole returns, which would include"),
+        (
+            OFF_POLICY,
+            "mine.yml",
+            {},
+            "mine.yml: the file's name is not an algorithm; give one as --algorithm: DQN",
+        ),
         (OFF_POLICY, "sac.yml", {"algorithm": "SAK"}, "--algorithm: SAK is not an algorithm; give one as"),
         (
             "n_timesteps: 5",
             "sac.yml",
             {},
-            "sac.yml: has the hyperparameters of one environment and no id; give it as",
+            "sac.yml: has the hyperparameters of one environment, but not its id; give the id as",
         ),
         ("a-v1: {gamma: 1}", "sac.yml", {}, "sac.yml: the entry a-v1 has no n_timesteps; add it"),
         ("a-v1: [1]", "sac.yml", {}, "sac.yml: the entry a-v1 is not a mapping"),
-        ("- 1", "sac.yml", {}, "sac.yml: has no entries by environment"),
+        ("- 1", "sac.yml", {}, "sac.yml: has no entries with names of environments"),
         ("a: b: c", "sac.yml", {}, "sac.yml:1:5: not YAML"),
         ("!!python/object/apply:collections.OrderedDict []", "config.yml", {}, "config.yml that Zoo wrote"),
     ],
@@ -180,7 +185,7 @@ NOTED = [
         "env_wrapper: a run counts returns outside of the wrappers, and Zoo inside of them",
     ),
     ("env_wrapper: rl_zoo3.wrappers.FrameSkip", "rl_zoo3.wrappers.FrameSkip needs the package rl_zoo3"),
-    ("env_wrapper: [{a.Own: 1, b: 2}]", "is left out; it is not one class; check the indentation"),
+    ("env_wrapper: [{a.Own: 1, b: 2}]", "is left out, because it does not name a class"),
     ("vec_env_wrapper: a.Own", "vec_env_wrapper: a.Own is left out; a run makes the vector environment"),
     ("vec_env_wrapper: [{b.VecFrameStack: {n_stack: 2, channels_order: first}}]", "is left out; a run makes"),
     ("callback: stable_baselines3.common.callbacks.EvalCallback", "set trainer.evaluation"),
@@ -194,7 +199,7 @@ NOTED = [
     ),
     (
         "optimize_memory_usage: true",
-        "optimize_memory_usage: left out; a run stores next observations, as with",
+        "optimize_memory_usage: left out; in a run, its value is always false",
     ),
     ("noise_std: 0.1", "noise_std: 0.1 is left out; without noise_type it has no effect"),
     ("n_steps: 3", "n_steps: 3 is left out; rows of several simulators share a buffer, so only 1 works"),
@@ -208,7 +213,7 @@ NOTED = [
     ('policy_kwargs: "dict(a=Own, gamma=1)"', "policy_kwargs.a: left out; Own does not name a module"),
     ('policy_kwargs: "open(1)"', "policy_kwargs: left out; open(1) is not a mapping"),
     ("policy_kwargs: 3", "policy_kwargs: left out; 3 is not a mapping"),
-    ("verbose: 1", "verbose: left out; the log of a run has every figure"),
+    ("verbose: 1", "verbose: left out; the log of a run contains all figures"),
 ]
 
 

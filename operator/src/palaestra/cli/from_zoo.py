@@ -37,7 +37,7 @@ def add(commands: Commands) -> None:
 
 def _from_zoo(options: argparse.Namespace) -> int:
     if options.out is not None and options.out.exists():
-        raise PalaestraError(f"--out: {options.out} exists; name a new file, or remove it")
+        raise PalaestraError(f"--out: {options.out} already exists; name another file, or remove this one")
     converted = convert(
         read_text(options.file), options.file.name, env=options.env, algorithm=options.algorithm
     )

@@ -59,7 +59,7 @@ def _world(options: argparse.Namespace) -> int:
     if options.check:
         return _check(options)
     if options.job is None or options.group is None:
-        raise PalaestraError("--job and --group: at least one is missing; give both, or --check")
+        raise PalaestraError("--job and --group: at least one of them is missing; give both, or use --check")
     identity = RunIdentity(
         job=options.job,
         namespace=options.namespace,

@@ -145,7 +145,7 @@ def _resources(text: str) -> Resources:
         )
     except (AttributeError, TypeError, ValueError) as error:
         raise argparse.ArgumentTypeError(
-            f'{text!r} is not resources; use JSON such as {{"limits": {{"cpu": "500m"}}}}'
+            f'{text!r} does not describe resources; use JSON such as {{"limits": {{"cpu": "500m"}}}}'
         ) from error
 
 

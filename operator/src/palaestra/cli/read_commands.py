@@ -72,7 +72,7 @@ def _add_logs(commands: Commands) -> None:
 
 def _get(client: Client, options: argparse.Namespace) -> int:
     if options.name and (options.all_namespaces or options.selector):
-        raise PalaestraError("NAME: cannot be combined with -A and -l; remove one of them")
+        raise PalaestraError("NAME: cannot be combined with -A or -l; remove NAME or the options")
     show = _table if options.output in {None, "wide"} else _document
     return show(client, options, None if options.all_namespaces else client.namespace)
 

@@ -64,7 +64,9 @@ def _chosen(options: argparse.Namespace) -> int:
     if options.local:
         return _here(options)
     if options.agent is not None or options.episodes is not None or options.json:
-        raise PalaestraError("--agent, --episodes, --json: are for --local; add it, or leave them out")
+        raise PalaestraError(
+            "--agent, --episodes, --json: work only with --local; add --local, or remove them"
+        )
     work: Callable[[argparse.Namespace], int] = options.in_cluster
     return work(options)
 

@@ -161,7 +161,7 @@ def _extra(module: str, purpose: str) -> Any:
         return import_module(f"palaestra.sweeps.{module}")
     except ModuleNotFoundError as error:
         raise PalaestraError(
-            f"{purpose}: needs {error.name}; install palaestra[sweeps] (`make setup` does)"
+            f"{purpose}: needs the package {error.name}; install palaestra[sweeps] (`make setup` does)"
         ) from error
 
 

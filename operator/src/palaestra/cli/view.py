@@ -95,7 +95,9 @@ def _shown(options: argparse.Namespace, sources: Callable[[], Sequence[SidecarSo
     """Serve the page until the view ends, and return the exit code."""
     found = {source.name: source for source in sources()}
     if options.simulator is not None and options.simulator not in found:
-        say([f"--simulator {options.simulator}: the run has {', '.join(found)}"])
+        say(
+            [f"--simulator {options.simulator}: the run has no such simulator; use one of {', '.join(found)}"]
+        )
         return WRONG_INPUT
     try:
         with suppress(NotNow):  # the simulator may start later

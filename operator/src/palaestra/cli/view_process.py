@@ -28,7 +28,7 @@ def require_viser() -> None:
         ViserMissing: an optional package is not installed.
     """
     if find_spec("viser") is None:
-        fact = "viser is not installed, which a view needs"
+        fact = "a view needs the package viser, which is not installed"
         raise ViserMissing(f"{fact}; install it: pip install 'palaestra[view]'")
 
 

@@ -214,7 +214,7 @@ class Client:
             known = _containers(job, replica)
             if container not in known:
                 raise NoPod(
-                    f"pod {pod.name}: has no container {container}; it has {', '.join(known)}"
+                    f"pod {pod.name}: has no container {container}; its containers are {', '.join(known)}"
                 ) from error
             raise NoPod(
                 f"pod {pod.name}: {error.message}; `palaestra describe {name}` shows what the pod waits for"

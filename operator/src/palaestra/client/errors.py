@@ -48,7 +48,7 @@ class NoSuchNamespace(ClientError, LookupError):
     def of(cls, name: str) -> Self:
         """Return the error about a namespace of this name."""
         return cls(
-            f"namespace {name}: does not exist; choose another with -n, `kubectl get namespaces` lists them"
+            f"namespace {name}: does not exist; choose another with -n; `kubectl get namespaces` lists all"
         )
 
 
@@ -60,7 +60,7 @@ class NoSuchJob(ClientError, LookupError):
         """Return the error about a job of this name."""
         return cls(
             f"job {name}: does not exist in namespace {namespace}; "
-            "`palaestra get` lists the jobs of a namespace, -A of all namespaces"
+            "`palaestra get` lists the jobs of a namespace, `palaestra get -A` those of all namespaces"
         )
 
 
@@ -73,7 +73,7 @@ class QueueDecides(ClientError):
         return cls(
             f"job {name}: Kueue decides when it runs, because it is in queue {queue}; to stop it, delete "
             "it, or set spec.active of its Workloads to false "
-            f"(`kubectl get workloads -n {namespace}` lists them)"
+            f"(`kubectl get workloads -n {namespace}` lists the Workloads)"
         )
 
 
@@ -96,7 +96,7 @@ class NothingLost(ClientError):
     def of(cls, name: str) -> Self:
         """Return the error about the job of this name."""
         return cls(
-            f"job {name}: no replica has the reason RunLost, so none is restarted; to train from step 0 "
+            f"job {name}: no replica has the reason RunLost, so no run is restarted; to train from step 0 "
             "again, create a new job"
         )
 

@@ -108,8 +108,8 @@ def _with_remedies(source: RunSource, target: Path, deadline: float) -> Iterator
         ) from error
     except WrongArchive as error:
         raise NotFetched(
-            f"{source.directory} in pod {source.pod}: was refused: {error}; no file was written; inspect "
-            "the run, and raise --max-size if its files are only large"
+            f"{source.directory} in pod {source.pod}: was not copied, because {error}; no file was "
+            "written; inspect the run; if its files are good but large, raise --max-size"
         ) from error
     except OSError as error:
         raise NotFetched(f"{target}: {error}; choose a writable folder") from error
@@ -146,7 +146,7 @@ def _source(api: Api, job: TrainingJob, replica: int, deadline: float) -> Iterat
     if job.spec.storage.ephemeral:
         raise NotFetched(
             f"job {job.metadata.name}: spec.storage.ephemeral: the run was deleted with its pod; "
-            "fetch while the job runs, or create the next job without ephemeral"
+            "fetch while the job runs, or create the next job without this field"
         )
     with _reader(api, job, replica, template, deadline) as pod:
         yield RunSource(namespace=job.metadata.namespace, pod=pod, container=CONTAINER, directory=directory)
@@ -177,7 +177,7 @@ def _running(api: Api, job: TrainingJob, replica: int) -> str | None:
     if phase == "Pending":
         raise NotFetched(
             f"pod {name}: is about to start, and no other pod may use its volume; "
-            "run the same command again when it runs"
+            "run the same command again when the pod runs"
         )
     if phase == "Running" and _trainer_ended(status):  # the pod still stops its simulators
         raise NotFetched(f"pod {name}: its trainer has just ended; run the same command again in a minute")
@@ -187,7 +187,7 @@ def _running(api: Api, job: TrainingJob, replica: int) -> str | None:
         again = " again" if name is not None else ""
         raise NotFetched(
             f"job {job.metadata.name}: replica {replica} is about to be started{again}, and no other pod may "
-            "use its volume; run the same command again when it runs"
+            "use its volume; run the same command again when the replica runs"
         )
     return None
 
@@ -243,7 +243,9 @@ def _await(api: Api, pod: Object, deadline: float) -> None:
             f"pod {name}: did not start in time ({why or 'no reason reported'}); "
             "fix the cause, or allow more time with --timeout"
         ) from None
-    raise NotFetched(f"pod {name}: was deleted or ended before it was used; run the same command again")
+    raise NotFetched(
+        f"pod {name}: was deleted or ended before the run was copied; run the same command again"
+    )
 
 
 def hindrance(pod: Object) -> str:

@@ -46,13 +46,13 @@ def unpack(chunks: Iterator[bytes], into: Path, wanted: Collection[str], most_by
                 path = _path(member, wanted, seen)
                 seen.add(path)
                 left -= member.size
-                _refuse(f"its files have more than {most_bytes} bytes", when=left < 0)
+                _refuse(f"its files have more than {most_bytes} bytes together", when=left < 0)
                 stream.left = member.size + MOST_HEAD_BYTES
                 _write(tar, member, into / path)
     except WrongArchive:
         raise
     except (tarfile.TarError, ValueError, UnicodeError) as error:  # tarfile raises all three
-        raise WrongArchive(f"it is damaged ({one_line(str(error), 200)})") from error
+        raise WrongArchive(f"the archive from the pod is damaged ({one_line(str(error), 200)})") from error
     for _ in chunks:  # The exit code of the command is at the end of the stream.
         pass
 
@@ -83,9 +83,9 @@ def _path(member: tarfile.TarInfo, wanted: Collection[str], seen: _Seen) -> Pure
     shown = one_line(name, 100) or "a member without a name"
     asked_for = bool(path.parts) and (name in wanted or path.parts[0] in wanted) and ".." not in path.parts
     _refuse(f"{shown} is not a file of the run", when=not (asked_for and name.isprintable()))
-    _refuse(f"{shown} is not a plain file", when=not member.isreg() or member.issparse())
+    _refuse(f"{shown} is not a regular file", when=not member.isreg() or member.issparse())
     long = len(path.parts) > MOST_PARTS or any(len(part.encode()) > MOST_NAME_BYTES for part in path.parts)
-    _refuse(f"{shown} has too long a name", when=long)
+    _refuse(f"{shown} has a name that is too long", when=long)
     _refuse(f"{shown} occurs twice, or is a file and a folder", when=seen.clashes_with(path))
     _refuse(f"it has more than {MOST_FILES} files", when=len(seen.files) >= MOST_FILES)
     return path
@@ -99,7 +99,7 @@ def _refuse(fact: str, *, when: bool) -> None:
 def _write(tar: tarfile.TarFile, member: tarfile.TarInfo, path: Path) -> None:
     content = tar.extractfile(member)
     if content is None:
-        raise AssertionError("unreachable: a plain file has content")
+        raise AssertionError("unreachable: a regular file has content")
     path.parent.mkdir(parents=True, exist_ok=True)
     with content, path.open("xb") as target:
         shutil.copyfileobj(content, target)

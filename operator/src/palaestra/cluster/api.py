@@ -102,7 +102,7 @@ class Api:
         for resource in found:
             if name in resource.get("x-kubernetes-group-version-kind", ()):
                 return resource
-        raise NotFound(404, "NotFound", f"{path} has no {kind}")
+        raise NotFound(404, "NotFound", f"{path} has no schema of kind {kind}")
 
     def list(
         self,

@@ -40,9 +40,9 @@ def authorization(
     by_token = bool(user.get(TOKEN) or user.get(TOKEN_FILE))
     by_password = bool(user.get(NAME) or user.get(PASSWORD))
     if by_token and by_password:
-        raise NotConfigured(f"the user has both {TOKEN} and {NAME}; remove one")
+        raise NotConfigured(f"the user of the kubeconfig has both {TOKEN} and {NAME}; remove one of them")
     if user.get(EXEC) and user.get(PROVIDER):
-        raise NotConfigured(f"the user has both {EXEC} and {PROVIDER}; remove one")
+        raise NotConfigured(f"the user of the kubeconfig has both {EXEC} and {PROVIDER}; remove one of them")
     if user.get(TOKEN_FILE):
         return _of_file(folder / str(user[TOKEN_FILE]))
     if by_token:
@@ -102,5 +102,5 @@ def _always(header: str | None) -> Authorization:
 def _one_line(text: object, field: str) -> str:
     found = str(text).strip()
     if not found or not found.isascii() or not found.isprintable():
-        raise NotConfigured(f"{field} is not one line of text; write it as it was given")
+        raise NotConfigured(f"{field} is not one line of text; copy it again, on one line")
     return found

@@ -25,12 +25,14 @@ def impersonation(user: Mapping[str, Any]) -> Headers:
     if not isinstance(groups, list):
         raise NotConfigured(f"{GROUPS}: {groups!r} is not a list; write a list of groups")
     if not isinstance(extra, Mapping) or not all(isinstance(values, list) for values in extra.values()):
-        raise NotConfigured(f"{EXTRA}: {extra!r} is not usable; write a list of texts under each key")
+        raise NotConfigured(
+            f"{EXTRA}: {extra!r} is not a mapping of lists; write a list of texts under each key"
+        )
     name, uid = user.get(USER) or "", user.get(UID) or ""
     if not name:
         if groups or extra or uid:
             raise NotConfigured(
-                f"{USER} is missing, but required with {GROUPS}, {UID} or {EXTRA}; name the user there"
+                f"{USER} is missing, but required with {GROUPS}, {UID} or {EXTRA}; set it to the user's name"
             )
         return ()
     found = [("Impersonate-User", _text(name, USER))]

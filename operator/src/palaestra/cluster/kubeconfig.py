@@ -90,7 +90,9 @@ def namespace(files: str, context: str | None) -> str | None:
     except WRONG as error:
         raise NotConfigured(_fact(files, error)) from error
     if chosen is None:
-        raise NotConfigured(f"--context: {files} has no {name!r}; `kubectl config get-contexts` lists them")
+        raise NotConfigured(
+            f"--context: {files} has no context {name!r}; `kubectl config get-contexts` lists the contexts"
+        )
     return str(found) if found else None
 
 
@@ -108,7 +110,7 @@ def _merged(files: str) -> tuple[KubeConfigMerger, Any]:
 
 def _entry(node: ConfigNode) -> _Entry:
     if not isinstance(node.value, Mapping):
-        raise ConfigException(f"{node.name} has no fields")
+        raise ConfigException(f"{node.name} is not a mapping")
     return _Entry(node.value, Path(node.path or "").absolute().parent)
 
 
@@ -157,7 +159,7 @@ def _verification(authority: bytes | None, user: _Entry, *, insecure: bool) -> s
             ) from error
     elif certificate or key:
         missing = KEY if certificate else CERTIFICATE
-        raise NotConfigured(f"{missing} is missing; {CERTIFICATE} and {KEY} belong together")
+        raise NotConfigured(f"{missing} is missing, but {CERTIFICATE} and {KEY} work only together; set both")
     return found
 
 
@@ -193,7 +195,7 @@ def _authorization(
 
 def _of_provider(merger: KubeConfigMerger, context: str, provider: Mapping[str, Any]) -> Authorization:
     if (name := provider.get("name")) != OIDC:
-        raise NotConfigured(f"{PROVIDER}: {name!r} is not known any more; use a plugin under `exec`")
+        raise NotConfigured(f"{PROVIDER}: {name!r} is no longer supported; use a plugin under `exec`")
     configuration = Configuration()
     base: Any = None  # None selects each file's own folder
     loader = KubeConfigLoader(

@@ -103,7 +103,9 @@ class Plugin:
                 check=False,
             )
         except subprocess.TimeoutExpired as error:
-            raise self._failure(f"did not respond within {WAIT_S:.0f} s; run it by hand") from error
+            raise self._failure(
+                f"did not respond within {WAIT_S:.0f} s; run it by hand to see the reason"
+            ) from error
         except (OSError, ValueError) as error:
             raise self._failure(f"cannot be run ({error})") from error
         if ended.returncode:
@@ -136,7 +138,7 @@ class Plugin:
         if not token and not certificate:
             raise self._failure("returned neither a token nor a certificate")
         if bool(certificate) is not bool(key):
-            raise self._failure("returned a certificate without its key, or a key without its certificate")
+            raise self._failure("returned only one of certificate and key")
         if token and not (token.isascii() and token.isprintable()):
             raise self._failure("returned a token that is not one line of text")
         return Credentials(

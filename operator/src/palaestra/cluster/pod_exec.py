@@ -49,7 +49,7 @@ def open_socket(connection: socket, url: str, headers: Headers, wait_s: float) -
     except websocket.WebSocketBadStatusException as error:
         raise from_status(error.status_code, _decoded(error.resp_body)) from error
     except (websocket.WebSocketException, OSError) as error:
-        raise Unreachable(0, "Unreachable", f"{url.partition('?')[0]}: no answer ({error})") from error
+        raise Unreachable(0, "Unreachable", f"{url.partition('?')[0]}: no response ({error})") from error
 
 
 def output(command: websocket.WebSocket, deadline: float) -> Iterator[bytes]:
@@ -94,9 +94,9 @@ def _message(command: websocket.WebSocket, deadline: float) -> tuple[int, bytes]
     except websocket.WebSocketTimeoutException as error:
         raise Unreachable(0, "Timeout", "the command did not end in time") from error
     except (websocket.WebSocketException, OSError) as error:
-        raise Unreachable(0, "Unreachable", f"the command's output broke off ({error})") from error
+        raise Unreachable(0, "Unreachable", f"the command's output ended early ({error})") from error
     if opcode == websocket.ABNF.OPCODE_CLOSE:
-        raise Unreachable(0, "Unreachable", "the command's output broke off (the connection was closed)")
+        raise Unreachable(0, "Unreachable", "the command's output ended early (the connection was closed)")
     if opcode not in (websocket.ABNF.OPCODE_BINARY, websocket.ABNF.OPCODE_TEXT) or not frame.data:
         return -1, b""  # the frame is a ping, to which the library has responded, or empty
     return frame.data[0], frame.data[1:]

@@ -67,7 +67,8 @@ def definition(site: Site) -> Iterator[CheckResult]:
     if place:
         yield wrong(
             what,
-            f"their CustomResourceDefinition differs from that of {version('palaestra')} in {place}",
+            f"their CustomResourceDefinition differs from the definition of release {version('palaestra')} "
+            f"in {place}",
             f"{remedy}, or use the command line of the installed release",
         )
     else:
@@ -132,7 +133,7 @@ def judged_pod(made: Object) -> CheckResult:
         return right("sidecars", "stay unchanged when a pod is created")
     return wrong(
         "sidecars",
-        "something drops restartPolicy of init containers, so no pod of a job would become ready",
+        "the cluster drops restartPolicy of init containers, so no pod of a job would become ready",
         "update or remove the mutating webhook: `kubectl get mutatingwebhookconfigurations`",
     )
 

@@ -49,7 +49,7 @@ class LocalRun:
         except (OSError, ValueError) as error:
             raise NoRun(f"{file}: names no simulators ({error}); start the run again") from error
         if not found:
-            raise NoRun(f"{file}: names no simulators; there is nothing to see")
+            raise NoRun(f"{file}: names no simulators, so the view would be empty; start the run again")
         return found
 
 
@@ -74,5 +74,5 @@ def _replica_in(folder: Path) -> Path:
         return replicas[0]
     if replicas:
         names = ", ".join(str(replica) for replica in replicas)
-        raise NoRun(f"{folder}: has several replicas; give one of {names}")
+        raise NoRun(f"{folder}: has several replicas; name one of their folders: {names}")
     raise NoRun(f"{folder}: is not a run directory, which has {FILE}; give runs/JOB/REPLICA")

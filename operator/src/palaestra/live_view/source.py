@@ -185,7 +185,7 @@ class SidecarSource:
                 raise NotNow(f"{self.name}: its process does not run on this machine")
             os.kill(pid, number)
         except (OSError, http.client.HTTPException, ProtocolError) as error:
-            raise NotNow(f"{self.name}: has no process to signal ({error})") from error
+            raise NotNow(f"{self.name}: no signal could be sent to its process ({error})") from error
 
     def _read(self, kind: type[_Data], path: str, most_bytes: int) -> _Data:
         try:
@@ -199,7 +199,9 @@ class SidecarSource:
         try:
             return kind.from_json(decoded(body, most_bytes))
         except ProtocolError as error:
-            raise NotShown(f"{self.name}: its sidecar answered /{path} with {error}") from error
+            raise NotShown(
+                f"{self.name}: its sidecar sent an invalid response to /{path}: {error}"
+            ) from error
 
 
 def at_address(host: str, port: int) -> Fetch:

@@ -49,7 +49,9 @@ class Log:
             folder.mkdir(parents=True, exist_ok=True)
             self._file = self.path.open("a+b", buffering=0)
         except OSError as error:
-            raise StorageFailed(f"{self.path}: {error.strerror}; make room for it") from error
+            raise StorageFailed(
+                f"{self.path}: {error.strerror}; free some space, or choose another folder with --dir"
+            ) from error
         self._limited = LimitedFile(self._file.fileno())
 
     def begin(self, terminal: int | None = None) -> int:

@@ -67,7 +67,9 @@ def read_pod(template: Mapping[str, Any], uid: str) -> Pod:
     spec = template["spec"]
     main, *others = spec["containers"]
     if others:
-        raise RunRefused(f"container {others[0]['name']}: a pod is run here with one main container only")
+        raise RunRefused(
+            f"container {others[0]['name']}: a pod that runs on this machine can have only one main container"
+        )
     return Pod(
         uid=uid,
         init=tuple(_container(container, uid) for container in spec.get("initContainers", ())),
@@ -100,7 +102,7 @@ def _value(container: str, entry: Mapping[str, Any], uid: str) -> str:
     if source.get("fieldRef", {}).get("fieldPath") == "metadata.uid":
         return uid
     raise RunRefused(
-        f"env {entry['name']} of container {container}: its value is in an object of a cluster; "
+        f"env {entry['name']} of container {container}: its value is in an object that only a cluster has; "
         "give it as `value` to run the job here"
     )
 

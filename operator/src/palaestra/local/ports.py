@@ -37,7 +37,7 @@ class HeldPorts:
         except OSError as error:
             raise RunRefused(
                 f"port {port}: {error.strerror or error}; "
-                "choose another with --ros-port, or leave it out for a free one"
+                "choose another with --ros-port, or remove the option to get a free port"
             ) from error
 
     def _bind(self, port: int) -> int:

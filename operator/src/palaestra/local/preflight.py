@@ -125,8 +125,8 @@ def space_is_left(request: PreflightRequest) -> Iterator[str]:
         yield f"{folder}: cannot be written; choose another folder with --dir"
     elif (free := shutil.disk_usage(folder).free) < LEAST_FREE:
         yield (
-            f"{folder}: {free // 2**20} MiB are free and a run takes {LEAST_FREE // 2**20}; "
-            "make room, or choose another folder with --dir"
+            f"{folder}: {free // 2**20} MiB are free, but a run needs {LEAST_FREE // 2**20} MiB; "
+            "free some space, or choose another folder with --dir"
         )
 
 

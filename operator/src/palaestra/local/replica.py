@@ -64,7 +64,10 @@ async def run_replica(planned: ReplicaPlan, setting: Setting) -> RunOutcome:
                 return _ended_early(outcome, interrupt)
             if not tries.another(verdict(planned.job, outcome.exit_code), outcome.steps or 0):
                 return outcome
-            say(f"trainer ended with {meaning(outcome.exit_code)}; the next pod starts in {tries.wait_s:g} s")
+            say(
+                f"the trainer ended with {meaning(outcome.exit_code)}; "
+                f"the next pod starts in {tries.wait_s:g} s"
+            )
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(interrupt.asked.wait(), tries.wait_s)
 

@@ -101,7 +101,7 @@ def _chosen(job: TrainingJob, replica: int | None) -> range:
         return range(job.spec.replicas)
     if not 0 <= replica < job.spec.replicas:
         raise RunRefused(
-            f"--replica {replica}: the job has {job.spec.replicas}; "
+            f"--replica {replica}: the job has {job.spec.replicas} replicas; "
             f"use 0 to {job.spec.replicas - 1}, or raise spec.replicas"
         )
     return range(replica, replica + 1)
@@ -118,8 +118,8 @@ def _run_one(job: TrainingJob, path: Path, replica: int, options: RunOptions) ->
         before = RunOutcome.of(path)
         if before is not None and before.finished and not run_directory.is_prolonged(path, record):
             say(
-                f"{job.metadata.name}-{replica}: finished already; "
-                "more spec.trainer.steps prolong it, --fresh starts a new run"
+                f"{job.metadata.name}-{replica}: has already finished; "
+                "to prolong it, raise spec.trainer.steps; to start a new run, add --fresh"
             )
             _tell(before, path, built_in=True)
             return before
@@ -194,6 +194,6 @@ def _tell(outcome: RunOutcome, path: Path, *, built_in: bool) -> None:
         log = path / "logs" / "trainer.log"
         last = log.read_text(errors="replace").splitlines()[-SHOWN_LINES:]
         said = outcome.reason or "\n".join(last)
-        say(f"{what}: the trainer ended with {meaning(outcome.exit_code)}: {said}; more in {log}")
+        say(f"{what}: the trainer ended with {meaning(outcome.exit_code)}: {said}; the whole log is {log}")
     for line in summary(outcome, path):
         say(line)

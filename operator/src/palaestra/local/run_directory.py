@@ -122,8 +122,8 @@ def refuse_another_job(directory: Path, record: Record) -> None:
     changes = _changes(directory, record)
     if changes and not _learned_nothing(directory):
         raise RunRefused(
-            "\n".join(changes) + f"\n{directory}: holds a run of the job as it was; "
-            "change the file back, give the job another name, or start a new run with --fresh"
+            "\n".join(changes) + f"\n{directory}: has a run of an earlier version of the job; "
+            "undo the change in the file, give the job another name, or start a new run with --fresh"
         )
 
 
@@ -180,7 +180,7 @@ def changed_fields(before: Record, now: Record) -> Iterator[str]:
         name, was, is_now = _INDEX.sub("", field), old.get(field), new.get(field)
         allowed = name in MUTABLE or (name == STEPS and _raised(was, is_now))
         if was != is_now and not allowed:
-            remedy = "; raise it to prolong the run, it cannot be lowered" if name == STEPS else ""
+            remedy = "; it can only be raised, to prolong the run" if name == STEPS else ""
             yield f"{field}: was {_short(was)}, is {_short(is_now)}{remedy}"
 
 

@@ -238,12 +238,13 @@ def _replica(job: TrainingJob, replica: int | None) -> int:
     count = job.spec.replicas
     if replica is None and count > 1:
         raise RunRefused(
-            f"spec.replicas: the job has {count}; choose one with replica=, because a handle runs one replica"
+            f"spec.replicas: the job has {count} replicas, but a handle runs only one; "
+            "choose it with replica="
         )
     number = replica or 0
     if not 0 <= number < count:
         raise RunRefused(
-            f"replica={number}: the job has {count}; use 0 to {count - 1}, or raise spec.replicas"
+            f"replica={number}: the job has {count} replicas; use 0 to {count - 1}, or raise spec.replicas"
         )
     return number
 

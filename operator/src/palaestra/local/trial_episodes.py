@@ -72,6 +72,6 @@ def _refuse_own_program(job: TrainingJob) -> None:
     place, group = collecting[0]
     if group.driver is Driver.COMMAND:
         raise RunRefused(
-            f"spec.simulators[{place}].driver: command cannot be tried here; "
+            f"spec.simulators[{place}].driver: episodes cannot be tried with command; "
             "set stub, mujoco or webots, or train a few steps with `palaestra run`"
         )

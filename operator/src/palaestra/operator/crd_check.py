@@ -65,7 +65,7 @@ class CrdCheck:
         try:
             served = self._api.schema(API_VERSION, KIND)
         except ApiError as error:
-            log.info("definition not read", error=str(error))
+            log.info("CustomResourceDefinition not read", error=str(error))
             return
         before, self._found = self._found, tuple(_lacking(served.get("properties", {})))
         knew, self._knows_new = self._knows_new, _condition_types(served) >= _NEW
@@ -74,7 +74,7 @@ class CrdCheck:
             self._changed()
         if self._found and self._found != before:
             log.warning(
-                "definition outdated",
+                "CustomResourceDefinition outdated",
                 lacks=self._found[:MOST_SHOWN],
                 count=len(self._found),
                 remedy="kubectl apply --server-side --filename manifests/crd.yaml of this release",
@@ -103,7 +103,7 @@ class CrdCheck:
         try:
             self.look()
         except Exception:  # an unexpected document must not end the operator
-            log.exception("definition not compared")
+            log.exception("CustomResourceDefinition not compared")
 
 
 def _lacking(served: Mapping[str, Any]) -> list[str]:

@@ -79,7 +79,7 @@ class FencedClient:
         term = self._term()
         if term is None or term != getattr(self._look, "term", term):
             raise NotLeading(
-                "another operator may have taken the Lease since the decision; the write is refused"
+                "another operator may have acquired the Lease since the decision, so this write is refused"
             )
 
 

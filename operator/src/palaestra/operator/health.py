@@ -37,6 +37,8 @@ def serving(address: Address, *, healthy: Trouble, ready: Trouble, metrics: Call
     try:
         server = Server(address, routes, name="palaestra-operator")
     except OSError as error:
-        raise PalaestraError(f"--metrics-address: {address}: {error.strerror}; choose a free one") from error
+        raise PalaestraError(
+            f"--metrics-address: {address}: {error.strerror}; choose a free address"
+        ) from error
     server.start()
     return server

@@ -152,7 +152,7 @@ class JobObserver:
         except NotFound:
             found = None
         if found is None or found["metadata"]["resourceVersion"] != metadata["resourceVersion"]:
-            raise Outdated("the caches are behind the cluster; nothing was planned")
+            raise Outdated("the caches are older than the cluster, so nothing was planned")
         return found
 
     def forget(self, key: Key) -> None:

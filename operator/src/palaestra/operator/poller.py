@@ -120,7 +120,7 @@ class Poller:
             log.debug("unreachable", job=target.key, pod=target.uid, error=type(error).__name__)
         except ProtocolError as error:
             if not entry.refused:  # log it once for each pod, so that bad responses do not fill the log
-                log.warning("answer refused", job=target.key, pod=target.uid, error=str(error))
+                log.warning("response refused", job=target.key, pod=target.uid, error=str(error))
             entry.refused = True
         except Exception:  # the response of one pod must not end the polling of all others
             if not entry.refused:

@@ -79,7 +79,7 @@ class WorldCheckProcess:
             try:
                 process = subprocess.Popen([*command, *limits], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
             except OSError as error:  # the memory or the number of processes is exhausted
-                log.warning("no process for a check", error=str(error))
+                log.warning("no process for the check of a world", error=str(error))
                 return [], -signal.SIGKILL
             self._running.add(process)
         with process:
@@ -110,7 +110,7 @@ class WorldCheckProcess:
         return None
 
     def _too_costly(self, world: GivenWorld, budget: str) -> WorldVerdict:
-        log.warning("world too costly", field=world.field, bytes=len(world.source), budget=budget)
+        log.warning("world too costly to check", field=world.field, bytes=len(world.source), budget=budget)
         fact = f"its check needs more than {budget}, the limit for one world"
         return WorldVerdict(problem=f"{world.field}: {fact}; {_REMEDY}", too_costly=True)
 

@@ -74,7 +74,7 @@ def initial_path(replica: Replica) -> str | None:
     places = replica.places(TRAINER)
     if places.initial is None:
         raise PlanError(
-            "spec.trainer.initialPolicy.claim: names a claim of a cluster, and this machine has no claims; "
+            "spec.trainer.initialPolicy.claim: names a claim of a cluster, but this machine has no claims; "
             "remove it, and give the absolute path of a file of this machine"
         )
     return f"{places.volume if initial_volume(replica) is None else places.initial}/{initial.path}"

@@ -247,6 +247,6 @@ class LocalLayout:
         """Raise an error, because a laptop has no claims."""
         raise PlanError(
             "spec.storage.resumeFrom: names a run on a claim of a cluster, but this machine has no claims; "
-            "remove it. A job that is run again resumes from its own run directory, and more "
-            "spec.trainer.steps prolong it"
+            "remove it. A job that is run again resumes from its own run directory; to "
+            "prolong the run, raise spec.trainer.steps"
         )

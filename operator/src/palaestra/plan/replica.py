@@ -53,7 +53,7 @@ def uid_of(job: TrainingJob) -> str:
         PlanError: the job has no uid.
     """
     if job.metadata.uid is None:
-        raise PlanError("metadata.uid: is absent; plan the job as the cluster returned it")
+        raise PlanError("metadata.uid: is missing; plan the job as the API server returned it")
     return job.metadata.uid
 
 

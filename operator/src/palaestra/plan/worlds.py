@@ -156,8 +156,8 @@ def _require_reader(group: SimulatorGroup, source: bytes | None, place: int) -> 
         mjcf = suffix(source) == MJCF
     if mjcf and group.driver not in _READ_MJCF:
         raise PlanError(
-            f"spec.simulators[{place}].driver: {group.driver.value} reads no MJCF, and the world is a model "
-            "of MuJoCo; set driver mujoco"
+            f"spec.simulators[{place}].driver: {group.driver.value} cannot load the world, which is a model "
+            "of MuJoCo (MJCF); set driver mujoco"
         )
 
 

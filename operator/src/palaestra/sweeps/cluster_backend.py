@@ -117,8 +117,8 @@ class ClusterBackend:
             found = self._client.get(trial.name)
             if found.metadata.labels.get(LABEL) != trial.job.metadata.labels[LABEL]:
                 raise NotOfThisSweep(
-                    f"job {trial.name}: exists in namespace {self._client.namespace} outside of this sweep; "
-                    "give the sweep another name"
+                    f"job {trial.name}: already exists in namespace {self._client.namespace}, but not for "
+                    "this sweep; give the sweep another name"
                 )
         self._client.apply(trial.job)
 

@@ -63,7 +63,7 @@ class Distribution(ApiModel):
         ),
         Rule(
             holds=lambda values: not values.log or (values.low is not None and values.low > 0),
-            message="log needs a low of more than 0; raise low, or remove log",
+            message="log needs a low above 0; raise low, or remove log",
         ),
     )
 
@@ -121,12 +121,12 @@ class SweepSpec(ApiModel):
         Rule(
             field="trials",
             holds=lambda spec: (spec.trials is not None) == bool(spec.random),
-            message="is the number of random trials; give it with random, and only there",
+            message="is the number of random trials; set it if random is set, and only then",
         ),
         Rule(
             field="optuna",
             holds=lambda spec: spec.optuna is None or bool(spec.random),
-            message="searches in random; replace matrix by random, or remove optuna",
+            message="searches only in random; replace matrix by random, or remove optuna",
         ),
     )
 

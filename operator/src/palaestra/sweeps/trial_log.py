@@ -48,8 +48,8 @@ def begin(folder: Path, sweep: Sweep) -> None:
         if changes := [field for field in _fields(before, record) if field not in mutable]:
             named = ", ".join(f"spec.{field}" for field in changes)
             raise RunRefused(
-                f"{named}: differs from that of the sweep in {folder}; "
-                "change it back, give the sweep another name, or choose another folder with --dir"
+                f"{named}: differs from the sweep whose runs are in {folder}; "
+                "undo the change, give the sweep another name, or choose another folder with --dir"
             )
     write(path, yaml.safe_dump(record, sort_keys=False).encode())
     _remove_cut_line(folder / TRIALS)

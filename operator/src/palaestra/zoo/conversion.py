@@ -47,7 +47,7 @@ def convert(text: str, name: str, *, env: str | None = None, algorithm: str | No
         entry=entry, environment=environment, algorithm={"name": algorithm_of(algorithm, name, entry)}
     )
     if chosen != environment:
-        draft.note("--env", f"{name} does not name {environment}; as in Zoo, it gets the entry {chosen}")
+        draft.note("--env", f"{name} has no entry {environment}; as in Zoo, the job uses the entry {chosen}")
     for word, value in entry.items():
         put(draft, word, value)
     note_together(draft)

@@ -72,7 +72,7 @@ def _pairs(node: ast.expr) -> Iterator[tuple[str, ast.expr]]:
     elif isinstance(node, ast.Dict):
         for key, item in zip(node.keys, node.values, strict=True):
             if not (isinstance(key, ast.Constant) and isinstance(key.value, str)):
-                raise NotPlain(f"{ast.unparse(node)} has a key that is not text")
+                raise NotPlain(f"{ast.unparse(node)} has a key that is not a string")
             yield key.value, item
     else:
         raise NotPlain(f"{ast.unparse(node)} is not a mapping")

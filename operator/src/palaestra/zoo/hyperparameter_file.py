@@ -53,7 +53,8 @@ def read_file(text: str, name: str) -> Mapping[str, Any]:
         raise ZooError(error.problem) from None
     if not isinstance(data, dict) or not data:
         raise ZooError(
-            f"{name}: has no entries by environment; name a file such as Zoo's hyperparams/ppo.yml"
+            f"{name}: has no entries with names of environments; name a file such as Zoo's "
+            "hyperparams/ppo.yml"
         )
     return data
 
@@ -69,7 +70,7 @@ def entry_of(data: Mapping[str, Any], name: str, env: str | None) -> tuple[str, 
     if _OF_AN_ENTRY in data:
         if env is None:
             raise ZooError(
-                f"{name}: has the hyperparameters of one environment and no id; give it as --env ID"
+                f"{name}: has the hyperparameters of one environment, but not its id; give the id as --env ID"
             )
         return env, data, env
     ids = [each for each in data if each not in _SHARED]
@@ -102,7 +103,7 @@ def algorithm_of(given: str | None, name: str, entry: Mapping[str, Any]) -> str:
         raise ZooError(f"--algorithm: {word} cannot be used: {why}")
     if given is not None and re.fullmatch(ALGORITHM, given):
         return given
-    subject = f"--algorithm: {given} is" if given is not None else f"{name}: its name is"
+    subject = f"--algorithm: {given} is" if given is not None else f"{name}: the file's name is"
     raise ZooError(f"{subject} not an algorithm; give one as --algorithm: {', '.join(ALGORITHMS)}")
 
 

@@ -40,7 +40,7 @@ _CALLBACKS: Mapping[str, str] = {
     "EvalCallback": "a run evaluates; set trainer.evaluation",
     "ProgressBarCallback": "palaestra run and palaestra watch show the progress",
     "StopTrainingOnMaxEpisodes": "training ends by steps; set trainer.steps",
-    "StopTrainingOnNoModelImprovement": "it works inside EvalCallback only; write a callback of your own",
+    "StopTrainingOnNoModelImprovement": "it works only inside EvalCallback; write a callback of your own",
     "StopTrainingOnRewardThreshold": "a run stops by success; set trainer.evaluation.stopAtSuccessRate",
 }
 
@@ -182,8 +182,8 @@ def _old_hindsight(word: str) -> Callable[[Draft, Any], None]:
 
 
 def _memory(draft: Draft, value: Any) -> None:
-    same = "as with false" if value else "the same"
-    draft.note("optimize_memory_usage", f"left out; a run stores next observations, {same}")
+    same = "unlike in the file" if value else "as in the file"
+    draft.note("optimize_memory_usage", f"left out; in a run, its value is always false, {same}")
 
 
 def _noise_type(draft: Draft, value: Any) -> None:
@@ -285,7 +285,9 @@ def _classes(draft: Draft, word: str, value: Any) -> Iterator[tuple[str, dict[st
                 name, options = next(iter(item.items()))
                 yield name, dict(options or {})
             case _:
-                draft.note(word, f"{item!r} is left out; it is not one class; check the indentation")
+                draft.note(
+                    word, f"{item!r} is left out, because it does not name a class; check the indentation"
+                )
 
 
 def _schedule(draft: Draft, word: str, value: str) -> Any:

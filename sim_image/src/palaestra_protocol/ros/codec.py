@@ -87,7 +87,7 @@ class _FixedCodec:
         try:
             numbers = self._struct.unpack(payload)
         except struct.error as error:
-            raise ValueError(f"{len(payload)} bytes for {self._struct.size}") from error
+            raise ValueError(f"{len(payload)} bytes instead of {self._struct.size}") from error
         return self._record.make(numbers) if self._record.flat else self._record.build(numbers)
 
     def _refusal(self, fields: Mapping[str, Any], error: Exception) -> ValueError:
@@ -112,9 +112,9 @@ class _VariableCodec:
         try:
             message, end = self._sections.read(bytes(payload), 0)
         except struct.error as error:
-            raise ValueError(f"{len(payload)} bytes, which end inside a field") from error
+            raise ValueError(f"{len(payload)} bytes, which end in the middle of a field") from error
         if end != len(payload):
-            raise ValueError(f"{len(payload)} bytes for {end}")
+            raise ValueError(f"{len(payload)} bytes instead of {end}")
         return message
 
     def _pieces(self, fields: Mapping[str, Any]) -> list[Piece]:

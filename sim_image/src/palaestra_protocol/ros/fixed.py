@@ -146,7 +146,7 @@ def check_length(value: Sequence[Any], length: int) -> None:
         ValueError: the number of elements is not `length`.
     """
     if len(value) != length:
-        raise ValueError(f"{len(value)} elements for {length}")
+        raise ValueError(f"{len(value)} elements instead of {length}")
 
 
 def attribute(field: MessageField) -> str:

@@ -40,7 +40,7 @@ def decode_header(payload: bytes) -> dict[str, str]:
     while at < len(payload):
         start = at + LENGTH.size
         if start > len(payload):
-            raise FramingError("the connection header ends inside a length")
+            raise FramingError("the connection header ends in the middle of a length")
         at = start + int(LENGTH.unpack_from(payload, at)[0])
         name, equals, value = payload[start:at].decode(errors="replace").partition("=")
         if at > len(payload) or not equals:
@@ -74,7 +74,7 @@ class FrameReader:
         while len(buffer) >= LENGTH.size:
             (length,) = LENGTH.unpack_from(buffer)
             if length > MAX_FRAME_BYTES:
-                raise FramingError(f"a frame of {length} bytes; the stream is out of step")
+                raise FramingError(f"a frame of {length} bytes, more than the limit of {MAX_FRAME_BYTES}")
             end = LENGTH.size + length
             if len(buffer) < end:
                 return

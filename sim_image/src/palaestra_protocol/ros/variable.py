@@ -80,7 +80,7 @@ class Sections:
         """
         fields = dict(zip(self._names, value, strict=True)) if isinstance(value, tuple) else value
         if not fields.keys() <= self._known:
-            raise ValueError(f"no field {', '.join(sorted(fields.keys() - self._known))}")
+            raise ValueError(f"the type has no field {', '.join(sorted(fields.keys() - self._known))}")
         for name, layout in self._sections:
             try:
                 layout.write(fields if type(layout) is _Packed else fields.get(name, layout.empty), pieces)
@@ -145,7 +145,7 @@ class _Octets:
 
     def write(self, value: Any, pieces: list[Piece]) -> None:
         if not isinstance(value, bytes | bytearray | memoryview | list | tuple):
-            raise TypeError(f"{type(value).__name__} is not a type of bytes")
+            raise TypeError(f"{type(value).__name__} is not bytes or a list of numbers")
         octets = bytes(value) if isinstance(value, list | tuple) else memoryview(value).cast("B")
         pieces += LENGTH.pack(len(octets)), octets
 

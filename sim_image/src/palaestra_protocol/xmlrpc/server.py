@@ -125,7 +125,10 @@ class RpcServer(TcpServer):
                 case {"methodName": str(name), "params": list(parameters)} if name != _MULTICALL:
                     return [self._called(name, tuple(parameters))]
                 case _:
-                    return {"faultCode": FAULT, "faultString": "a call has a methodName and a list params"}
+                    return {
+                        "faultCode": FAULT,
+                        "faultString": "each call needs a methodName and a list of params",
+                    }
         except xmlrpc.client.Fault as fault:  # the other calls of the request are still made
             return {"faultCode": fault.faultCode, "faultString": fault.faultString}
 

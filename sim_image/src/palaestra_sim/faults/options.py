@@ -88,6 +88,6 @@ def _whole(least: int, *given: tuple[str, str | None]) -> int | None:
         if text is None:
             continue
         if not (text.isascii() and text.isdigit() and int(text) >= least):
-            raise FaultError(f"{where}: {text!r} is not a whole number of at least {least}; give one")
+            raise FaultError(f"{where}: {text!r} is refused; give a whole number of at least {least}")
         return int(text)
     return None

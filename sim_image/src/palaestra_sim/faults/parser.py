@@ -61,7 +61,7 @@ def _value(text: str) -> float:
         number = float(text)
         _FLOAT32.pack(number)
     except (ValueError, OverflowError):
-        raise ValueError("a number that fits into 32 bits, nan, inf or -inf") from None
+        raise ValueError("a number in the range of a 32-bit float, nan, inf or -inf") from None
     return number
 
 
@@ -168,12 +168,12 @@ class _Reader:
         for key, text in given.items():
             known = self._kind.keys.get(key)
             if known is None:
-                raise self._error(f"{key} is not known here", f"use {self._keys()}")
+                raise self._error(f"{key} is not a key of this fault", f"use {self._keys()}")
             fields[known.field] = self._read(key, known.read, text)
         if self._kind.needs and not set(self._kind.needs) & given.keys():
             raise self._error("it has no duration", f"add {self._kind.needs[0]}=100")
         if {"service", "topic"} <= given.keys():
-            raise self._error("it names a service and a topic", "write two faults")
+            raise self._error("it names both a service and a topic", "write a fault for each")
         if "service" not in given:
             fields.setdefault("topic", self._kind.topic)
         return self._kind.make(text=self._text, trigger=trigger, **fields)
@@ -193,12 +193,12 @@ class _Reader:
         """Return the trigger, and remove its keys from `given`."""
         said = [it for it in ("every", "probability", *FaultEvent) if it in given]
         if len(said) > 1:
-            raise self._error(f"{said[0]} and {said[1]} set two different times", "remove one")
+            raise self._error(f"{said[0]} and {said[1]} each set when the fault occurs", "remove one")
         event = self._events[0]
         if "on" in given:
             event = self._event(given.pop("on"))
             if set(said) & set(FaultEvent):
-                raise self._error(f"on and {said[0]} both set what is counted", "remove on")
+                raise self._error(f"on and {said[0]} each set the event that is counted", "remove on")
         if not said:
             return Trigger(event=event)
         key, text = said[0], given.pop(said[0])
@@ -211,7 +211,7 @@ class _Reader:
 
     def _event(self, text: str) -> FaultEvent:
         if text not in self._events:
-            raise self._error(f"it cannot be at a {text}", f"use {' or '.join(self._events)}")
+            raise self._error(f"it cannot occur at a {text}", f"use {' or '.join(self._events)}")
         return FaultEvent(text)
 
     def _read(self, key: str, read: Callable[[str], Any], text: str) -> Any:

@@ -85,7 +85,7 @@ def _open_context() -> Any:
     """
     name = os.environ.get("MUJOCO_GL", "").strip().lower() or "egl"
     if name not in _BACKENDS:
-        raise UnsimulatedError(f"MUJOCO_GL={name} draws no pictures; use {' or '.join(_BACKENDS)}")
+        raise UnsimulatedError(f"MUJOCO_GL={name} cannot draw pictures; use {' or '.join(_BACKENDS)}")
     # By default Mesa renders with its own threads. For small images, these threads mostly wait for each
     # other.
     os.environ.setdefault("LP_NUM_THREADS", "0")

@@ -209,7 +209,7 @@ class RosNode:
     def _greet_client(self, link: Connection, header: Mapping[str, str]) -> Endpoint:
         known = self._services.get(header["service"])
         if known is None:
-            raise HeaderRefused(f"no such service {header['service']}")
+            raise HeaderRefused(f"this node has no service {header['service']}")
         service, handler = known
         md5 = _agreed_md5(header, service.name, service.md5, service.later_md5)
         link.send(
@@ -228,7 +228,7 @@ class RosNode:
     def _greet_subscriber(self, link: Connection, header: Mapping[str, str]) -> Endpoint:
         topic = self._topics.get(header.get("topic", ""))
         if topic is None:
-            raise HeaderRefused(f"no such topic {header.get('topic')}")
+            raise HeaderRefused(f"this node has no topic {header.get('topic')}")
         _agreed_md5(header, topic.type.name, topic.type.md5)
         link.send(
             encode_header(
@@ -256,7 +256,7 @@ def _agreed_md5(header: Mapping[str, str], type_name: str, *known: str) -> str:
     """
     theirs = header.get("md5sum", "*")
     if theirs not in {"*", *known}:
-        raise HeaderRefused(f"client wants md5sum {theirs}, but {type_name} has {known[0]}")
+        raise HeaderRefused(f"the client wants md5sum {theirs}, but {type_name} has {known[0]}")
     return known[0] if theirs == "*" else theirs
 
 

@@ -174,10 +174,10 @@ def _require_possible(movie: Movie) -> None:
     if any(not 0 < length <= MOST_PIXELS or length % 2 for length in movie.size):
         width, height = movie.size
         raise UnsimulatedError(
-            f"a movie of {width} by {height} pixels; use even numbers from 2 to {MOST_PIXELS}"
+            f"a movie cannot have {width} by {height} pixels; use even numbers from 2 to {MOST_PIXELS}"
         )
     if not 1 <= movie.quality <= _BEST or movie.acceleration < 1:
         raise UnsimulatedError(
-            f"a movie of quality {movie.quality} and acceleration {movie.acceleration};"
+            f"a movie cannot have quality {movie.quality} and acceleration {movie.acceleration};"
             f" use a quality from 1 to {_BEST} and an acceleration of at least 1"
         )

@@ -53,9 +53,7 @@ _FRAMES: Final = _MOUNTED.keys() | {"Pose", "Transform", "Solid", "Track"}
 _JOINTS: Final = frozenset(("HingeJoint", "SliderJoint"))
 _LOOSE_JOINTS: Final = frozenset(("BallJoint", "Hinge2Joint"))
 
-_NAME_IT: Final = (
-    "give it a name of its own of letters, digits and underscores, or leave it out (--leave-out)"
-)
+_NAME_IT: Final = "give it a unique name of letters, digits and underscores, or leave it out (--leave-out)"
 # Robots drive over lower steps. Real worlds need this, because their robots start slightly inside the floor.
 _STEP_M: Final = 0.005
 

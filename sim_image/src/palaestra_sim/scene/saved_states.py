@@ -82,4 +82,4 @@ def require_joint(node: SceneNode, index: int) -> JointFrame:
     for end in node.nodes("endPoint"):
         if isinstance(end.place, JointFrame):
             return end.place
-    raise UnsimulatedError(f"this {node.type_name} has nothing at its end; give it an endPoint")
+    raise UnsimulatedError(f"this {node.type_name} has no node at its end; give it an endPoint")

@@ -103,7 +103,9 @@ def prepare(given: argparse.Namespace) -> tuple[SupervisedSimulator, ...]:
         raise SidecarError(f"--control: {given.control} is not a loopback address; use 127.0.0.1 or [::1]")
     driver = Driver(given.driver)
     if given.program and driver is not Driver.COMMAND:
-        raise SidecarError(f"--driver {driver}: takes no program; use --driver command")
+        raise SidecarError(
+            f"--driver {driver}: does not take a program; remove the program, or use --driver command"
+        )
     if given.standby and given.job is None:
         raise SidecarError("--standby: two simulators need different ROS names; give --job and --work")
     slots = world_files.SLOTS if given.standby else world_files.SLOTS[:1]
@@ -147,7 +149,9 @@ def _world(given: argparse.Namespace, slot: str) -> Path:
     if given.job is None and not given.suffix:
         return Path(given.world).absolute()
     if given.work is None:
-        raise SidecarError("--work: is missing; with --job, give the folder for the generated world")
+        raise SidecarError(
+            "--work: is missing, but required with --job; give the folder for the generated world"
+        )
     work, as_project = given.work.absolute(), Driver(given.driver) is Driver.WEBOTS
     if given.job is None:
         return world_files.renamed(given.world, work, given.suffix, as_project=as_project, root=given.root)

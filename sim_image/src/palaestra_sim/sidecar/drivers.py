@@ -112,7 +112,7 @@ def _found(driver: Driver, program: str, environment: Mapping[str, str]) -> str:
     for path in (environment.get("PATH", os.defpath), python_folder):
         if (found := shutil.which(program, path=path)) is not None:
             return str(Path(found).absolute())
-    raise SidecarError(f"--driver {driver}: program {program} not found; install it, or set PATH")
+    raise SidecarError(f"--driver {driver}: the program {program} was not found; install it, or set PATH")
 
 
 _ARGUMENTS: Mapping[Driver, Callable[[Launch], list[str]]] = {

@@ -219,7 +219,7 @@ def _ended(said: Mapping[str, int], last_line: str) -> Ended:
     if "error" in said:
         return Ended(problem=f"it could not be run: {os.strerror(said['error'])}", last_line=last_line)
     if "exit" not in said:
-        return Ended(problem="its reaper ended before it", last_line=last_line)
+        return Ended(problem="the reaper of the simulator ended before the simulator", last_line=last_line)
     code = os.waitstatus_to_exitcode(said["exit"])
     if code >= 0:
         return Ended(code=code, last_line=last_line)

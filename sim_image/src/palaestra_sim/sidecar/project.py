@@ -56,7 +56,9 @@ def lay_out(world: Path, project: Path, root: Path, *, linked: bool) -> Path:
     folders = dict(_folders(world, project, root))
     *_, folder = folders
     if any(not made.is_symlink() and _same(made, source) for made, source in folders.items()):
-        raise SidecarError(f"--work: {project.parent}: has the project of the world; give another folder")
+        raise SidecarError(
+            f"--work: {project.parent}: contains the source project of the world; give another folder"
+        )
     try:
         wanted = dict(_links(folders)) if linked else {}
     except OSError as error:

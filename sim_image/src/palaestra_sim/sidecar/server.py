@@ -44,7 +44,7 @@ def bound(option: str, address: Address, routes: Routes) -> Server:
     try:
         return Server(address, routes, name="palaestra-sidecar")
     except OSError as error:
-        remedy = "choose another, or 0 for a free one"
+        remedy = "choose another port, or 0 for a free port"
         raise SidecarError(f"{option}: {address}: {error.strerror}; {remedy}") from error
 
 

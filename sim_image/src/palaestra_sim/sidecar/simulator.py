@@ -212,7 +212,7 @@ class SupervisedSimulator:
         """Set the time of the kill, unless an earlier time is set already; return the new state."""
         kill_at = self._clock() + deadline_s
         self._kill_at = kill_at if self._kill_at is None else min(self._kill_at, kill_at)
-        return replace(state, detail=f"to be killed in {self._kill_at - self._clock():.1f} s")
+        return replace(state, detail=f"will be killed in {self._kill_at - self._clock():.1f} s")
 
     def _report(self, report: Started | Ended) -> None:
         """Put a report from a thread of the process into the queue."""

@@ -49,7 +49,7 @@ def no_robot_speaks_ros(candidate: Candidate) -> Iterator[WorldError]:
     )
     more = f" and {len(others) - _MOST_NAMED} others" if len(others) > _MOST_NAMED else ""
     fact = f'no robot has the controller "ros": there are {named}{more}'
-    remedy = 'set controller "ros" on those to be trained, and supervisor TRUE on one'
+    remedy = 'set controller "ros" on the robots to be trained, and supervisor TRUE on one of them'
     yield candidate.source.error(others[0].span[0], fact, remedy)
 
 
@@ -70,7 +70,7 @@ def robot_used_twice(candidate: Candidate) -> Iterator[WorldError]:
         if node.uses in containers:
             robot = glance(robot_name(containers[node.uses]))
             fact = f'USE {node.uses} repeats the robot "{robot}" and its ROS name'
-            yield candidate.source.error(node.span[0], fact, "write the node out, with its own name")
+            yield candidate.source.error(node.span[0], fact, "write the node out, with another name")
 
 
 def robots_of_one_name(candidate: Candidate) -> Iterator[WorldError]:
@@ -80,7 +80,7 @@ def robots_of_one_name(candidate: Candidate) -> Iterator[WorldError]:
         name = robot_name(robot)
         if name in seen:
             fact = f'a second robot is called "{name}"'
-            yield candidate.source.error(robot.span[0], fact, "give it a name of its own")
+            yield candidate.source.error(robot.span[0], fact, "give it another name")
         seen.add(name)
 
 
@@ -98,7 +98,7 @@ def renamed_behind_its_name(candidate: Candidate) -> Iterator[WorldError]:
     for value in _argument_values(candidate):
         for token in _strings(candidate.world, value):
             if _ROS_REMAPPING.match(unquoted(token)):
-                fact = f"{token.text.decode()} overrules the generated ROS name"
+                fact = f"{token.text.decode()} overrides the generated ROS name"
                 yield candidate.source.error(token.start, fact, "remove it")
 
 

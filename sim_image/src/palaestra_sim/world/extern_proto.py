@@ -175,7 +175,7 @@ class _Search:
         proto = parse_proto(data, str(path))
         if proto.name != type_name:
             fact = f"the file {path.name} declares the PROTO {proto.name}"
-            raise proto.source.error(0, fact, "give file and PROTO the same name")
+            raise proto.source.error(0, fact, "give the file and the PROTO the same name")
         return proto
 
 

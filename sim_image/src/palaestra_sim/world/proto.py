@@ -118,7 +118,7 @@ class _ProtoReader(Reader):
 
     def proto(self) -> Proto:
         """Read `file := extern* "PROTO" name "[" declaration* "]" "{" node "}"`."""
-        self._is_refused = "IS outside the body of the PROTO"
+        self._is_refused = "found IS outside the body of the PROTO"
         externs = []
         while self._peek().text in (b"IMPORTABLE", b"EXTERNPROTO"):
             externs.append(self._extern())
@@ -135,7 +135,7 @@ class _ProtoReader(Reader):
 
     def fields(self, proto: str) -> dict[str, ProtoField]:
         """Read `declaration*` to the end of the text."""
-        self._is_refused = "IS outside the body of the PROTO"
+        self._is_refused = "found IS outside the body of the PROTO"
         self._access_needed = False
         fields: dict[str, ProtoField] = {}
         while (token := self._peek()).kind != "end":
@@ -167,7 +167,7 @@ class _ProtoReader(Reader):
         kind = self._take()
         type_name = kind.text.decode()
         if type_name not in _TYPES:
-            fact = f"{shown(kind)} where the type of a field of {proto} should be"
+            fact = f"found {shown(kind)} where the type of a field of {proto} should be"
             raise self._error(kind, fact, "write a type such as SFVec3f or MFNode")
         allowed = self._allowed(type_name)
         name = self._name(f"the name of a {type_name} of {proto}")
@@ -180,7 +180,7 @@ class _ProtoReader(Reader):
         if access.text in _ACCESSES:
             return self._take().text.decode()
         if self._access_needed:
-            fact = f"{shown(access)} where a field of {proto} should be declared"
+            fact = f"found {shown(access)} where a field of {proto} should be declared"
             raise self._error(access, fact, "write field, a type, a name and a default")
         return "field"
 
@@ -210,21 +210,21 @@ class _ProtoReader(Reader):
         first = self._peek()
         body = self._node(1)
         if body.uses is not None:
-            fact = f"a USE where the node of {proto} should be"
+            fact = f"found a USE where the node of {proto} should be"
             raise self._error(first, fact, "write the node out")
         return body
 
     def _end(self) -> None:
         token = self._peek()
         if token.kind != "end":
-            fact = f"{shown(token)} after the end of the PROTO"
+            fact = f"found {shown(token)} after the end of the PROTO"
             raise self._error(token, fact, "remove it, or move it to a file of its own")
 
     def _expect(self, text: bytes, remedy: str) -> None:
         """Move past the next token, whose text must be `text`."""
         token = self._peek()
         if not self._skip(text):
-            fact = f"{shown(token)} where {text.decode()} should be"
+            fact = f"found {shown(token)} where {text.decode()} should be"
             raise self._error(token, fact, remedy)
 
 

@@ -54,7 +54,7 @@ class Reader:
         self._coming = iter(tokens)
         self._next = next(self._coming)
         self._taken_up_to = 0  # the byte after the last token taken
-        self._is_refused: str | None = "IS outside a PROTO file"  # None where IS is allowed
+        self._is_refused: str | None = "found IS outside a PROTO file"  # None where IS is allowed
         self._last_counts = False  # whether a field may occur twice: then the last value counts
 
     def world(self, header: str) -> World:
@@ -78,11 +78,11 @@ class Reader:
         self._skip(b"IMPORTABLE")
         if not self._skip(b"EXTERNPROTO"):
             token = self._peek()
-            fact = f"{shown(token)} where EXTERNPROTO should be"
+            fact = f"found {shown(token)} where EXTERNPROTO should be"
             raise self._error(token, fact, "only an EXTERNPROTO can be IMPORTABLE")
         address = self._take()
         if address.kind != "string":
-            fact = f"{shown(address)} where the address of an EXTERNPROTO should be"
+            fact = f"found {shown(address)} where the address of an EXTERNPROTO should be"
             raise self._error(address, fact, "write it as a string")
         return address
 
@@ -99,7 +99,7 @@ class Reader:
         type_name = self._name("the type of a node")
         opening = self._take()
         if opening.text != b"{":
-            fact = f'{shown(opening)} where the "{{" of {type_name} should be'
+            fact = f'found {shown(opening)} where the "{{" of {type_name} should be'
             raise self._error(opening, fact, "a node is written Type { … }")
         fields = self._fields(type_name, opening, depth)
         span = self._span(first)
@@ -157,7 +157,7 @@ class Reader:
             return _CONSTANTS[self._take().text]
         if token.kind == "word":
             return self._node(depth + 1)
-        raise self._error(token, f"{shown(token)} where a value of {name} should be", "write one")
+        raise self._error(token, f"found {shown(token)} where a value of {name} should be", "write a value")
 
     def _span(self, first: Token) -> tuple[int, int]:
         """Return the span from the token `first` to the end of the last token taken."""
@@ -167,7 +167,7 @@ class Reader:
         """Take a name; `role` is its description for an error."""
         token = self._take()
         if token.kind != "word" or token.text in _RESERVED or not _NAME.fullmatch(token.text):
-            fact = f"{shown(token)} where {role} should be"
+            fact = f"found {shown(token)} where {role} should be"
             raise self._error(token, fact, "remove it or add what is missing before it")
         return intern(token.text.decode())  # saves memory: a world repeats a few names
 

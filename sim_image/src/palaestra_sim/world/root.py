@@ -30,9 +30,9 @@ def root_of(world: Path, source: bytes, given: Path | None = None) -> Path:
         return folders[1] if nearest == folders[0] and len(folders) > 1 else nearest
     root = placed(given)
     if root not in folders:
-        raise RootError(f"{root}: is not above {world}; name a folder that holds the world")
+        raise RootError(f"{root}: is not a folder above {world}; name a folder that contains the world")
     if not nearest.is_relative_to(root):
-        raise RootError(f"{root}: the world names files above it; name {nearest}")
+        raise RootError(f"{root}: the world refers to files outside of this folder; name {nearest}")
     return root
 
 

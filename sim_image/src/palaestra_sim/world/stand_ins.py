@@ -130,7 +130,11 @@ class _Entry:
         kinds: list[Literal["flat", "drawn"]] = [kind for kind in _LISTS if rest.get(kind) is not None]
         if kinds:
             if rest != {kinds[0]: True}:
-                self._refuse(kinds[0], "it has a shape too, or is not true", f"write {kinds[0]} = true alone")
+                self._refuse(
+                    kinds[0],
+                    "the type also has a shape, or the value is not true",
+                    f"write {kinds[0]} = true alone",
+                )
             return StandIn(name=self._type, fields=self._fields, kind=kinds[0])
         forms = self._parts(rest) if "parts" in rest else (self._form(rest, ""),)
         return StandIn(name=self._type, fields=self._fields, forms=forms)
@@ -149,7 +153,9 @@ class _Entry:
         parts = rest.pop("parts")
         if rest or not isinstance(parts, list) or not all(isinstance(part, dict) for part in parts):
             self._refuse(
-                "parts", "it is not a list of tables, or not the only key", 'write [ { box = "size" } ]'
+                "parts",
+                "it is not a list of tables, or the type has other keys",
+                'write [ { box = "size" } ]',
             )
         return tuple(self._form(part, f"parts[{number}].") for number, part in enumerate(parts))
 
@@ -159,7 +165,9 @@ class _Entry:
         unknown = sorted(table.keys() - LENGTHS.keys() - _OPTIONS)
         if unknown:
             self._refuse(
-                prefix + unknown[0], "it is not a key here", f"choose from {_words({*LENGTHS, *_OPTIONS})}"
+                prefix + unknown[0],
+                "it is not a key of a stand-in",
+                f"choose from {_words({*LENGTHS, *_OPTIONS})}",
             )
         if len(shapes) != 1:
             fact = f"it has {len(shapes)} shapes"
@@ -186,7 +194,7 @@ class _Entry:
             keys = _FIELDS_OF_FORM[kind]
             if not isinstance(written, dict) or not {*keys} <= written.keys() <= {*keys, "path", "closed"}:
                 self._refuse(
-                    place, "it needs other keys", f"write {{ {', '.join(f'{key} = 1' for key in keys)} }}"
+                    place, "its keys are wrong", f"write {{ {', '.join(f'{key} = 1' for key in keys)} }}"
                 )
             return tuple(self._formula(written[key], f"{place}.{key}") for key in keys)
         if kind == "sphere":

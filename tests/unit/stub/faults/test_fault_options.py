@@ -75,8 +75,16 @@ def test_a_life_that_nobody_counts_is_drawn_and_can_be_repeated(read):
     [
         (["--fault=crsh"], {}, "--fault: crsh: 'crsh' is not a fault"),
         ([], {"PALAESTRA_STUB_FAULTS": "crsh"}, "PALAESTRA_STUB_FAULTS: crsh: 'crsh' is not a fault"),
-        (["--fault=crash", "--fault-seed=-1"], {}, "--fault-seed: '-1' is not a whole number of at least 0"),
-        (["--fault=crash", "--fault-life=0"], {}, "--fault-life: '0' is not a whole number of at least 1"),
+        (
+            ["--fault=crash", "--fault-seed=-1"],
+            {},
+            "--fault-seed: '-1' is refused; give a whole number of at least 0",
+        ),
+        (
+            ["--fault=crash", "--fault-life=0"],
+            {},
+            "--fault-life: '0' is refused; give a whole number of at least 1",
+        ),
         (["--fault=crash"], {"PALAESTRA_SIMULATOR_START": ""}, "PALAESTRA_SIMULATOR_START: ''"),
         (["--fault=crash", "--fault=crash"], {}, "fault crash: is given twice; remove one"),
         (["--fault=slow_start:every=2,latency_ms=1"], {}, "the number of this start is unknown"),

@@ -88,7 +88,7 @@ def test_a_value_may_be_no_number():
     """The narrowest field of a message is a 32-bit float, which can be NaN or infinite, but not 1e300."""
     assert math.isnan(one("wrong_value").value)
     assert one("wrong_value:value=-inf").value == -math.inf
-    with pytest.raises(FaultError, match="value is '1e300'; give a number that fits into 32 bits"):
+    with pytest.raises(FaultError, match="value is '1e300'; give a number in the range of a 32-bit float"):
         one("wrong_value:value=1e300")
 
 
@@ -104,16 +104,19 @@ def test_a_value_may_be_no_number():
         ("crash:step=²", "step is '²'; give a whole number"),
         ("crash:probability=2", "probability is '2'; give a number from 0 to 1"),
         ("crash:probability=nan", "probability is 'nan'; give a number from 0 to 1"),
-        ("crash:step=1,every=2", "every and step set two different times; remove one"),
-        ("crash:step=1,on=step", "on and step both set what is counted; remove on"),
-        ("crash:on=call", "it cannot be at a call; use step or reset"),
-        ("crash:start=1", "it cannot be at a start; use step or reset"),
-        ("lost:reset=1", "it cannot be at a reset; use step"),
-        ("crash:color=red", "color is not known here; use signal, step, reset, every, probability, on"),
-        ("lost:service=a/b", "service is not known here; use topic, step, every, probability, on"),
+        ("crash:step=1,every=2", "every and step each set when the fault occurs; remove one"),
+        ("crash:step=1,on=step", "on and step each set the event that is counted; remove on"),
+        ("crash:on=call", "it cannot occur at a call; use step or reset"),
+        ("crash:start=1", "it cannot occur at a start; use step or reset"),
+        ("lost:reset=1", "it cannot occur at a reset; use step"),
+        (
+            "crash:color=red",
+            "color is not a key of this fault; use signal, step, reset, every, probability, on",
+        ),
+        ("lost:service=a/b", "service is not a key of this fault; use topic, step, every, probability, on"),
         ("slow", "it has no duration; add latency_ms=100"),
         ("slow:latency_ms=4000000", "latency_ms is '4000000'; give a number from 0 to 3,600,000"),
-        ("wrong_value:service=a,topic=b", "it names a service and a topic; write two faults"),
+        ("wrong_value:service=a,topic=b", "it names both a service and a topic; write a fault"),
         ("hang:service=", "service is ''; give a path below the robot's name, such as ir1/enable"),
         ("exit:code=256", "code is '256'; give a whole number from 0 to 255"),
         ("memory_growth:mib=0", "mib is '0'; give a number from 0.001 to 1,048,576"),

@@ -123,7 +123,7 @@ def test_an_update_of_one_row_whose_advantage_is_to_be_normalized_is_refused(mak
     with pytest.raises(ConfigurationError) as refusal:
         model_of(name, make_env(), n_steps=1, normalize_advantage=True)
 
-    line = "algorithm.hyperparameters.n_steps: 1 step of 1 collecting simulator is 1 row"
+    line = "algorithm.hyperparameters.n_steps: 1 step in 1 collecting simulator gives 1 row"
     assert str(refusal.value).startswith(line)
     assert str(refusal.value).endswith("raise n_steps, add a simulator, or set normalize_advantage: false")
 

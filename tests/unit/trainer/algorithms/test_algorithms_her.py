@@ -202,7 +202,7 @@ def test_an_episode_that_does_not_continue_after_a_resume_is_never_sampled():
 
 def test_a_run_with_another_number_of_simulators_is_refused():
     """The columns would belong to other simulators."""
-    with pytest.raises(ConfigurationError, match="the run has 2 columns, not 1; use as many simulators"):
+    with pytest.raises(ConfigurationError, match="the checkpoint has 2 columns, not 1; use the number"):
         buffer_of().positions = buffer_of(members=2).positions
 
 
@@ -257,7 +257,10 @@ def test_its_size_is_computed_before_it_exists():
         ),
         ({"replay_buffer_kwargs": {}}, "has no effect without replay_buffer_class"),
         ({"replay_buffer_kwargs": 4}, "replay_buffer_kwargs: 4 is refused; give a mapping"),
-        ({"replay_buffer_kwargs": {"copy_info_dict": True}}, "copy_info_dict: is not an option here"),
+        (
+            {"replay_buffer_kwargs": {"copy_info_dict": True}},
+            "copy_info_dict: is not an option of this buffer",
+        ),
         ({"replay_buffer_kwargs": {"n_sampled_goals": 4}}, "did you mean n_sampled_goal?"),
         (
             {"replay_buffer_kwargs": {"n_sampled_goal": 0}},

@@ -246,7 +246,7 @@ def test_an_environment_without_masks_is_refused_before_a_simulator_starts(run, 
     assert {entry for member in members for entry in member.log} <= {"stop"}
     assert (
         "environment.id: MoveToTargetEnv-v0 has no method action_masks, which MaskablePPO asks for allowed "
-        "actions; define action_masks(self), which returns a truth value for each, or use PPO"
+        "actions; define action_masks(self), which returns a bool for each action, or use PPO"
     ) in last_word().reason
 
 
@@ -299,7 +299,7 @@ def test_an_episode_that_is_played_again_ends_before_a_forbidden_action(learn):
     saved = [EpisodeState(0, np.zeros(6, np.int64)), EpisodeState(4, np.array([1]))]
     env = learn(task_of())[2]
 
-    with pytest.raises(AssertionError, match="action 0 is forbidden"):
+    with pytest.raises(AssertionError, match="action 0 is not allowed"):
         env.resume(saved)
     env.resume(saved, masked=True)
 

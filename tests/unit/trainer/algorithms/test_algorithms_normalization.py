@@ -226,7 +226,7 @@ def test_a_policy_is_used_without_this_package_as_the_page_says(make_normal, tmp
         (None, {}, "algorithm.normalize is set, unlike in the checkpoint"),
         ({"observations": False}, {}, "it normalizes rewards"),
         ({}, {"observations": False}, "it normalizes observations and rewards"),
-        ({}, {"clip_observations": 5.0}, "it clips elsewhere"),
+        ({}, {"clip_observations": 5.0}, "its limits of clipping are different"),
     ],
 )
 def test_a_policy_is_not_used_with_other_eyes(make_normal, make_env, tmp_path, saved, wanted, fact):

@@ -69,13 +69,16 @@ def test_a_run_with_a_class_of_ones_own_is_saved_and_resumed(lab, play, job, dir
 
 
 REFUSED = [
-    ("sb3_contrib:ARS", "sb3_contrib:ARS cannot be used: ARS learns from whole returns, which rows of"),
+    (
+        "sb3_contrib:ARS",
+        "sb3_contrib:ARS cannot be used: ARS learns from whole returns, which would include rows",
+    ),
     (
         "my_lab:Search",
-        "Search is neither an OnPolicyAlgorithm nor an OffPolicyAlgorithm, so rows that a fault",
+        "Search is neither an OnPolicyAlgorithm nor an OffPolicyAlgorithm, so it would learn from rows",
     ),
     ("HER", "HER cannot be used: HER is a replay buffer; use SAC"),
-    ("my_lab:Doubled", "my_lab:Doubled is not a subclass of BaseAlgorithm; name a class that is one"),
+    ("my_lab:Doubled", "my_lab:Doubled is not a subclass of BaseAlgorithm; name a subclass"),
     ("my_lab:no_class", "my_lab:no_class is not a subclass of BaseAlgorithm"),
     ("my_lab:Missing", "my_lab:Missing cannot be imported .* has no attribute 'Missing'"),
     ("no_lab:Any", "no_lab:Any cannot be imported .* install its package in the image, or add its folder"),
@@ -106,7 +109,7 @@ def test_a_class_that_makes_its_own_buffer_is_refused(lab, corridor_model, name,
     wanted = Algorithm(name=name, hyperparameters=hyperparameters)
     check(wanted)
 
-    fact = rf"^algorithm\.name: {name.partition(':')[2]} creates its own {buffer}, which learns from rows"
+    fact = rf"^algorithm\.name: {name.partition(':')[2]} creates its own {buffer}, which would keep rows"
     with pytest.raises(ConfigurationError, match=fact):
         corridor_model(wanted)
 

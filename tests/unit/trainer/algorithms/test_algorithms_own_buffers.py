@@ -252,7 +252,7 @@ def _refusal(act):
 
 
 REFUSED = [
-    ("DQN", {"replay_buffer_class": "buffer_lab:Steps"}, "Steps reads the rows after a row"),
+    ("DQN", {"replay_buffer_class": "buffer_lab:Steps"}, "Steps takes the following row as the next step"),
     ("DQN", {"replay_buffer_class": "stable_baselines3:HerReplayBuffer"}, "use HerReplayBuffer by its name"),
     ("DQN", {"replay_buffer_class": "buffer_lab:Greedy"}, "is not a subclass of ReplayBuffer"),
     ("DQN", {"replay_buffer_class": "buffer_lab:Missing"}, "cannot be imported"),
@@ -260,14 +260,14 @@ REFUSED = [
     (
         "DQN",
         {"replay_buffer_class": "buffer_lab:Prioritized", "replay_buffer_kwargs": {"alfa": 1}},
-        "replay_buffer_kwargs.alfa: is not an option here; did you mean alpha?",
+        "replay_buffer_kwargs.alfa: is not an option of this buffer; did you mean alpha?",
     ),
     (
         "DQN",
         {"replay_buffer_class": "buffer_lab:ForDict", "replay_buffer_kwargs": {"depth": 1}},
-        "its class adds none, so remove it",
+        "the class of the buffer has no options of its own",
     ),
-    ("PPO", {"rollout_buffer_class": "buffer_lab:Ordered"}, "Ordered draws batches of its own"),
+    ("PPO", {"rollout_buffer_class": "buffer_lab:Ordered"}, "Ordered overrides get, so"),
     ("PPO", {"rollout_buffer_class": "Greedy"}, "write module:Class"),
     ("PPO", {"rollout_buffer_kwargs": {}}, "has no effect without rollout_buffer_class"),
 ]
@@ -285,11 +285,15 @@ def test_buffers_that_cannot_be_used_are_refused_before_a_simulator_starts(lab, 
 
 UNFIT = [
     ("DQN", {"replay_buffer_class": "buffer_lab:ForDict"}, "takes observations that are a Dict, unlike"),
-    ("DQN", {"replay_buffer_class": "buffer_lab:Treed"}, "has tree, a Tree, which no checkpoint can write"),
+    ("DQN", {"replay_buffer_class": "buffer_lab:Treed"}, "has tree, a Tree, which a checkpoint cannot store"),
     ("DQN", {"replay_buffer_class": "buffer_lab:Tail"}, "has tail, a deque"),
     ("DQN", {"replay_buffer_class": "buffer_lab:Broken"}, "Broken.state_dict failed (AttributeError"),
-    ("PPO", {"rollout_buffer_class": "buffer_lab:Masks"}, "Masks does not fit PPO, which gives no masks"),
-    ("MaskablePPO", {"rollout_buffer_class": "buffer_lab:Greedy"}, "which needs masks of actions"),
+    (
+        "PPO",
+        {"rollout_buffer_class": "buffer_lab:Masks"},
+        "Masks does not fit PPO, which has no action masks",
+    ),
+    ("MaskablePPO", {"rollout_buffer_class": "buffer_lab:Greedy"}, "which needs action masks"),
 ]
 
 

@@ -36,17 +36,20 @@ OBSERVATIONS = {
         "observation a is a Dict, which no",
     ),
     "a Dict without parts": (spaces.Dict({}), "a Dict without parts"),
-    "text": (spaces.Text(5), "is a Text, which no policy takes"),
+    "text": (spaces.Text(5), "is a Text, which no policy accepts"),
 }
 ACTIONS = {
     "counts from -1": (spaces.Discrete(3, start=-1), "action counts from -1, and networks count from 0"),
     "counts from 1 and 2": (spaces.MultiDiscrete([3, 3], start=[1, 2]), r"action counts from \[1, 2\]"),
     "a matrix of bits": (spaces.MultiBinary((2, 3)), "flatten it"),
     "a single number": (spaces.Box(-1.0, 1.0, (), np.float32), r"give it the shape \(1,\)"),
-    "whole numbers": (spaces.Box(-5, 5, (2,), np.int32), "a Box of int32, and algorithms send fractions"),
+    "whole numbers": (
+        spaces.Box(-5, 5, (2,), np.int32),
+        "a Box of int32, but algorithms send fractional values",
+    ),
     "as wide as floats": (
         spaces.Box(np.finfo(np.float32).min, np.finfo(np.float32).max, (2,), np.float32),
-        "has bounds of which float32 cannot hold the difference; give narrower ones",
+        "has bounds whose difference is too large for float32; give narrower bounds",
     ),
     "no bounds": (spaces.Box(-np.inf, np.inf, (2,), np.float32), "has no bounds; give its Box a finite low"),
 }

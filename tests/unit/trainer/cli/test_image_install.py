@@ -142,7 +142,7 @@ def test_a_dependency_that_the_image_lacks_comes_without_what_the_image_has(proj
     [
         ("gymnasium>=99", "corridor: needs gymnasium>=99, and the image has 1."),
         ("companion", "companion: needs torch>=99, and the image has 2.6"),
-        ("stable-baselines3[tests]", "corridor: needs pytest-cov, and the image has none"),
+        ("stable-baselines3[tests]", "corridor: needs pytest-cov, and the image has no version"),
     ],
     ids=["direct", "indirect", "extra"],
 )
@@ -199,7 +199,7 @@ def test_a_module_that_a_newer_version_lacks_is_gone(project, target):
 def test_a_folder_without_a_module_is_refused(tmp_path, target, capfd):
     """An image without any installed module would look like a success."""
     assert f"{target}: holds neither a module nor a package" in refusal(capfd, target)
-    assert "is not a folder; name the one with your project" in refusal(capfd, tmp_path / "missing")
+    assert "is not a folder; name the folder with your project" in refusal(capfd, tmp_path / "missing")
 
 
 def test_a_folder_that_is_itself_a_package_is_refused(folder, target, capfd):

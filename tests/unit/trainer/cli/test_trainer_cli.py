@@ -136,9 +136,9 @@ def test_a_wrong_configuration_is_refused_before_a_learning_library_is_imported(
 @pytest.mark.parametrize(
     ("program", "arguments", "words"),
     [
-        (evaluate, ["run", "--in", "stub,gazebo"], "'gazebo' is not a simulator; choose of stub, mujoco"),
-        (evaluate, ["run", "--json"], "--json: without --in the output is JSON already; leave it out"),
-        (compare, ["a", "b", "--margin", "5"], "'5' is not between 0 and 1, such as 0.05"),
+        (evaluate, ["run", "--in", "stub,gazebo"], "'gazebo' is not a simulator; choose from stub, mujoco"),
+        (evaluate, ["run", "--json"], "--json: has an effect only with --in; without --in"),
+        (compare, ["a", "b", "--margin", "5"], "'5' is not a number between 0 and 1, such as 0.05"),
         (compare, ["a", "b", "--in", "gazebo"], "argument --in: invalid choice"),
     ],
 )
@@ -163,7 +163,7 @@ def test_a_pod_evaluates_in_its_own_simulators_only(tmp_path, capsys, monkeypatc
     code = evaluate([str(tmp_path), "--in", "stub"])
 
     assert code == 2
-    assert "--in: the simulators are those of the pod; leave it out" in capsys.readouterr().err
+    assert "--in: a pod evaluates in its own simulators; remove the option" in capsys.readouterr().err
 
 
 def test_keys_are_read_from_a_terminal_only(tmp_path, capsys, monkeypatch):

@@ -148,7 +148,7 @@ def test_the_same_seed_is_the_same_episode_as_in_the_task_without_goals(make_env
 @pytest.mark.parametrize(
     ("options", "fact"),
     [
-        ({"observe": ["target"]}, "observe: target would show the goal"),
+        ({"observe": ["target"]}, "observe: the policy must see the target only as"),
         ({"reward": "Sparce"}, "reward: 'Sparce' is not a reward"),
         ({"frames": 3}, "frames: is not an option; use "),
     ],

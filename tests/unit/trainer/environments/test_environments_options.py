@@ -32,11 +32,14 @@ def test_python_may_use_the_enumeration():
     ("given", "message"),
     [
         ({"reward": "dense"}, "reward: 'dense' is not a reward; use Dense or Sparse"),
-        ({"observe": ["camera"]}, "observe: 'camera' is not a part; use sensors, velocity"),
+        (
+            {"observe": ["camera"]},
+            "observe: 'camera' is not a part of the observation; use sensors, velocity",
+        ),
         ({"observe": []}, "observe: is empty"),
         ({"observe": ["target", "target"]}, "observe: contains a part twice"),
         ({"actions": "both"}, "actions: 'both' is not known; use discrete or continuous"),
-        ({"movements": ["JUMP"]}, "movements: JUMP not known; use STOP, FORWARD"),
+        ({"movements": ["JUMP"]}, r"movements: contains unknown movements \(JUMP\); use STOP, FORWARD"),
         ({"movements": []}, "movements: is empty"),
         ({"movements": ["STOP", "STOP"]}, "movements: contains a movement twice"),
         ({"max_steps": 0}, "max_steps: 0 leaves no time; use at least 1"),

@@ -107,7 +107,7 @@ def test_a_wrong_option_raises_an_error_before_a_simulator_is_requested():
 
 def test_an_unknown_role_raises_an_error_that_names_the_roles():
     """With a wrong role, no simulator would be found, and the message would be about simulators."""
-    with pytest.raises(ConfigurationError, match=r'^role: "collect" does not exist; choose Collect or'):
+    with pytest.raises(ConfigurationError, match=r'^role: "collect" is not a role; choose Collect or'):
         make(role="collect")
 
 

@@ -49,7 +49,7 @@ def test_a_refusal_names_the_robot_the_task_and_what_is_missing():
 
     assert str(refusal.value) == (
         "trainer.robot: FakeRobotino has no Cameras and no Joints, which Sorting-v0 needs; it has Steering, "
-        "Omnidrive, Localization, Distances, Bumper. Use a robot or a task that fits the other"
+        "Omnidrive, Localization, Distances, Bumper. Use another robot or another task"
     )
 
 

@@ -61,8 +61,8 @@ def test_a_robot_of_your_own_is_named_by_its_module(module):
         ("mybots:Gone", "trainer.robot: mybots:Gone cannot be imported"),
         ("mybots:Thing", "trainer.robot: mybots:Thing is not a RobotAbc; derive the class from"),
         ("mybots:number", "trainer.robot: mybots:number is not a RobotAbc"),
-        ("mybots:Real", "trainer.robot: mybots:Real is a RobotAbc without a simulator"),
-        ("mybots:Half", "trainer.robot: mybots:Half lacks the method bumped; implement it"),
+        ("mybots:Real", "trainer.robot: mybots:Real is a RobotAbc, but not a SimulatedRobot"),
+        ("mybots:Half", "trainer.robot: mybots:Half does not implement the method bumped; add it"),
     ],
 )
 def test_what_is_no_class_of_a_robot_is_refused_before_anything_starts(module, name, fact):

@@ -264,7 +264,7 @@ def test_an_image_of_another_size_is_refused():
 
     _, scene = fake_seeing()
 
-    with pytest.raises(ConfigurationError, match=r"\(480, 640, 3\), and SeeTarget-v0 needs \(48, 64, 3\)"):
+    with pytest.raises(ConfigurationError, match=r"\(480, 640, 3\), but SeeTarget-v0 needs \(48, 64, 3\)"):
         SeeTargetEnv(Large(), scene).reset(seed=1)
 
 

@@ -69,7 +69,10 @@ def test_too_few_simulators_end_the_run(play, pool, last_word):
     code, _ = play(pool("DQN", least=2), {"collect-1": {"steps": range(10, 1000)}})
 
     assert code == 80
-    assert "collect-1: 2 restarts within 600 s did not repair it (dead 2; last: " in last_word().reason
+    assert (
+        "collect-1: 2 restarts within 600 s did not repair the simulator (dead 2; last: "
+        in last_word().reason
+    )
 
 
 @pytest.mark.parametrize("name", DISCRETE)

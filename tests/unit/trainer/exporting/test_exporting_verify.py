@@ -26,7 +26,7 @@ from palaestra_trainer.testing import MaskedTask
 NUMBERS = spaces.Box(-1.0, 1.0, (3,), np.float32)
 FEW = spaces.Discrete(3)
 SMALL = {"policy_kwargs": {"net_arch": [8]}, "device": "cpu", "seed": 1}
-SAME = "takes one and the same action on 1000 observations"
+SAME = "takes the same action on all 1000 observations"
 FORMATS = (onnx_file, safetensors_file)
 LARGEST = {kind: float(np.finfo(kind).max) for kind in (np.float32, np.float64)}
 

@@ -100,7 +100,7 @@ def test_a_run_without_recorded_episodes_has_no_film(run, tmp_path, capsys):
     code = main([str(run), "--film", str(tmp_path / "best.gif")])
 
     assert code == 2
-    assert "run: has no recorded episode; evaluations of robots" in capsys.readouterr().err
+    assert "run: has no recorded episode; set evaluation.everySteps" in capsys.readouterr().err
     assert (tmp_path / "best.gif").read_text() == "old"
 
 

@@ -251,7 +251,7 @@ def test_a_run_may_resume_with_other_callbacks(play, job, with_callbacks):
         ("Notes", {}, "[0].name: Notes does not name a class; write it as module:Class"),
         ("nowhere:Notes", {}, "[0].name: nowhere:Notes cannot be imported (ModuleNotFoundError: No module"),
         ("{module}:Note", {}, "{module}:Note cannot be imported (AttributeError"),
-        ("{module}:Plain", {}, "{module}:Plain is not a subclass of BaseCallback; name a class"),
+        ("{module}:Plain", {}, "{module}:Plain is not a subclass of BaseCallback; name a subclass"),
         ("{module}:SEEN", {}, "{module}:SEEN is not a subclass of BaseCallback"),
         ("{module}:Unfinished", {}, "{module}:Unfinished has no _on_step; add this method"),
         ("{module}:Notes", {"stopat": 1}, "options.stopat: {module}:Notes has no such argument; did you"),
@@ -262,7 +262,7 @@ def test_a_run_may_resume_with_other_callbacks(play, job, with_callbacks):
             "[0].name: stable_baselines3.common.callbacks:EvalCallback is refused: a run",
         ),
         (f"{SB3}:StopTrainingOnRewardThreshold", {"reward_threshold": 1}, "evaluation.stopAtSuccessRate"),
-        (f"{SB3}:StopTrainingOnNoModelImprovement", {}, "it works inside an EvalCallback only; write a"),
+        (f"{SB3}:StopTrainingOnNoModelImprovement", {}, "it works only inside an EvalCallback; write a"),
         (
             f"{SB3}:CheckpointCallback",
             {},

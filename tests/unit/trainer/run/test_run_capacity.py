@@ -121,12 +121,12 @@ def test_checkpoints_that_are_there_are_room_for_those_to_come(begun, monkeypatc
     [
         (20 * GB, True, 20 * GB, []),
         (2 * GB, True, 20 * GB, [
-            ("1,000,000 rows of 18,452 bytes need 18.45 GB of memory, and 2.00 GB are left; "
+            ("1,000,000 rows of 18,452 bytes need 18.45 GB of memory, but only 2.00 GB are free; "
              "set at most 108389, or raise trainer.resources.limits.memory"),
         ]),
         (2 * GB, False, 20 * GB, ["set at most 108389, or free some memory"]),
         (20 * GB, True, GB, [
-            ("need 18.73 GB for checkpoints, and the run directory's volume has 1.00 GB; "
+            ("need 18.73 GB for checkpoints, but the volume of the run directory has only 1.00 GB; "
              "set at most 39194, or use a larger volume (storage.size)"),
         ]),
         (2 * GB, True, GB, ["of memory", "for checkpoints"]),

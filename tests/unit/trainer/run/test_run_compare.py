@@ -137,9 +137,9 @@ def test_policies_of_different_tasks_are_refused_before_anything_starts(written)
 
     first, second = str(refused.value).splitlines()
     assert first == (
-        "environment.id: A learned Corridor-v0, and B Other-v0; compare policies of one environment"
+        "environment.id: A learned Corridor-v0, but B learned Other-v0; compare policies of one environment"
     )
-    assert second == "robot: A drives Robotino, and B EPuck; compare policies of one robot"
+    assert second == "robot: A drives Robotino, but B drives EPuck; compare policies of one robot"
 
 
 def test_a_run_without_a_policy_is_named(written):
@@ -168,7 +168,7 @@ def test_options_that_differ_are_told(written):
     other = written("b", environment={"id": "Corridor-v0", "options": {"max_steps": 5}})
 
     assert list(notes(written("a"), other)) == [
-        "environment.options differ (max_steps): each policy plays with those of its own job"
+        "environment.options differ (max_steps): each policy plays with the options of its own job"
     ]
 
 

@@ -65,7 +65,7 @@ def test_a_rollout_of_more_steps_than_the_run_is_told(play):
     [
         ("DQN", {"train_freq": 1000}, "1000 steps come before each update"),
         ("REINFORCE", {"episodes_per_update": 1000}, "1000 episodes are more than the run has"),
-        ("DQN", {"train_freq": [100, "episode"]}, "the run took more steps, because an update is due later"),
+        ("DQN", {"train_freq": [100, "episode"]}, "an update waited for whole episodes"),
     ],
 )
 def test_updates_that_are_rarer_than_the_steps_are_told(play, name, given, line):

@@ -29,7 +29,7 @@ def test_the_message_tells_flapping_from_an_accident():
         budget.spend(DEAD)
 
     assert str(told.value) == (
-        "collect-0: flapping: 10 restarts within 600 s did not repair it "
+        "collect-0: flapping: 10 restarts within 600 s did not repair the simulator "
         "(dead 9, hung 1; last: robotino: closed the connection); "
         "read the simulator's log, or raise restart.limit"
     )

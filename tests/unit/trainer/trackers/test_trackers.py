@@ -163,5 +163,5 @@ def test_wandb_that_cannot_upload_in_time_ends_with_a_warning_and_the_remedy(wan
 
     (line,) = lines
     assert line["log_level"] == "warning"
-    assert line["event"] == "W&B has not received all data of the run"
+    assert line["event"] == "W&B has not received all data of the run in time"
     assert line["remedy"] == f"wandb sync {directory.path}/wandb/run-*"

@@ -120,7 +120,7 @@ def test_a_message_that_is_too_long_is_refused(kind):
     read, make_message, _ = kind
     sound = make_message()
 
-    with pytest.raises(ValueError, match=f"a message of {len(sound) + 1} bytes, not {len(sound)}"):
+    with pytest.raises(ValueError, match=f"a message of {len(sound) + 1} bytes instead of {len(sound)}"):
         read(memoryview(bytes([*sound, 0])))
 
 
@@ -128,9 +128,13 @@ REFUSED = {
     "another encoding": (
         ImageReading("camera"),
         color(encoding="rgb8"),
-        "an image in rgb8, little-endian, not bgra8",
+        "an image in rgb8, little-endian, instead of bgra8",
     ),
-    "big-endian": (ImageReading("camera"), color(is_bigendian=1), "an image in bgra8, big-endian, not bgra8"),
+    "big-endian": (
+        ImageReading("camera"),
+        color(is_bigendian=1),
+        "an image in bgra8, big-endian, instead of bgra8",
+    ),
     "padded rows": (ImageReading("camera"), color(step=16), "3 x 2 pixels with 16 bytes a row and 24 in all"),
     "missing rows": (
         ImageReading("camera"),

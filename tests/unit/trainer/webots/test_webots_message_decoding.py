@@ -70,7 +70,7 @@ def test_a_message_that_is_too_long_is_refused(kind, read):
     """A message with more bytes than its type needs was sent to the wrong topic."""
     sound = message(kind, KINDS[kind][2])
 
-    with pytest.raises(ValueError, match=f"a message of {len(sound) + 1} bytes, not {len(sound)}"):
+    with pytest.raises(ValueError, match=f"a message of {len(sound) + 1} bytes instead of {len(sound)}"):
         read(memoryview(bytes([*sound, 0])))
 
 
@@ -82,7 +82,7 @@ def test_a_message_whose_frame_id_claims_another_length_is_refused(kind, read):
     damaged = bytearray(sound)
     damaged[12] += 1
 
-    with pytest.raises(ValueError, match="a frame_id of 13 bytes, not 12"):
+    with pytest.raises(ValueError, match="a frame_id of 13 bytes instead of 12"):
         read(memoryview(damaged))
 
 

@@ -87,7 +87,10 @@ def _mistakes(kind: BufferKind, chosen: Any, options: Any) -> Iterator[str]:
     if options is None:
         return
     if chosen is None:
-        yield f"{FIELD}.{kind.options}: has no effect without {kind.chooser}; set it, or remove both"
+        yield (
+            f"{FIELD}.{kind.options}: has no effect without {kind.chooser}; "
+            f"set {kind.chooser}, or remove this field"
+        )
     if not isinstance(options, dict):
         yield f"{FIELD}.{kind.options}: {options!r} is refused; give a mapping"
     elif known is not None:
@@ -99,8 +102,12 @@ def _mistakes(kind: BufferKind, chosen: Any, options: Any) -> Iterator[str]:
 def _unknown(field: str, options: Mapping[str, Any], known: Mapping[str, object]) -> Iterator[str]:
     for name in options:
         if name not in known:
-            remedy = nearest(str(name), known) if known else "its class adds none, so remove it"
-            yield f"{field}.{name}: is not an option here; {remedy}"
+            remedy = (
+                nearest(str(name), known)
+                if known
+                else "the class of the buffer has no options of its own, so remove it"
+            )
+            yield f"{field}.{name}: is not an option of this buffer; {remedy}"
 
 
 def _own(kind: BufferKind, name: str) -> type[BaseBuffer]:

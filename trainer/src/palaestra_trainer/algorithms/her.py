@@ -44,7 +44,7 @@ def mistakes(options: Mapping[str, Any], field: str) -> Iterator[str]:
     """Yield a message with field, fact and remedy for each wrong option of the buffer."""
     for name, value in options.items():
         if name not in OPTIONS:
-            yield f"{field}.{name}: is not an option here; {nearest(str(name), list(OPTIONS))}"
+            yield f"{field}.{name}: is not an option of this buffer; {nearest(str(name), list(OPTIONS))}"
         elif name == OPTIONS[0] and not _is_count(value):
             yield f"{field}.{name}: {value!r} is refused; give a whole number above 0"
         elif name == OPTIONS[1] and value not in STRATEGIES:
@@ -67,7 +67,7 @@ def refuse_other_observations(observation: spaces.Space[Any]) -> None:
     if parts[GOALS[0]].shape != parts[GOALS[1]].shape:
         raise ConfigurationError(
             f"environment.id: its achieved_goal has the shape {parts[GOALS[0]].shape} and its desired_goal "
-            f"{parts[GOALS[1]].shape}; give both the same"
+            f"{parts[GOALS[1]].shape}; give both the same shape"
         )
 
 
@@ -112,8 +112,9 @@ class ValidHerReplayBuffer(ValidDictReplayBuffer, HerReplayBuffer):
     def positions(self, positions: Positions) -> None:
         if len(positions.columns) != self.n_envs:
             raise ConfigurationError(
-                f"simulators: {NAME} has a column for each collecting simulator, and the run has "
-                f"{len(positions.columns)} columns, not {self.n_envs}; use as many simulators"
+                f"simulators: {NAME} has a column for each collecting simulator; the checkpoint has "
+                f"{len(positions.columns)} columns, not {self.n_envs}; use the number of simulators that it "
+                "was saved with"
             )
         self._next = [row for row, _ in positions.columns]
         self._filled = [filled for _, filled in positions.columns]

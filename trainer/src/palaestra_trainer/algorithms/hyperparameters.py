@@ -106,7 +106,7 @@ def _mistakes_of_policy(policy: type[BasePolicy], given: Mapping[str, Any]) -> I
                 )
         elif name == "net_arch" and _has_shared_layers(value):
             yield (
-                f"{field}: {value!r} is a form of Stable-Baselines3 before 1.8, where layers were shared; "
+                f"{field}: {value!r} has shared layers, which Stable-Baselines3 removed in 1.8; "
                 "write {pi: [...], vf: [...]}, or a list of numbers for both"
             )
         elif fact := _refused(value, known[name]):

@@ -76,11 +76,11 @@ def _refuse_members(chosen: Mapping[str, Any], members: int) -> None:
     if limits.needs_one_member(chosen) and members > 1:
         raise ConfigurationError(
             f"{hyperparameters.FIELD}.train_freq: counts in episodes, which only one collecting simulator "
-            f"allows, not {members}; count in steps, or collect in one"
+            f"allows, not {members}; count in steps, or use one collecting simulator"
         )
     if chosen.get("normalize_advantage") and (chosen.get("n_steps"), members) == (1, 1):
         raise ConfigurationError(
-            f"{hyperparameters.FIELD}.n_steps: 1 step of 1 collecting simulator is 1 row, and "
+            f"{hyperparameters.FIELD}.n_steps: 1 step in 1 collecting simulator gives 1 row, but "
             "normalize_advantage needs 2; raise n_steps, add a simulator, or set normalize_advantage: false"
         )
 

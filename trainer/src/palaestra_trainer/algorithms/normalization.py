@@ -146,7 +146,7 @@ class ValidNormalize(VecNormalize):
         if content["epsilon"] != self.epsilon:
             raise ValueError(f"its epsilon is {content['epsilon']}")
         if any(content[name]["clip"] != clip for name, clip in self._clips().items()):
-            raise ValueError("it clips elsewhere")
+            raise ValueError("its limits of clipping are different")
         self.scales = {name: Moments.from_json(content[name], np.shape(running[name].mean)) for name in there}
 
     def take_over(self, content: Mapping[str, Any]) -> None:

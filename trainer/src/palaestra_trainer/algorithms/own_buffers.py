@@ -90,7 +90,7 @@ class OwnBuffer(BaseBuffer):
             if not _can_be_written(value):
                 raise ConfigurationError(
                     f"{field_of(type(self))}: {type(self).__name__} has {name}, a {type(value).__name__}, "
-                    "which no checkpoint can write; use arrays, tensors and numbers, or give the class "
+                    "which a checkpoint cannot store; use arrays, tensors and numbers, or give the class "
                     "state_dict() and load_state_dict()"
                 )
         return state
@@ -115,9 +115,9 @@ class OwnBuffer(BaseBuffer):
             ConfigurationError: always.
         """
         raise ConfigurationError(
-            f"{field_of(type(self))}: the checkpoint has lost {np.count_nonzero(~kept)} rows, and only "
-            f"{type(self).__name__} knows what belongs to them; restore the run directory from a copy, or "
-            "begin a new run"
+            f"{field_of(type(self))}: the checkpoint has lost {np.count_nonzero(~kept)} rows, but only the "
+            f"code of {type(self).__name__} could remove what belongs to them; restore the run directory "
+            "from a copy, or begin a new run"
         )
 
     def _own_state(self) -> dict[str, Any]:
@@ -145,14 +145,15 @@ def with_valid_rows(named: type[BaseBuffer]) -> type[BaseBuffer]:
     """
     if issubclass(named, _NEIGHBOURS):
         raise ConfigurationError(
-            f"{field_of(named)}: {named.__name__} reads the rows after a row, and rows of several simulators "
-            "lie in one column; extend ReplayBuffer, or use HerReplayBuffer by its name"
+            f"{field_of(named)}: {named.__name__} takes the following row as the next step of the same "
+            "episode, but here the rows of several simulators alternate; extend ReplayBuffer, or use "
+            "HerReplayBuffer by its name"
         )
     base = next((base for base in _VALID if issubclass(named, base)), None)
     if base is None or getattr(named, "get", None) is not getattr(base, "get", None):
         raise ConfigurationError(
-            f"{field_of(named)}: {named.__name__} draws batches of its own (get), which may have rows "
-            "that a fault spoiled; override compute_returns_and_advantage, add or _get_samples instead"
+            f"{field_of(named)}: {named.__name__} overrides get, so its batches may contain rows that a "
+            "fault made invalid; override compute_returns_and_advantage, add or _get_samples instead"
         )
     content = {"__doc__": named.__doc__, "__module__": named.__module__, "_rows_only": _VALID[base]}
     return cast("type[BaseBuffer]", type(named.__name__, (OwnBuffer, _VALID[base], named), content))

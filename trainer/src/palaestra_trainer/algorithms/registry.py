@@ -218,7 +218,7 @@ def entry_of(name: str) -> RegisteredAlgorithm:
         return entry
     raise ConfigurationError(
         f"algorithm.name: {name} is not an algorithm; {nearest(name, dict(ALGORITHMS))} "
-        "or name a class as module:Class"
+        "or name your own class as module:Class"
     )
 
 

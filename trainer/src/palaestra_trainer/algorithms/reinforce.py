@@ -109,7 +109,7 @@ class REINFORCE(BaseAlgorithm):
         if baseline not in ("value", "none"):
             raise ValueError(f'baseline: {baseline!r} is unknown; use "value" or "none"')
         if episodes_per_update < 1:
-            raise ValueError(f"episodes_per_update: {episodes_per_update} is less than 1")
+            raise ValueError(f"episodes_per_update: {episodes_per_update} is less than 1; use 1 or more")
         self.episodes_per_update = episodes_per_update
         self.gamma = gamma
         self.baseline = baseline

@@ -131,10 +131,10 @@ class OnPolicyRows(ValidRowsCounted, OnPolicyAlgorithm):
         takes_masks = isinstance(self, MaskablePPO)
         if isinstance(buffer, _WITH_MASKS) == takes_masks:
             return
-        masks, base = ("needs", "MaskableRolloutBuffer") if takes_masks else ("gives no", "RolloutBuffer")
+        masks, base = ("needs", "MaskableRolloutBuffer") if takes_masks else ("has no", "RolloutBuffer")
         raise ConfigurationError(
             f"{own_buffers.field_of(type(buffer))}: {type(buffer).__name__} does not fit "
-            f"{type(self).__name__}, which {masks} masks of actions; extend {base}"
+            f"{type(self).__name__}, which {masks} action masks; extend {base}"
         )
 
     def _update_info_buffer(self, infos: list[dict[str, Any]], dones: np.ndarray | None = None) -> None:
@@ -172,7 +172,7 @@ def with_valid_rows(cls: type[BaseAlgorithm]) -> type[BaseAlgorithm]:
     else:
         raise ConfigurationError(
             f"algorithm.name: {cls.__name__} is neither an OnPolicyAlgorithm nor an OffPolicyAlgorithm, so "
-            "rows that a fault spoiled would reach its losses; use a class that is one of them"
+            "it would learn from rows that a fault made invalid; use a subclass of one of them"
         )
     made = type(cls.__name__, (rows, cls), {"__doc__": cls.__doc__, "__module__": cls.__module__})
     return cast("type[BaseAlgorithm]", made)
@@ -180,6 +180,6 @@ def with_valid_rows(cls: type[BaseAlgorithm]) -> type[BaseAlgorithm]:
 
 def _creates_its_own(model: BaseAlgorithm, buffer: Any) -> ConfigurationError:
     return ConfigurationError(
-        f"algorithm.name: {type(model).__name__} creates its own {type(buffer).__name__}, which learns from "
-        "rows that a fault spoiled; use an algorithm with a buffer of Stable-Baselines3"
+        f"algorithm.name: {type(model).__name__} creates its own {type(buffer).__name__}, which would keep "
+        "rows that a fault made invalid; use an algorithm with a buffer of Stable-Baselines3"
     )

@@ -133,5 +133,5 @@ def _margin(text: str) -> float:
     except ValueError:
         margin = -1.0
     if not 0.0 < margin < 1.0:
-        raise argparse.ArgumentTypeError(f"{text!r} is not between 0 and 1, such as 0.05")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number between 0 and 1, such as 0.05")
     return margin

@@ -67,7 +67,9 @@ def evaluate(arguments: Sequence[str] | None = None) -> int:
     chosen = options.parse_args(arguments)
     require_linux("palaestra-eval")
     if chosen.json and chosen.drivers is None:
-        options.error("--json: without --in the output is JSON already; leave it out")
+        options.error(
+            "--json: has an effect only with --in; without --in the output is always JSON; remove --json"
+        )
     configure_logs()
     try:
         _evaluate(chosen)
@@ -88,7 +90,7 @@ def _evaluate(chosen: argparse.Namespace) -> None:
     in_pod = CONFIG_VARIABLE in os.environ
     if in_pod and chosen.drivers is not None:
         raise ConfigurationError(
-            "--in: the simulators are those of the pod; leave it out, or evaluate elsewhere"
+            "--in: a pod evaluates in its own simulators; remove the option, or evaluate on your machine"
         )
     if in_pod:
         configuration = configuration.model_copy(update={"simulators": load().simulators})
@@ -118,7 +120,7 @@ def _drivers(text: str) -> tuple[str, ...]:
     names = tuple(dict.fromkeys(text.split(",")))
     for name in names:
         if name not in DRIVERS:
-            raise argparse.ArgumentTypeError(f"{name!r} is not a simulator; choose of {', '.join(DRIVERS)}")
+            raise argparse.ArgumentTypeError(f"{name!r} is not a simulator; choose from {', '.join(DRIVERS)}")
     return names
 
 

@@ -102,7 +102,7 @@ def _target() -> Path:
 def _copy(folder: Path, source: Path) -> None:
     """Copy a project to a folder in which a build backend can write files."""
     if not folder.is_dir():
-        raise ConfigurationError(f"{folder}: is not a folder; name the one with your project")
+        raise ConfigurationError(f"{folder}: is not a folder; name the folder with your project")
 
     def left_out(at: str, names: Iterable[str]) -> set[str]:
         top = {RUNS} if Path(at) == folder else set()
@@ -180,8 +180,8 @@ def _check_requirements(staged: Path) -> None:
             found = _found(requirement, there)
             raise ConfigurationError(
                 f"{distribution.name}: needs {requirement.name}{requirement.specifier}, and the image has "
-                f"{found.version if found else 'none'}; choose a version that fits the image, "
-                "or name the package in your dependencies"
+                f"{found.version if found else 'no version'}; choose a version that fits the image, "
+                "or add the package to your dependencies"
             )
 
 

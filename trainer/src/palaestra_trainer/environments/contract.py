@@ -50,7 +50,7 @@ def _no_info(info: Any) -> str:
 def _unlike(space: spaces.Space[Any], observation: Any) -> str:
     """Return the difference in type, shape or keys between an observation and its space; "" if equal."""
     fact = _mismatch_of_kind(space, observation)
-    return fact and f"an observation of another kind ({fact})"
+    return fact and f"an observation that does not fit its space ({fact})"
 
 
 def _mismatch_of_kind(space: spaces.Space[Any], observation: Any) -> str:
@@ -104,4 +104,4 @@ def _mismatch_of_box(space: spaces.Box, observation: Any) -> str:
     if not len(outside):
         return ""
     place = tuple(int(index) for index in outside[0])
-    return f"{numbers[place]} at {list(place)}, not within {space.low[place]} and {space.high[place]}"
+    return f"{numbers[place]} at {list(place)}, not between {space.low[place]} and {space.high[place]}"

@@ -117,5 +117,7 @@ def _creator(name: str, spec: EnvSpec) -> Callable[..., Any]:
         )
         return found
     if creator is None:
-        raise ConfigurationError(f"environment.id: {name} is registered without entry_point; add one")
+        raise ConfigurationError(
+            f"environment.id: {name} is registered without an entry_point; add one to its registration"
+        )
     return creator

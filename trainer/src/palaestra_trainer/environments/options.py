@@ -210,7 +210,9 @@ def parse_as(kind: type[_Chosen], given: Mapping[str, Any]) -> _Chosen:
 def _movements(given: Sequence[Movement | str]) -> tuple[Movement, ...]:
     known = Movement.__members__
     if unknown := [str(it) for it in given if it not in known and it not in known.values()]:
-        raise ConfigurationError(f"movements: {', '.join(unknown)} not known; use {', '.join(known)}")
+        raise ConfigurationError(
+            f"movements: contains unknown movements ({', '.join(unknown)}); use {', '.join(known)}"
+        )
     return tuple(known[it] if isinstance(it, str) else Movement(it) for it in given)
 
 
@@ -241,7 +243,7 @@ def _mistakes_of_episodes(options: Episodes) -> Iterator[str]:
 def _mistakes_of_parts(names: Sequence[str]) -> Iterator[str]:
     for name in names:
         if name not in PARTS:
-            yield f"observe: {name!r} is not a part; use {', '.join(PARTS)}"
+            yield f"observe: {name!r} is not a part of the observation; use {', '.join(PARTS)}"
     if not names:
         yield f"observe: is empty; choose from {', '.join(PARTS)}"
     if len(set(names)) < len(names):
@@ -250,7 +252,7 @@ def _mistakes_of_parts(names: Sequence[str]) -> Iterator[str]:
 
 def _mistakes_of_goals(names: Sequence[str]) -> Iterator[str]:
     if "target" in names:
-        yield "observe: target would show the goal to a policy that learns other goals; remove it"
+        yield "observe: the policy must see the target only as its desired goal; remove target"
 
 
 def _mistakes_of_images(options: SeeOptions) -> Iterator[str]:

@@ -129,7 +129,7 @@ class FreePlaces:
             for sign, edges in ((1.0, self.layout.low), (-1.0, self.layout.high))
         )
         raise ConfigurationError(
-            f"reset option {name}: ({x_m:g}, {y_m:g}) {fact} or beyond the floor; choose a free place with"
+            f"reset option {name}: ({x_m:g}, {y_m:g}) {fact} or beyond the floor; choose a free position with"
             f" x from {least[0]:g} to {most[0]:g} and y from {least[1]:g} to {most[1]:g}"
         )
 

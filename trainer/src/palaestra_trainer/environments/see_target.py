@@ -201,7 +201,7 @@ class SeeTargetEnv(gymnasium.Env[Observation, Any]):
         image = self._eyes.color_image()
         if image.shape != IMAGE:
             raise ConfigurationError(
-                f"the camera's image has the shape {image.shape}, and SeeTarget-v0 needs {IMAGE}; "
+                f"the camera's image has the shape {image.shape}, but SeeTarget-v0 needs {IMAGE}; "
                 "set width and height of the Camera in the world"
             )
         return np.array(image, order="C")

@@ -32,8 +32,8 @@ def flaws_of_observation(seen: spaces.Space[Any]) -> Iterator[str]:
         what = f"environment.id: its {f'observation {key}'.rstrip()}"
         if not isinstance(part, KINDS):
             yield (
-                f"{what} is a {type(part).__name__}, which no policy takes; use Box, Discrete, MultiDiscrete "
-                "or MultiBinary, or a Dict of these"
+                f"{what} is a {type(part).__name__}, which no policy accepts; use Box, Discrete, "
+                "MultiDiscrete or MultiBinary, or a Dict of these"
             )
         elif flaw := _flaw(part):
             yield f"{what} {flaw}"
@@ -49,7 +49,10 @@ def _flaw(part: spaces.Space[Any]) -> str:
     """Return the reason why Stable-Baselines3 would misread a space, and the remedy; "" if it would not."""
     if isinstance(part, spaces.Discrete | spaces.MultiDiscrete) and np.any(part.start):
         start = np.asarray(part.start).tolist()
-        return f"counts from {start}, and networks count from 0; count from 0, and add {start} inside"
+        return (
+            f"counts from {start}, and networks count from 0; count from 0, and add {start} in the "
+            "environment"
+        )
     if isinstance(part, spaces.MultiBinary) and len(part.shape) > 1:
         return f"is a MultiBinary of shape {part.shape}; flatten it"
     if isinstance(part, spaces.Box) and not part.shape:
@@ -62,11 +65,13 @@ def _flaw_of_bounds(acted: spaces.Space[Any]) -> str:
     if not isinstance(acted, spaces.Box):
         return ""
     if not np.issubdtype(acted.dtype, np.floating):
-        return f"is a Box of {acted.dtype}, and algorithms send fractions; use float32, or MultiDiscrete"
+        return (
+            f"is a Box of {acted.dtype}, but algorithms send fractional values; use float32 or MultiDiscrete"
+        )
     if not acted.is_bounded():
         return "has no bounds; give its Box a finite low and high"
     with np.errstate(over="ignore"):
         narrow = np.isfinite(acted.high - acted.low).all()
     return (
-        "" if narrow else f"has bounds of which {acted.dtype} cannot hold the difference; give narrower ones"
+        "" if narrow else f"has bounds whose difference is too large for {acted.dtype}; give narrower bounds"
     )

@@ -78,7 +78,7 @@ class StackedFrames(gymnasium.Wrapper[Any, Any, Any, Any]):
         if not (isinstance(space, spaces.Box) and space.shape):
             raise ConfigurationError(
                 f"environment.frameStack: the observation is a {type(space).__name__} of shape "
-                f"{space.shape}, and only a Box with an axis can be stacked; remove frameStack"
+                f"{space.shape}, but only a Box with an axis can be stacked; remove frameStack"
             )
         self._axis = 0 if _has_channels_first(space) else -1
         self._width = space.shape[self._axis]

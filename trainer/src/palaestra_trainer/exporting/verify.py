@@ -89,7 +89,7 @@ def _difference(
     return float((apart / span).max())
 
 
-_REMEDY = "nothing was written; use load_policy where this policy is needed"
+_REMEDY = "nothing was written; use load_policy in the program that needs this policy"
 _NOTHING = "so a comparison would show nothing; normalize observations, train it longer, or use load_policy"
 
 
@@ -118,7 +118,7 @@ def _refuse_what_shows_nothing(
     elif same and _scores_show(convert, Scoring(policy), observations):
         return
     if same:
-        raise ExportError(f"the policy takes one and the same action on {len(rows)} observations, {_NOTHING}")
+        raise ExportError(f"the policy takes the same action on all {len(rows)} observations, {_NOTHING}")
 
 
 def _scores_show(convert: Convert, scoring: Scoring, observations: dict[str, np.ndarray]) -> bool:

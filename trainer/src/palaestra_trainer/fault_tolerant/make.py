@@ -60,7 +60,8 @@ def make_players(
     """
     if environment_id is None and options:
         raise ConfigurationError(
-            f"environment: options were given without it ({', '.join(options)}); name the environment too"
+            f"environment: is missing, but its options were given ({', '.join(options)}); name the "
+            "environment"
         )
     wanted = None if environment_id is None else Environment(id=environment_id, options=options)
     role = role_of(role_name)

@@ -95,7 +95,9 @@ class FaultTolerantVectorEnv(VectorEnv[Any, Any, np.ndarray]):
         """
         each = values if isinstance(values, list | tuple) else [values] * self.num_envs
         if len(each) != self.num_envs:
-            raise ValueError(f"values: {len(each)} for {self.num_envs} environments; give one for each")
+            raise ValueError(
+                f"values: {len(each)} values for {self.num_envs} environments; give one for each"
+            )
         for player, value in zip(self._players.all, each, strict=True):
             player.restarter.set_attribute(name, value)
 

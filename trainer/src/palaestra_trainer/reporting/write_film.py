@@ -36,8 +36,8 @@ def write_film(run: RunDirectory, to: Path) -> None:
     replays = list(replays_of(json_file(run.replays)))
     if not replays:
         raise ValueError(
-            f"{run.path}: has no recorded episode; evaluations of robots that drive on a floor record some, "
-            "so set evaluation.everySteps in the job"
+            f"{run.path}: has no recorded episode; set evaluation.everySteps in the job, and use a robot "
+            "that drives on a floor"
         )
     best = next((replay for replay in replays if replay.title == "best"), replays[0])
     replace_file(to, lambda name: write(best, name))

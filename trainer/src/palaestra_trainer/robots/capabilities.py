@@ -238,5 +238,5 @@ def require(robot: object, needs: Iterable[type], by: str) -> None:
         has = [known.__name__ for known in CAPABILITIES if isinstance(robot, known)]
         raise MissingCapability(
             f"trainer.robot: {type(robot).__name__} has no {' and no '.join(missing)}, which {by} needs; "
-            f"it has {', '.join(has) or 'no capability'}. Use a robot or a task that fits the other"
+            f"it has {', '.join(has) or 'no capability'}. Use another robot or another task"
         )

@@ -42,7 +42,8 @@ class JointRobot(SimulatedRobot, Joints):
         if not self.motors or len(self.motors) != len(self.greatest):
             raise ConfigurationError(
                 f"trainer.robot: {type(self).__name__} has {len(self.motors)} motors and "
-                f"{len(self.greatest)} numbers in greatest; name motors in a subclass, with a number for each"
+                f"{len(self.greatest)} numbers in greatest; set both in a subclass, with one number for "
+                "each motor"
             )
         super().__init__(*arguments, **options)
 

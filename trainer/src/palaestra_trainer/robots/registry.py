@@ -28,13 +28,13 @@ def robot_class(name: str) -> type[SimulatedRobot]:
         )
     found = imports.object_named(SHIPPED.get(name, name), f"trainer.robot: {name}")
     if not (isinstance(found, type) and issubclass(found, SimulatedRobot)):
-        kind = "a RobotAbc without a simulator" if _is_robot(found) else "not a RobotAbc"
+        kind = "a RobotAbc, but not a SimulatedRobot" if _is_robot(found) else "not a RobotAbc"
         raise ConfigurationError(
             f"trainer.robot: {name} is {kind}; derive the class from "
             "palaestra_trainer.robots.simulated.SimulatedRobot or one of its subclasses"
         )
     if missing := sorted(getattr(found, "__abstractmethods__", ())):
-        raise ConfigurationError(f"trainer.robot: {name} lacks the method {missing[0]}; implement it")
+        raise ConfigurationError(f"trainer.robot: {name} does not implement the method {missing[0]}; add it")
     return found
 
 

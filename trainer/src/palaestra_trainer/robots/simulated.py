@@ -136,7 +136,7 @@ class SimulatedRobot(RobotAbc):
             raise NoSuchSensor(f"{self._title}: its {thing} is not in use; call {call}, then advance()")
 
     def _no_reading(self) -> NoReading:
-        return NoReading(f"{self._title}: its sensors have sent nothing yet; let a period pass by advance()")
+        return NoReading(f"{self._title}: its sensors have sent no reading yet; call advance() first")
 
     @property
     def _title(self) -> str:
@@ -223,7 +223,10 @@ class SimulatedScene(Scene, JointScene):
         """
         name = self._robot.definition
         if not name:
-            raise MissingCapability(f"{type(self._robot).__name__} has no definition; set its DEF name")
+            raise MissingCapability(
+                f"{type(self._robot).__name__}: `definition` is empty; "
+                "set it to the DEF name of the robot in the world"
+            )
         self.supervisor.place(name, start.x_m, start.y_m, start.heading_rad)
         self.mark(target)
         self.supervisor.stop_inertia(name)

@@ -39,7 +39,9 @@ class Master:
         try:
             self._call("getPid")
         except UnreadableAnswer as error:
-            raise MasterLost(f"no ROS master at {self.uri}: {error}; is another program there?") from error
+            raise MasterLost(
+                f"no ROS master at {self.uri}: {error}; another program may use this address"
+            ) from error
 
     def service_address(self, service: str) -> tuple[str, int] | None:
         """Return host and port of the node that serves `service`; None if no node serves it."""

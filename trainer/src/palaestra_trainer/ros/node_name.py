@@ -44,6 +44,6 @@ def _values(arguments: Sequence[str], option: str) -> list[str]:
     values = [word.removeprefix(option) for word in arguments if word.startswith(option)]
     for value in values:
         if not _LEGAL.fullmatch(value):
-            fact = f"{option}{value}: is not a name of ROS"
+            fact = f"{option}{value}: is not a valid ROS name"
             raise ConfigurationError(f"{fact}; begin with a letter, and use letters, digits, _ and / only")
     return values

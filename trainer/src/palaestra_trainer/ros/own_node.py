@@ -81,7 +81,7 @@ def _made(name: str) -> _Node:
     try:
         server = RpcServer((bind_address(host), 0), _answers(master.uri).get)
     except OSError as error:
-        fact = f"{host}: cannot listen there as a ROS node: {error.strerror}"
+        fact = f"{host}: a ROS node cannot listen on this address: {error.strerror}"
         raise ConfigurationError(f"{fact}; set ROS_HOSTNAME, for example to localhost") from error
     server.start()
     return _Node(name=in_full, uri=f"http://{host}:{server.port}/", pid=os.getpid())

@@ -87,7 +87,7 @@ class RosService:
 
     def _asked(self) -> TcprosClient:
         if self._wire is None:
-            raise SimulatorDead(self.simulator, f"{self.name} has no request under way")
+            raise SimulatorDead(self.simulator, f"{self.name} has no pending request")
         return self._wire
 
     def _read_answer(self, wire: TcprosClient) -> Any:

@@ -137,9 +137,11 @@ class RosSubscriber:
         try:
             answer = call(publisher, _CONNECT_S, "requestTopic", node, self.name, [["TCPROS"]])
         except TimeoutError as error:
-            raise SimulatorHung(self.simulator, f"{self.name} has a publisher that hangs") from error
+            raise SimulatorHung(
+                self.simulator, f"{self.name} has a publisher that does not respond"
+            ) from error
         except OSError as error:
-            raise SimulatorDead(self.simulator, f"{self.name} has a publisher that is gone") from error
+            raise SimulatorDead(self.simulator, f"{self.name} has a publisher that no longer runs") from error
         except UnreadableAnswer as error:
             raise WrongData(
                 self.simulator, f"{self.name} has a publisher that sends invalid responses: {error}"
@@ -149,4 +151,6 @@ class RosSubscriber:
         match answer.value:
             case [str(), str(host), int(port)]:
                 return host, port
-        raise WrongData(self.simulator, f"{self.name} is published at {answer.value!r}, not an address")
+        raise WrongData(
+            self.simulator, f"{self.name} is published at {answer.value!r}, which is not an address"
+        )

@@ -111,7 +111,10 @@ class TcprosClient:
                 return self._take(ahead, end)
             self._make_room(end)
             if give_up and time.monotonic() > give_up:
-                raise SimulatorHung(self._simulator, f"sent part of a response within {self._deadline_s:g} s")
+                raise SimulatorHung(
+                    self._simulator,
+                    f"sent only part of a response; the rest did not arrive within {self._deadline_s:g} s",
+                )
             self._read_more()
             give_up = give_up or time.monotonic() + self._deadline_s
 
@@ -149,7 +152,10 @@ class TcprosClient:
             return 0
         (length,) = LENGTH.unpack_from(self._buffer, ahead)
         if length > MAX_FRAME_BYTES:
-            raise WrongData(self._simulator, f"announced a frame of {length} bytes")
+            raise WrongData(
+                self._simulator,
+                f"announced a frame of {length} bytes, more than the limit of {MAX_FRAME_BYTES}",
+            )
         return ahead + LENGTH.size + int(length)
 
     def _take(self, ahead: int, end: int) -> memoryview:
@@ -180,7 +186,7 @@ class TcprosClient:
             if count is None:
                 count = self._sleep(room)
         except OSError as error:
-            raise self._fault("does not answer", error) from error
+            raise self._fault("does not respond", error) from error
         finally:
             count_wait(time.perf_counter() - began)
         if count == 0:

@@ -29,4 +29,6 @@ def call(uri: str, timeout_s: float, method: str, *arguments: Any) -> RpcRespons
     match answer:
         case [int(code), str(text), value]:
             return RpcResponse(code, text, value)
-    raise UnreadableAnswer(f"{uri} responded to {method} with {answer!r}, not a code, a text and a value")
+    raise UnreadableAnswer(
+        f"{uri} responded to {method} with {answer!r} instead of a code, a text and a value"
+    )

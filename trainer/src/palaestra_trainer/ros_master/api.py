@@ -64,7 +64,7 @@ class _Call:
         """
         if len(arguments) != len(self._names):
             names = ", ".join(name.removeprefix("_") for name in self._names)
-            raise WrongArgument(f"{len(arguments)} arguments were given; it takes {names}")
+            raise WrongArgument(f"{len(arguments)} arguments were given; the method takes {names}")
         if not isinstance(arguments[0], str):
             raise WrongArgument(f"caller: {arguments[0]!r} is not a text; give the full name of the node")
         return self._function(*arguments)

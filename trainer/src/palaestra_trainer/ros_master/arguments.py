@@ -22,7 +22,7 @@ def text_of(argument: str, value: Any) -> str:
         WrongArgument: the argument is empty or not a text.
     """
     if not isinstance(value, str) or not value:
-        raise WrongArgument(f"{argument}: {value!r} is not a text with characters; give a name")
+        raise WrongArgument(f"{argument}: {value!r} is empty or not a text; give a name")
     return value
 
 

@@ -170,7 +170,9 @@ class Attempt:
             try:
                 stack.close()
             except ENDING as error:
-                log.warning("not everything was stopped in order", fact=fact_of(error), exc_info=error)
+                log.warning(
+                    "an error occurred while the run was stopped", fact=fact_of(error), exc_info=error
+                )
             finally:
                 hurry.cancel()
         return end
@@ -295,7 +297,11 @@ class Attempt:
         """Log a warning if the run took many more steps than set, because an update waited for episodes."""
         wanted, taken = self._configuration.steps, self._progress.step
         if taken > _FAR_BEYOND * wanted:
-            log.warning("the run took more steps, because an update is due later", wanted=wanted, taken=taken)
+            log.warning(
+                "the run took more steps than set, because an update waited for whole episodes",
+                wanted=wanted,
+                taken=taken,
+            )
 
     def _forget_what_is_played_again(self) -> None:
         """Remove evaluations and curves that a previous attempt recorded after the resumed step."""

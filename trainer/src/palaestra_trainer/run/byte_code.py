@@ -33,7 +33,7 @@ def refuse_another_python(model: Path) -> None:
         coded = [] if written_by in {"", _this_python()} else _with_code(archive)
     if coded:
         raise ConfigurationError(
-            f"{model}: {' and '.join(coded)} has byte code of Python {written_by}, and this is Python "
+            f"{model}: {' and '.join(coded)} has byte code of Python {written_by}, but this is Python "
             f"{_this_python()}; use Python {written_by}, or export the policy there"
         )
 

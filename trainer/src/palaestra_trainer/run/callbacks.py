@@ -36,7 +36,7 @@ FIELD = "algorithm.callbacks"
 _OF_EVALUATION: Mapping[type[BaseCallback], str] = {
     EvalCallback: "a run evaluates on simulators of its own; set trainer.evaluation",
     StopTrainingOnRewardThreshold: "a run ends at a success rate; set trainer.evaluation.stopAtSuccessRate",
-    StopTrainingOnNoModelImprovement: "it works inside an EvalCallback only; write a callback of your own",
+    StopTrainingOnNoModelImprovement: "it works only inside an EvalCallback; write a callback of your own",
 }
 _CHECKPOINTS = "a run saves checkpoints without it; set trainer.checkpoint.everySteps, or give its arguments"
 

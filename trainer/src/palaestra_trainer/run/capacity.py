@@ -80,12 +80,12 @@ def refuse_what_does_not_fit(replay: ReplaySize | None, wanted: Checkpoint, capa
     if replay.memory_bytes > memory:
         remedy = "raise trainer.resources.limits.memory" if capacity.memory_limit else "free some memory"
         lines.append(
-            f"{what} {_gb(replay.memory_bytes)} of memory, and {_gb(memory)} are left; "
+            f"{what} {_gb(replay.memory_bytes)} of memory, but only {_gb(memory)} are free; "
             f"set at most {most}, or {remedy}"
         )
     if disk_bytes > capacity.disk_bytes:
         lines.append(
-            f"{what} {_gb(disk_bytes)} for checkpoints, and the run directory's volume has "
+            f"{what} {_gb(disk_bytes)} for checkpoints, but the volume of the run directory has only "
             f"{_gb(capacity.disk_bytes)}; set at most {most}, or use a larger volume (storage.size)"
         )
     if lines:

@@ -100,12 +100,12 @@ def _differences(a: Configuration, b: Configuration) -> Iterator[str]:
     """Yield the reasons why the success rates of two policies cannot be compared."""
     if a.environment.id != b.environment.id:
         yield (
-            f"environment.id: A learned {a.environment.id}, and B {b.environment.id}; "
+            f"environment.id: A learned {a.environment.id}, but B learned {b.environment.id}; "
             "compare policies of one environment"
         )
     robots = [configuration.robot or DEFAULT_ROBOT for configuration in (a, b)]
     if robots[0] != robots[1]:
-        yield f"robot: A drives {robots[0]}, and B {robots[1]}; compare policies of one robot"
+        yield f"robot: A drives {robots[0]}, but B drives {robots[1]}; compare policies of one robot"
 
 
 def notes(a: Path, b: Path) -> Iterator[str]:
@@ -114,12 +114,18 @@ def notes(a: Path, b: Path) -> Iterator[str]:
     ours, theirs = first.environment.options, second.environment.options
     names = [name for name in sorted({*ours, *theirs}) if ours.get(name) != theirs.get(name)]
     if names:
-        yield f"environment.options differ ({', '.join(names)}): each policy plays with those of its own job"
+        yield (
+            f"environment.options differ ({', '.join(names)}): each policy plays with the options of its "
+            "own job"
+        )
     if not first.with_role(Role.EVALUATE):
-        yield f"no simulator of A has role Evaluate: both play in the world of {evaluating(first)[0].name}"
+        yield (
+            "no simulator of A has role Evaluate: both policies play in the world of "
+            f"{evaluating(first)[0].name}"
+        )
     worlds = [Path(evaluating(each)[0].world).name for each in (first, second)]
     if worlds[0] != worlds[1]:
-        yield f"B was evaluated in the world {worlds[1]}; both play in A's world, {worlds[0]}"
+        yield f"B was evaluated in the world {worlds[1]}; both policies play in A's world, {worlds[0]}"
 
 
 def compare(

@@ -75,7 +75,7 @@ class ProgramReport(Progress):
 def report(step: int, success_rate: float | None) -> None:
     """Implement `palaestra_trainer.report`."""
     if step < 0:
-        raise ValueError(f"step: {step} is negative; give the number of environment steps learned from")
+        raise ValueError(f"step: {step} is negative; give the number of environment steps so far")
     if success_rate is not None and not 0 <= success_rate <= 1:
         raise ValueError(f"success_rate: {success_rate} is not a share; give a number from 0 to 1")
     if not os.environ.get(CONFIG_VARIABLE):

@@ -125,7 +125,7 @@ def _check_document(path: Path, kind: Any) -> None:
 def _check_model(path: Path) -> None:
     with zipfile.ZipFile(path) as archive:
         if damaged := archive.testzip():
-            raise _Damaged(f"{damaged} in it is damaged")
+            raise _Damaged(f"its file {damaged} is damaged")
         # A truncated file may end with the index of a zip inside it, and then looks complete.
         if _DATA not in archive.namelist():
             raise _Damaged(f"has no {_DATA}, as models of Stable-Baselines3 have")

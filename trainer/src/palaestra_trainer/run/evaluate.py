@@ -151,7 +151,7 @@ def _warned(configuration: Configuration) -> tuple[SimulatorConfiguration, ...]:
     found = evaluating(configuration)
     if not configuration.with_role(Role.EVALUATE):
         log.warning(
-            "no simulator has role Evaluate: a collecting simulator evaluates in its world",
+            "no simulator has role Evaluate: a collecting simulator evaluates, in its own world",
             name=found[0].name,
         )
     return found

@@ -95,7 +95,7 @@ class TrainedPolicy:
             try:
                 masks = masks_in(action_masks, self.model.action_space)
             except ValueError as error:
-                raise ValueError(f"action_masks: {error}; pass those of the environment") from error
+                raise ValueError(f"action_masks: {error}; pass the masks of the environment") from error
             return predict_allowed(self.model, masks, *seen, deterministic=deterministic)
         if action_masks is not None:
             raise ValueError(

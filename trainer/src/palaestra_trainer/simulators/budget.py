@@ -68,7 +68,7 @@ class RestartBudget:
         faults = ", ".join(f"{kind} {count}" for kind, count in kinds)
         return (
             f"{self.simulator}: {'flapping: ' if self.flapping else ''}"
-            f"{self.limit.restarts} restarts within {self.limit.within_s:g} s did not repair it "
+            f"{self.limit.restarts} restarts within {self.limit.within_s:g} s did not repair the simulator "
             f"({f'{faults}; ' if faults else ''}last: {fault}); "
             "read the simulator's log, or raise restart.limit"
         )

@@ -176,7 +176,7 @@ def _process(configuration: Configuration, entry: SimulatorConfiguration, run: P
     world = inside if inside.exists() else Path(entry.world)
     if not world.exists() or entry.driver == "command":
         raise ConfigurationError(
-            f"{entry.name}: {world} with driver {entry.driver} cannot be started here; "
+            f"{entry.name}: {world} with driver {entry.driver} cannot be started on this machine; "
             "copy the whole run directory, or evaluate in the pod"
         )
     names = (

@@ -134,5 +134,5 @@ def role_of(name: str) -> Role:
         ConfigurationError: no role has this name.
     """
     if name not in set(Role):
-        raise ConfigurationError(f'role: "{name}" does not exist; choose {" or ".join(Role)}')
+        raise ConfigurationError(f'role: "{name}" is not a role; choose {" or ".join(Role)}')
     return Role(name)

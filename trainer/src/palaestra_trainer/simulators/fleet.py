@@ -43,7 +43,9 @@ class Fleet:
         by_name = {member.name: member for member in members}
         missing = [wanted.name for wanted in configuration.simulators if wanted.name not in by_name]
         if missing:
-            raise ConfigurationError(f"simulators: {', '.join(missing)} was not created; add it to members")
+            raise ConfigurationError(
+                f"simulators: {', '.join(missing)} has no member; add one of that name to members"
+            )
         groups = groups_of(configuration)
         restarters = {
             wanted.name: Restarter(

@@ -135,5 +135,5 @@ class _OneLife(gymnasium.Wrapper[Any, Any, Any, Any]):
             SimulatorDead: the simulator of this episode has ended, or the environment raised it.
         """
         if self.ended:
-            raise SimulatorDead(self._name, "was restarted during an episode")
+            raise SimulatorDead(self._name, "was restarted during the episode")
         return self.env.step(action)

@@ -138,7 +138,7 @@ class Restarter:
         """Stop the member in any state; first cancel a running restart."""
         settle([self])
         if self.busy:
-            log.warning("simulator not stopped: its restart has not ended", simulator=self.name)
+            log.warning("simulator not stopped, because its restart has not ended", simulator=self.name)
         else:
             self._switch(self.member.stop)
 
@@ -279,7 +279,11 @@ class Restarter:
         return str(fault) if refused and not self.meter.stepped else ""
 
     def _lose(self, spent: FaultBudgetSpent) -> None:
-        log.error("simulator given up: the others continue", simulator=self.name, fact=str(spent))
+        log.error(
+            "simulator given up; training continues with the other simulators",
+            simulator=self.name,
+            fact=str(spent),
+        )
         self.lost = True
         self.watcher.given_up(self.name)
         with contextlib.suppress(SimulatorFault):

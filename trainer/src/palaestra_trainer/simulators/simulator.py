@@ -71,7 +71,9 @@ class Simulator:
         state = sidecar.first_state(start_deadline_s)
         supervisor = next((each for each in state.robots if each.supervisor), None)
         if supervisor is None:
-            raise ConfigurationError(f"{name}: the world has no robot with supervisor TRUE; set it on one")
+            raise ConfigurationError(
+                f"{name}: the world has no robot with supervisor TRUE; set supervisor TRUE on one robot"
+            )
         driven = driven_robot(state.robots, robot.definition) or supervisor
         self.webots = Webots(
             supervisor.ros_name, state.world, launcher=sidecar, start_deadline_s=start_deadline_s

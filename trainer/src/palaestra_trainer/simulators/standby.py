@@ -203,7 +203,7 @@ class Side:
                 never_up = not self._was_up and isinstance(fault, WorldMisfit)
                 if never_up or not self.wanted:
                     raise
-                log.warning("standby did not come up", simulator=self.simulator.name, fact=str(fault))
+                log.warning("standby did not start", simulator=self.simulator.name, fact=str(fault))
                 self._spend(fault)
             else:
                 self._was_up = True
@@ -223,5 +223,9 @@ class Side:
         try:
             self._budget.spend(fault)
         except FaultBudgetSpent as spent:
-            log.error("standby stays down until it is needed", simulator=self.simulator.name, fact=str(spent))
+            log.error(
+                "standby used up its restarts; it starts again only when it is needed",
+                simulator=self.simulator.name,
+                fact=str(spent),
+            )
             raise fault from spent

@@ -106,7 +106,7 @@ class MaskedTask(FakeTask):
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Take a step; raise an error if the action is forbidden."""
         if not allows(self._allowed(), self.action_space, action):
-            raise AssertionError(f"action {action} is forbidden in step {self._length + 1}")
+            raise AssertionError(f"action {action} is not allowed by the mask in step {self._length + 1}")
         return super().step(action)
 
     def _allowed(self) -> np.ndarray:

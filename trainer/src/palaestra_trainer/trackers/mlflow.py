@@ -66,7 +66,9 @@ class MLflow(Tracker):
             self._client.log_batch(self._run, metrics=metrics)
         except MlflowException as error:
             if not self._lost:
-                log.warning("MLflow does not respond: points are lost", step=step, fact=str(error))
+                log.warning(
+                    "MLflow does not respond: points of its charts are lost", step=step, fact=str(error)
+                )
             self._lost += len(metrics)
 
     def end(self) -> None:

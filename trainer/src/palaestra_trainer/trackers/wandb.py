@@ -80,7 +80,7 @@ class Wandb(Tracker):
             self._run.finish()
         except TimeoutError:
             log.warning(
-                "W&B has not received all data of the run",
+                "W&B has not received all data of the run in time",
                 waited_s=FINISH_S,
                 remedy=f"wandb sync {self._directory.path}/wandb/run-*",
             )

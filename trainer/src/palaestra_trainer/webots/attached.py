@@ -29,7 +29,7 @@ class Attached:
             ConfigurationError: always.
         """
         del deadline_s
-        raise ConfigurationError("only attached to this simulator; stop it where it was started")
+        raise ConfigurationError("launcher: Attached() cannot stop a simulator; stop it where it was started")
 
     def failure(self) -> str | None:
         """Return the reason why the simulator cannot be used; called only while it does not respond."""

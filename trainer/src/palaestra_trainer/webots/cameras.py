@@ -31,7 +31,7 @@ class _Rendered(Sensor):
     def _array(self) -> NDArray[Any]:
         array: NDArray[Any] | None = self.value
         if array is None:
-            raise NoReading(f"{self.device} has sent nothing yet; let a period pass")
+            raise NoReading(f"{self.device} has sent no reading yet; step the simulation first")
         return array
 
 
@@ -110,7 +110,9 @@ class LidarPoints(Sensor):
         """
         super().enable(period_ms)
         if not self._cloud(value=True).success:
-            raise WrongData(self.robot, f"{self.device} refuses to make a point cloud; use its ranges")
+            raise WrongData(
+                self.robot, f"{self.device} refuses to send a point cloud; use its ranges instead"
+            )
 
     def close(self) -> None:
         """Close the connections."""

@@ -47,5 +47,5 @@ def require_node(observer: Observer, name: str) -> None:
     """
     if not observer.exists(name):
         raise WorldMisfit(
-            observer.node_name, f"the world has no node DEF {name}; give a node that DEF name in the world"
+            observer.node_name, f"the world has no node DEF {name}; add DEF {name} to the node in the world"
         )

@@ -48,7 +48,7 @@ def encoded(kind: FieldCodec, field: str, value: Value) -> Any:
     try:
         return kind.to_wire(value)
     except (TypeError, ValueError):
-        raise ConfigurationError(f"{field}: holds {kind.wanted}, not {value!r}") from None
+        raise ConfigurationError(f"{field}: {value!r} does not fit; give {kind.wanted}") from None
 
 
 def turn_about_z(heading_rad: float) -> dict[str, float]:

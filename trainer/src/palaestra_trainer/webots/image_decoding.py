@@ -77,7 +77,7 @@ class _Arrays(ABC):
         if layout is None or message[_HEAD_AT : _HEAD_AT + len(layout.head)] != layout.head:
             layout = self._layout = self._read_head(message)
         if len(message) != layout.length:
-            raise ValueError(f"a message of {len(message)} bytes, not {layout.length}")
+            raise ValueError(f"a message of {len(message)} bytes instead of {layout.length}")
         array: NDArray[Any] = np.ndarray(layout.shape, self._dtype, message, layout.data_at, layout.strides)
         array.flags.writeable = False
         return array
@@ -107,7 +107,9 @@ class ImageReading(_Arrays):
         pixel_bytes = math.prod(self.channels) * self._dtype.itemsize
         if (encoding, big_endian) != (self.encoding, 0):
             order = "big" if big_endian else "little"
-            raise ValueError(f"an image in {encoding}, {order}-endian, not {self.encoding}, little-endian")
+            raise ValueError(
+                f"an image in {encoding}, {order}-endian, instead of {self.encoding}, little-endian"
+            )
         if (step, data_bytes) != (width * pixel_bytes, height * width * pixel_bytes):
             raise ValueError(
                 f"an image of {width} x {height} pixels with {step} bytes a row and {data_bytes} in all"

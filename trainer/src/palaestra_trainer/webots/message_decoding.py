@@ -50,7 +50,7 @@ class NumberReading:
             self._fit(message)
         numbers = self._layout.unpack(message)
         if numbers[0] != self._frame_id_bytes:
-            raise ValueError(f"a frame_id of {numbers[0]} bytes, not {self._frame_id_bytes}")
+            raise ValueError(f"a frame_id of {numbers[0]} bytes instead of {self._frame_id_bytes}")
         if not math.isfinite(numbers[-1]):
             raise ValueError(f"{numbers[-1]} from {self._device}")
         return numbers[-1]
@@ -69,7 +69,7 @@ class NumberReading:
         (frame_id_bytes,) = _FRAME_ID_LENGTH.unpack_from(message, _FRAME_ID_AT)
         length = self._layout.size - self._frame_id_bytes + frame_id_bytes
         if len(message) != length:
-            raise ValueError(f"a message of {len(message)} bytes, not {length}")
+            raise ValueError(f"a message of {len(message)} bytes instead of {length}")
         self._frame_id_bytes = frame_id_bytes
         self._layout = _layout(frame_id_bytes, self._codes)
 

@@ -98,7 +98,7 @@ class Observer:
         heading = 2.0 * math.atan2(turn.z, turn.w)
         pose = (position.position.x, position.position.y, math.remainder(heading, 2.0 * math.pi))
         if not all(map(math.isfinite, pose)):
-            raise WrongData(self.node_name, f"the pose of {name} is {pose}")
+            raise WrongData(self.node_name, f"the pose of {name} is not finite: {pose}")
         return pose
 
     def full_pose(self, name: str) -> tuple[Vector, Quaternion]:
@@ -165,7 +165,7 @@ class Observer:
             self._nodes[name] = int(self._services.ask("supervisor/get_root", "get_uint64"))
         if name not in self._nodes:
             answer = self._services.get("supervisor/get_from_def", "supervisor_get_from_def")(name=name)
-            self._nodes[name] = self._known(answer.node, f"no node DEF {name}")
+            self._nodes[name] = self._known(answer.node, f"the world has no node DEF {name}")
         return self._nodes[name]
 
     def field(self, name: str, field: str) -> int:
@@ -210,9 +210,9 @@ class Observer:
         try:
             return kind.from_json(decoded(text.encode(), most_bytes))
         except ProtocolError as error:
-            raise WrongData(self.node_name, f"answered {path} with {error}") from error
+            raise WrongData(self.node_name, f"sent an invalid response to {path}: {error}") from error
 
     def _known(self, handle: Any, fact: str) -> int:
         if not handle:
-            raise WrongData(self.node_name, f"the world has {fact}")
+            raise WrongData(self.node_name, fact)
         return int(handle)

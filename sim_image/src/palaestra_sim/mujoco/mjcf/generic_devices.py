@@ -135,7 +135,7 @@ def _services(actuator: MujocoActuator) -> tuple[Row, ...]:
 
 
 def _in_no_world(_part: DevicePart) -> Never:
-    raise TypeError("a world file of Webots has no such node")
+    raise TypeError("a world file of Webots cannot have such a node")
 
 
 MUJOCO_SENSOR: Final = DeviceType(

@@ -99,7 +99,7 @@ class ActuatorMotor(Motor):
     def set_acceleration(self, acceleration_rad_s2: float) -> None:
         """Limit the acceleration of a velocity servo; see `Motor`."""
         if self._actuator.control is not Control.VELOCITY and acceleration_rad_s2 != -1.0:
-            raise UnsimulatedError(f"{self._what()}, whose acceleration MuJoCo does not limit")
+            raise UnsimulatedError(f"{self._what()}, so MuJoCo cannot limit its acceleration")
         super().set_acceleration(acceleration_rad_s2)
 
     def set_effort(self, torque_nm: float) -> None:
@@ -120,7 +120,7 @@ class ActuatorMotor(Motor):
             UnsimulatedError: always.
         """
         del torque_nm
-        raise UnsimulatedError(f"{self._what()}, whose force the model limits; write forcerange there")
+        raise UnsimulatedError(f"{self._what()}; only forcerange in the model can limit its force")
 
     def set_control_pid(self, p: float, i: float, d: float) -> None:
         """Set the gains with which a velocity servo turns to a target; see `Motor`.
@@ -129,7 +129,7 @@ class ActuatorMotor(Motor):
             UnsimulatedError: the control does not set a velocity, so only the model can set the gains.
         """
         if self._actuator.control is not Control.VELOCITY and (p, i, d) != self.spec.gains:
-            raise UnsimulatedError(f"{self._what()}, whose gains the model has; write kp and kv there")
+            raise UnsimulatedError(f"{self._what()}; only kp and kv in the model can set its gains")
         super().set_control_pid(p, i, d)
 
     def feel(self) -> None:
@@ -172,7 +172,7 @@ class ActuatorMotor(Motor):
             raise UnsimulatedError(f"{self._what()}; {remedy}")
 
     def _what(self) -> str:
-        return f"the actuator of {self.name!r} takes a {self._actuator.control.value}"
+        return f"the actuator of {self.name!r} is controlled by {self._actuator.control.value}"
 
 
 def control_of(model: Any, index: int) -> tuple[Control, float] | None:

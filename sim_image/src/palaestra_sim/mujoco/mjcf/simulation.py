@@ -24,7 +24,7 @@ from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.robot import Robot
 from palaestra_sim.scene.tree.fields import NodeField
 
-_FIXED: Final = "an MJCF world keeps its bodies while it runs; write them into the model"
+_FIXED: Final = "the bodies of an MJCF world cannot change while it runs; write them into the model"
 
 
 class MjcfSimulation:

@@ -79,6 +79,6 @@ class NodeLog:
     def _set_logger_level(self, request: Any) -> Fields:
         level = request.level.lower()
         if level not in _LEVELS:
-            raise ServiceFailed(f"no level {request.level!r}; use {', '.join(_LEVELS)}")
+            raise ServiceFailed(f"{request.level!r} is not a level; use {', '.join(_LEVELS)}")
         self._levels[request.logger] = level
         return {}

@@ -106,4 +106,4 @@ def _always(fields: Fields) -> Handler:
 
 
 def _no_urdf(_request: Any) -> Fields:
-    raise ServiceFailed("no URDF is written here; use driver webots")
+    raise ServiceFailed("this simulator writes no URDF; use driver webots")

@@ -133,7 +133,9 @@ class SupervisorServices:
     def _get_from_device(self, request: Any) -> Fields:
         node = self._robot.parts.devices.nodes.get(request.value)
         if node is None:
-            raise ServiceFailed(f"no device {request.value!r}; get_device_list lists the names")
+            raise ServiceFailed(
+                f"the robot has no device {request.value!r}; get_device_list lists the devices"
+            )
         return {"node": self._handles.of(node)}
 
 
@@ -142,11 +144,11 @@ def _accept(_request: Any) -> Fields:
 
 
 def _no_saving(_request: Any) -> Fields:
-    raise ServiceFailed("worlds are not saved here; use driver webots")
+    raise ServiceFailed("this simulator saves no worlds; use driver webots")
 
 
 def _no_animation(_request: Any) -> Fields:
-    raise ServiceFailed("no animations are recorded here; record a movie, or use driver webots")
+    raise ServiceFailed("this simulator records no animations; record a movie, or use driver webots")
 
 
 def _refuse_get(_request: Any) -> Fields:

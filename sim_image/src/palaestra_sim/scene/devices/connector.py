@@ -60,7 +60,7 @@ class Connector:
         """
         if locked and self.value > 0:
             raise UnsimulatedError(
-                f"{self.name} and another Connector are in reach, and joining them is not simulated;"
+                f"{self.name} and another Connector are in reach, but joining them is not simulated;"
                 " use driver webots"
             )
         self.locked = locked

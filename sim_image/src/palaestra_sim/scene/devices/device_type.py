@@ -359,7 +359,7 @@ class Devices:
         if name in self.rows:
             return f"a second device {name!r}"
         if not is_ros_name(name):
-            return f"a device {name!r}, a name that ROS does not accept"
+            return f"a device {name!r}, whose name ROS does not accept"
         path = topic_name(name)
         same = self._by_topic.get(path)
         return None if same is None else f"devices {same!r} and {name!r}, whose topics are both {path!r}"

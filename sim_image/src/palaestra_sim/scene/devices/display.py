@@ -76,13 +76,13 @@ class Display:
         if camera is None or self.camera is not None:
             return camera is not None
         if not isinstance(camera, Camera):
-            raise UnsimulatedError(f"{name} is not a Camera; attach one")
+            raise UnsimulatedError(f"{name} is not a Camera; attach a Camera")
         if camera.eye is None:
-            raise UnsimulatedError(f"{name} has no image here; use driver mujoco or webots")
+            raise UnsimulatedError(f"{name} has no image in this simulator; use driver mujoco or webots")
         size = self.picture.width, self.picture.height
         if camera.lens.size != size:
             raise UnsimulatedError(
-                f"{name} has {camera.lens.size} pixels, {self.name} {size}; give both the same size"
+                f"{name} has {camera.lens.size} pixels, but {self.name} has {size}; give both the same size"
             )
         camera.eye.open()
         self.camera = camera
@@ -102,7 +102,9 @@ class Display:
             UnsimulatedError: no image has that handle; Webots would read invalid memory.
         """
         if handle and handle not in self.images:
-            raise UnsimulatedError(f"no image {handle}; make one with image_new or image_copy")
+            raise UnsimulatedError(
+                f"the image {handle} does not exist; make one with image_new or image_copy"
+            )
         return self.images.get(handle)
 
 
@@ -210,7 +212,7 @@ def _require_small(request: Any) -> None:
     for name, value in request._asdict().items():
         numbers = value if isinstance(value, list | tuple) else [value]
         if any(isinstance(number, int) and abs(number) > _LARGEST for number in numbers):
-            raise UnsimulatedError(f"{name} is beyond {_LARGEST}; use a smaller number")
+            raise UnsimulatedError(f"{name} has a number above {_LARGEST}; use a smaller number")
 
 
 def _images(display: Display) -> tuple[Row, ...]:

@@ -266,7 +266,7 @@ def _require(lidar: Lidar, layer: int) -> None:
     """Check that the layer exists; Webots would read a null pointer."""
     count = len(lidar.layers)
     if not 0 <= layer < count:
-        raise UnsimulatedError(f"no layer {layer}; use one of 0 to {count - 1}")
+        raise UnsimulatedError(f"the lidar has no layer {layer}; use a layer from 0 to {count - 1}")
 
 
 def _image(lidar: Lidar, height: int) -> Fields:

@@ -163,7 +163,7 @@ def _switch(motor: Motor, effort: str) -> Handler:
 
     def handle(request: Any) -> dict[str, Any]:
         if 0.0 < request.value < most:
-            fact = f"a part of the {effort} of {motor.name!r} is not simulated"
+            fact = f"{motor.name!r} cannot use a part of its {effort} in this simulator"
             raise UnsimulatedError(f"{fact}; set 0, or the whole {effort} of {most:g}")
         motor.set_available_torque(request.value)
         return done

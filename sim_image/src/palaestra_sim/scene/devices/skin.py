@@ -24,7 +24,9 @@ def _read(part: DevicePart) -> Skin:
 def _without_bones(name: str) -> Handler:
     # Webots dereferences a null pointer for the name or the position of a bone that does not exist.
     def fail(request: Any) -> dict[str, Any]:
-        raise UnsimulatedError(f"{name} has no bone {request.index}: the meshes of skins are not loaded")
+        raise UnsimulatedError(
+            f"{name} has no bone {request.index}, because this simulator does not load the meshes of skins"
+        )
 
     return fail
 

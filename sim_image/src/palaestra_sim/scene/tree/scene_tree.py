@@ -107,7 +107,7 @@ class SceneTree:
 def _of_parent(node: SceneNode) -> SceneNode:
     """Return the parent of a node that is not the root."""
     if node.parent is None:
-        raise ValueError("the root has no parent; change the nodes inside it")
+        raise ValueError("the root of the world has no parent; change the nodes inside the root")
     return node.parent
 
 

@@ -53,7 +53,7 @@ def without_data(found: Description) -> Iterator[WorldError]:
     for tag in ("text", "numeric"):
         for element in found.root.named("custom", tag):
             if not element.attributes.get("name") or not element.attributes.get("data", "").strip():
-                fact = f"a {tag} in <custom> without {'name' if element.attributes.get('data') else 'data'}"
+                fact = f"a {tag} in <custom> has no {'name' if element.attributes.get('data') else 'data'}"
                 yield found.source.error(element.start, fact, "write both")
 
 
@@ -62,7 +62,7 @@ def renamed_behind_its_name(found: Description) -> Iterator[WorldError]:
     for argument in found.arguments:
         if _ROS_REMAPPING.match(argument):
             element = found.texts["controllerArgs"]
-            fact = f"{argument} in controllerArgs overrules the generated ROS name"
+            fact = f"{argument} in controllerArgs overrides the generated ROS name"
             yield found.source.error(element.start, fact, "remove it")
 
 

@@ -38,8 +38,9 @@ def keys_of(space: spaces.Space[Any], names: Sequence[str] = ()) -> Keys:
             return _of_numbers(space)
         case _:
             raise ConfigurationError(
-                f"--agent keyboard: the actions are {space}, and keys choose among at most {_MOST_ACTIONS} "
-                f"actions of a Discrete space or {_MOST_NUMBERS} bounded numbers; use --agent random"
+                f"--agent keyboard: the actions are {space}, but keys can choose only among at most "
+                f"{_MOST_ACTIONS} actions of a Discrete space or {_MOST_NUMBERS} bounded numbers; use "
+                "--agent random"
             )
 
 

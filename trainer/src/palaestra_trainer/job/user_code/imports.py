@@ -38,9 +38,7 @@ def class_named(name: str, field: str, base: type[Any]) -> type[Any]:
     """
     found = object_named(name, f"{field}: {name}")
     if not (isinstance(found, type) and issubclass(found, base)):
-        raise ConfigurationError(
-            f"{field}: {name} is not a subclass of {base.__name__}; name a class that is one"
-        )
+        raise ConfigurationError(f"{field}: {name} is not a subclass of {base.__name__}; name a subclass")
     return found
 
 

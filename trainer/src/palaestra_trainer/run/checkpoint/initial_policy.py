@@ -68,7 +68,8 @@ def _read(path: Path, device: torch.device, most: int) -> tuple[Any, dict[str, A
         raise
     except pickle.UnpicklingError as error:  # PyTorch's message recommends to unpickle, so it is not shown
         raise _refused(
-            path, f"{POLICY} holds more than tensors, which is never unpickled; name a model.zip"
+            path,
+            f"{POLICY} has objects other than tensors, which are never unpickled; name another model.zip",
         ) from error
     except (OSError, KeyError, EOFError, RuntimeError, ValueError, zipfile.BadZipFile) as error:
         fact = f"cannot be read as a model of Stable-Baselines3 ({error}); name a model.zip"
@@ -81,14 +82,14 @@ def _refuse_larger(path: Path, members: Iterable[zipfile.ZipInfo], most: int) ->
     if unpacked > most:
         raise _refused(
             path,
-            f"unpacks to {unpacked} bytes, and the policy of this run needs {most} at most; use the "
+            f"unpacks to {unpacked} bytes, but the policy of this run has at most {most} bytes; use the "
             "algorithm, policy and spaces that it was trained with",
         )
 
 
 def _mistakes(tensors: Any, own: Mapping[str, torch.Tensor]) -> Iterator[str]:
     if not isinstance(tensors, Mapping):
-        yield f"{POLICY} holds no tensors by name"
+        yield f"{POLICY} has no tensors with names"
         return
     for name, tensor in own.items():
         there = tensors.get(name)
@@ -109,8 +110,8 @@ def _take_statistics(path: Path, model: BaseAlgorithm, known: Mapping[str, Any])
     own = {} if normalizer is None else normalizer.scales
     if own.keys() - {"rewards"} != known.keys() - {"rewards", "epsilon"}:
         log.warning(
-            "the initial policy and this run normalize different observations, so the policy gets other "
-            "values than in its training; set algorithm.normalize as in its run",
+            "the initial policy and this run normalize different observations, so the policy gets "
+            "different values from those it was trained with; set algorithm.normalize as in its run",
             file=str(path),
         )
     if normalizer is None:

@@ -90,7 +90,7 @@ def read(folder: Path) -> SavedCheckpoint:
     damaged = [name for name, digest in manifest.files.items() if not _is(folder / name, digest)]
     for name in damaged:
         if not name.startswith(EXPERIENCE):
-            raise ValueError(f"{name} differs from the manifest")
+            raise ValueError(f"{name} does not match its digest in the manifest")
     return SavedCheckpoint(path=folder, manifest=manifest, lost=frozenset(damaged))
 
 
@@ -132,7 +132,7 @@ def _completed(saved: dict[str, Any], section: type[BaseModel]) -> dict[str, Any
 def _read_manifest(folder: Path) -> Manifest:
     content = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
     if not isinstance(content, dict):
-        raise TypeError(f"{MANIFEST} is not an object")
+        raise TypeError(f"{MANIFEST} is not a JSON object")
     digest = content.pop("digest", None)
     whole = digest == _digest_of(content)
     number = content.get("format")

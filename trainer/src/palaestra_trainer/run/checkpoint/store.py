@@ -134,7 +134,9 @@ def newest(folder: Path) -> SavedCheckpoint | None:
         if not found.lost:
             return found
         log.warning(
-            "damaged checkpoint skipped", path=str(path), fact=f"{len(found.lost)} files of experience"
+            "damaged checkpoint skipped",
+            path=str(path),
+            fact=f"{len(found.lost)} files of experience are damaged",
         )
         rest = rest or found
     if rest:

@@ -120,14 +120,16 @@ class Sidecar:
         except TimeoutError as error:
             raise SimulatorHung(self._name, "its sidecar does not respond") from error
         except (OSError, http.client.HTTPException) as error:
-            raise SimulatorDead(self._name, f"its sidecar is gone ({error})") from error
+            raise SimulatorDead(self._name, f"its sidecar cannot be reached ({error})") from error
         finally:
             connection.close()
         if answer.status not in {http.client.OK, _CONFLICT}:
-            raise WrongData(self._name, f"its sidecar responded to {self._above}{path} with {answer.status}")
+            raise WrongData(
+                self._name, f"its sidecar responded to {self._above}{path} with HTTP status {answer.status}"
+            )
         try:
             return SimulatorState.from_json(decoded(text))
         except ProtocolError as error:
             raise WrongData(
-                self._name, f"its sidecar responded to {self._above}{path} with {error}"
+                self._name, f"its sidecar sent an invalid response to {self._above}{path}: {error}"
             ) from error

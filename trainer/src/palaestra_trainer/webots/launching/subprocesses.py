@@ -29,7 +29,7 @@ def start_child(command: list[str], stderr: int) -> subprocess.Popen[bytes]:
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=stderr, start_new_session=True
         )
     except OSError as error:
-        fact = f"{command[0]} cannot be started ({error.strerror}); is it installed?"
+        fact = f"{command[0]} cannot be started ({error.strerror}); install it, or put it on the PATH"
         raise ConfigurationError(fact) from error
     atexit.register(end_child, process)
     return process
