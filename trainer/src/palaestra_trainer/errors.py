@@ -1,4 +1,4 @@
-"""The errors of a trainer; the tree says for each error whether a retry can help.
+"""The errors of a trainer; the tree shows for each error whether a retry can help.
 
 TrainerError
 ├── ConfigurationError   the configuration is wrong; retrying cannot help     exit 2

@@ -42,7 +42,7 @@ OURS = frozenset(
 )  # fmt: skip
 ARENA_ENVIRONMENTS = frozenset({"MoveToTargetEnv-v0"})
 _ANY_ACTIONS = (spaces.Box, spaces.Discrete, spaces.MultiDiscrete, spaces.MultiBinary)
-_LOG_INTERVAL = {True: 10, False: 1}  # episodes off policy, rollouts on policy
+_LOG_INTERVAL = {True: 10, False: 1}  # True: episodes of an off-policy algorithm; False: rollouts
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -132,7 +132,7 @@ def _entry(
 ALGORITHMS: Mapping[str, RegisteredAlgorithm] = MappingProxyType(
     {
         # DQN has soft target updates at every step, and as many gradient steps as environment steps. With
-        # hard updates, the success rate after the same 50,000 steps was 10 points lower.
+        # hard updates, the success rate after 50,000 steps was 10 percentage points lower.
         "DQN": _entry(
             sb3.DQN,
             spaces.Discrete,

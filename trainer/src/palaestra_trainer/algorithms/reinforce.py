@@ -34,11 +34,11 @@ class REINFORCE(BaseAlgorithm):
     """The Monte-Carlo policy gradient algorithm REINFORCE.
 
     One update learns from `episodes_per_update` whole episodes of each environment. The number is the same
-    for each environment, because an update with the first episodes to end would prefer short episodes. If an
-    environment finishes further episodes before the others are ready, these are dropped. Episodes that a
-    fault truncated are dropped too. The update does not wait for an environment that restarts. Training ends
-    with the first episode that ends at or after `total_timesteps`. The return of a truncated episode is the
-    sum of its rewards until its last step.
+    for each environment, because an update from the episodes that end first would prefer short episodes. If
+    an environment finishes further episodes before the others are ready, the further episodes are dropped.
+    Episodes that a fault truncated are dropped too. The update does not wait for an environment that
+    restarts. Training ends with the first episode that ends at or after `total_timesteps`. The return of a
+    truncated episode is the sum of its rewards until its last step.
 
     Args:
         policy: "MlpPolicy", "CnnPolicy", "MultiInputPolicy" or an actor-critic class; its value network is

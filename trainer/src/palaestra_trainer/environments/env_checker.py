@@ -53,7 +53,7 @@ def held(env: gymnasium.Env[Any, Any], name: str) -> gymnasium.Env[Any, Any]:
 
 
 def refuse_statistics(env: gymnasium.Env[Any, Any], name: str) -> None:
-    """Refuse wrappers with statistics; a model does not save these, and they differ between simulators.
+    """Refuse wrappers with statistics: a model does not save statistics, and they differ between simulators.
 
     Raises:
         ConfigurationError: the environment has such a wrapper.
@@ -68,7 +68,7 @@ def refuse_statistics(env: gymnasium.Env[Any, Any], name: str) -> None:
 
 
 class Checked(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """A wrapper that checks resets and steps, the first of each completely, and returns results unchanged.
+    """A wrapper that checks the results of resets and steps, and returns them unchanged.
 
     Args:
         env: the environment.

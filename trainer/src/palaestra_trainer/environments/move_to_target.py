@@ -84,7 +84,7 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
     | to_reach  | 0     | targets left; always 1 with a single target   | 1         | 0    | 1   |
 
     By default `observe` names all parts except `position` and `to_reach`; docs/explain/tasks.md describes the
-    cost.
+    benefit and the cost of each part.
 
     ## Reward
 

@@ -2,8 +2,8 @@
 
 The task is for algorithms that also learn from goals that the policy reached by accident, such as hindsight
 experience replay. The interface is that of gymnasium-robotics: a Dict with `achieved_goal` and
-`desired_goal`, and rewards that are a function of both. An inner `MoveToTargetEnv` plays the episodes, so
-robot, scene and faults are the same as there.
+`desired_goal`, and rewards that are a function of these two goals. An inner `MoveToTargetEnv` plays the
+episodes, so robot, scene and faults are the same as there.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ class MoveToTargetGoalEnv(gymnasium.Env[Observation, Any]):
 
     ## Info
 
-    `is_success`: whether the robot is within 0.20 m of the target; for the episode, its last step counts.
+    `is_success`: whether the robot is within 0.20 m of the target. An episode succeeds if its last step does.
     `outcome` (running, reached, collided, time_up), `reward_terms`, `extra_steps`.
 
     Args:

@@ -13,7 +13,7 @@ from enum import Enum
 
 from palaestra_trainer.robots.base import SENSOR_RANGE_M
 
-MARGIN_M = 0.18  # free space to keep around the robot, which drives half of this in a step
+MARGIN_M = 0.18  # free space to keep around the robot, which drives about half of this distance in a step
 
 
 class EpisodeOutcome(Enum):
@@ -70,7 +70,7 @@ def collision(step: Transition) -> float:
 
 
 def proximity(step: Transition) -> float:
-    """Return how far the nearest object is inside the margin; 1 at the nearest measurable distance."""
+    """Return 0 if no object is inside the margin; rise to 1 at the nearest measurable distance."""
     used_m = MARGIN_M - step.nearest_m
     return max(0.0, used_m) / (MARGIN_M - SENSOR_RANGE_M[0])
 

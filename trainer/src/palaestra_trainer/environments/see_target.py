@@ -184,7 +184,7 @@ class SeeTargetEnv(gymnasium.Env[Observation, Any]):
             self._on_close()
 
     def _raise_cylinders(self) -> None:
-        """Move the cylinders to the floor; the world stores them below it."""
+        """Move the cylinders onto the floor; the world stores them below the floor."""
         for thing in self._scene.layout().obstacles:
             if thing.top_m < 0.0:
                 self._scene.put(thing.name, (thing.x_m, thing.y_m, 0.5 * (thing.top_m - thing.bottom_m)))

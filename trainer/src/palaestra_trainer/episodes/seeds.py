@@ -14,7 +14,7 @@ import numpy as np
 
 COLLECT = "collect"
 EVALUATE = "A"
-CONFIRM = "C"  # `palaestra-eval` uses B by default
+CONFIRM = "C"  # not B, because B is the default of `palaestra-eval`
 _FRESH = 2**31  # all seeds of a run are below this number
 
 
@@ -42,6 +42,6 @@ def fresh_seeds(stream: str, episodes: int, first: int = 0) -> Iterator[int]:
     """Yield seeds for `episodes` episodes that no run uses, from episode number `first` on.
 
     These seeds are in [2**31, 2**32), and the seeds of runs are below 2**31. So two policies are compared on
-    episodes that neither of them learned from, and that did not select either of them.
+    episodes that neither of them learned from, and that were not used to select either of them.
     """
     return (_FRESH + seed for seed in episode_seeds(0, stream, episodes, first))

@@ -1,10 +1,10 @@
-"""Generate the observations on which a file is compared with its policy, always the same ones.
+"""Generate the observations on which a file is compared with its policy; they never change.
 
-The observations should be similar to those of episodes, but the bounds of a space do not show the usual
-numbers. A bound may be infinite, or the largest number of a type. Numbers drawn uniformly between such bounds
-would saturate a network, and all actions would be the same. So the numbers of a Box have several scales, from
-a hundredth up to the bounds. A network gives the same output for all images of noise, so the images have
-areas of different brightness and contrast.
+The observations should be similar to those of episodes, but the bounds of a space do not show which numbers
+are usual. A bound may be infinite, or the largest number of a type. Numbers drawn uniformly between such
+bounds would saturate a network, and all actions would be the same. So the numbers of a Box have several
+scales, from a hundredth up to the bounds. A network gives the same output for all images of noise, so the
+images have areas of different brightness and contrast.
 """
 
 from __future__ import annotations

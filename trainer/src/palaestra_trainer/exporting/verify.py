@@ -17,7 +17,7 @@ from palaestra_trainer.run.policies import TrainedPolicy
 OBSERVATIONS = 1_000
 TOLERANCE = 1e-5  # largest allowed difference of a continuous action, as a share of its range
 # A comparison is meaningful only if at least this number of actions are between the bounds, or if scores
-# differ by this number of tolerances.
+# differ by this multiple of the tolerance.
 _TELLING = 10
 
 Arrays = tuple[np.ndarray, ...]
@@ -46,7 +46,7 @@ def compare(convert: Convert, acting: PolicyModule, policy: TrainedPolicy) -> fl
     played = [_played(run, acting, policy, observations, masks) for masks in _masks(acting)]
     difference = max(_difference(*actions, acting, observations) for actions in played)
     # Random masks make even the actions of a constant policy differ, so the check uses the masks that allow
-    # all.
+    # all actions.
     _, expected = played[-1]
     _refuse_what_shows_nothing(convert, acting, policy, observations, expected)
     return difference

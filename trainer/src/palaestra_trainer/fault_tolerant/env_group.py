@@ -85,7 +85,7 @@ class EnvGroup:
         return row
 
     def step_all(self, actions: Sequence[Any]) -> list[StepResult]:
-        """Step all members at the same time and return their rows; begin a new episode after each that ended.
+        """Step all members at the same time and return their rows; begin new episodes after those that ended.
 
         Raises:
             ResetNeeded: a member has no running episode.

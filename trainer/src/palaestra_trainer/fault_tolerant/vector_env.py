@@ -17,7 +17,7 @@ Stepped = tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]
 
 
 class FaultTolerantVectorEnv(VectorEnv[Any, Any, np.ndarray]):
-    """A VectorEnv whose members all step at the same time; the last step of an episode also resets it.
+    """A VectorEnv whose members step at the same time; the last step of an episode also resets the member.
 
     The last observation and info of an episode are `infos["final_obs"]` and `infos["final_info"]`. If a fault
     ended the episode, `infos["final_info"]["palaestra"]["sim_fault"]` is set. The step then waits until the

@@ -1,10 +1,10 @@
 """Read and check training.yaml, the configuration of one replica.
 
-The operator's plan writes the file. The modules of this package read the file only through this module;
-reports and experiment trackers show its text unchanged. A wrong file is refused before a simulator starts.
-The error lists all mistakes of the file, each with field, fact and remedy. The hyperparameters of each
-algorithm are defined in `palaestra_trainer.algorithms`, not here, because reading a configuration must not
-import a learning library.
+The operator writes the file. The modules of this package read the file only through this module; reports and
+experiment trackers show its text unchanged. A wrong file is refused before a simulator starts. The error
+lists all mistakes of the file, each with field, fact and remedy. The hyperparameters of each algorithm are
+defined in `palaestra_trainer.algorithms`, not here, because reading a configuration must not import a
+learning library.
 
 Unknown fields are logged and ignored. A job may name a `trainer.image` that is older than the operator that
 writes the file. A newer operator writes a new field only if the job sets that field. Misspelled fields of

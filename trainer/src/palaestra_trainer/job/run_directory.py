@@ -1,8 +1,8 @@
 """The files in the folder of one run on its volume, and functions that write these files.
 
-This folder is enough to inspect the run and to resume it. A whole file is replaced atomically: its new
-content gets a temporary name, then follow fsync, rename and fsync of the folder. Lines are appended with
-fsync. So after a crash each file has either its old or its new content.
+This folder is enough to inspect the run and to resume it. A whole file is replaced atomically: the new
+content is written under a temporary name, then follow fsync, rename and fsync of the folder. Lines are
+appended with fsync. So after a crash each file has either its old or its new content.
 """
 
 from __future__ import annotations

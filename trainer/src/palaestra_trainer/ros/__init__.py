@@ -1,4 +1,4 @@
-"""The only package that uses ROS, layer 1 of the trainer.
+"""Layer 1 of the trainer, the only package that uses ROS.
 
 The process is a ROS node. If rospy is installed, the node is rospy's, as programs of users expect; otherwise
 it is our own (`node`). The calls of each step never use rospy. Its thread per topic costs more time than the

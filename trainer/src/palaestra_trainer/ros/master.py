@@ -19,7 +19,7 @@ _NODE_TIMEOUT_S = 1.0
 
 
 class Master:
-    """A client of the master at ROS_MASTER_URI, which calls it with the node name `caller`.
+    """A client of the master at ROS_MASTER_URI; its calls come from the node `caller`.
 
     Every method except `ping` raises MasterLost if no master responds or the master refuses the request. It
     raises UnreadableAnswer if the response of the master is invalid.

@@ -49,7 +49,7 @@ def object_named(name: str, subject: str) -> Any:
 
     Args:
         name: `module:object`.
-        subject: the subject of messages: a field of the job and its value.
+        subject: beginning of error messages, a field of the job and its value.
 
     Raises:
         ConfigurationError: it cannot be imported.
