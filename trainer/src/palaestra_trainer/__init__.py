@@ -72,7 +72,7 @@ def make_vec_env(
         options: see `make_env`.
 
     Raises:
-        As `make_env`.
+        The same errors as `make_env`.
     """
     from palaestra_trainer.fault_tolerant.vector_env import FaultTolerantVectorEnv
 
@@ -91,7 +91,7 @@ def make_sb3_vec_env(
         options: see `make_env`.
 
     Raises:
-        As `make_env`.
+        The same errors as `make_env`.
     """
     from palaestra_trainer.fault_tolerant.sb3_vec_env import FaultTolerantVecEnv
 

@@ -126,7 +126,7 @@ class REINFORCE(BaseAlgorithm):
         policy = self.policy_class(
             self.observation_space, self.action_space, self.lr_schedule, **self.policy_kwargs
         )
-        self.policy = policy.to(self.device)  # type: ignore[assignment]  # an actor-critic one: see __init__
+        self.policy = policy.to(self.device)  # type: ignore[assignment]  # actor-critic policy: see __init__
 
     def learn(
         self,

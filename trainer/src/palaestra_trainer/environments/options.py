@@ -41,7 +41,7 @@ class Episodes(Protocol):
 
     @property
     def time_up(self) -> str | None:
-        """How an episode ends when time is up, a value of `TIME_UP`; None: `TIME_UP_OF` the reward."""
+        """How an episode ends when time is up, one of `TIME_UP`; None: the reward's value in `TIME_UP_OF`."""
         ...
 
 

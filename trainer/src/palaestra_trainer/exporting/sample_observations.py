@@ -99,7 +99,7 @@ def _middle(low: np.ndarray, high: np.ndarray, normalize: Any) -> tuple[np.ndarr
 
 
 def _scales(farthest: np.ndarray, count: int) -> np.ndarray:
-    """Return the scale of each observation: the largest scale in every other episode, else smaller ones."""
+    """Return each observation's scale: the largest in every other episode, smaller scales in the others."""
     episodes = np.arange(count) // EPISODE
     ladder = np.where(episodes % 2, (episodes // 2 % EPISODE) / max(1, episodes.max() // 2), 0.0)
     nearest = np.minimum(1.0, _NEAREST / np.maximum(farthest, _NEAREST))

@@ -76,7 +76,7 @@ def _masks(acting: PolicyModule) -> list[Arrays]:
 def _difference(
     ours: np.ndarray, expected: np.ndarray, acting: PolicyModule, observations: dict[str, np.ndarray]
 ) -> float:
-    """Return the largest difference between actions, as a share of the range; refuse a too large one."""
+    """Return the largest difference between actions, as a share of the range; refuse one above tolerance."""
     if ours.shape != expected.shape:
         raise ExportError(f"actions have the shape {ours.shape}, not {expected.shape}; {_REMEDY}")
     apart = _apart(ours, expected)

@@ -60,7 +60,7 @@ class FaultTolerantEnv(gymnasium.Wrapper[Any, Any, Any, Any]):
         """Wait until the simulator is up, and begin an episode; return its first observation and info.
 
         Raises:
-            As `EnvGroup.begin`.
+            The same errors as `EnvGroup.begin`.
         """
         self._players.begin([seed], [options])
         self.env = self._player.env
@@ -70,7 +70,7 @@ class FaultTolerantEnv(gymnasium.Wrapper[Any, Any, Any, Any]):
         """Return the result of the environment's step, or after a fault a truncated row.
 
         Raises:
-            As `EnvGroup.step`.
+            The same errors as `EnvGroup.step`.
         """
         return self._players.step(action).step
 

@@ -90,7 +90,7 @@ class EnvGroup:
         Raises:
             ResetNeeded: a member has no running episode.
             Diverged: observation or reward is not finite.
-            As `begin`.
+            The same errors as `begin`.
         """
         rows: list[StepResult] = take_turns(
             partial(_step, player, action) for player, action in zip(self.all, actions, strict=True)

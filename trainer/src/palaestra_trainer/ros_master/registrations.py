@@ -58,7 +58,7 @@ class Registrations:
         return replaced
 
     def register_service(self, service: str, node: str, uri: str, address: str) -> str | None:
-        """Register the only node that serves `service`; return the same as `register`."""
+        """Register the only node that serves `service`; return the same value as `register`."""
         replaced = self._entered(Kind.SERVICE, service, node, uri)
         self._members[Kind.SERVICE][service] = {node: uri}
         self._service_uris[service] = (node, address)
@@ -68,7 +68,7 @@ class Registrations:
         """Remove a registration; return whether that node had this registration.
 
         Args:
-            kind: not SERVICE.
+            kind: any kind except SERVICE; use `unregister_service` for services.
             name: the name of the topic or parameter.
             node: full name of the node.
             uri: URI at which the node responds; a registration with another URI stays.

@@ -135,7 +135,7 @@ def compare(
     Args:
         a: the run directory in whose simulator both policies play.
         b: the other run directory.
-        make_here: a function that returns a function that creates the simulators of a run directory.
+        make_here: a function of a run directory; the result is a function that creates the simulators.
         rules: the rules of the comparison.
         report: called after each batch; the last call comes before the stop of the simulators, which takes at
             most a minute.

@@ -63,7 +63,7 @@ class ProgramReport(Progress):
             self.success_rate = success_rate
 
     def played(self, role: Role, infos: Sequence[Mapping[str, Any]]) -> None:
-        """Count a step of collecting environments by the infos of their rows; not of evaluating ones."""
+        """Count a step of collecting environments by the infos of its rows; ignore other environments."""
         valid = sum("sim_fault" not in ours(info) for info in infos)
         if valid:
             self.stepped(valid)

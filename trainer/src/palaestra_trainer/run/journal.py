@@ -52,8 +52,8 @@ class Journal:
     def regained(self, step: int, saved: Counters) -> Counters:
         """Return the counters of a run that resumes from `step`.
 
-        These are the `saved` counters of that step, unless the run continued after the step without a new
-        checkpoint.
+        If the run continued after `step` without a new checkpoint, most counters come from the journal,
+        because time and faults still count. Otherwise the result is `saved`, the counters of the checkpoint.
         """
         try:
             content = json.loads(self._path.read_text(encoding="utf-8"))

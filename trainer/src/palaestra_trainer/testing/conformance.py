@@ -65,7 +65,7 @@ def check_robot(robot: RobotAbc) -> None:
     """Check a robot that stands on free floor against the rules for robots and for its capabilities.
 
     Raises:
-        NotConforming: with the broken rule and the observed value.
+        NotConforming: a rule is broken; the message has the rule and the observed value.
     """
     _check_time(robot)
     for capability, check in _CHECKS:
@@ -84,7 +84,7 @@ def check_scene(robot: Any, scene: Scene, start: Pose, target: tuple[float, floa
         target: x, y in meters of another free position.
 
     Raises:
-        NotConforming: with the broken rule and the observed value.
+        NotConforming: a rule is broken; the message has the rule and the observed value.
     """
     first = _drive_after_reset(robot, scene, start, target)
     second = _drive_after_reset(robot, scene, start, target)

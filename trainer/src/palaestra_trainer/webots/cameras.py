@@ -1,4 +1,4 @@
-"""The sensors of a robot with arrays as readings: cameras, depth cameras and lidars.
+"""The sensors of a robot whose readings are arrays: cameras, depth cameras and lidars.
 
 An array is valid until the next step, which writes the next array into the same memory; see `image_decoding`.
 """

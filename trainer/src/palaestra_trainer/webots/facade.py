@@ -1,7 +1,7 @@
-"""The facade of the paper, which starts Webots on demand.
+"""The facade `Webots`, which starts a simulator on demand; CITATION.cff cites the paper that describes it.
 
-Simulated time passes only inside `with webots:` and `webots.run(...)`. Outside of these, every simulator is
-paused, because a running simulator uses a whole core even between steps.
+Simulated time passes only inside `with webots:` and `webots.run(...)`. Outside of these blocks and calls,
+every simulator is paused, because a running simulator uses a whole core even between steps.
 """
 
 from __future__ import annotations

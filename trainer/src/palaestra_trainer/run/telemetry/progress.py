@@ -52,7 +52,8 @@ class Counters:
 
     Attributes:
         episodes: number of collected episodes that ended without a fault.
-        faults: number of faults by kind: dead, hung and wrong_data; also of slow steps, which are not faults.
+        faults: number of faults by kind: `dead`, `hung` and `wrong_data`; `slow` counts slow steps, which are
+            not faults.
         restarts: number of restarts of simulators after faults.
         recycled: number of restarts of healthy simulators.
         given_up: number of simulators that were given up while the run continued.
@@ -77,7 +78,7 @@ class Counters:
 
     @property
     def broken(self) -> int:
-        """Number of faults of all kinds except slow."""
+        """Number of faults of all kinds except `slow`."""
         return self.faults.total() - self.faults[FaultKind.SLOW]
 
     def to_json(self) -> dict[str, Any]:
