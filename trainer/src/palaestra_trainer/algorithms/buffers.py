@@ -39,10 +39,10 @@ class Positions(NamedTuple):
     Attributes:
         next: number of the row for the next step.
         full: whether every row is in use; if not, only the rows before `next` are in use.
-        newest: for each member the number of the row of its last step; None if the buffer does not hold that
+        newest: for each member, the number of the row of its last step; None if the buffer does not hold that
             row.
-        columns: for each member the next row of its column, and whether that column is full; empty for a
-            buffer without columns.
+        columns: for each member, the number of the next row in its column, and whether that column is full;
+            empty for a buffer without columns.
     """
 
     next: int

@@ -35,8 +35,8 @@ class Learner:
         """Check that all losses and learned tensors are finite.
 
         Raises:
-            Diverged: a number is NaN or infinite; the message names the step, and the losses and tensors that
-                hold it.
+            Diverged: a number is NaN or infinite; the message names the step, and the losses and tensors with
+                such a number.
         """
         if found := self.not_finite():
             raise Diverged(f"step {step}: {found}; {REMEDY}")

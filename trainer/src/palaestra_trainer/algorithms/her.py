@@ -103,7 +103,7 @@ class ValidHerReplayBuffer(ValidDictReplayBuffer, HerReplayBuffer):
 
     @property
     def positions(self) -> Positions:
-        """The write positions of the columns; `newest` is the first row of each open episode."""
+        """The write positions of the columns; `newest` holds the first row of each member's open episode."""
         starts = [self._start(column) if self._under_way[column] else None for column in range(self.n_envs)]
         columns = tuple(zip(self._next, self._filled, strict=True))
         return Positions(0, all(self._filled), tuple(starts), columns)

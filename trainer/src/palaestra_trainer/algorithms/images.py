@@ -22,7 +22,7 @@ from palaestra_trainer.job.configuration import Cnn
 
 
 def with_network(policy_kwargs: dict[str, Any], cnn: Cnn | None) -> dict[str, Any]:
-    """Return the arguments of the policy; if the job sets `cnn`, they include the network for images."""
+    """Return the arguments of the policy, with the network for images if the job sets `cnn`."""
     if cnn is None:
         return policy_kwargs
     # As with NatureCNN, the output layer follows the features directly, unless the job sets `net_arch`.

@@ -1,6 +1,6 @@
 """The ranges of hyperparameters; with a value outside its range, an algorithm fails later or does not learn.
 
-The algorithms themselves check few of these values. They check most of them only in `learn`, after the
+The algorithms themselves check few of these values, and most of these few only in `learn`, after the
 simulators have started.
 """
 

@@ -60,7 +60,7 @@ class OwnBuffer(BaseBuffer):
     """The base of an author's buffer in use; it gives checkpoints the state that the author's class adds.
 
     If the class has the methods `state_dict` and `load_state_dict`, this state is the result of `state_dict`.
-    Otherwise it is every attribute that the class adds.
+    Otherwise this state is every attribute that the class adds.
 
     Raises:
         ConfigurationError: a checkpoint cannot hold one of these attributes.

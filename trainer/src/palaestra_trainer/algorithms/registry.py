@@ -31,8 +31,8 @@ from palaestra_trainer.job.configuration import nearest
 from palaestra_trainer.job.user_code import imports
 
 # A job cannot set these arguments of an algorithm's class as hyperparameters. The training loop sets some of
-# them, and other modules check others. `optimize_memory_usage` does not work with buffers for valid rows,
-# because they store rows of several members in one column.
+# these arguments, and other modules check others. `optimize_memory_usage` does not work with buffers for
+# valid rows, because they store rows of several members in one column.
 OURS = frozenset(
     {
         "self", "policy", "env", "seed", "device", "verbose", "tensorboard_log", "_init_setup_model",
@@ -53,8 +53,7 @@ class RegisteredAlgorithm:
         original: the algorithm's class in its package; this class loads a model.zip.
         arena: hyperparameters that are better for the arena's environments than the defaults of the class.
         actions: types of action spaces that the algorithm supports; None: unknown until a model is created.
-        log_interval: episodes of an off-policy algorithm, or rollouts of an on-policy algorithm, between two
-            records of values.
+        log_interval: number of episodes (off-policy) or rollouts (on-policy) between two records of values.
     """
 
     original: type[BaseAlgorithm]

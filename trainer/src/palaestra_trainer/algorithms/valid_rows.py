@@ -1,8 +1,8 @@
 """Subclasses of Stable-Baselines3 algorithms that count only valid rows and learn only from them.
 
-Two mixins override methods that Stable-Baselines3 calls between a step and its storage, so this module copies
-no code. `with_valid_rows` returns a subclass of an algorithm with one of the mixins. A saved model names
-neither that subclass nor the buffers, so the original class can load the model.
+Two mixins override methods that Stable-Baselines3 calls between a step and the storage of its rows, so this
+module copies no code. `with_valid_rows` returns a subclass of an algorithm with one of the mixins. A saved
+model names neither that subclass nor the buffers, so the original class can load the model.
 """
 
 from __future__ import annotations

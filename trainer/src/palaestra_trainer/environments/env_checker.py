@@ -2,8 +2,8 @@
 
 gymnasium's own wrapper only warns, so training would continue with wrong rows. The wrapper of this module
 applies gymnasium's checks to the first reset and the first step. It raises an error that names the expected
-and the actual value. It also checks types and shapes of later results, see `contract`. It does not check for
-NaN and infinity, because the learner reports them as divergence.
+and the actual value. For later results, the wrapper checks types and shapes, see `contract`. It does not
+check for NaN and infinity, because the learner reports these numbers as divergence.
 """
 
 from __future__ import annotations

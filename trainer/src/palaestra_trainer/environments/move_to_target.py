@@ -126,7 +126,7 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
     Args:
         robot: the robot to drive.
         scene: the scene, which places robot and mark for each episode.
-        options: observation, actions and rewards.
+        options: the options for observation, actions and rewards.
         on_close: a function that `close` calls.
 
     Raises:

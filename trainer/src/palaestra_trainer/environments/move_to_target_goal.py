@@ -3,7 +3,7 @@
 The task is for algorithms that also learn from goals that the policy reached by accident, such as hindsight
 experience replay. The interface is that of gymnasium-robotics: a Dict with `achieved_goal` and
 `desired_goal`, and rewards that are a function of these two goals. An inner `MoveToTargetEnv` plays the
-episodes, so robot, scene and faults are the same as there.
+episodes, so this task has the same robot, scene and faults.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ class MoveToTargetGoalEnv(gymnasium.Env[Observation, Any]):
     Args:
         robot: the robot to drive.
         scene: the scene, which places robot and mark for each episode.
-        options: observation, actions and rewards.
+        options: the options for observation, actions and rewards.
         on_close: a function that `close` calls.
     """
 

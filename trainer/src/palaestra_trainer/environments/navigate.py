@@ -105,7 +105,7 @@ class NavigateEnv(gymnasium.Env[Observation, Any]):
     Args:
         robot: the robot to drive, with the capabilities in `needs`.
         scene: the scene, which places robot and mark for each episode.
-        options: actions and rewards.
+        options: the options for actions and rewards.
         on_close: a function that `close` calls.
 
     Raises:

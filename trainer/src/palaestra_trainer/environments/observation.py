@@ -30,7 +30,7 @@ class StepState:
         pose: pose of the robot in the world's frame.
         velocity: mean velocity over the last step: forward and left in m/s, counter-clockwise in rad/s.
         target: x and y of the current target in meters, in the world's frame.
-        time_left: share of the episode's steps that are left; it falls from 1 to 0.
+        time_left: share of the episode's steps that are left, falling from 1 to 0.
         to_reach: share of the episode's targets that the robot has not reached, including the current target.
     """
 

@@ -81,7 +81,7 @@ def time_up(step: Transition) -> float:
 
 
 def duration(step: Transition) -> float:  # noqa: ARG001 - every term has the same form
-    """Return 1 for every step; its negative weight makes time cost reward."""
+    """Return 1 for every step; the weight is negative, so each step reduces the reward."""
     return 1.0
 
 

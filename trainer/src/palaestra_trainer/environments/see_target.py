@@ -95,7 +95,7 @@ class SeeTargetEnv(gymnasium.Env[Observation, Any]):
     Args:
         robot: the robot to drive, a `RobotinoAbc` with `Cameras`; its color camera has 64 x 48 pixels.
         scene: the scene, which places robot and pole for each episode.
-        options: images, actions and rewards.
+        options: the options for images, actions and rewards.
         on_close: a function that `close` calls.
 
     Raises:

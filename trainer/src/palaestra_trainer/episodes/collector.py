@@ -43,7 +43,7 @@ class CollectedRow(NamedTuple):
         observation: the next observation. After the end of an episode, it is the first observation of the
             next episode, unless that episode has not begun yet.
         reward: reward of this step; 0 in an invalid row.
-        done: whether an episode ended, by termination, by a time limit or by a fault. In a recovering row:
+        done: whether an episode ended, by termination, by a time limit or by a fault. In a recovering row,
             whether the next episode has begun.
         info: the environment's info, with the keys in this module's docstring.
     """

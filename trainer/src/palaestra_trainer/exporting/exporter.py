@@ -1,4 +1,4 @@
-"""Export the best policy of a run: read it, convert it, compare both, and write the file."""
+"""Export the best policy of a run: read the policy, convert it, compare both, and write the file."""
 
 from __future__ import annotations
 

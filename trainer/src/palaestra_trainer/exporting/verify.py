@@ -37,9 +37,9 @@ def compare(convert: Convert, acting: PolicyModule, policy: TrainedPolicy) -> fl
         policy: the policy that the file must reproduce.
 
     Raises:
-        ExportError: discrete actions differ, or continuous actions differ by more than the tolerance. It is
-            also raised if the comparison proves nothing, because a wrong file could have the same actions on
-            these observations.
+        ExportError: discrete actions differ, or continuous actions differ by more than the tolerance. The
+            error is also raised if the comparison proves nothing, because a wrong file could have the same
+            actions on these observations.
     """
     observations = drawn(acting, OBSERVATIONS)
     run = convert(acting)

@@ -73,7 +73,7 @@ class Environment(_Section):
 
     Attributes:
         id: name under which the environment is registered with gymnasium.
-        reward: with Dense the environment gives a reward at each step, with Sparse only at the end of an
+        reward: with `Dense` the environment gives a reward at each step, with `Sparse` only at the end of an
             episode.
         options: keyword arguments of the environment.
         wrappers: wrappers around the environment, the innermost first; None: no wrappers.
@@ -166,12 +166,13 @@ class Checkpoint(_Section):
 
 
 class Recycle(_Section):
-    """Limits for a healthy simulator; when it reaches one of them, it is restarted after its episode.
+    """Limits for a healthy simulator, which is restarted after its episode when it reaches a limit.
 
     Attributes:
-        after_resets: resets since the simulator was taken into use.
-        after_minutes: minutes since the simulator was taken into use; its time as a standby does not count.
-        above_memory_bytes: memory of all its processes together.
+        after_resets: greatest number of resets since the simulator was started, or took over as a standby.
+        after_minutes: greatest number of minutes since the simulator was started or took over; its time as a
+            standby does not count.
+        above_memory_bytes: greatest memory of all processes of the simulator together.
     """
 
     after_resets: Positive | None = None
@@ -191,10 +192,10 @@ class SimulatorConfiguration(_Section):
 
     Attributes:
         name: `<group>-<index>`, unique in the file.
-        role: Collect for collecting experience, Evaluate for evaluating the policy.
+        role: `Collect` for collecting experience, `Evaluate` for evaluating the policy.
         min_simulators: number of simulators of its group that must work for the run to continue; None: all.
         control: address of the control port of the simulator's sidecar.
-        driver: the simulator program: stub, mujoco, webots or command.
+        driver: the simulator program, `stub`, `mujoco`, `webots` or `command`.
         options: command-line options of the simulator program.
         world: path of the generated world that the simulator loads.
         standby: whether the sidecar also runs a standby for this simulator.
@@ -221,7 +222,8 @@ class Configuration(_Section):
 
     Attributes:
         seed: the job's seed plus the replica's index; all other seeds are derived from this seed.
-        device: device of the model; cuda: the GPU that the job requested, or the CPU if PyTorch finds no GPU.
+        device: device of the model; `cuda` is the GPU that the job requested, or the CPU if PyTorch finds no
+            GPU.
         steps: number of valid environment steps of the whole run, of all simulators together.
         resume_from: the run directory of another job; a run that has not saved a checkpoint yet resumes from
             the newest checkpoint in that directory.

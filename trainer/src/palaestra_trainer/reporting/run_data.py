@@ -67,7 +67,8 @@ class Replay:
             y in meters.
         low: smallest x and y of the floor; None: unknown.
         high: greatest x and y of the floor.
-        outlines: obstacles as x, y, half length, half width, radius of the rounding, heading.
+        outlines: obstacles, each as x, y, half length, half width and radius of the rounding in meters, and
+            heading in radians.
         radius_m: radius of the robot.
     """
 
@@ -90,8 +91,8 @@ class RunData:
         name: name of the job and number of the replica.
         ended: `good`, `interrupted`, `failed`, or `open` if the end is not known.
         end: the end of the run in words.
-        figures: name and value of the main results, in order.
-        asked: name and value of the job's settings, in order.
+        figures: name and value of each main result, in the order of the page.
+        asked: name and value of each setting of the job, in the order of the page.
         versions: name and version of the programs and the machine.
         evaluations: the evaluations in the order of steps.
         confirmations: the confirmations in the order of steps.

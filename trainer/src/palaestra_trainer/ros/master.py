@@ -21,8 +21,8 @@ _NODE_TIMEOUT_S = 1.0
 class Master:
     """A client of the master at ROS_MASTER_URI; its calls come from the node `caller`.
 
-    Every method except `ping` raises MasterLost if no master responds or the master refuses the request. It
-    raises UnreadableAnswer if the response of the master is invalid.
+    Every method except `ping` raises MasterLost if no master responds or the master refuses the request.
+    These methods raise UnreadableAnswer if the response of the master is invalid.
     """
 
     def __init__(self, caller: str, timeout_s: float = _TIMEOUT_S) -> None:

@@ -2,8 +2,8 @@
 
 The node does not register topics or services. `RosSubscriber` registers under the node's name and connects by
 itself, so the node ignores updates of a topic's publishers. `rosnode kill` ends the process as SIGTERM does.
-The master ends it in the same way if another node takes its name. A training saves a checkpoint before it
-ends.
+The master ends the process in the same way if another node takes the name. A training saves a checkpoint
+before it ends.
 """
 
 from __future__ import annotations

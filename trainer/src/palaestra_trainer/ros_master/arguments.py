@@ -16,7 +16,7 @@ class WrongArgument(ValueError):
 
 
 def text_of(argument: str, value: Any) -> str:
-    """Check that an argument is a text and not empty; return it.
+    """Check that an argument is a text and not empty; return the text.
 
     Raises:
         WrongArgument: the argument is empty or not a text.

@@ -1,8 +1,8 @@
 """Keep the registrations of nodes: their topics, services and addresses.
 
 This module is pure: it uses no thread, socket or clock. A node is known from its first registration until its
-last registration ends. If a node registers with another address, it is a new node of the same name, and all
-registrations of the old node are dropped.
+last registration ends. If a node registers with another address, it counts as a new node of the same name,
+and all registrations of the old node are dropped.
 """
 
 from __future__ import annotations

@@ -63,7 +63,7 @@ def own_simulator(world: str = "arena", driver: str = "stub") -> Configured:
     """Start a new simulator for one environment and return it.
 
     Raises:
-        ConfigurationError: the driver is mujoco, which is not installed.
+        ConfigurationError: the driver is `mujoco`, but MuJoCo is not installed.
         SimulatorFault: the simulator does not start.
     """
     require_driver(driver)
@@ -75,7 +75,7 @@ def require_driver(driver: str) -> None:
     """Check that simulators of this driver can be started on this machine.
 
     Raises:
-        ConfigurationError: the driver is mujoco, which is not installed.
+        ConfigurationError: the driver is `mujoco`, but MuJoCo is not installed.
     """
     if driver == "mujoco" and importlib.util.find_spec("mujoco") is None:
         raise ConfigurationError(

@@ -110,7 +110,7 @@ class OwnSimulator:
 
     Args:
         world: the name of the world.
-        driver: stub or mujoco.
+        driver: the simulator program, `stub` or `mujoco`.
 
     Raises:
         SimulatorDead, SimulatorHung, WrongData: the simulator does not start in time.

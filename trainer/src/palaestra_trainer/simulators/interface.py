@@ -44,7 +44,7 @@ class Member(Protocol):
         ...
 
     def restart(self) -> None:
-        """Stop the simulator, in any state, and start it; raise `SimulatorFault` if that fails."""
+        """Stop the simulator, in any state, and start it; raise `SimulatorFault` if the start fails."""
         ...
 
     def abandon(self) -> None:

@@ -1,6 +1,6 @@
 """Use the simulator of a facade that a program created before its environment.
 
-The program starts, pauses and stops the simulator, and steps it inside `with webots:` and `webots.run`.
+The program starts, pauses and stops the simulator. Steps run inside `with webots:` and `webots.run`.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 A fake, a simulated and a real robot of the same class pass the same checks, so an environment works with each
 of them. Each rule is a constant; its sentence is also the error message for a robot that breaks the rule. The
-checks move the robot, so it needs half a meter of free floor on every side.
+checks move the robot, so the robot needs half a meter of free floor on every side.
 """
 
 from __future__ import annotations

@@ -33,7 +33,8 @@ Colors = NDArray[np.uint8]
 Depths = NDArray[np.float32]
 _Row = NDArray[np.floating[Any]]
 
-# The ray of a pixel per meter forward: meters to the left by column, and meters up by row.
+# The direction of each pixel's ray, per meter forward: meters to the left for each column, and meters up for
+# each row.
 _FOCAL = 0.5 * WIDTH / math.tan(0.5 * FIELD_OF_VIEW_RAD)  # pixels
 _LEFT: _Row = (0.5 * WIDTH - 0.5 - np.arange(WIDTH)) / _FOCAL
 _UP: _Row = (0.5 * HEIGHT - 0.5 - np.arange(HEIGHT))[:, None] / _FOCAL
@@ -42,7 +43,7 @@ _FLOOR_M: _Row = np.where(_UP < 0.0, ABOVE_M / np.maximum(-_UP, 1e-9), math.inf)
 
 @dataclass(frozen=True, slots=True)
 class _Thing:
-    """An object in an image: the meters forward to it by column, its height and its color."""
+    """An object in an image: for each column the meters forward to the object, its height and its color."""
 
     forward_m: _Row
     height_m: float

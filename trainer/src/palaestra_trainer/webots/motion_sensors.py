@@ -63,7 +63,7 @@ class Gyro(_AxesSensor):
 class Accelerometer(_AxesSensor):
     """An accelerometer; `value` is the acceleration along the sensor's axes in m/s2: x, y, z.
 
-    At rest it is the reaction to gravity, so the axis that points up reads 9.81.
+    At rest, `value` is the reaction to gravity, so the axis that points up reads 9.81.
     """
 
     __slots__ = ()

@@ -55,8 +55,9 @@ class TrainingState:
             model.zip has them.
         memories: states of recurrent networks, each of shape (layers, members, units).
         action_noise: state of the noise on each member's actions; None if the noise has no state.
-        scales: statistics of observations and rewards, if they are normalized; `write` omits them too.
-        running_returns: for each member the discounted sum of the rewards in its open episode so far; None
+        scales: statistics of observations and rewards, if these are normalized; `write` omits the statistics
+            too.
+        running_returns: for each member, the discounted sum of the rewards in its open episode so far; None
             without normalization.
     """
 

@@ -212,11 +212,11 @@ class Progress:
             self._standings.add(simulator, role)
 
     def has_standby(self, simulator: str, ask: AskStandby) -> None:
-        """Set the function that returns the state of the simulator's spare; any thread may call it."""
+        """Set the function, called by any thread, that returns the state of the simulator's spare."""
         self._standings.has_standby(simulator, ask)
 
     def reports_left_out(self, simulator: str, ask: AskLeftOut) -> None:
-        """Set the function that returns the parts that the simulator left out; any thread may call it."""
+        """Set the function, called by any thread, that returns the parts that the simulator left out."""
         self._standings.reports_left_out(simulator, ask)
 
     def left_out(self) -> tuple[str, ...]:

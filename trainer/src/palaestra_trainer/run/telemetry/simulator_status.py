@@ -89,11 +89,11 @@ class SimulatorStatuses:
         standing.state, standing.given_up = "failed", True
 
     def has_standby(self, simulator: str, ask: AskStandby) -> None:
-        """Set the function that returns the state of the simulator's spare; any thread may call it."""
+        """Set the function, called by any thread, that returns the state of the simulator's spare."""
         self._all[simulator].standby = ask
 
     def reports_left_out(self, simulator: str, ask: AskLeftOut) -> None:
-        """Set the function that returns the parts that the simulator left out; any thread may call it."""
+        """Set the function, called by any thread, that returns the parts that the simulator left out."""
         self._all[simulator].left_out = ask
 
     def left_out(self) -> tuple[str, ...]:
