@@ -38,7 +38,7 @@ class BufferKind:
 
     @property
     def names(self) -> tuple[str, str]:
-        """The names of both hyperparameters."""
+        """The names of the two hyperparameters."""
         return self.chooser, self.options
 
 

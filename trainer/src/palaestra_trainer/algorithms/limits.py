@@ -1,4 +1,4 @@
-"""The ranges of hyperparameters; with a value outside its range, an algorithm fails later or does not learn.
+"""The ranges of hyperparameters; outside of these ranges, an algorithm fails later or does not learn.
 
 The algorithms themselves check few of these values, and most of these few only in `learn`, after the
 simulators have started.

@@ -105,7 +105,7 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
     Only the seed of `reset(seed=s)` decides the start, the target and the heading. Start and target are drawn
     uniformly from the free positions, at least 1 m apart. At a free position the robot has 0.1 m of free
     space around it. The heading is drawn from all directions. `options={"start": (x, y, heading), "target":
-    (x, y)}` sets one or both.
+    (x, y)}` sets the start, the target or both.
 
     ## End of an episode
 

@@ -66,10 +66,10 @@ class MoveToTargetGoalEnv(gymnasium.Env[Observation, Any]):
 
     ## End of an episode
 
-    An episode is terminated when the robot bumps into something (`compute_terminated`). It continues after
-    the robot reaches the target, so the value of a goal is the same for a desired and an achieved goal. After
-    `max_steps` steps the episode is truncated (`compute_truncated`), or terminated with
-    `time_up="terminated"`.
+    An episode is terminated when the robot bumps into something (`compute_terminated`). The episode continues
+    after the robot reaches the target, so the value of a goal does not depend on whether the goal was desired
+    or only achieved. After `max_steps` steps the episode is truncated (`compute_truncated`), or terminated
+    with `time_up="terminated"`.
 
     ## Info
 

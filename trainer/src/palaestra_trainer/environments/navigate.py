@@ -89,7 +89,7 @@ class NavigateEnv(gymnasium.Env[Observation, Any]):
     Only the seed of `reset(seed=s)` decides the start, the target and the heading. Start and target are drawn
     uniformly from the free positions of the scene's layout, at least 1 m apart. At a free position the robot
     has 0.1 m of free space around it. The heading is drawn from all directions. `options={"start": (x, y,
-    heading), "target": (x, y)}` sets one or both.
+    heading), "target": (x, y)}` sets the start, the target or both.
 
     ## End of an episode
 

@@ -39,7 +39,7 @@ class Transition:
         before_m: meters to the target before the step.
         after_m: meters to the target after the step.
         nearest_m: meters to the nearest object after the step, as the robot's sensors measure it.
-        outcome: the outcome after the step.
+        outcome: how the episode ended in the step, or that the episode continues.
     """
 
     before_m: float

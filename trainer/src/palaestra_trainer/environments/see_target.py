@@ -78,8 +78,8 @@ class SeeTargetEnv(gymnasium.Env[Observation, Any]):
     Only the seed of `reset(seed=s)` decides the start, the heading and the position of the pole. Start and
     pole are drawn uniformly from the free positions, at least 1 m apart. At a free position the robot has 0.1
     m of free space around it. The heading is drawn from all directions. `options={"start": (x, y, heading),
-    "target": (x, y)}` sets one or both. With `cylinders=True` the world's four cylinders stand on the floor
-    and can hide the pole.
+    "target": (x, y)}` sets the start, the pole or both. With `cylinders=True` the world's four cylinders
+    stand on the floor and can hide the pole.
 
     ## End of an episode
 

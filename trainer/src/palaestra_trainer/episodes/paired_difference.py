@@ -113,7 +113,7 @@ def interval(pairs: Pairs, alpha: float = ALPHA) -> Difference:
     """Return bounds of the difference between the success rates of A and B.
 
     The bounds are valid after any number of episodes: if they are computed after every episode, the
-    probability that the true difference is ever outside is at most `alpha`.
+    probability that the true difference is ever outside the bounds is at most `alpha`.
     """
     gained = partial(log_capital, pairs, weights=_weights(pairs))
     most, middle = -log(alpha), pairs.difference

@@ -7,9 +7,9 @@ defined in `palaestra_trainer.algorithms`, not here, because reading a configura
 learning library.
 
 Unknown fields are logged and ignored. A job may name a `trainer.image` that is older than the operator that
-writes the file. A newer operator writes a new field only if the job sets that field. Misspelled fields of
-users do not reach this module, because the operator checks the job before it writes the file. An unknown
-value of a known field is refused, because the training would differ from the job.
+writes the file. A newer operator writes a new field only if the job sets that field. A field that a user
+misspelled does not reach this module, because the operator checks the job before it writes the file. An
+unknown value of a known field is refused, because the training would differ from the job.
 """
 
 from __future__ import annotations

@@ -133,8 +133,8 @@ def compare(
     """Compare the policies of two run directories until the verdict is clear or all episodes are played.
 
     Args:
-        a: the run directory in whose simulator both policies play.
-        b: the other run directory.
+        a: the run directory of A; both policies play in simulators like the one of this run.
+        b: the run directory of B.
         make_here: a function of a run directory; the result is a function that creates the simulators.
         rules: the rules of the comparison.
         report: called after each batch; the last call comes before the stop of the simulators, which takes at

@@ -1,4 +1,4 @@
-"""Create an environment without a simulator that computes rewards for hindsight experience replay.
+"""Create an environment that computes rewards for hindsight experience replay and needs no simulator.
 
 The collecting environments cannot compute these rewards, because their simulators may be restarting in other
 threads while the algorithm learns. This environment is never reset or stepped. Its robot has the job's class

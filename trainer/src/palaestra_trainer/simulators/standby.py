@@ -65,7 +65,7 @@ class Standby:
 
     @property
     def resets(self) -> int:
-        """Resets since the active simulator was last started."""
+        """The number of resets since the active simulator was last started."""
         return self._active.simulator.resets
 
     @property

@@ -83,7 +83,7 @@ def _things(pose: Pose, target: Point, cylinders: Sequence[Point]) -> Iterator[_
 
 
 def _to_wall(position_m: float, way: _Row) -> _Row:
-    """Return for each column the meters forward to the wall that it faces."""
+    """Return, for each column, the meters forward to the wall that the column faces."""
     away = np.copysign(np.maximum(np.abs(way), 1e-9), way)
     wall: _Row = (np.copysign(HALF_SIDE_M, way) - position_m) / away
     return wall

@@ -56,7 +56,7 @@ class Camera(_Rendered):
 class RangeFinder(_Rendered):
     """A depth camera; `value` is a read-only array of meters: shape (height, width), float32.
 
-    An infinite value means out of range.
+    An infinite value means that no object is in range.
     """
 
     __slots__ = ()
@@ -77,7 +77,7 @@ class RangeFinder(_Rendered):
 class Lidar(Sensor):
     """A lidar; `value` is a read-only array of meters: shape (layers, rays), float32.
 
-    An infinite value means out of range. Layers are ordered from the top down. The rays of a layer are
+    An infinite value means that no object is in range. Layers are ordered from the top down. The rays of a layer are
     ordered from left to right.
     """
 
