@@ -68,7 +68,7 @@ class ObservationPart:
 
 
 def in_frame(heading_rad: float, x_m: float, y_m: float) -> Point:
-    """Convert a vector from the world's frame to forward and left of a robot with this heading."""
+    """Return a vector of the world's frame in the frame of a robot with this heading: forward, left."""
     c, s = math.cos(heading_rad), math.sin(heading_rad)
     return x_m * c + y_m * s, y_m * c - x_m * s
 

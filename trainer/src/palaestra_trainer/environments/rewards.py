@@ -70,7 +70,7 @@ def collision(step: Transition) -> float:
 
 
 def proximity(step: Transition) -> float:
-    """Return 0 if no object is inside the margin; rise to 1 at the nearest measurable distance."""
+    """Return 0 if no object is inside the margin, and up to 1 at the nearest measurable distance."""
     used_m = MARGIN_M - step.nearest_m
     return max(0.0, used_m) / (MARGIN_M - SENSOR_RANGE_M[0])
 

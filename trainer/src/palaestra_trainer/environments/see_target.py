@@ -46,13 +46,13 @@ class SeeTargetEnv(gymnasium.Env[Observation, Any]):
     ## Actions
 
     The actions are those of `MoveToTargetEnv`. With `actions="discrete"` an action is one of the `movements`,
-    by default one of all seven. With `actions="continuous"` it is forward, left and turning, `Box(-1, 1,
-    (3,), float32)`. Three movements are enough: FORWARD, TURN_LEFT and TURN_RIGHT.
+    by default one of all seven. With `actions="continuous"` an action is forward, left and turning, `Box(-1,
+    1, (3,), float32)`. Three movements are enough: FORWARD, TURN_LEFT and TURN_RIGHT.
 
     ## Observation
 
-    The space is a `Box(uint8)` with only the image of the camera. With `frames=3` it has the newest three
-    images, the oldest first. The first observation of an episode then has the same image three times.
+    The space is a `Box(uint8)` with only the image of the camera. With `frames=3` the space has the newest
+    three images, the oldest first. The first observation of an episode then has the same image three times.
 
     | axis | frames=1 | frames=3 | min | max | meaning                                   |
     |------|----------|----------|-----|-----|-------------------------------------------|

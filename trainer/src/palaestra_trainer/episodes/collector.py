@@ -45,7 +45,7 @@ class CollectedRow(NamedTuple):
         reward: reward of this step; 0 in an invalid row.
         done: whether an episode ended, by termination, by a time limit or by a fault. In a recovering row,
             whether the next episode has begun.
-        info: the environment's info, with the keys in this module's docstring.
+        info: the environment's info, with the keys that the docstring of this module describes.
     """
 
     observation: Any

@@ -1,4 +1,4 @@
-"""Export the best policy of a run: read the policy, convert it, compare both, and write the file."""
+"""Export the best policy of a run: convert it, compare the result with the policy, and write the file."""
 
 from __future__ import annotations
 

@@ -176,7 +176,7 @@ class Scoring(PolicyModule):
 
 
 def parts_of(space: spaces.Space[Any]) -> dict[str, spaces.Space[Any]]:
-    """Return the space of each key of a Dict, in the order of the keys; another space is the only part."""
+    """Return the space of each key of a Dict, in the order of the keys; any other space is the only part."""
     return dict(space.spaces) if isinstance(space, spaces.Dict) else {OBSERVATION: space}
 
 

@@ -1,4 +1,4 @@
-"""Generate the observations on which a file is compared with its policy; they never change.
+"""Generate the observations on which a file is compared with its policy; they are always the same.
 
 The observations should be similar to those of episodes, but the bounds of a space do not show which numbers
 are usual. A bound may be infinite, or the largest number of a type. Numbers drawn uniformly between such

@@ -122,7 +122,7 @@ def _refuse_what_shows_nothing(
 
 
 def _scores_show(convert: Convert, scoring: Scoring, observations: dict[str, np.ndarray]) -> bool:
-    """Return whether the scores of actions depend on the observations, and are the same from a file."""
+    """Return whether the scores of actions depend on the observations, and are the same in a file."""
     masks = map(torch.from_numpy, _masks(scoring)[-1])
     inputs = [*map(torch.from_numpy, observations.values()), *masks, *scoring.begin(OBSERVATIONS)]
     try:
@@ -143,7 +143,7 @@ def _span_and_tolerance(
     """Return the range of each number of an action, and the largest allowed difference.
 
     If actions are only clipped, they may use a small part of the space's range. Then the range of the actual
-    values counts, but at least 1, because the network may compute with numbers around 1.
+    values counts, or 1 if that range is smaller, because the network may compute with numbers around 1.
     """
     space = acting.action_space
     if not isinstance(space, spaces.Box):

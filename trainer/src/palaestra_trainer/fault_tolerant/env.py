@@ -67,7 +67,7 @@ class FaultTolerantEnv(gymnasium.Wrapper[Any, Any, Any, Any]):
         return self._player.observation, self._player.reset_info
 
     def step(self, action: Any) -> Step:
-        """Return the result of the environment's step, or after a fault a truncated row.
+        """Return the result of the environment's step; after a fault, return a truncated row.
 
         Raises:
             The same errors as `EnvGroup.step`.

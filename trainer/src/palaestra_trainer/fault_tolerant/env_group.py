@@ -85,7 +85,7 @@ class EnvGroup:
         return row
 
     def step_all(self, actions: Sequence[Any]) -> list[StepResult]:
-        """Step all members at the same time and return their rows; begin new episodes after those that ended.
+        """Step all members at the same time and return their rows; replace each ended episode by a new one.
 
         Raises:
             ResetNeeded: a member has no running episode.

@@ -47,7 +47,7 @@ def make_players(
     `SeeTarget-v0`.
 
     Args:
-        environment_id: the id of the environment; None: that of PALAESTRA_CONFIG.
+        environment_id: the id of the environment; None: the id in PALAESTRA_CONFIG.
         number: number of simulators; None: the simulator of the facade, or else all simulators with the role,
             or else one new simulator.
         role_name: the role of the simulators in PALAESTRA_CONFIG.

@@ -228,7 +228,7 @@ class Configuration(_Section):
         resume_from: the run directory of another job; a run that has not saved a checkpoint yet resumes from
             the newest checkpoint in that directory.
         initial_policy: a model.zip with whose policy a new run begins; None: random weights.
-        stall_deadline_seconds: the run fails after this time without an environment step.
+        stall_deadline_seconds: the run fails after this number of seconds without an environment step.
         robot: class of the robot, `module:Class` or a name of `robots.registry`; None: `DEFAULT_ROBOT`.
         command: the user's own program that replaces the built-in training loop; the trainer does not read
             it.

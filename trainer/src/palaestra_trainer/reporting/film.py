@@ -168,7 +168,7 @@ class _Canvas:
         )
 
     def _at(self, place: Position) -> Position:
-        """Return a position on the floor in pixels, from the upper left corner."""
+        """Convert a position on the floor to pixels, counted from the upper left corner."""
         return (place[0] - self.low_x) * self.scale, (self.high_y - place[1]) * self.scale
 
 

@@ -90,7 +90,7 @@ def _to_wall(position_m: float, way: _Row) -> _Row:
 
 
 def _to_circle(middle: Point, ways: tuple[_Row, _Row], radius_m: float) -> _Row:
-    """Return meters forward to a circle on the floor by column; infinite if the column misses it."""
+    """Return, for each column, the meters forward to a circle on the floor; infinite without a hit."""
     x, y = ways
     squared = x**2 + y**2
     along = (middle[0] * x + middle[1] * y) / squared

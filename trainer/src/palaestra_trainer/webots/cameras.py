@@ -77,8 +77,8 @@ class RangeFinder(_Rendered):
 class Lidar(Sensor):
     """A lidar; `value` is a read-only array of meters: shape (layers, rays), float32.
 
-    An infinite value means that no object is in range. Layers are ordered from the top down. The rays of a layer are
-    ordered from left to right.
+    An infinite value means that no object is in range. The layers are ordered from the top down. The rays of
+    a layer are ordered from left to right.
     """
 
     __slots__ = ()
