@@ -62,7 +62,7 @@ class ReplaySize:
 def replay_size(
     algorithm: Algorithm, observation: spaces.Space[Any], action: spaces.Space[Any], steps: int
 ) -> ReplaySize | None:
-    """Return the size of an algorithm's replay buffer; None: no such buffer, or no policy for the space.
+    """Return the size of the replay buffer; None: the algorithm has no buffer, or no policy for the space.
 
     Args:
         algorithm: the algorithm with all its hyperparameters.

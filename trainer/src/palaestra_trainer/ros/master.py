@@ -64,7 +64,7 @@ class Master:
         self._call("unregisterSubscriber", topic, node_uri)
 
     def node_names(self) -> set[str]:
-        """Return the full names of all nodes that publish, subscribe or serve."""
+        """Return the full names of all nodes that publish, subscribe or offer services."""
         answer = self._call("getSystemState")
         try:
             return {str(node) for part in answer.value for _, nodes in part for node in nodes}

@@ -65,7 +65,7 @@ NOTHING_LEARNED = End(
     "Completed",
     "the training is complete, but nothing was learned: no update was made",
 )
-_FAR_BEYOND = 1.5  # multiple of the job's steps; the last rollout usually exceeds the steps only a little
+_FAR_BEYOND = 1.5  # a run with more steps than the job's steps times this number is logged
 STOPPED_S = 60.0  # longest time for closing environments and stopping simulators
 # Code of the job's author may try to end the program, for example by sys.exit.
 ENDING = (Exception, SystemExit, KeyboardInterrupt, GeneratorExit)

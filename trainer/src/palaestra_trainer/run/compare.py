@@ -37,7 +37,7 @@ class Rules:
     """The rules of a comparison of two policies.
 
     Attributes:
-        episodes: the most episodes that each policy plays.
+        episodes: the largest number of episodes that each policy plays.
         batch: number of episodes between two computations of the difference.
         margin: two success rates that differ by at most this number count as equal.
         stream: name of the seed stream.

@@ -42,7 +42,7 @@ class ProgramReport(Progress):
     def phase(self) -> str:
         """The phase: "evaluating" if an evaluating environment made the last step recently, else "training".
 
-        By this phase the operator can distinguish an evaluation from stalled training.
+        With this phase the operator can distinguish an evaluation from stalled training.
         """
         return "evaluating" if self._evaluates and self.idle_s() < _EVALUATING_S else "training"
 

@@ -158,7 +158,7 @@ def new_simulator(
     Other simulators of the same world may run, because the ROS names of this simulator get a random suffix.
 
     Raises:
-        ConfigurationError: the sidecar refused the world or the driver, or as `simulator_at`.
+        ConfigurationError: the sidecar refused the world or the driver, or `simulator_at` raised this error.
     """
     # A stub ignores a suffix of six hexadecimal digits when it seeds its faults, so the faults are
     # repeatable.

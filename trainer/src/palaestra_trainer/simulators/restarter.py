@@ -201,7 +201,7 @@ class Restarter:
         self._switch(self.member.pause)
 
     def recycle_resting(self, episodes: int) -> None:
-        """Begin to recycle the paused member if that would be due by the end of the next `episodes`."""
+        """Begin to recycle the paused member if a recycling would be due within the next `episodes`."""
         if self.up() and (reason := self.member.due(episodes)):
             self._log_recycling(reason)
             self._recycles_resting = True

@@ -88,7 +88,7 @@ class Lidar(Sensor):
 
 
 class LidarPoints(Sensor):
-    """The point cloud of a lidar, which this sensor enables too.
+    """The point cloud of a lidar; this sensor also enables the lidar.
 
     A robot may have a `Lidar` of the same device in addition. `value` is a read-only array: shape (layers *
     rays, 3), float32, with x, y and z in meters in the lidar's frame. The values of a ray without a hit are

@@ -254,5 +254,5 @@ class Stepper:
 
 
 def _busy_s() -> float:
-    """Return a clock that counts only the seconds in which this thread works for this simulator."""
+    """Return the time on a clock that runs only while this thread works for this simulator."""
     return time.perf_counter() - away_s() - waited_s()

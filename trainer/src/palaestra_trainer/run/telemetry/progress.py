@@ -101,10 +101,10 @@ class Progress:
         step: number of valid environment steps so far, over all attempts.
         target: number of steps at which the run ends.
         counters: counts over all attempts, without the time of this attempt; `counted` adds that time.
-        success_rate: success rate of this attempt's last evaluation or confirmation; None before the first,
-            or if the environment does not report success.
+        success_rate: success rate of this attempt's last evaluation or confirmation; None before the first
+            evaluation, or if the environment does not report success.
         success_interval: the interval around `success_rate`; None if the rate is None.
-        checkpoint: the newest checkpoint; None before the first.
+        checkpoint: the newest checkpoint; None before the first checkpoint.
         attempt: number of this attempt in the run directory; None before the attempt is recorded.
         figures: values of this attempt only, for /metrics.
         fault_log: the file of faults; None: faults are not written to a file.
@@ -296,7 +296,7 @@ class Progress:
         return totals | faults | spent
 
     def faults_by_kind(self) -> Mapping[tuple[str, ...], int]:
-        """Return the faults in this attempt by simulator and kind."""
+        """Return the number of faults in this attempt by simulator and kind."""
         with self._lock:
             return self._standings.faults_by_kind()
 
@@ -306,7 +306,7 @@ class Progress:
             return self._standings.restarts_by_cause()
 
     def restarts(self) -> int:
-        """Return the restarts of simulators after faults, in this attempt.
+        """Return the number of restarts of simulators after faults in this attempt.
 
         This method never blocks, because the watchdog calls it while other threads hang.
         """

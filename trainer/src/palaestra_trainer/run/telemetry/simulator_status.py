@@ -105,7 +105,7 @@ class SimulatorStatuses:
         return tuple(f"{group}: {line}" for group, lines in reports.items() for line in lines)
 
     def restarts(self) -> int:
-        """Return the restarts after faults of all simulators."""
+        """Return the number of restarts after faults, of all simulators together."""
         return sum(standing.restarts.total() for standing in self._all.values())
 
     def down(self) -> list[str]:

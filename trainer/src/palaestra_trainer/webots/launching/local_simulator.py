@@ -1,4 +1,4 @@
-"""Run simulators as processes of this machine, for notebooks and scripts without a pod or a runner.
+"""Run simulators as processes of this machine, for notebooks and scripts outside of a pod.
 
 The trainer starts a sidecar, which starts the simulator. So restarts, kills and clean ends use the same code
 as in a pod.
