@@ -301,7 +301,7 @@ class Progress:
             return self._standings.faults_by_kind()
 
     def restarts_by_cause(self) -> Mapping[tuple[str, ...], int]:
-        """Return the restarts in this attempt by simulator and cause: a kind of fault, or recycling."""
+        """Return the number of restarts in this attempt by simulator and cause: a fault kind or recycling."""
         with self._lock:
             return self._standings.restarts_by_cause()
 
