@@ -30,7 +30,7 @@ def with_network(policy_kwargs: dict[str, Any], cnn: Cnn | None) -> dict[str, An
 
 
 def with_channels_first(env: VecEnv) -> VecEnv:
-    """Return the environment with the channels of images first; one without images is not changed.
+    """Return the environment with the channels of its images first; if it has no images, return it unchanged.
 
     Without this wrapper, Stable-Baselines3 would transpose the images after the normalizer. The statistics of
     the normalizer would then have another layout than the observations of the model.

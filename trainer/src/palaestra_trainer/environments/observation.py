@@ -74,7 +74,7 @@ def in_frame(heading_rad: float, x_m: float, y_m: float) -> Point:
 
 
 def velocity(before: Pose, after: Pose, elapsed_s: float) -> Twist:
-    """Return the mean twist between two poses in the robot's frame: m/s, m/s, rad/s."""
+    """Return the mean velocity between two poses: forward and left in m/s, counter-clockwise in rad/s."""
     turned_rad = math.remainder(after.heading_rad - before.heading_rad, 2.0 * math.pi)
     forward_m, left_m = in_frame(
         before.heading_rad + 0.5 * turned_rad, after.x_m - before.x_m, after.y_m - before.y_m

@@ -202,7 +202,7 @@ class Attempt:
         found = self._newest()
         before = RunDirectory(found.path.parent.parent) if found else None
         self._algorithm = algorithms.begin_with(configuration, self._directory, before)
-        self._take_over(found)  # before the server starts: to Prometheus, a later jump would be an increase
+        self._take_over(found)  # before the server starts: Prometheus would count a later jump as new events
         known = constants(configuration)
         stack.enter_context(status_server(configuration.status_address, progress, known))
         self._begin(found)

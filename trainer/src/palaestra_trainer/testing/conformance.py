@@ -142,7 +142,7 @@ def _knows_where_it_is(robot: object) -> bool:
 
 
 def _check_motion(robot: Any, drive: Callable[[Twist], None], wanted: Twist, rule: str) -> None:
-    """Compare the driven distance (m, m, rad) with the commanded distance, then stop the robot."""
+    """Compare the motion of the robot with the commanded motion, then stop the robot."""
     before = robot.pose()
     drive(wanted)
     elapsed_s = sum(robot.period_s * (1 + robot.advance()) for _ in range(PERIODS))
