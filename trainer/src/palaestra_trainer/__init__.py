@@ -38,9 +38,9 @@ def make_env(environment: str | None = None, *, role: str = "Collect", **options
     reward 0 and `info["palaestra"]["sim_fault"]`. The next `reset` waits until the simulator is restarted, if
     its restart budget allows that.
 
-    If this process has a `Webots` facade that no environment uses, the environment takes the simulator of the
-    newest such facade. Otherwise it takes a free simulator of PALAESTRA_CONFIG. If that variable is not set,
-    as in a notebook, a new simulator is started: the stub, or MuJoCo for `SeeTarget-v0`.
+    If this process has `Webots` facades that no environment uses, the environment takes the simulator of the
+    newest of these facades. Otherwise it takes a free simulator of PALAESTRA_CONFIG. If that variable is not
+    set, as in a notebook, a new simulator is started: the stub, or MuJoCo for `SeeTarget-v0`.
 
     Args:
         environment: id of the environment; by default the environment of PALAESTRA_CONFIG.
@@ -61,8 +61,8 @@ def make_vec_env(
 ) -> FaultTolerantVectorEnv:
     """Return a gymnasium VectorEnv whose simulators step at the same time; see `make_env`.
 
-    The last step of an episode also resets it (`AutoresetMode.SAME_STEP`). After a fault, this step waits
-    until the faulty simulator is restarted, and the other simulators wait too.
+    The last step of an episode also resets the environment (`AutoresetMode.SAME_STEP`). A step with a fault
+    waits until the faulty simulator is restarted, and the other simulators wait too.
 
     Args:
         environment: see `make_env`.
@@ -72,7 +72,7 @@ def make_vec_env(
         options: see `make_env`.
 
     Raises:
-        As `make_env`.
+        The same errors as `make_env`.
     """
     from palaestra_trainer.fault_tolerant.vector_env import FaultTolerantVectorEnv
 
@@ -91,7 +91,7 @@ def make_sb3_vec_env(
         options: see `make_env`.
 
     Raises:
-        As `make_env`.
+        The same errors as `make_env`.
     """
     from palaestra_trainer.fault_tolerant.sb3_vec_env import FaultTolerantVecEnv
 

@@ -1,4 +1,4 @@
-"""The errors of a trainer; the tree says for each error whether a retry can help.
+"""The errors of a trainer; the tree shows for each error whether a retry can help.
 
 TrainerError
 ├── ConfigurationError   the configuration is wrong; retrying cannot help     exit 2
@@ -150,6 +150,6 @@ class WorldMisfit(WrongData):
     """The simulator's world lacks a device or node that the program needs.
 
     The simulator's complete list of devices or its response shows that the device or node is missing. If an
-    earlier process had the right world, a restart can help. If two processes in a row lack it before the
-    run's first step, the configuration is wrong.
+    earlier process had the right world, a restart can help. If two processes in a row lack the device or node
+    before the run's first step, the configuration is wrong.
     """

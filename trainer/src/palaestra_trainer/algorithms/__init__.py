@@ -1,4 +1,4 @@
-"""The learning algorithms of Stable-Baselines3, sb3-contrib and users, without learning from faulty rows."""
+"""The algorithms of Stable-Baselines3, sb3-contrib and users, changed to learn only from valid rows."""
 
 from palaestra_trainer.algorithms.ineffective_settings import futile
 from palaestra_trainer.algorithms.make_model import check, make_model

@@ -28,7 +28,7 @@ class BufferKind:
         chooser: the hyperparameter that names a class.
         options: the hyperparameter that holds the keyword arguments of that class.
         base: the class that the named class must extend.
-        by_name: classes that a job names without a module.
+        by_name: names of the classes that a job names without a module.
     """
 
     chooser: str
@@ -38,7 +38,7 @@ class BufferKind:
 
     @property
     def names(self) -> tuple[str, str]:
-        """The names of both hyperparameters."""
+        """The names of the two hyperparameters."""
         return self.chooser, self.options
 
 

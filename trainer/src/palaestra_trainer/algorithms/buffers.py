@@ -1,4 +1,4 @@
-"""Buffers of which algorithms sample only valid rows, so a fault does not affect a loss.
+"""Buffers from which algorithms sample only valid rows, so a fault does not affect a loss.
 
 A row is invalid if its simulator failed during the step. The episode is truncated before an invalid row. The
 learner bootstraps the value after the last valid row, so the policy is not punished for the fault.
@@ -29,8 +29,7 @@ def valid_rows(infos: Sequence[dict[str, Any]]) -> np.ndarray:
 
 
 COLUMNS = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
-# With chunks of this size, a million rows need only some dozens of files, and a few new rows are cheap to
-# save.
+# With chunks of this size, a million rows need only a few dozen files, and a few new rows are cheap to save.
 CHUNK_BYTES = 4 << 20
 
 
@@ -40,9 +39,10 @@ class Positions(NamedTuple):
     Attributes:
         next: number of the row for the next step.
         full: whether every row is in use; if not, only the rows before `next` are in use.
-        newest: for each member the row of its last step; None if the buffer does not hold that row.
-        columns: for each member the next row of its column, and whether that column is full; empty for a
-            buffer without columns.
+        newest: for each member, the number of the row of its last step; None if the buffer does not hold that
+            row.
+        columns: for each member, the number of the next row in its column, and whether that column is full;
+            empty for a buffer without columns.
     """
 
     next: int
@@ -131,7 +131,7 @@ class ValidReplayBuffer(ReplayBuffer):
             column[start : start + len(rows[name])] = rows[name]
 
     def keep(self, kept: np.ndarray) -> None:
-        """Keep only the `kept` rows of those in use, and move them to the start, oldest first."""
+        """Keep only the rows that the mask `kept` selects, and move them to the start, oldest first."""
         order = np.roll(np.arange(self.size()), -self.pos if self.full else 0)
         order = order[kept[order]]
         self.fill(0, {name: column[order] for name, column in self.rows().items()})
@@ -176,7 +176,8 @@ class ValidRolloutBuffer(RolloutBuffer):
         """Compute returns and advantages as if the rollout was truncated before each invalid row.
 
         An invalid row ends its episode. The reward of that row is set to the row's value estimate, so its
-        advantage is 0. So the row before bootstraps from the value of the state between both rows.
+        advantage is 0. So the row before the invalid row bootstraps from the value of the state between the
+        two rows.
         """
         self.rewards[~self.valid] = self.values[~self.valid]
         super().compute_returns_and_advantage(last_values, dones)

@@ -18,8 +18,8 @@ class Batch:
         observations: the observation before each step, shape (steps, *observation); for a Dict, an array for
             each key.
         actions: the action of each step, not clipped to the bounds of the space; shape (steps, *action).
-        returns: for each step the discounted sum of the rewards until the end of its episode; shape (steps,),
-            float32.
+        returns: for each step, the discounted sum of the rewards until the end of its episode; shape
+            (steps,), float32.
     """
 
     observations: Observations
@@ -93,7 +93,7 @@ class EpisodeRecorder:
 
 
 def returns_to_go(rewards: list[float], gamma: float) -> np.ndarray:
-    """Return for each step the discounted sum of its reward and of all later rewards, float32."""
+    """Return, for each step, the discounted sum of its reward and all later rewards, float32."""
     returns = np.zeros(len(rewards), dtype=np.float32)
     later = 0.0
     for step in range(len(rewards) - 1, -1, -1):

@@ -103,7 +103,7 @@ class ValidHerReplayBuffer(ValidDictReplayBuffer, HerReplayBuffer):
 
     @property
     def positions(self) -> Positions:
-        """The write positions of the columns; `newest` is the first row of each open episode."""
+        """The write positions of the columns; `newest` holds the first row of each member's open episode."""
         starts = [self._start(column) if self._under_way[column] else None for column in range(self.n_envs)]
         columns = tuple(zip(self._next, self._filled, strict=True))
         return Positions(0, all(self._filled), tuple(starts), columns)
@@ -119,8 +119,8 @@ class ValidHerReplayBuffer(ValidDictReplayBuffer, HerReplayBuffer):
         self._next = [row for row, _ in positions.columns]
         self._filled = [filled for _, filled in positions.columns]
         for column, start in enumerate(positions.newest):
-            # Without a start, the open episode does not continue. It is never closed, so its rows are not
-            # sampled.
+            # `start` is None if no episode is open, or if the resumed run does not continue the open episode.
+            # Such an episode is never closed, so its rows are not sampled.
             rows = 0 if start is None else (self._next[column] - start) % self.buffer_size
             self._under_way[column] = self.buffer_size if start == self._next[column] else rows
             open_rows = self._rows_under_way(column)
@@ -168,7 +168,7 @@ class ValidHerReplayBuffer(ValidDictReplayBuffer, HerReplayBuffer):
                 self._close(column)
 
     def keep(self, kept: np.ndarray) -> None:
-        """Drop every episode that has a row outside of `kept`."""
+        """Drop every episode that has a row which the mask `kept` does not select."""
         for column in range(self.n_envs):
             lost = np.flatnonzero(~kept[: self._used(column)])
             for start in set(self.ep_start[lost, column].tolist()):

@@ -133,9 +133,10 @@ def _mistakes_of_schedule(field: str, name: str) -> Iterator[str]:
 
 
 def _class(argument: str, name: Any) -> type[Any] | None:
-    """Return the class that a policy's argument names: `module:Class`, or a PyTorch name in any case.
+    """Return the class that a policy's argument names: `module:Class`, or a name in PyTorch.
 
-    A PyTorch name may include its module, as in `torch.nn.Tanh`, `th.nn.Tanh` or `nn.Tanh`.
+    A PyTorch name may include its module, as in `torch.nn.Tanh`, `th.nn.Tanh` or `nn.Tanh`. Upper and lower
+    case make no difference.
     """
     if imports.names_class(name):
         return imports.class_named(name, f"{FIELD}.policy_kwargs.{argument}", BASES.get(argument, object))

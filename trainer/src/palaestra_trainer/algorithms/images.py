@@ -22,7 +22,7 @@ from palaestra_trainer.job.configuration import Cnn
 
 
 def with_network(policy_kwargs: dict[str, Any], cnn: Cnn | None) -> dict[str, Any]:
-    """Return the arguments of the policy; if the job sets `cnn`, they include the network for images."""
+    """Return the arguments of the policy, with the network for images if the job sets `cnn`."""
     if cnn is None:
         return policy_kwargs
     # As with NatureCNN, the output layer follows the features directly, unless the job sets `net_arch`.
@@ -30,7 +30,7 @@ def with_network(policy_kwargs: dict[str, Any], cnn: Cnn | None) -> dict[str, An
 
 
 def with_channels_first(env: VecEnv) -> VecEnv:
-    """Return the environment with channels of its images first; without images, return it unchanged.
+    """Return the environment with the channels of its images first; if it has no images, return it unchanged.
 
     Without this wrapper, Stable-Baselines3 would transpose the images after the normalizer. The statistics of
     the normalizer would then have another layout than the observations of the model.

@@ -1,6 +1,6 @@
-"""The ranges of hyperparameters; with a value outside, an algorithm fails later, or does not learn.
+"""The ranges of hyperparameters; outside of these ranges, an algorithm fails later or does not learn.
 
-The algorithms themselves check few of these values. They check most of them only in `learn`, after the
+The algorithms themselves check few of these values, and most of these few only in `learn`, after the
 simulators have started.
 """
 
@@ -130,7 +130,7 @@ def _layers(layers: Any) -> Iterator[tuple[str, str]]:
 
 
 def _first(frequency: Any) -> Any:
-    """Return the number of a frequency, also if it is a list of number and unit; None without a number."""
+    """Return the number in a frequency, which may be a list of number and unit; None if it has no number."""
     value = frequency[0] if isinstance(frequency, list | tuple) and frequency else frequency
     return value if _is_number(value) else None
 

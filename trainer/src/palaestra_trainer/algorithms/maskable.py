@@ -20,8 +20,8 @@ class _Masked(ValidRolloutBuffer):
     def _parts(self, rows: np.ndarray, size: int) -> Iterator[np.ndarray]:
         """Yield `rows` in parts of `size`; add a single last row to the part before it.
 
-        Unlike PPO, MaskablePPO normalizes the advantage even of a single row, whose standard deviation is
-        NaN.
+        Unlike PPO, MaskablePPO also normalizes the advantage of a single row, and the standard deviation of a
+        single advantage is NaN.
         """
         return batches(rows, size)
 

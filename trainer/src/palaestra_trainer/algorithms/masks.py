@@ -48,7 +48,7 @@ def predict_allowed(policy: Any, masks: Any, *seen: Any, deterministic: bool = T
     Args:
         policy: a policy for which `takes_masks` is True.
         masks: masks as `action_masks` returns them.
-        seen: observation, state, and whether an episode begins, as for `predict` of the policy.
+        seen: the observation, the state and the flag `episode_start`, as for the policy's `predict`.
         deterministic: whether to choose the most probable action.
     """
     action, state = policy.predict(*seen, deterministic=deterministic, action_masks=masks)

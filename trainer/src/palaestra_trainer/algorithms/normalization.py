@@ -123,7 +123,7 @@ class ValidNormalize(VecNormalize):
     def go_on(self, observations: Observations, returns: np.ndarray) -> Any:
         """Set the last observations and returns of a resumed run; return the normalized observations.
 
-        `returns` holds for each member the discounted reward of its running episode.
+        For each member, `returns` holds the discounted sum of the rewards so far in its open episode.
         """
         self.old_obs, self.returns = observations, returns
         return self.normalize_obs(observations)

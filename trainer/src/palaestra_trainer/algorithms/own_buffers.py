@@ -1,8 +1,8 @@
 """Support for buffer classes of a job's author, which extend a buffer of Stable-Baselines3.
 
-In Python's method resolution order, the author's class comes after the buffer for valid rows. So its method
-`add` gets one valid row at a time. Its returns are computed as if the rollout was truncated before each
-invalid row.
+In Python's method resolution order, the author's class comes after the buffer for valid rows. So the method
+`add` of the author's class gets one valid row at a time. In a rollout buffer, returns are computed as if the
+rollout was truncated before each invalid row.
 """
 
 from __future__ import annotations
@@ -36,7 +36,8 @@ from palaestra_trainer.algorithms.hyperparameters import FIELD
 from palaestra_trainer.algorithms.maskable import ValidMaskableDictRolloutBuffer, ValidMaskableRolloutBuffer
 from palaestra_trainer.errors import ConfigurationError, fact_of
 
-# The class for valid rows of each rollout buffer; subclasses come before the classes that they extend.
+# For each rollout buffer on the left, the subclass for valid rows is on the right. Subclasses come before the
+# classes that they extend.
 VALID_ROLLOUTS: Mapping[type[Any], type[Any]] = {
     MaskableDictRolloutBuffer: ValidMaskableDictRolloutBuffer,
     MaskableRolloutBuffer: ValidMaskableRolloutBuffer,
@@ -49,8 +50,8 @@ _VALID: Mapping[type[Any], type[Any]] = {
     ReplayBuffer: ValidReplayBuffer,
     **VALID_ROLLOUTS,
 }
-# These classes also sample the rows that follow a row. In a single column, the next row may belong to another
-# member.
+# These classes also sample the rows that follow a sampled row. In a single column, the next row may belong to
+# another member.
 _NEIGHBOURS = (HerReplayBuffer, NStepReplayBuffer)
 _STATE_METHODS = ("state_dict", "load_state_dict")
 
@@ -59,10 +60,10 @@ class OwnBuffer(BaseBuffer):
     """The base of an author's buffer in use; it gives checkpoints the state that the author's class adds.
 
     If the class has the methods `state_dict` and `load_state_dict`, this state is the result of `state_dict`.
-    Otherwise it is every attribute that the class adds.
+    Otherwise this state is every attribute that the class adds.
 
     Raises:
-        ConfigurationError: a checkpoint cannot hold an attribute.
+        ConfigurationError: a checkpoint cannot hold one of these attributes.
     """
 
     _rows_only: type[BaseBuffer]  # the buffer for valid rows that this class extends

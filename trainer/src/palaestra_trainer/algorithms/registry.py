@@ -31,8 +31,8 @@ from palaestra_trainer.job.configuration import nearest
 from palaestra_trainer.job.user_code import imports
 
 # A job cannot set these arguments of an algorithm's class as hyperparameters. The training loop sets some of
-# them, and other modules check others. `optimize_memory_usage` does not work with buffers for valid rows,
-# because they store rows of several members in one column.
+# these arguments, and other modules check others. `optimize_memory_usage` does not work with buffers for
+# valid rows, because they store rows of several members in one column.
 OURS = frozenset(
     {
         "self", "policy", "env", "seed", "device", "verbose", "tensorboard_log", "_init_setup_model",
@@ -42,7 +42,7 @@ OURS = frozenset(
 )  # fmt: skip
 ARENA_ENVIRONMENTS = frozenset({"MoveToTargetEnv-v0"})
 _ANY_ACTIONS = (spaces.Box, spaces.Discrete, spaces.MultiDiscrete, spaces.MultiBinary)
-_LOG_INTERVAL = {True: 10, False: 1}  # episodes off policy, rollouts on policy
+_LOG_INTERVAL = {True: 10, False: 1}  # True: episodes of an off-policy algorithm; False: rollouts
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,8 +53,7 @@ class RegisteredAlgorithm:
         original: the algorithm's class in its package; this class loads a model.zip.
         arena: hyperparameters that are better for the arena's environments than the defaults of the class.
         actions: types of action spaces that the algorithm supports; None: unknown until a model is created.
-        log_interval: episodes of an off-policy algorithm, or rollouts of an on-policy algorithm, between two
-            records of values.
+        log_interval: number of episodes (off-policy) or rollouts (on-policy) between two records of values.
     """
 
     original: type[BaseAlgorithm]
@@ -132,7 +131,7 @@ def _entry(
 ALGORITHMS: Mapping[str, RegisteredAlgorithm] = MappingProxyType(
     {
         # DQN has soft target updates at every step, and as many gradient steps as environment steps. With
-        # hard updates, the success rate after the same 50,000 steps was 10 points lower.
+        # hard updates, the success rate after 50,000 steps was 10 percentage points lower.
         "DQN": _entry(
             sb3.DQN,
             spaces.Discrete,

@@ -34,11 +34,11 @@ class REINFORCE(BaseAlgorithm):
     """The Monte-Carlo policy gradient algorithm REINFORCE.
 
     One update learns from `episodes_per_update` whole episodes of each environment. The number is the same
-    for each environment, because an update with the first episodes to end would prefer short episodes. If an
-    environment finishes further episodes before the others are ready, these are dropped. Episodes that a
-    fault truncated are dropped too. The update does not wait for an environment that restarts. Training ends
-    with the first episode that ends at or after `total_timesteps`. The return of a truncated episode is the
-    sum of its rewards until its last step.
+    for each environment, because an update from the episodes that end first would prefer short episodes. If
+    an environment finishes further episodes before the others are ready, the further episodes are dropped.
+    Episodes that a fault truncated are dropped too. The update does not wait for an environment that
+    restarts. Training ends with the first episode that ends at or after `total_timesteps`. The return of a
+    truncated episode is the sum of its rewards until its last step.
 
     Args:
         policy: "MlpPolicy", "CnnPolicy", "MultiInputPolicy" or an actor-critic class; its value network is
@@ -126,7 +126,7 @@ class REINFORCE(BaseAlgorithm):
         policy = self.policy_class(
             self.observation_space, self.action_space, self.lr_schedule, **self.policy_kwargs
         )
-        self.policy = policy.to(self.device)  # type: ignore[assignment]  # an actor-critic one: see __init__
+        self.policy = policy.to(self.device)  # type: ignore[assignment]  # actor-critic policy: see __init__
 
     def learn(
         self,

@@ -53,8 +53,8 @@ class ReplaySize:
         """Return the largest number of rows for which memory and the disk for checkpoints suffice."""
         in_memory = memory_bytes // self.row_bytes
         on_disk = disk_bytes // self.row_bytes
-        # With at most `every_steps` rows, checkpoints may share no rows. With more rows, each checkpoint has
-        # its own copy of `every_steps` rows.
+        # If the buffer has at most `every_steps` rows, two checkpoints need not have any row in common. If it
+        # has more rows, each checkpoint has its own copy of `every_steps` rows.
         fitting = on_disk - keep * every_steps
         return max(0, min(in_memory, fitting if fitting >= every_steps else on_disk // (keep + 1)))
 
@@ -62,7 +62,7 @@ class ReplaySize:
 def replay_size(
     algorithm: Algorithm, observation: spaces.Space[Any], action: spaces.Space[Any], steps: int
 ) -> ReplaySize | None:
-    """Return the size of an algorithm's replay buffer; None: it has no buffer, or no policy for the space.
+    """Return the size of the replay buffer; None: the algorithm has no buffer, or no policy for the space.
 
     Args:
         algorithm: the algorithm with all its hyperparameters.

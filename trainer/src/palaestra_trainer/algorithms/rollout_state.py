@@ -27,8 +27,9 @@ class RolloutState:
     Attributes:
         networks: names of networks with tensors that a rollout changes; an update may change these tensors
             too.
-        memories: states of recurrent networks, nested tuples of tensors of shape (layers, members, units).
-        numbers: counts of the algorithm, and numbers that it derives from its counts.
+        memories: names of the states of recurrent networks; a state is a nested tuple of tensors of shape
+            (layers, members, units).
+        numbers: names of counts of the algorithm, and of numbers that the algorithm derives from its counts.
     """
 
     networks: tuple[str, ...] = ()

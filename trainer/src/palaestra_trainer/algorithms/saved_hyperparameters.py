@@ -1,6 +1,6 @@
 """Save the hyperparameters with which a run begins, so later changes of defaults do not affect it.
 
-A file in the run directory holds all of them.
+A file in the run directory holds these hyperparameters, including the defaults.
 """
 
 from __future__ import annotations
@@ -21,7 +21,8 @@ def begin_with(
     Args:
         configuration: the configuration of the run.
         directory: the directory of the run; the run may not have begun yet.
-        before: the run, this or another, from whose checkpoint the attempt resumes; None: it does not resume.
+        before: the directory of the run from whose checkpoint the attempt resumes, which may be this run or
+            another run; None: the attempt does not resume.
 
     Raises:
         ConfigurationError: the file in the run directory cannot be read.

@@ -78,7 +78,7 @@ def images_in(space: spaces.Space[Any]) -> list[spaces.Box]:
 
 
 def scalable(space: spaces.Space[Any]) -> list[str] | bool:
-    """Return the keys of a Dict that can be normalized; for another space, return whether it can.
+    """Return the keys of a Dict that can be normalized, or whether another space can be normalized.
 
     Images are excluded because networks scale images themselves. Discrete is excluded because its numbers are
     labels without a scale.

@@ -15,7 +15,7 @@ from palaestra_trainer.algorithms.registry import ALGORITHMS, RegisteredAlgorith
 from palaestra_trainer.job.configuration import nearest
 
 # A name with at least this similarity to a hyperparameter counts as misspelled, such as gama for gamma. The
-# similarity of n_timesteps or n_epochs to n_steps is less.
+# similarity of n_timesteps or n_epochs to n_steps is lower.
 _MISSPELLED = 0.85
 # Other libraries use the names on the left for the hyperparameters on the right.
 _SAME: Mapping[str, str] = MappingProxyType(

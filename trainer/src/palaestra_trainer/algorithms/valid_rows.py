@@ -1,8 +1,8 @@
 """Subclasses of Stable-Baselines3 algorithms that count only valid rows and learn only from them.
 
-Two mixins override methods that Stable-Baselines3 calls between a step and its storage, so this module copies
-no code. `with_valid_rows` returns a subclass of an algorithm with one of the mixins. A saved model names
-neither that subclass nor the buffers, so the original class can load the model.
+Two mixins override methods that Stable-Baselines3 calls between a step and the storage of its rows, so this
+module copies no code. `with_valid_rows` returns a subclass of an algorithm with one of the mixins. A saved
+model names neither that subclass nor the buffers, so the original class can load the model.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class ValidRowsCounted(BaseAlgorithm):
 
 
 class OffPolicyRows(ValidRowsCounted, OffPolicyAlgorithm):
-    """An off-policy algorithm that stores only valid rows, and stops at the target of the run.
+    """An off-policy algorithm that stores only valid rows, and stops at the run's number of steps.
 
     Raises:
         ConfigurationError: the algorithm creates its own replay buffer, which would store invalid rows.
@@ -158,7 +158,7 @@ class OnPolicyRows(ValidRowsCounted, OnPolicyAlgorithm):
 
 @cache
 def with_valid_rows(cls: type[BaseAlgorithm]) -> type[BaseAlgorithm]:
-    """Return a subclass of `cls`, with its name, that counts only valid rows and learns only from them.
+    """Return a subclass of the same name that counts only valid rows and learns only from valid rows.
 
     Raises:
         ConfigurationError: `cls` is neither an on-policy nor an off-policy algorithm of Stable-Baselines3.

@@ -1,4 +1,4 @@
-"""`palaestra-install` installs a user's project while an image is built FROM one of ours.
+"""`palaestra-install` installs a user's project while an image is built FROM one of Palaestra's images.
 
 The project goes to the first folder of PYTHONPATH, together with the dependencies that the image lacks. The
 packages of the image stay as they were tested, because the project can neither replace nor hide them. If the
@@ -119,7 +119,7 @@ def _copy(folder: Path, source: Path) -> None:
 def _install_project(source: Path, staged: Path) -> None:
     """Build the project and install it into `staged`, with the dependencies that the image lacks.
 
-    uv skips the packages of the image, even if the project requires another version of one.
+    uv skips the packages of the image, even if the project requires another version of such a package.
     `_check_requirements` finds such a conflict later.
     """
     project = _pyproject(source)

@@ -120,7 +120,7 @@ def _attempt(chosen: argparse.Namespace, interruption: Interruption) -> int:
 def _agent(
     chosen: argparse.Namespace, restarter: Restarter, seed: int, interruption: Interruption
 ) -> Iterator[tuple[Agent, list[str]]]:
-    """Yield the agent, and lines that explain the keys to a person who drives."""
+    """Yield the agent, and lines that explain the keys to a person who drives the robot."""
     from palaestra_trainer.cli.trying import agents, keyboard, keymap
 
     env = restarter.member.env

@@ -33,9 +33,9 @@ __all__ = [
     "SeeTargetEnv",
 ]
 
-# Entry points are text, because the modules that they name import simulators, and this package must not.
-# max_episode_steps is not set, because the reward `Sparse` depends on the end of time. So the environments
-# count their steps themselves.
+# Entry points are text, because the modules that they name import simulators, and this package must not
+# import simulators. The environments count their steps themselves instead of setting max_episode_steps,
+# because the reward `Sparse` depends on whether time is up.
 gymnasium.register(id="MoveToTargetEnv-v0", entry_point="palaestra_trainer.simulators.entry_point:make")
 gymnasium.register(id="SeeTarget-v0", entry_point="palaestra_trainer.simulators.entry_point:make_seeing")
 gymnasium.register(

@@ -33,7 +33,7 @@ class DeliverEnv(MoveToTargetEnv):
     Args:
         robot: the robot to drive.
         scene: the scene, which places robot and mark for each episode.
-        options: observation, actions and rewards.
+        options: the options for observation, actions and rewards.
         on_close: a function that `close` calls.
 
     Raises:

@@ -2,8 +2,8 @@
 
 gymnasium's own wrapper only warns, so training would continue with wrong rows. The wrapper of this module
 applies gymnasium's checks to the first reset and the first step. It raises an error that names the expected
-and the actual value. It also checks types and shapes of later results, see `contract`. It does not check for
-NaN and infinity, because the learner reports them as divergence.
+and the actual value. For later results, the wrapper checks types and shapes, see `contract`. It does not
+check for NaN and infinity, because the learner reports these numbers as divergence.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def held(env: gymnasium.Env[Any, Any], name: str) -> gymnasium.Env[Any, Any]:
 
 
 def refuse_statistics(env: gymnasium.Env[Any, Any], name: str) -> None:
-    """Refuse wrappers with statistics; a model does not save these, and they differ between simulators.
+    """Refuse wrappers with statistics: a model does not save statistics, and they differ between simulators.
 
     Raises:
         ConfigurationError: the environment has such a wrapper.
@@ -68,7 +68,7 @@ def refuse_statistics(env: gymnasium.Env[Any, Any], name: str) -> None:
 
 
 class Checked(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """A wrapper that checks resets and steps, the first of each completely, and returns results unchanged.
+    """A wrapper that checks the results of resets and steps, and returns them unchanged.
 
     Args:
         env: the environment.

@@ -17,7 +17,7 @@ REMEDY = "return truncated after a number of steps, or register it with max_epis
 
 
 class EpisodeEnd:
-    """Watches one episode; logs every minute that it has not ended, and raises after `MOST_STEPS` steps.
+    """Watches one episode; logs a line in every minute until its end, and raises after `MOST_STEPS` steps.
 
     Args:
         waits: name of the part of the program that waits, for messages.

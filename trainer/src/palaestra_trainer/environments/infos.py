@@ -5,9 +5,9 @@ its other facts about a step into a separate dict, `info["palaestra"]`. So the k
 those of Palaestra cannot be confused:
 
 - `valid`: False in a row that the algorithm must not learn from
-- `sim_fault`: only in the row of a fault: its kind, simulator, fact, episode and step
-- `recovering`: in the rows after the fault, until the simulator is up again; False after the simulator was
-  given up
+- `sim_fault`: the kind, simulator, fact, episode and step of a fault; only in the row of that fault
+- `recovering`: True in the rows after the fault until the simulator is up again; False in the rows after the
+  simulator was given up
 - `extra_steps`: simulation steps in addition to the usual one, because a message was late
 - `hidden`: the environment's own values for keys that Stable-Baselines3 or Palaestra uses
 """

@@ -24,7 +24,7 @@ def gives_masks(env: gymnasium.Env[Any, Any]) -> bool:
 
 
 def choices_of(space: spaces.Space[Any]) -> list[int]:
-    """Return for each number of an action how many choices it has.
+    """Return the count of choices for each number of an action.
 
     Raises:
         TypeError: actions of this type of space have no masks.
@@ -104,6 +104,6 @@ def _parts(mask: np.ndarray, choices: list[int]) -> list[np.ndarray]:
 
 
 def _odd(mask: np.ndarray) -> Any:
-    """Return the first value that is not a truth value, or the first value if all are."""
+    """Return the first value that is not a truth value, or the first value if all are truth values."""
     values = mask.ravel().tolist()
     return next((value for value in values if value not in (0, 1)), values[0])

@@ -84,7 +84,7 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
     | to_reach  | 0     | targets left; always 1 with a single target   | 1         | 0    | 1   |
 
     By default `observe` names all parts except `position` and `to_reach`; docs/explain/tasks.md describes the
-    cost.
+    benefit and the cost of each part.
 
     ## Reward
 
@@ -105,7 +105,7 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
     Only the seed of `reset(seed=s)` decides the start, the target and the heading. Start and target are drawn
     uniformly from the free positions, at least 1 m apart. At a free position the robot has 0.1 m of free
     space around it. The heading is drawn from all directions. `options={"start": (x, y, heading), "target":
-    (x, y)}` sets one or both.
+    (x, y)}` sets the start, the target or both.
 
     ## End of an episode
 
@@ -126,7 +126,7 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
     Args:
         robot: the robot to drive.
         scene: the scene, which places robot and mark for each episode.
-        options: observation, actions and rewards.
+        options: the options for observation, actions and rewards.
         on_close: a function that `close` calls.
 
     Raises:

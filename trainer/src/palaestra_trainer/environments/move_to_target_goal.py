@@ -2,8 +2,8 @@
 
 The task is for algorithms that also learn from goals that the policy reached by accident, such as hindsight
 experience replay. The interface is that of gymnasium-robotics: a Dict with `achieved_goal` and
-`desired_goal`, and rewards that are a function of both. An inner `MoveToTargetEnv` plays the episodes, so
-robot, scene and faults are the same as there.
+`desired_goal`, and rewards that are a function of these two goals. An inner `MoveToTargetEnv` plays the
+episodes, so this task has the same robot, scene and faults.
 """
 
 from __future__ import annotations
@@ -66,20 +66,20 @@ class MoveToTargetGoalEnv(gymnasium.Env[Observation, Any]):
 
     ## End of an episode
 
-    An episode is terminated when the robot bumps into something (`compute_terminated`). It continues after
-    the robot reaches the target, so the value of a goal is the same for a desired and an achieved goal. After
-    `max_steps` steps the episode is truncated (`compute_truncated`), or terminated with
-    `time_up="terminated"`.
+    An episode is terminated when the robot bumps into something (`compute_terminated`). The episode continues
+    after the robot reaches the target, so the value of a goal does not depend on whether the goal was desired
+    or only achieved. After `max_steps` steps the episode is truncated (`compute_truncated`), or terminated
+    with `time_up="terminated"`.
 
     ## Info
 
-    `is_success`: whether the robot is within 0.20 m of the target; for the episode, its last step counts.
+    `is_success`: whether the robot is within 0.20 m of the target. An episode succeeds if its last step does.
     `outcome` (running, reached, collided, time_up), `reward_terms`, `extra_steps`.
 
     Args:
         robot: the robot to drive.
         scene: the scene, which places robot and mark for each episode.
-        options: observation, actions and rewards.
+        options: the options for observation, actions and rewards.
         on_close: a function that `close` calls.
     """
 

@@ -26,7 +26,7 @@ from palaestra_trainer.robots.capabilities import Localization, Scanner, Steerin
 from palaestra_trainer.robots.geometry import Point, Pose
 
 REACHED_M = 0.15
-BUMPED_M = 0.05  # distance from the robot's outline; a scanner may not detect a nearer object
+BUMPED_M = 0.05  # an object nearer to the robot's outline counts as touched; a scanner may not detect it
 SECTORS = 24
 SEEN_M = 0.8  # a sector counts as empty if its nearest object is farther than this
 TARGET_M = 2.0  # the unit of the distance to the target
@@ -89,7 +89,7 @@ class NavigateEnv(gymnasium.Env[Observation, Any]):
     Only the seed of `reset(seed=s)` decides the start, the target and the heading. Start and target are drawn
     uniformly from the free positions of the scene's layout, at least 1 m apart. At a free position the robot
     has 0.1 m of free space around it. The heading is drawn from all directions. `options={"start": (x, y,
-    heading), "target": (x, y)}` sets one or both.
+    heading), "target": (x, y)}` sets the start, the target or both.
 
     ## End of an episode
 
@@ -105,7 +105,7 @@ class NavigateEnv(gymnasium.Env[Observation, Any]):
     Args:
         robot: the robot to drive, with the capabilities in `needs`.
         scene: the scene, which places robot and mark for each episode.
-        options: actions and rewards.
+        options: the options for actions and rewards.
         on_close: a function that `close` calls.
 
     Raises:

@@ -30,7 +30,7 @@ class StepState:
         pose: pose of the robot in the world's frame.
         velocity: mean velocity over the last step: forward and left in m/s, counter-clockwise in rad/s.
         target: x and y of the current target in meters, in the world's frame.
-        time_left: share of the episode's steps that are left; it falls from 1 to 0.
+        time_left: share of the episode's steps that are left, falling from 1 to 0.
         to_reach: share of the episode's targets that the robot has not reached, including the current target.
     """
 
@@ -68,13 +68,13 @@ class ObservationPart:
 
 
 def in_frame(heading_rad: float, x_m: float, y_m: float) -> Point:
-    """Convert a vector from the world's frame to forward and left of a robot with this heading."""
+    """Return a vector of the world's frame in the frame of a robot with this heading: forward, left."""
     c, s = math.cos(heading_rad), math.sin(heading_rad)
     return x_m * c + y_m * s, y_m * c - x_m * s
 
 
 def velocity(before: Pose, after: Pose, elapsed_s: float) -> Twist:
-    """Return the mean twist between two poses in the robot's frame: m/s, m/s, rad/s."""
+    """Return the mean velocity between two poses: forward and left in m/s, counter-clockwise in rad/s."""
     turned_rad = math.remainder(after.heading_rad - before.heading_rad, 2.0 * math.pi)
     forward_m, left_m = in_frame(
         before.heading_rad + 0.5 * turned_rad, after.x_m - before.x_m, after.y_m - before.y_m

@@ -13,8 +13,8 @@ from palaestra_trainer.robots.geometry import Movement
 
 ACTIONS = ("discrete", "continuous")
 TIME_UP = ("terminated", "truncated")
-# `Sparse` has a reward for the end of time, so the end of time terminates its episodes. `Dense` has no such
-# reward, so the end of time truncates its episodes. docs/explain/tasks.md gives the reasons.
+# `Sparse` has a reward term for the time limit, so the time limit terminates its episodes. `Dense` has no
+# such term, so the time limit truncates its episodes. docs/explain/tasks.md gives the reasons.
 TIME_UP_OF = {"Dense": "truncated", "Sparse": "terminated"}
 
 
@@ -41,7 +41,7 @@ class Episodes(Protocol):
 
     @property
     def time_up(self) -> str | None:
-        """How an episode ends when time is up, a value of `TIME_UP`; None: `TIME_UP_OF` the reward."""
+        """How an episode ends when time is up, one of `TIME_UP`; None: the reward's value in `TIME_UP_OF`."""
         ...
 
 
@@ -62,10 +62,10 @@ class MoveToTargetOptions:
         reward: `Dense` gives a reward at each step, `Sparse` only at the end of an episode.
         observe: the parts of the observation, in this order.
         movements: the choices of a discrete action, in this order.
-        actions: `discrete`, one of `movements`, or `continuous`, a twist.
+        actions: with `discrete` an action is one of `movements`, with `continuous` it is a twist.
         max_steps: steps until time is up.
-        time_up: how an episode ends when time is up, `terminated` or `truncated`; None: `TIME_UP_OF` the
-            reward.
+        time_up: how an episode ends when time is up, `terminated` or `truncated`; None: the reward's value in
+            `TIME_UP_OF`.
 
     Raises:
         ConfigurationError: an option is wrong; the message has one line for every mistake.
@@ -88,7 +88,8 @@ class GoalOptions(MoveToTargetOptions):
 
     Args:
         observe: the parts of `observation`; `target` is refused, because the goal has its own keys.
-        time_up: see `MoveToTargetOptions`; by default `truncated`, because the end of time has no reward.
+        time_up: see `MoveToTargetOptions`; by default `truncated`, because no reward depends on the time
+            limit.
 
     Raises:
         ConfigurationError: an option is wrong; the message has one line for every mistake.
@@ -175,7 +176,7 @@ class NavigateOptions:
 
 
 def time_up_terminates(options: Episodes) -> bool:
-    """Return whether the end of time terminates an episode; a learner then estimates no value after it."""
+    """Return whether the time limit terminates an episode; then a learner counts later steps as worth 0."""
     return (options.time_up or TIME_UP_OF[options.reward]) == "terminated"
 
 

@@ -120,7 +120,7 @@ class FreePlaces:
         return self.draw_task(random, start, target)
 
     def _check(self, name: str, x_m: float, y_m: float, radius_m: float) -> None:
-        """Refuse a position without `radius_m` of free floor; the simulator would push a robot there away."""
+        """Refuse a position without `radius_m` of free floor; the simulator would push a robot out of it."""
         if self.layout.gap(x_m, y_m) > radius_m:  # false for NaN too
             return
         fact = "puts the robot in an obstacle" if radius_m else "is in an obstacle"

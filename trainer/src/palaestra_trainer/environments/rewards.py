@@ -13,7 +13,7 @@ from enum import Enum
 
 from palaestra_trainer.robots.base import SENSOR_RANGE_M
 
-MARGIN_M = 0.18  # free space to keep around the robot, which drives half of this in a step
+MARGIN_M = 0.18  # free space to keep around the robot, which drives about half of this distance in a step
 
 
 class EpisodeOutcome(Enum):
@@ -39,7 +39,7 @@ class Transition:
         before_m: meters to the target before the step.
         after_m: meters to the target after the step.
         nearest_m: meters to the nearest object after the step, as the robot's sensors measure it.
-        outcome: the outcome after the step.
+        outcome: how the episode ended in the step, or that the episode continues.
     """
 
     before_m: float
@@ -70,7 +70,7 @@ def collision(step: Transition) -> float:
 
 
 def proximity(step: Transition) -> float:
-    """Return how far the nearest object is inside the margin; 1 at the nearest measurable distance."""
+    """Return 0 if no object is inside the margin, and up to 1 at the nearest measurable distance."""
     used_m = MARGIN_M - step.nearest_m
     return max(0.0, used_m) / (MARGIN_M - SENSOR_RANGE_M[0])
 
@@ -81,7 +81,7 @@ def time_up(step: Transition) -> float:
 
 
 def duration(step: Transition) -> float:  # noqa: ARG001 - every term has the same form
-    """Return 1 for every step; its negative weight makes time cost reward."""
+    """Return 1 for every step; the weight is negative, so each step reduces the reward."""
     return 1.0
 
 

@@ -46,13 +46,13 @@ class SeeTargetEnv(gymnasium.Env[Observation, Any]):
     ## Actions
 
     The actions are those of `MoveToTargetEnv`. With `actions="discrete"` an action is one of the `movements`,
-    by default one of all seven. With `actions="continuous"` it is forward, left and turning, `Box(-1, 1,
-    (3,), float32)`. Three movements are enough: FORWARD, TURN_LEFT and TURN_RIGHT.
+    by default one of all seven. With `actions="continuous"` an action is forward, left and turning, `Box(-1,
+    1, (3,), float32)`. Three movements are enough: FORWARD, TURN_LEFT and TURN_RIGHT.
 
     ## Observation
 
-    The space is a `Box(uint8)` with only the image of the camera. With `frames=3` it has the newest three
-    images, the oldest first. The first observation of an episode then has the same image three times.
+    The space is a `Box(uint8)` with only the image of the camera. With `frames=3` the space has the newest
+    three images, the oldest first. The first observation of an episode then has the same image three times.
 
     | axis | frames=1 | frames=3 | min | max | meaning                                   |
     |------|----------|----------|-----|-----|-------------------------------------------|
@@ -78,8 +78,8 @@ class SeeTargetEnv(gymnasium.Env[Observation, Any]):
     Only the seed of `reset(seed=s)` decides the start, the heading and the position of the pole. Start and
     pole are drawn uniformly from the free positions, at least 1 m apart. At a free position the robot has 0.1
     m of free space around it. The heading is drawn from all directions. `options={"start": (x, y, heading),
-    "target": (x, y)}` sets one or both. With `cylinders=True` the world's four cylinders stand on the floor
-    and can hide the pole.
+    "target": (x, y)}` sets the start, the pole or both. With `cylinders=True` the world's four cylinders
+    stand on the floor and can hide the pole.
 
     ## End of an episode
 
@@ -95,7 +95,7 @@ class SeeTargetEnv(gymnasium.Env[Observation, Any]):
     Args:
         robot: the robot to drive, a `RobotinoAbc` with `Cameras`; its color camera has 64 x 48 pixels.
         scene: the scene, which places robot and pole for each episode.
-        options: images, actions and rewards.
+        options: the options for images, actions and rewards.
         on_close: a function that `close` calls.
 
     Raises:
@@ -184,7 +184,7 @@ class SeeTargetEnv(gymnasium.Env[Observation, Any]):
             self._on_close()
 
     def _raise_cylinders(self) -> None:
-        """Move the cylinders to the floor; the world stores them below it."""
+        """Move the cylinders onto the floor; the world stores them below the floor."""
         for thing in self._scene.layout().obstacles:
             if thing.top_m < 0.0:
                 self._scene.put(thing.name, (thing.x_m, thing.y_m, 0.5 * (thing.top_m - thing.bottom_m)))

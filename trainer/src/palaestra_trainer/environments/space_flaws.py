@@ -40,7 +40,7 @@ def flaws_of_observation(seen: spaces.Space[Any]) -> Iterator[str]:
 
 
 def flaws_of_action(acted: spaces.Space[Any]) -> Iterator[str]:
-    """Yield the line for an action space that would be misread; nothing if it would not."""
+    """Yield a line with place, fact and remedy if an action space would be misread."""
     if flaw := _flaw(acted) or _flaw_of_bounds(acted):
         yield f"environment.id: its action {flaw}"
 

@@ -40,12 +40,12 @@ class CollectedRow(NamedTuple):
     """The row of one member in a vector step.
 
     Attributes:
-        observation: the next observation; if `done`, the first observation of the next episode, if that
-            episode has begun.
+        observation: the next observation. After the end of an episode, it is the first observation of the
+            next episode, unless that episode has not begun yet.
         reward: reward of this step; 0 in an invalid row.
-        done: whether an episode ended, by termination, by a time limit or by a fault. In a recovering row:
+        done: whether an episode ended, by termination, by a time limit or by a fault. In a recovering row,
             whether the next episode has begun.
-        info: the environment's info, with the keys in this module's docstring.
+        info: the environment's info, with the keys that the docstring of this module describes.
     """
 
     observation: Any
@@ -63,7 +63,8 @@ class Collector:
         index: the member's index among the collecting members.
         episode: number of the next episode.
         training_progress: share of the training that is complete when the next episode begins, 0 to 1.
-        reset_info: the environment's info of the last reset; if the reset failed, `valid` is False in it.
+        reset_info: the environment's info of the last reset; if the reset failed, this info has `valid`
+            False.
     """
 
     def __init__(self, restarter: Restarter, run_seed: int, index: int, check: Check = go_on) -> None:

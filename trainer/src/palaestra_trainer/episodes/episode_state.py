@@ -24,7 +24,7 @@ class EpisodeState:
 
 
 class ActionLog:
-    """The actions of one episode, in an array that grows; reading it does not copy."""
+    """The actions of one episode, in an array that grows; reading the array does not copy the actions."""
 
     def __init__(self) -> None:
         self._rows = np.empty((0,))

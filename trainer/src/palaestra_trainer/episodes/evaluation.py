@@ -53,7 +53,7 @@ class Episode:
         seed: seed of the episode's reset.
         total_reward: undiscounted sum of the episode's rewards.
         length: number of environment steps.
-        success: the last step's `info["is_success"]`; None: the environment did not report it.
+        success: the last step's `info["is_success"]`; None: the environment did not report success.
         outcome: the last step's `info["outcome"]` if it is a text, else None.
         film: a recording of the episode; None: the robot does not drive on a floor, or the episode is not one
             of the first `MOST_FILMS`.
@@ -193,9 +193,9 @@ def evaluate_on_all(
 class _Games:
     """The open and the complete episodes of one evaluation.
 
-    Each thread plays one episode at a time. If a fault truncates the episode, the thread puts it back. An
-    idle thread waits until the last episode is complete, because it may have to play a truncated episode
-    again.
+    Each thread plays one episode at a time. If a fault truncates the episode, the thread returns it to the
+    open episodes. An idle thread waits until the last episode is complete, because it may have to play a
+    truncated episode again.
 
     Attributes:
         faults: number of episodes that a fault truncated.

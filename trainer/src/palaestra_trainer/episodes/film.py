@@ -58,7 +58,7 @@ class Filming:
     """Records one episode of a member; of a long episode only every second, fourth, ... step.
 
     Args:
-        member: the member; without the interface `Located`, or if it is None, the film stays empty.
+        member: the member; if it is None or lacks the interface `Located`, the film stays empty.
     """
 
     def __init__(self, member: object) -> None:

@@ -113,7 +113,7 @@ def interval(pairs: Pairs, alpha: float = ALPHA) -> Difference:
     """Return bounds of the difference between the success rates of A and B.
 
     The bounds are valid after any number of episodes: if they are computed after every episode, the
-    probability that the true difference is ever outside is at most `alpha`.
+    probability that the true difference is ever outside the bounds is at most `alpha`.
     """
     gained = partial(log_capital, pairs, weights=_weights(pairs))
     most, middle = -log(alpha), pairs.difference
@@ -144,7 +144,8 @@ def _times_log(count: np.ndarray, share: float) -> np.ndarray:
 def _weights(pairs: Pairs) -> np.ndarray:
     """Return, for each k, the logarithm of the factor that does not depend on the candidate.
 
-    An episode with equal results pays like a fair coin. k is the number of such episodes that count for A.
+    An episode with equal results is replaced by the toss of a fair coin, which counts for A or for B. k is
+    the number of tosses that count for A.
     """
     equal, k = pairs.equal, np.arange(pairs.equal + 1)
     factorial, gamma = _log_factorials(equal), _log_gammas(pairs.episodes)
@@ -166,8 +167,8 @@ def _log_gammas(most: int) -> np.ndarray:
 def _last_within(gained: Callable[[float], float], inside: float, outside: float, most: float) -> float:
     """Return the candidate nearest to `outside` whose log capital is below `most`.
 
-    The capital is a log-convex function of the candidate, so from `inside` to `outside` it does not fall
-    again.
+    The capital is a log-convex function of the candidate, so the capital does not fall again on the way from
+    `inside` to `outside`.
     """
     if gained(outside) < most:
         return outside

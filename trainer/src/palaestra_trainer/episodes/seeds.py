@@ -14,7 +14,7 @@ import numpy as np
 
 COLLECT = "collect"
 EVALUATE = "A"
-CONFIRM = "C"  # `palaestra-eval` uses B by default
+CONFIRM = "C"  # not B, because B is the default of `palaestra-eval`
 _FRESH = 2**31  # all seeds of a run are below this number
 
 
@@ -24,8 +24,8 @@ def episode_seed(run_seed: int, stream: str, simulator: int, episode: int) -> in
     Args:
         run_seed: the replica's seed, not negative.
         stream: name of the stream, which stands for the purpose of the episode.
-        simulator: index of the simulator among those of its role; 0 if several simulators share a stream, as
-            in evaluations.
+        simulator: index of the simulator among the simulators of its role; 0 if several simulators share a
+            stream, as in evaluations.
         episode: number of the episode in the whole run, counted from 0.
     """
     name = int.from_bytes(hashlib.sha256(stream.encode()).digest()[:8])
@@ -42,6 +42,6 @@ def fresh_seeds(stream: str, episodes: int, first: int = 0) -> Iterator[int]:
     """Yield seeds for `episodes` episodes that no run uses, from episode number `first` on.
 
     These seeds are in [2**31, 2**32), and the seeds of runs are below 2**31. So two policies are compared on
-    episodes that neither of them learned from, and that did not select either of them.
+    episodes that neither of them learned from, and that were not used to select either of them.
     """
     return (_FRESH + seed for seed in episode_seeds(0, stream, episodes, first))

@@ -42,8 +42,8 @@ class SimulatorsVecEnv(MembersVecEnv):
         restarters: the restarter of each member; rows have the same order.
         run_seed: the replica's seed; the seed of each episode is derived from this seed.
         check: called every tenth of a second during waits for members; it raises to end the wait.
-        judge: an environment without a simulator that computes rewards of goals; None: the members'
-            environments compute them.
+        judge: an environment that computes the rewards of goals and needs no simulator; None: the members'
+            environments compute these rewards.
     """
 
     def __init__(
@@ -107,7 +107,7 @@ class SimulatorsVecEnv(MembersVecEnv):
     def resume(self, states: Sequence[EpisodeState], *, masked: bool = False) -> VecEnvObs:
         """Bring all members back to their states at the same time; return their observations.
 
-        The steps that this takes are not counted. Returns and lengths of the episodes continue from their old
+        The repeated steps are not counted. Returns and lengths of the episodes continue from their old
         values. If `masked` is set, a member does not take an action that its mask forbids now.
         """
         observations = take_turns(
@@ -178,7 +178,7 @@ class SimulatorsVecEnv(MembersVecEnv):
             return take_turns(self._collectors[index].action_mask for index in self._get_indices(indices))
 
     def _await_somebody(self) -> None:
-        """If no member can step, wait until a member is restarted; only invalid rows would be useless."""
+        """If no member can step, wait until a member is restarted, because all rows would be invalid."""
         if all(restarter.busy or restarter.lost for restarter in self._restarters):
             with self._watcher.spending(Cause.RECOVERING):
                 await_one(self._restarters, self._check)

@@ -1,4 +1,4 @@
-"""Export the best policy of a run: read it, convert it, compare both, and write the file."""
+"""Export the best policy of a run: convert it, compare the result with the policy, and write the file."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ FORMATS: Mapping[str, str] = {"onnx": "onnx_file", "safetensors": "safetensors_f
 
 
 class Format(Protocol):
-    """The interface that a module of this package has if it writes a format."""
+    """The interface of the modules of this package that write a format."""
 
     def content(self, acting: PolicyModule, sheet: Mapping[str, Any]) -> bytes:
         """Return the bytes of a file."""
@@ -38,8 +38,8 @@ class Exported:
     Attributes:
         path: the file that was written.
         observations: number of observations in the comparison of the file with the policy.
-        largest_difference: the largest difference of an action's number in that comparison; for continuous
-            actions, as a share of the range.
+        largest_difference: the largest difference between a number in an action of the file and the same
+            number in the policy's action; for continuous actions, as a share of the range.
     """
 
     path: Path

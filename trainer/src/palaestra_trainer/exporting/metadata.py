@@ -26,7 +26,7 @@ from palaestra_trainer.job.run_directory import RunDirectory
 from palaestra_trainer.run.summary import measured
 
 KEY = "palaestra"  # the key of the data sheet in a file's metadata
-MOST_BOUNDS = 1_000  # for a space with more numbers, the sheet has only the extreme bounds
+MOST_BOUNDS = 1_000  # for a space with more numbers, the sheet has only the least and the greatest bound
 
 Table = list[dict[str, str]]
 

@@ -61,7 +61,7 @@ class PolicyModule(nn.Module):
     Attributes:
         spaces: the space of each input, in the layout of the environment.
         action_space: the space of an action.
-        choices: for each number of an action how many choices it has; empty: the policy does not take masks.
+        choices: the count of choices for each number of an action; empty: the policy does not take masks.
         state_shape: layers and units of the state; None: the policy has no state.
         normalizers: the normalizer of each input, in the order of `spaces`; `Identity` for an input that is
             not normalized.
@@ -176,12 +176,12 @@ class Scoring(PolicyModule):
 
 
 def parts_of(space: spaces.Space[Any]) -> dict[str, spaces.Space[Any]]:
-    """Return the space of each key of a Dict, in its order; another space is the only part."""
+    """Return the space of each key of a Dict, in the order of the keys; any other space is the only part."""
     return dict(space.spaces) if isinstance(space, spaces.Dict) else {OBSERVATION: space}
 
 
 def as_returned(space: spaces.Space[Any]) -> spaces.Space[Any]:
-    """Return the space of images with channels last, as environments return images; others unchanged."""
+    """Return the space of images with channels last, as environments return them; other spaces unchanged."""
     if not (isinstance(space, spaces.Box) and is_image_space(space) and is_image_space_channels_first(space)):
         return space
     low, high = (np.moveaxis(bound, 0, -1) for bound in (space.low, space.high))

@@ -1,10 +1,10 @@
-"""Generate the observations on which a file is compared with its policy, always the same ones.
+"""Generate the observations on which a file is compared with its policy; they are always the same.
 
-The observations should be similar to those of episodes, but the bounds of a space do not show the usual
-numbers. A bound may be infinite, or the largest number of a type. Numbers drawn uniformly between such bounds
-would saturate a network, and all actions would be the same. So the numbers of a Box have several scales, from
-a hundredth up to the bounds. A network gives the same output for all images of noise, so the images have
-areas of different brightness and contrast.
+The observations should be similar to those of episodes, but the bounds of a space do not show which numbers
+are usual. A bound may be infinite, or the largest number of a type. Numbers drawn uniformly between such
+bounds would saturate a network, and all actions would be the same. So the numbers of a Box have several
+scales, from a hundredth up to the bounds. A network gives the same output for all images of noise, so the
+images have areas of different brightness and contrast.
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ def _middle(low: np.ndarray, high: np.ndarray, normalize: Any) -> tuple[np.ndarr
 
 
 def _scales(farthest: np.ndarray, count: int) -> np.ndarray:
-    """Return the scale of each observation: the largest scale in every other episode, else smaller ones."""
+    """Return each observation's scale: the largest in every other episode, smaller scales in the others."""
     episodes = np.arange(count) // EPISODE
     ladder = np.where(episodes % 2, (episodes // 2 % EPISODE) / max(1, episodes.max() // 2), 0.0)
     nearest = np.minimum(1.0, _NEAREST / np.maximum(farthest, _NEAREST))

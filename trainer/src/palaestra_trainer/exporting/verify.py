@@ -17,7 +17,7 @@ from palaestra_trainer.run.policies import TrainedPolicy
 OBSERVATIONS = 1_000
 TOLERANCE = 1e-5  # largest allowed difference of a continuous action, as a share of its range
 # A comparison is meaningful only if at least this number of actions are between the bounds, or if scores
-# differ by this number of tolerances.
+# differ by this multiple of the tolerance.
 _TELLING = 10
 
 Arrays = tuple[np.ndarray, ...]
@@ -37,16 +37,16 @@ def compare(convert: Convert, acting: PolicyModule, policy: TrainedPolicy) -> fl
         policy: the policy that the file must reproduce.
 
     Raises:
-        ExportError: discrete actions differ, or continuous actions differ by more than the tolerance. It is
-            also raised if the comparison proves nothing, because a wrong file could have the same actions on
-            these observations.
+        ExportError: discrete actions differ, or continuous actions differ by more than the tolerance. The
+            error is also raised if the comparison proves nothing, because a wrong file could have the same
+            actions on these observations.
     """
     observations = drawn(acting, OBSERVATIONS)
     run = convert(acting)
     played = [_played(run, acting, policy, observations, masks) for masks in _masks(acting)]
     difference = max(_difference(*actions, acting, observations) for actions in played)
     # Random masks make even the actions of a constant policy differ, so the check uses the masks that allow
-    # all.
+    # all actions.
     _, expected = played[-1]
     _refuse_what_shows_nothing(convert, acting, policy, observations, expected)
     return difference
@@ -76,7 +76,7 @@ def _masks(acting: PolicyModule) -> list[Arrays]:
 def _difference(
     ours: np.ndarray, expected: np.ndarray, acting: PolicyModule, observations: dict[str, np.ndarray]
 ) -> float:
-    """Return the largest difference between actions, as a share of the range; refuse a too large one."""
+    """Return the largest difference between actions, as a share of the range; refuse one above tolerance."""
     if ours.shape != expected.shape:
         raise ExportError(f"actions have the shape {ours.shape}, not {expected.shape}; {_REMEDY}")
     apart = _apart(ours, expected)
@@ -122,7 +122,7 @@ def _refuse_what_shows_nothing(
 
 
 def _scores_show(convert: Convert, scoring: Scoring, observations: dict[str, np.ndarray]) -> bool:
-    """Return whether the scores of actions depend on the observations, and are the same from a file."""
+    """Return whether the scores of actions depend on the observations, and are the same in a file."""
     masks = map(torch.from_numpy, _masks(scoring)[-1])
     inputs = [*map(torch.from_numpy, observations.values()), *masks, *scoring.begin(OBSERVATIONS)]
     try:
@@ -143,7 +143,7 @@ def _span_and_tolerance(
     """Return the range of each number of an action, and the largest allowed difference.
 
     If actions are only clipped, they may use a small part of the space's range. Then the range of the actual
-    values counts, but at least 1, because the network may compute with numbers around 1.
+    values counts, or 1 if that range is smaller, because the network may compute with numbers around 1.
     """
     space = acting.action_space
     if not isinstance(space, spaces.Box):

@@ -60,17 +60,17 @@ class FaultTolerantEnv(gymnasium.Wrapper[Any, Any, Any, Any]):
         """Wait until the simulator is up, and begin an episode; return its first observation and info.
 
         Raises:
-            As `EnvGroup.begin`.
+            The same errors as `EnvGroup.begin`.
         """
         self._players.begin([seed], [options])
         self.env = self._player.env
         return self._player.observation, self._player.reset_info
 
     def step(self, action: Any) -> Step:
-        """Return the result of the environment's step, or after a fault a truncated row.
+        """Return the result of the environment's step; after a fault, return a truncated row.
 
         Raises:
-            As `EnvGroup.step`.
+            The same errors as `EnvGroup.step`.
         """
         return self._players.step(action).step
 

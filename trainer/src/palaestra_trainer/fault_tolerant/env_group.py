@@ -85,12 +85,12 @@ class EnvGroup:
         return row
 
     def step_all(self, actions: Sequence[Any]) -> list[StepResult]:
-        """Step all members at the same time and return their rows; begin a new episode after each that ended.
+        """Step all members at the same time and return their rows; replace each ended episode by a new one.
 
         Raises:
             ResetNeeded: a member has no running episode.
             Diverged: observation or reward is not finite.
-            As `begin`.
+            The same errors as `begin`.
         """
         rows: list[StepResult] = take_turns(
             partial(_step, player, action) for player, action in zip(self.all, actions, strict=True)

@@ -26,7 +26,8 @@ class StepResult(NamedTuple):
     Attributes:
         step: the result of gymnasium's `step`.
         episode: return, length and seconds of the episode, under the names of Stable-Baselines3's Monitor.
-            Only the last step of an episode without a fault has these values; in other steps it is None.
+            Only the last step of an episode without a fault has these values; for other steps, `episode` is
+            None.
     """
 
     step: Step

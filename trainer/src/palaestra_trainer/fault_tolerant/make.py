@@ -41,14 +41,15 @@ def make_players(
 ) -> EnvGroup:
     """Return a group of environments of one class, each in its own running simulator.
 
-    If this process has a `Webots` facade that no environment uses, the environment takes the simulator of the
-    newest such facade. Without such a facade, or for more than one simulator, the simulators of
+    If this process has `Webots` facades that no environment uses, a single environment takes the simulator of
+    the newest of these facades. Without such a facade, or for more than one simulator, the simulators of
     PALAESTRA_CONFIG are used. If that variable is not set, new simulators are started: stubs, or MuJoCo for
     `SeeTarget-v0`.
 
     Args:
-        environment_id: the id of the environment; None: that of PALAESTRA_CONFIG.
-        number: number of simulators; None: that of the facade, else all of the role, else a new one.
+        environment_id: the id of the environment; None: the id in PALAESTRA_CONFIG.
+        number: number of simulators; None: the simulator of the facade, or else all simulators with the role,
+            or else one new simulator.
         role_name: the role of the simulators in PALAESTRA_CONFIG.
         options: options of the environment.
 
@@ -138,7 +139,7 @@ def _in_own(environment: Environment, number: int, world: str, driver: str) -> E
 def _allocated(
     stack: ExitStack, configuration: Configuration, number: int | None, role: Role
 ) -> tuple[SimulatorConfiguration, ...]:
-    """Reserve simulators until `stack` closes; return them with a minimum that allows none to be given up."""
+    """Reserve simulators until `stack` closes; return them so that none of them can be given up."""
     every = max(1, len(configuration.with_role(role)))
     entries = []
     for _ in range(number or every):

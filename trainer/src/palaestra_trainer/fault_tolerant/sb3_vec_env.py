@@ -39,7 +39,7 @@ class FaultTolerantVecEnv(MembersVecEnv):
         """Begin an episode in every member at the same time; return the first observations.
 
         Raises:
-            As `EnvGroup.begin`.
+            The same errors as `EnvGroup.begin`.
         """
         self._players.begin(self._seeds, [options or None for options in self._options])
         self._reset_seeds()
@@ -50,7 +50,7 @@ class FaultTolerantVecEnv(MembersVecEnv):
         """Step all members at the same time; return observations, rewards, dones and infos.
 
         Raises:
-            As `EnvGroup.step_all`.
+            The same errors as `EnvGroup.step_all`.
         """
         rows = self._players.step_all(list(self._actions))
         return (

@@ -17,7 +17,7 @@ Stepped = tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]
 
 
 class FaultTolerantVectorEnv(VectorEnv[Any, Any, np.ndarray]):
-    """A VectorEnv whose members all step at the same time; the last step of an episode also resets it.
+    """A VectorEnv whose members step at the same time; the last step of an episode also resets the member.
 
     The last observation and info of an episode are `infos["final_obs"]` and `infos["final_info"]`. If a fault
     ended the episode, `infos["final_info"]["palaestra"]["sim_fault"]` is set. The step then waits until the
@@ -50,7 +50,7 @@ class FaultTolerantVectorEnv(VectorEnv[Any, Any, np.ndarray]):
 
         Raises:
             ValueError: the numbers of seeds and members differ.
-            As `EnvGroup.begin`.
+            The same errors as `EnvGroup.begin`.
         """
         self._players.begin(self._seeds(seed), [options] * self.num_envs)
         infos: dict[str, Any] = {}
@@ -62,7 +62,7 @@ class FaultTolerantVectorEnv(VectorEnv[Any, Any, np.ndarray]):
         """Step all members at the same time; return the five results of a step, one row per member.
 
         Raises:
-            As `EnvGroup.step_all`.
+            The same errors as `EnvGroup.step_all`.
         """
         rows = self._players.step_all(list(iterate(self.action_space, actions)))
         infos: dict[str, Any] = {}

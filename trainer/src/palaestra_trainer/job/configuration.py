@@ -1,15 +1,15 @@
 """Read and check training.yaml, the configuration of one replica.
 
-The operator's plan writes the file. The modules of this package read the file only through this module;
-reports and experiment trackers show its text unchanged. A wrong file is refused before a simulator starts.
-The error lists all mistakes of the file, each with field, fact and remedy. The hyperparameters of each
-algorithm are defined in `palaestra_trainer.algorithms`, not here, because reading a configuration must not
-import a learning library.
+The operator writes the file. The modules of this package read the file only through this module; reports and
+experiment trackers show its text unchanged. A wrong file is refused before a simulator starts. The error
+lists all mistakes of the file, each with field, fact and remedy. The hyperparameters of each algorithm are
+defined in `palaestra_trainer.algorithms`, not here, because reading a configuration must not import a
+learning library.
 
 Unknown fields are logged and ignored. A job may name a `trainer.image` that is older than the operator that
-writes the file. A newer operator writes a new field only if the job sets that field. Misspelled fields of
-users do not reach this module, because the operator checks the job before it writes the file. An unknown
-value of a known field is refused, because the training would differ from the job.
+writes the file. A newer operator writes a new field only if the job sets that field. A field that a user
+misspelled does not reach this module, because the operator checks the job before it writes the file. An
+unknown value of a known field is refused, because the training would differ from the job.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ class Environment(_Section):
 
     Attributes:
         id: name under which the environment is registered with gymnasium.
-        reward: with Dense the environment gives a reward at each step, with Sparse only at the end of an
+        reward: with `Dense` the environment gives a reward at each step, with `Sparse` only at the end of an
             episode.
         options: keyword arguments of the environment.
         wrappers: wrappers around the environment, the innermost first; None: no wrappers.
@@ -166,12 +166,13 @@ class Checkpoint(_Section):
 
 
 class Recycle(_Section):
-    """Limits for a healthy simulator; when it reaches one of them, it is restarted after its episode.
+    """Limits for a healthy simulator, which is restarted after its episode when it reaches a limit.
 
     Attributes:
-        after_resets: resets since the simulator was taken into use.
-        after_minutes: minutes since the simulator was taken into use; its time as a standby does not count.
-        above_memory_bytes: memory of all its processes together.
+        after_resets: greatest number of resets since the simulator was started, or took over as a standby.
+        after_minutes: greatest number of minutes since the simulator was started or took over; its time as a
+            standby does not count.
+        above_memory_bytes: greatest memory of all processes of the simulator together.
     """
 
     after_resets: Positive | None = None
@@ -191,10 +192,10 @@ class SimulatorConfiguration(_Section):
 
     Attributes:
         name: `<group>-<index>`, unique in the file.
-        role: Collect for collecting experience, Evaluate for evaluating the policy.
+        role: `Collect` for collecting experience, `Evaluate` for evaluating the policy.
         min_simulators: number of simulators of its group that must work for the run to continue; None: all.
         control: address of the control port of the simulator's sidecar.
-        driver: the simulator program: stub, mujoco, webots or command.
+        driver: the simulator program, `stub`, `mujoco`, `webots` or `command`.
         options: command-line options of the simulator program.
         world: path of the generated world that the simulator loads.
         standby: whether the sidecar also runs a standby for this simulator.
@@ -221,12 +222,13 @@ class Configuration(_Section):
 
     Attributes:
         seed: the job's seed plus the replica's index; all other seeds are derived from this seed.
-        device: device of the model; cuda: the GPU that the job requested, or the CPU if PyTorch finds no GPU.
+        device: device of the model; `cuda` is the GPU that the job requested, or the CPU if PyTorch finds no
+            GPU.
         steps: number of valid environment steps of the whole run, of all simulators together.
         resume_from: the run directory of another job; a run that has not saved a checkpoint yet resumes from
             the newest checkpoint in that directory.
         initial_policy: a model.zip with whose policy a new run begins; None: random weights.
-        stall_deadline_seconds: the run fails after this time without an environment step.
+        stall_deadline_seconds: the run fails after this number of seconds without an environment step.
         robot: class of the robot, `module:Class` or a name of `robots.registry`; None: `DEFAULT_ROBOT`.
         command: the user's own program that replaces the built-in training loop; the trainer does not read
             it.

@@ -1,8 +1,8 @@
 """The files in the folder of one run on its volume, and functions that write these files.
 
-This folder is enough to inspect the run and to resume it. A whole file is replaced atomically: its new
-content gets a temporary name, then follow fsync, rename and fsync of the folder. Lines are appended with
-fsync. So after a crash each file has either its old or its new content.
+This folder is enough to inspect the run and to resume it. A whole file is replaced atomically: the new
+content is written under a temporary name, then follow fsync, rename and fsync of the folder. Lines are
+appended with fsync. So after a crash each file has either its old or its new content.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class RunDirectory:
 
     @property
     def journal(self) -> Path:
-        """The counters of some seconds ago; after a kill, the next attempt continues from these."""
+        """The counters of some seconds ago; after a kill, the next attempt continues from these counters."""
         return self.path / "journal.json"
 
     @property
@@ -160,7 +160,7 @@ def replace_file(path: Path, write: Callable[[Path], object]) -> None:
 
 @contextmanager
 def temporary(path: Path) -> Iterator[Path]:
-    """Yield a temporary name in the folder of `path`, with its suffix; remove that file at the end."""
+    """Yield a temporary path in the folder of `path` with the same suffix; remove that file at the end."""
     name = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
     try:
         yield name
@@ -171,8 +171,8 @@ def temporary(path: Path) -> Iterator[Path]:
 def sync(path: Path) -> None:
     """Wait until a file's or a folder's contents are on the disk.
 
-    Some file systems over object stores and networks do not support fsync of a folder. On these, this
-    function does nothing for a folder.
+    Some file systems over object stores and networks do not support fsync of a folder. On such a file system,
+    this function does nothing for a folder.
     """
     descriptor = os.open(path, os.O_RDONLY)
     try:

@@ -23,7 +23,7 @@ class Series:
     Attributes:
         label: name of the curve.
         points: step and value of each point.
-        band: step, lower bound and upper bound of an interval around the curve.
+        band: intervals around the curve, each as step, lower bound and upper bound.
         dots: whether each point is drawn as a dot with its value.
         color: number of the color in the style.
     """

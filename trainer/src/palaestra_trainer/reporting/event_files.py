@@ -1,7 +1,7 @@
 """Read scalars from the bytes of TensorBoard's event files.
 
 Palaestra has its own reader, because TensorBoard's reader takes a second to import. The reader skips an
-incomplete record at the end of a file, as a kill leaves it. Source of the format:
+incomplete record at the end of a file, which a kill may leave. Source of the format:
 tensorflow/core/util/event.proto and summary.proto, tensorflow/core/lib/io/record_writer.h.
 """
 
@@ -10,7 +10,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterator
 
-_HEADER, _CHECKSUM = 12, 4  # length and its checksum; checksum of the content; neither is compared
+_HEADER, _CHECKSUM = 12, 4  # length and its checksum; checksum of the content; checksums are not compared
 _VARINT, _FIXED64, _BYTES, _FIXED32 = 0, 1, 2, 5
 _STEP, _SUMMARY, _SESSION = 2, 5, 7  # fields of Event
 _VALUE = 1  # field of Summary
@@ -25,7 +25,8 @@ Scalars = dict[str, dict[int, float]]
 def add_scalars(content: bytes, found: Scalars) -> None:
     """Add the scalars of one event file to `found`, which has those of earlier files by name and step.
 
-    A file may begin with a session. Then scalars of earlier files at the same or later steps are removed.
+    If the file records the start of a session at a step, scalars of earlier files at this step and later
+    steps are removed.
     """
     for record in _records(content):
         try:

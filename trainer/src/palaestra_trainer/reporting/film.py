@@ -31,8 +31,8 @@ Position = tuple[float, float]
 def animated(replay: Replay) -> bytes:
     """Return an episode as a GIF of at most 200 kB that repeats; it lasts at most 11 s.
 
-    The longer side of the GIF has 360 pixels. It plays in real time or faster, because each picture lasts at
-    most 0.15 s.
+    The longer side of the GIF has 360 pixels. The GIF plays in real time or faster, because each picture
+    lasts at most 0.15 s.
 
     Args:
         replay: the episode, with at least one pose.
@@ -66,7 +66,7 @@ def pictures(replay: Replay, size_px: int, every: int = 1) -> Iterator[Image.Ima
 
     Args:
         replay: the episode, with at least one pose.
-        size_px: larger one of width and height of a picture, an even number; the other is even too.
+        size_px: the larger one of the width and the height of a picture; both are even numbers.
         every: number of poses per picture; with 1, each pose has a picture.
     """
     canvas = _Canvas.blank(replay, size_px)
@@ -168,7 +168,7 @@ class _Canvas:
         )
 
     def _at(self, place: Position) -> Position:
-        """Return a position on the floor in pixels, from the upper left corner."""
+        """Convert a position on the floor to pixels, counted from the upper left corner."""
         return (place[0] - self.low_x) * self.scale, (self.high_y - place[1]) * self.scale
 
 

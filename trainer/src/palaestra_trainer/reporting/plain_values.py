@@ -1,4 +1,4 @@
-"""Convert values of files that another release wrote or a crash damaged to the expected type."""
+"""Convert values to the expected type; another release may have written the file, or a crash damaged it."""
 
 from __future__ import annotations
 

@@ -167,7 +167,7 @@ def _evaluated(path: Path) -> tuple[Evaluated, ...]:
 
 
 def _faults(path: Path) -> tuple[ReportedFault, ...]:
-    """Return the faults; a later line about the restart has the downtimes of its simulator's faults."""
+    """Return the faults; their downtimes are in later lines, which report that the simulator is up again."""
     found: list[ReportedFault] = []
     open_: dict[tuple[str, str], list[int]] = {}  # indices in `found`, by attempt and simulator
     for line in lines(path):

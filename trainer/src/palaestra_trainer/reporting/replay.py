@@ -139,7 +139,7 @@ def _controls(replay: Replay) -> Markup:
 
 
 def _for_script(replay: Replay) -> dict[str, object]:
-    """Return the data for the page's script; whole millimeters and degrees keep it short."""
+    """Return the data for the page's script; whole millimeters and degrees keep the data short."""
     return {
         "s": replay.frame_s,
         "poses": [

@@ -38,7 +38,7 @@ class ReportedFault:
         time: time at which the trainer detected the fault.
         step: step of the run at that time.
         simulator: name of the simulator.
-        kind: kind of the fault: dead, hung or wrong_data.
+        kind: kind of the fault, `dead`, `hung` or `wrong_data`.
         fact: message of the fault.
         steps_lost: steps of the episode that the fault truncated.
         seconds: seconds from the fault until the simulator was up again; None: the simulator did not come up
@@ -59,14 +59,16 @@ class Replay:
     """One recorded episode of an evaluation.
 
     Attributes:
-        title: why the episode was chosen: best, median or failed.
+        title: the reason for choosing the episode, such as the best or the median return.
         facts: return, length, outcome and seed of the episode, as one text.
         poses: x and y in meters and heading in radians, for each frame.
         frame_s: seconds of simulated time from one frame to the next.
-        targets: for each position of the target the first frame, x and y.
+        targets: positions of the target, each as the number of the first frame with this position, and x and
+            y in meters.
         low: smallest x and y of the floor; None: unknown.
         high: greatest x and y of the floor.
-        outlines: obstacles as x, y, half length, half width, radius of the rounding, heading.
+        outlines: obstacles, each as x, y, half length, half width and radius of the rounding in meters, and
+            heading in radians.
         radius_m: radius of the robot.
     """
 
@@ -87,17 +89,17 @@ class RunData:
 
     Attributes:
         name: name of the job and number of the replica.
-        ended: good, interrupted, failed, or open if the end is not known.
+        ended: `good`, `interrupted`, `failed`, or `open` if the end is not known.
         end: the end of the run in words.
-        figures: name and value of the main results, in order.
-        asked: name and value of the job's settings, in order.
+        figures: name and value of each main result, in the order of the page.
+        asked: name and value of each setting of the job, in the order of the page.
         versions: name and version of the programs and the machine.
         evaluations: the evaluations in the order of steps.
         confirmations: the confirmations in the order of steps.
         curves: curves of the training by name.
         faults: the faults in the order of time.
         fault_count: number of all faults of the run; `faults` may have fewer.
-        goodput: seconds of the run by cause.
+        goodput: seconds of the run under each cause of `GoodputLedger`.
         checkpoints: step, size and time of each checkpoint, as texts.
         attempts: start and reason of each attempt, as texts.
         replays: recorded episodes.

@@ -16,7 +16,7 @@ from palaestra_trainer.reporting.run_data import Evaluated, ReportedFault, RunDa
 NUMBER = re.compile(r"-?[0-9][0-9,]*(\.[0-9]+)?%?")
 DEVIATIONS = 1.96  # half width of a 95 % interval, in standard deviations of a mean
 MOST_TEXT = 400  # most characters of one message
-NEVER = "\u2013"  # the simulator did not come up in that attempt
+NEVER = "\u2013"  # shown if the simulator did not come up again in the attempt of the fault
 ENDED = {"good": "complete", "interrupted": "interrupted", "failed": "failed", "open": "not ended"}
 
 
@@ -42,7 +42,7 @@ class Detail:
 
 
 def run_sections(run: RunData, detail: Detail) -> Markup:
-    """Return all sections about one run, which follow its name."""
+    """Return all sections about one run, which the page shows below the name of the run."""
     return joined(
         figures(run),
         *_section(f"Episodes of {run.replayed}", _replays(run, detail)),

@@ -12,7 +12,7 @@ import yaml
 
 from palaestra_trainer.reporting.plain_values import record
 
-MOST_LINES_BYTES = 32 * 2**20  # limit for a file of lines, of which only the end is read
+MOST_LINES_BYTES = 32 * 2**20  # of a larger file of lines, only the end is read
 MOST_FILE_BYTES = 2**20  # limit for a file that is read whole
 
 

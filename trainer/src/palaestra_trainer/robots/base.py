@@ -19,7 +19,7 @@ RADIUS_M = 0.2266  # radius of the body's cylinder, as in Webots' model of the R
 OUTLINE_M = 0.2286  # radius of the body with its bumper
 SENSORS = 9  # number of infrared sensors, one every 40 degrees
 # For a distance outside this range, the sensor returns the nearer bound. Source: lookup table of the GP2Y0A41
-# in that model.
+# in Webots' model of the Robotino 3.
 SENSOR_RANGE_M = (0.03, 0.40)
 
 

@@ -181,7 +181,7 @@ class Gripper(ABC):
 
     @abstractmethod
     def use_gripper(self) -> None:
-        """Start to use the gripper's motors, which do not slow the simulation before.
+        """Start to use the gripper's motors; motors that are not in use do not slow the simulation.
 
         Raises:
             NoSuchSensor: as `Cameras.use_cameras`.
@@ -203,7 +203,7 @@ class Forklift(ABC):
 
     @abstractmethod
     def use_forklift(self) -> None:
-        """Start to use the fork's motor, which does not slow the simulation before.
+        """Start to use the fork's motor; a motor that is not in use does not slow the simulation.
 
         Raises:
             NoSuchSensor: as `Cameras.use_cameras`.

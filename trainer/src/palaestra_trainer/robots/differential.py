@@ -79,7 +79,8 @@ class TurtleBot3Burger(DifferentialDrive, Scanner):
     def scan(self) -> NDArray[np.float32]:
         """Return a new array of distances in meters, shape (360,), counter-clockwise from behind.
 
-        The scanner does not detect an object nearer than 0.12 m; its ray then measures the greatest distance.
+        The scanner does not detect an object nearer than 0.12 m. The ray toward such an object measures the
+        greatest distance.
         """
         self._require_use(self._laser, "scanner", "use_scanner()")
         if self._laser.value is None:

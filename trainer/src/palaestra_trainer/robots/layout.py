@@ -59,7 +59,7 @@ class Obstacle:
         return outside + min(max(beyond_x, beyond_y), 0.0) - self.radius_m
 
     def away(self, x_m: float, y_m: float) -> Point:
-        """Return the direction from a point directly away from the object; inside, the shortest way out."""
+        """Return the direction from a point away from the object; inside the object, the shortest way out."""
         small = 1e-4
         gx = self.gap(x_m + small, y_m) - self.gap(x_m - small, y_m)
         gy = self.gap(x_m, y_m + small) - self.gap(x_m, y_m - small)

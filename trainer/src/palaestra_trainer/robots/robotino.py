@@ -38,8 +38,8 @@ _LEAST_VOLTS = 0.05  # below the sensor's range; avoids an infinite result
 class Robotino(MobileRobot, RobotinoAbc, Cameras, Scanner, Gripper, Forklift):
     """A Robotino in Webots, or in any simulator with the same ROS interface.
 
-    Cameras, laser scanner, gripper and forklift are optional. The world may lack them, and they do not slow
-    the simulation until they are used. The arguments are those of `SimulatedRobot`.
+    Cameras, laser scanner, gripper and forklift are optional. The world may lack these devices, which do not
+    slow the simulation until they are used. The arguments are those of `SimulatedRobot`.
 
     Attributes:
         wheels: names of the wheels' motors: rear, front right, front left.

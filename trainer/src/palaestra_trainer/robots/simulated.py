@@ -175,7 +175,7 @@ class SimulatedScene(Scene, JointScene):
         self.observer = webots.observer
         self._robot = robot
         self._target = target or robot.target
-        self._put: dict[str, tuple[float, float, float]] = {}  # by `put` since the last `begin`
+        self._put: dict[str, tuple[float, float, float]] = {}  # positions that `put` set since `begin`
         self._floor: FloorLayout | None = None
         self._aim: Point | None = None
         self.resets = 0

@@ -1,10 +1,10 @@
-"""The only package that uses ROS, layer 1 of the trainer.
+"""Layer 1 of the trainer, the only package that uses ROS.
 
 The process is a ROS node. If rospy is installed, the node is rospy's, as programs of users expect; otherwise
-it is our own (`node`). The calls of each step never use rospy. Its thread per topic costs more time than the
-simulation, and its service proxies have no deadline. Instead, `RosService` and `RosSubscriber` hold one
-persistent connection each. They wait with a deadline, reconnect after a failure, and distinguish dead, hung
-and wrong data. One thread uses the services and subscribers of one simulator.
+it is our own (`node`). The calls of each step never use rospy. A thread of rospy per topic costs more time
+than the simulation, and its service proxies have no deadline. Instead, `RosService` and `RosSubscriber` hold
+one persistent connection each. They wait with a deadline, reconnect after a failure, and distinguish dead,
+hung and wrong data. One thread uses the services and subscribers of one simulator.
 """
 
 from palaestra_trainer.ros.master import Master

@@ -19,10 +19,10 @@ _NODE_TIMEOUT_S = 1.0
 
 
 class Master:
-    """A client of the master at ROS_MASTER_URI, which calls it with the node name `caller`.
+    """A client of the master at ROS_MASTER_URI; its calls come from the node `caller`.
 
-    Every method except `ping` raises MasterLost if no master responds or the master refuses the request. It
-    raises UnreadableAnswer if the response of the master is invalid.
+    Every method except `ping` raises MasterLost if no master responds or the master refuses the request.
+    These methods raise UnreadableAnswer if the response of the master is invalid.
     """
 
     def __init__(self, caller: str, timeout_s: float = _TIMEOUT_S) -> None:
@@ -66,7 +66,7 @@ class Master:
         self._call("unregisterSubscriber", topic, node_uri)
 
     def node_names(self) -> set[str]:
-        """Return the full names of all nodes that publish, subscribe or serve."""
+        """Return the full names of all nodes that publish, subscribe or offer services."""
         answer = self._call("getSystemState")
         try:
             return {str(node) for part in answer.value for _, nodes in part for node in nodes}

@@ -1,4 +1,4 @@
-"""Compute the name of a ROS node from the arguments that rename it, as rospy does.
+"""Compute the name of a ROS node from the program's arguments that rename it, as rospy does.
 
 `__name:=NAME` and `__ns:=NAMESPACE` rename the node. The other forms, `TOPIC:=OTHER` and `_PARAMETER:=VALUE`,
 have no effect, because the topics and services of simulators have full names, and the trainer does not read

@@ -1,8 +1,9 @@
 """The ROS node of this process without rospy: a name, and an address for the master and for ROS tools.
 
 The node does not register topics or services. `RosSubscriber` registers under the node's name and connects by
-itself, so the node ignores updates of a topic's publishers. `rosnode kill` ends the process as SIGTERM does,
-and so does the master if another node takes the name. A training saves a checkpoint before it ends.
+itself, so the node ignores updates of a topic's publishers. `rosnode kill` ends the process as SIGTERM does.
+The master ends the process in the same way if another node takes the name. A training saves a checkpoint
+before it ends.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ log = structlog.get_logger(__name__)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Node:
-    """A node of this process, or of the process that forked it.
+    """A node of this process, or of the process that forked this process.
 
     Attributes:
         name: full name of the node.

@@ -136,7 +136,8 @@ def call_together(
 
     Args:
         calls: pairs of a service and the fields of its request.
-        meanwhile: called with the service of the last request, before the wait for responses.
+        meanwhile: called with the service of the last request, after all requests are sent and before the
+            wait for responses.
 
     Raises:
         SimulatorDead, SimulatorHung, WrongData: the first error of a call. All connections are then closed,

@@ -55,7 +55,7 @@ class RosSubscriber:
 
     @property
     def connected(self) -> bool:
-        """Whether a publisher is connected; earlier messages are lost."""
+        """Whether a publisher is connected; messages from before the connection are lost."""
         return self._wire is not None
 
     def connect(self) -> None:

@@ -83,7 +83,7 @@ class TcprosClient:
             raise self._fault("does not accept requests", error) from error
 
     def receive(self, ahead: int = 0) -> bytes | memoryview:
-        """Return the next frame, with the `ahead` bytes before its length; valid until the next call.
+        """Return the next frame, including `ahead` bytes before its length; valid until the next call.
 
         Raises:
             SimulatorDead, SimulatorHung: see the class.

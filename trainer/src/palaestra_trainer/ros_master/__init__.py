@@ -1,6 +1,6 @@
 """A ROS master without ROS, by which nodes find each other and share parameters.
 
-- `names`: names of ROS, relative to a node or not
+- `names`: global, private and relative names of ROS
 - `registrations`: the topics and services of each node
 - `parameters`: the tree of parameters
 - `arguments`: the checks of the arguments of calls

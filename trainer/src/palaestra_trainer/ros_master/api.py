@@ -252,7 +252,7 @@ class MasterApi:
             self._updates.append(Update(uri, "publisherUpdate", topic, publishers, node))
 
     def _report_changes(self, name: str, value: Any, *, but: str | None) -> None:
-        """Add an update for each subscriber; skip `but` if it changed a parameter to which it subscribes."""
+        """Add an update for each subscriber, except the node `but` if it changed a name it subscribes to."""
         for change in changes(name, value, self._nodes.names(Kind.PARAMETER)):
             for node, uri in self._nodes.members(Kind.PARAMETER, change.subscribed):
                 if not (change.by_caller and node == but):

@@ -12,11 +12,11 @@ _ILLEGAL = (":", " ")
 
 
 class WrongArgument(ValueError):
-    """An argument of a call is wrong; the message names it."""
+    """An argument of a call is wrong; the message names the argument."""
 
 
 def text_of(argument: str, value: Any) -> str:
-    """Check that an argument is a text and not empty; return it.
+    """Check that an argument is a text and not empty; return the text.
 
     Raises:
         WrongArgument: the argument is empty or not a text.
@@ -66,7 +66,7 @@ def type_name_of(argument: str, value: Any) -> str:
     """Check that an argument is the type of a topic, `package/Name` or ANY_TYPE; return it.
 
     Raises:
-        WrongArgument: the argument is neither.
+        WrongArgument: the argument is neither a type nor ANY_TYPE.
     """
     name = text_of(argument, value)
     if name != ANY_TYPE and name.count(SEPARATOR) != 1:

@@ -49,7 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _end_with_owner() -> None:
-    """End this process when its standard input closes, which the kernel does when the owner is killed."""
+    """End this process when its standard input closes; the kernel closes it when the parent is killed."""
     while os.read(sys.stdin.fileno(), 1024):
         pass
     os._exit(0)  # without waiting for the threads of connections

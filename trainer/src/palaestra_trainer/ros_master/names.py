@@ -25,7 +25,7 @@ def is_private(name: str) -> bool:
 
 
 def joined(names: tuple[str, ...]) -> str:
-    """Return the global name of these parts."""
+    """Return the global name that consists of these parts."""
     return SEPARATOR + SEPARATOR.join(names)
 
 

@@ -15,7 +15,7 @@ Tree = dict[str, Any]
 
 
 class Change(NamedTuple):
-    """A change that subscribers of a name must learn: a parameter and its new value; `{}` if it was deleted.
+    """A change to report to the subscribers of a name: a parameter and its value, `{}` after a deletion.
 
     Attributes:
         subscribed: the name to which the nodes subscribe; it ends with a slash.

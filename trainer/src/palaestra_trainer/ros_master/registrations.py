@@ -1,8 +1,8 @@
 """Keep the registrations of nodes: their topics, services and addresses.
 
 This module is pure: it uses no thread, socket or clock. A node is known from its first registration until its
-last registration ends. If a node registers with another address, it is a new node of the same name, and all
-registrations of the old node are dropped.
+last registration ends. If a node registers with another address, it counts as a new node of the same name,
+and all registrations of the old node are dropped.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class Registrations:
         return replaced
 
     def register_service(self, service: str, node: str, uri: str, address: str) -> str | None:
-        """Register the only node that serves `service`; return the same as `register`."""
+        """Register the only node that serves `service`; return the same value as `register`."""
         replaced = self._entered(Kind.SERVICE, service, node, uri)
         self._members[Kind.SERVICE][service] = {node: uri}
         self._service_uris[service] = (node, address)
@@ -68,7 +68,7 @@ class Registrations:
         """Remove a registration; return whether that node had this registration.
 
         Args:
-            kind: not SERVICE.
+            kind: any kind except SERVICE; use `unregister_service` for services.
             name: the name of the topic or parameter.
             node: full name of the node.
             uri: URI at which the node responds; a registration with another URI stays.

@@ -65,7 +65,7 @@ NOTHING_LEARNED = End(
     "Completed",
     "the training is complete, but nothing was learned: no update was made",
 )
-_FAR_BEYOND = 1.5  # factor for the job's steps; the last rollout usually exceeds the steps a little
+_FAR_BEYOND = 1.5  # a run with more steps than the job's steps times this number is logged
 STOPPED_S = 60.0  # longest time for closing environments and stopping simulators
 # Code of the job's author may try to end the program, for example by sys.exit.
 ENDING = (Exception, SystemExit, KeyboardInterrupt, GeneratorExit)
@@ -204,7 +204,7 @@ class Attempt:
         found = self._newest()
         before = RunDirectory(found.path.parent.parent) if found else None
         self._algorithm = algorithms.begin_with(configuration, self._directory, before)
-        self._take_over(found)  # before the server starts: Prometheus would count a later jump
+        self._take_over(found)  # before the server starts: Prometheus would count a later jump as new events
         known = constants(configuration)
         stack.enter_context(status_server(configuration.status_address, progress, known))
         self._begin(found)

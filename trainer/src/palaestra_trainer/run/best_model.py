@@ -1,8 +1,8 @@
 """Select the best policy of a run, and decide whether it is good enough to stop.
 
 The best of many evaluations on the same few episodes overestimates the policy, and so does the first
-evaluation that reaches the goal. Therefore both policies are confirmed, which means evaluated once more on
-episodes of another stream. Each confirmation plays the next episodes of that stream. If many confirmations
+evaluation that reaches the goal. Therefore these two policies are confirmed, which means evaluated once more
+on episodes of another stream. Each confirmation plays the next episodes of that stream. If many confirmations
 played the same episodes, these episodes would select the policy too.
 """
 
@@ -95,7 +95,8 @@ class Selection:
         that was interrupted, or whose confirmation was interrupted.
 
         Raises:
-            Enough: the policy reaches the goal of the run, also in the confirmation if there is one.
+            Enough: the policy reaches the goal of the run in this evaluation, and in the confirmation if the
+                run confirms.
             ConfigurationError: the run has a goal, but the environment does not report success.
             Interrupted: a signal has arrived.
         """
@@ -244,7 +245,7 @@ def confirmation_of(directory: RunDirectory, step: int) -> dict[str, Any] | None
 def last_evaluated(directory: RunDirectory, step: int) -> int:
     """Return the step of the last evaluation up to `step`; 0 if there is no evaluation.
 
-    The file does not have an interrupted evaluation, so a resumed attempt repeats that evaluation.
+    The file evaluations.jsonl does not contain an interrupted evaluation, so a resumed attempt repeats it.
     """
     steps = (int(line["step"]) for line in read_lines(directory.evaluations))
     return max((each for each in steps if each <= step), default=0)

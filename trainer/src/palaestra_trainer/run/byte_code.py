@@ -1,4 +1,4 @@
-"""Find byte code in a model.zip, which only the version of Python that wrote it can run.
+"""Find byte code in a model.zip; only the version of Python that wrote the byte code can run it.
 
 Stable-Baselines3 pickles each value that JSON cannot write. A function or class that cannot be imported by
 name is stored as byte code. If another version of Python executes this code, it raises SystemError or

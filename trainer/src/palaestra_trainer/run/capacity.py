@@ -17,8 +17,8 @@ from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.job.configuration import Checkpoint
 from palaestra_trainer.job.run_directory import RunDirectory
 
-# The reserve is for the batches of an update, for evaluations, and for writing a checkpoint. They need far
-# less.
+# The reserve is for the batches of an update, for evaluations, and for writing a checkpoint. All of these
+# together need far less.
 RESERVE_BYTES = 128 << 20
 CONTROL_GROUPS = Path("/sys/fs/cgroup")
 _KIB = 1024

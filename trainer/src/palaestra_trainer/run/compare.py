@@ -37,7 +37,7 @@ class Rules:
     """The rules of a comparison of two policies.
 
     Attributes:
-        episodes: the most episodes that each policy plays.
+        episodes: the largest number of episodes that each policy plays.
         batch: number of episodes between two computations of the difference.
         margin: two success rates that differ by at most this number count as equal.
         stream: name of the seed stream.
@@ -139,9 +139,9 @@ def compare(
     """Compare the policies of two run directories until the verdict is clear or all episodes are played.
 
     Args:
-        a: the run directory in whose simulator both policies play.
-        b: the other run directory.
-        make_here: a function that returns a function that creates the simulators of a run directory.
+        a: the run directory of A; both policies play in simulators like the one of this run.
+        b: the run directory of B.
+        make_here: a function of a run directory; the result is a function that creates the simulators.
         rules: the rules of the comparison.
         report: called after each batch; the last call comes before the stop of the simulators, which takes at
             most a minute.

@@ -42,7 +42,7 @@ class ProgramReport(Progress):
     def phase(self) -> str:
         """The phase: "evaluating" if an evaluating environment made the last step recently, else "training".
 
-        By this phase the operator can distinguish an evaluation from stalled training.
+        With this phase the operator can distinguish an evaluation from stalled training.
         """
         return "evaluating" if self._evaluates and self.idle_s() < _EVALUATING_S else "training"
 
@@ -63,7 +63,7 @@ class ProgramReport(Progress):
             self.success_rate = success_rate
 
     def played(self, role: Role, infos: Sequence[Mapping[str, Any]]) -> None:
-        """Count a step of collecting environments by the infos of their rows; not of evaluating ones."""
+        """Count a step of collecting environments by the infos of its rows; ignore other environments."""
         valid = sum("sim_fault" not in ours(info) for info in infos)
         if valid:
             self.stepped(valid)

@@ -85,8 +85,8 @@ def measure(
 ) -> dict[str, Any]:
     """Evaluate the model of a run directory in the first `episodes` episodes of a seed stream.
 
-    Only the evaluating simulators of the configuration are started. If the configuration does not have any,
-    the first collecting simulator is started.
+    Only the evaluating simulators of the configuration are started. If the configuration has no evaluating
+    simulators, the first collecting simulator is started.
 
     Args:
         configuration: the configuration of the run.
@@ -98,7 +98,7 @@ def measure(
             the process ends.
 
     Raises:
-        As `playing`.
+        The same errors as `playing`.
     """
     only = configuration.model_copy(update={"simulators": _warned(configuration)})
     with ExitStack() as last, playing(only, model, make_members) as player:
@@ -140,14 +140,14 @@ def in_each(
 
 
 def evaluating(configuration: Configuration) -> tuple[SimulatorConfiguration, ...]:
-    """Return the simulators with role Evaluate; without any, the first collecting simulator."""
+    """Return the simulators with role Evaluate; if there are none, return the first collecting simulator."""
     if found := configuration.with_role(Role.EVALUATE):
         return found
     return (configuration.with_role(Role.COLLECT)[0].model_copy(update={"role": Role.EVALUATE}),)
 
 
 def _warned(configuration: Configuration) -> tuple[SimulatorConfiguration, ...]:
-    """Return the simulators that evaluate; log a warning if it is a collecting simulator."""
+    """Return the simulators that evaluate; log a warning if a collecting simulator must evaluate."""
     found = evaluating(configuration)
     if not configuration.with_role(Role.EVALUATE):
         log.warning(

@@ -1,9 +1,9 @@
-"""Create an environment without a simulator that computes rewards for hindsight experience replay.
+"""Create an environment that computes rewards for hindsight experience replay and needs no simulator.
 
 The collecting environments cannot compute these rewards, because their simulators may be restarting in other
-threads while the algorithm learns. This environment gets a robot of the job's class that is never connected,
-and is never reset or stepped. The environments of simulators are also created before their robots are
-connected. So every environment of a run can be created here too.
+threads while the algorithm learns. This environment is never reset or stepped. Its robot has the job's class
+and is never connected. The environments of simulators are also created before their robots are connected. So
+every environment of a run can be created here too.
 """
 
 from __future__ import annotations

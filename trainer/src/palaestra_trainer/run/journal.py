@@ -1,9 +1,9 @@
 """Write the counters of a run every few seconds, for the attempt after a kill.
 
-A killed process cannot save a checkpoint. The next attempt plays its steps again, but the time and the faults
-of the killed process still count. So the counters are also written to this file. The write does not wait for
-the disk. A kill does not lose the written data, and a crash of the machine loses only data that a resume does
-not need.
+A killed process cannot save a checkpoint. The next attempt repeats the steps after the last checkpoint, but
+the time and the faults of the killed process still count. So the counters are also written to this file. The
+write does not wait for the disk. A kill does not lose the written data, and a crash of the machine loses only
+data that a resume does not need.
 """
 
 from __future__ import annotations
@@ -52,8 +52,8 @@ class Journal:
     def regained(self, step: int, saved: Counters) -> Counters:
         """Return the counters of a run that resumes from `step`.
 
-        These are the `saved` counters of that step, unless the run continued after the step without a new
-        checkpoint.
+        If the run continued after `step` without a new checkpoint, most counters come from the journal,
+        because time and faults still count. Otherwise the result is `saved`, the counters of the checkpoint.
         """
         try:
             content = json.loads(self._path.read_text(encoding="utf-8"))

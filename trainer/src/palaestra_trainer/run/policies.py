@@ -41,9 +41,9 @@ class TrainedPolicy:
         model: the Stable-Baselines3 model, which needs normalized observations if the run normalized them.
         environment_id: name of the environment in which the policy learned.
         environment_options: keyword arguments of that environment, without robot and scene.
-        environment: that environment in the job, with its wrappers.
-        scales: mean, variance, clip and epsilon by the key of the observation, or by "" if it is not a Dict;
-            keys that are missing here are not normalized.
+        environment: the job's settings of that environment, including its wrappers.
+        scales: mean, variance, clip and epsilon by the key of the observation, or by "" if the observation is
+            not a Dict; values under other keys are not normalized.
     """
 
     model: BaseAlgorithm
@@ -54,7 +54,7 @@ class TrainedPolicy:
 
     @property
     def takes_masks(self) -> bool:
-        """Whether the policy chooses only among allowed actions, as one of MaskablePPO does."""
+        """Whether the policy chooses only among allowed actions, as a policy of MaskablePPO does."""
         return takes_masks(self.model)
 
     def make_env(self, robot: RobotAbc, scene: Scene) -> gymnasium.Env[Any, Any]:

@@ -46,7 +46,7 @@ def films_of(content: Mapping[str, Any]) -> dict[str, bytes]:
 
 
 def chosen(episodes: Sequence[Episode]) -> list[tuple[str, Episode]]:
-    """Return the best, the median and the worst failed episode by return, each once, with their titles.
+    """Return title and episode of the best, the median and the worst failed episode by return, each once.
 
     If the environment does not report success, or no episode failed, the third episode is the worst episode.
     """

@@ -44,7 +44,7 @@ def link_curves(directory: RunDirectory, configuration: Configuration) -> None:
 
 
 def _folder(name: str, parent: int, stack: ExitStack) -> int:
-    """Return a descriptor of a folder in an open folder; create the folder if it is missing.
+    """Return a descriptor of a folder inside the open folder `parent`; create the folder if it is missing.
 
     Other jobs write to the claim too. A job could replace a folder by a link, to make this process write into
     another folder. So this function refuses links. A descriptor always refers to the folder that was opened.

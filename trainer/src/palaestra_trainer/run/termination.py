@@ -78,7 +78,7 @@ def end_of(error: BaseException) -> End:
 def write_last_word(
     word: Termination, environment: Mapping[str, str] = os.environ, default: Path = KUBERNETES_LOG
 ) -> None:
-    """Write the termination message to the file PALAESTRA_TERMINATION_LOG, or to that of Kubernetes.
+    """Write the termination message to the file PALAESTRA_TERMINATION_LOG, or to Kubernetes' file.
 
     Outside Kubernetes the default file does not exist, and this function does not create it.
     """

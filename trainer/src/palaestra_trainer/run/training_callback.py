@@ -89,7 +89,7 @@ class TrainingCallback(BaseCallback):
         self._selection.finish(self._step)
 
     def save(self) -> None:
-        """Set the model back to the last boundary and save it; do nothing before the first boundary."""
+        """Set the model back to the last boundary and save the model; do nothing before any boundary."""
         run, state = self._run, self._boundary
         if state is None:
             return

@@ -9,9 +9,10 @@ from palaestra_trainer.simulators.interface import Environment
 
 
 class Attributes:
-    """The attributes that a program has set on a member's environment; a standby's environment gets the same.
+    """The attributes that a program sets on a member's environment; a standby's environment gets them too.
 
-    Each environment gets each value once. So a value that the environment changes later is not overwritten.
+    Each environment gets each value only once. So if the environment changes the value later, the change
+    stays.
     """
 
     def __init__(self) -> None:

@@ -63,7 +63,7 @@ class MembersVecEnv(VecEnv):
         return [is_wrapped(env, wrapper_class) for env in self._targets(indices)]
 
     def get_images(self) -> Sequence[np.ndarray | None]:
-        """Return an image of each environment; warn and return None for each without such images."""
+        """Return an image of each environment; warn and return None for an environment without images."""
         if self.render_mode != "rgb_array":
             warnings.warn(f"render_mode: is {self.render_mode}; only rgb_array gives images", stacklevel=2)
             return [None] * self.num_envs

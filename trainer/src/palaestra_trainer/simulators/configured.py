@@ -43,9 +43,10 @@ class Configured:
 def simulator_for(role: Role, world: str = "arena", driver: str = "stub") -> Configured:
     """Return a started simulator for an environment that was created without one.
 
-    If this process has a `Webots` facade that no environment uses, return its simulator, or else a simulator
-    of PALAESTRA_CONFIG. If that variable is not set, as in a notebook, start a new simulator with this world
-    and driver. The new simulator ends when it is released, or with this process.
+    If this process has a `Webots` facade that no environment uses, return the simulator of that facade.
+    Otherwise return a simulator of PALAESTRA_CONFIG. If that variable is not set, as in a notebook, start a
+    new simulator with this world and driver. The new simulator ends when it is released, or with this
+    process.
 
     Raises:
         ConfigurationError: each simulator with this role has an environment, or MuJoCo is not installed.
@@ -62,7 +63,7 @@ def own_simulator(world: str = "arena", driver: str = "stub") -> Configured:
     """Start a new simulator for one environment and return it.
 
     Raises:
-        ConfigurationError: the driver is mujoco, which is not installed.
+        ConfigurationError: the driver is `mujoco`, but MuJoCo is not installed.
         SimulatorFault: the simulator does not start.
     """
     require_driver(driver)
@@ -74,7 +75,7 @@ def require_driver(driver: str) -> None:
     """Check that simulators of this driver can be started on this machine.
 
     Raises:
-        ConfigurationError: the driver is mujoco, which is not installed.
+        ConfigurationError: the driver is `mujoco`, but MuJoCo is not installed.
     """
     if driver == "mujoco" and importlib.util.find_spec("mujoco") is None:
         raise ConfigurationError(
@@ -107,6 +108,6 @@ def configured_simulator(role: Role) -> Configured:
 
 
 def _alone(configuration: Configuration, name: str) -> Configuration:
-    """Return an unvalidated copy with only this simulator; validation would require a collecting one."""
+    """Return an unvalidated copy with only this simulator, because validation requires one that collects."""
     chosen = tuple(simulator for simulator in configuration.simulators if simulator.name == name)
     return configuration.model_copy(update={"simulators": chosen})

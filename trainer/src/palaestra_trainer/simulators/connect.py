@@ -56,7 +56,7 @@ def connect_members(configuration: Configuration) -> list[Member]:
     """Return the members of a configuration, without starting them, for a caller that restarts them.
 
     Raises:
-        As `connect`.
+        The same errors as `connect`.
     """
     simulators = connect(configuration)
     return [
@@ -110,7 +110,7 @@ class OwnSimulator:
 
     Args:
         world: the name of the world.
-        driver: stub or mujoco.
+        driver: the simulator program, `stub` or `mujoco`.
 
     Raises:
         SimulatorDead, SimulatorHung, WrongData: the simulator does not start in time.
@@ -155,12 +155,13 @@ def new_simulator(
 ) -> tuple[Simulator, ProcessLauncher]:
     """Return a simulator in a new process of this machine, not started, and the launcher of that process.
 
-    Other simulators of the same world may run: the ROS names of this one get a random suffix.
+    Other simulators of the same world may run, because the ROS names of this simulator get a random suffix.
 
     Raises:
-        ConfigurationError: the sidecar refused the world or the driver, or as `simulator_at`.
+        ConfigurationError: the sidecar refused the world or the driver, or `simulator_at` raised this error.
     """
-    # A stub ignores six such digits when it seeds its faults, so that the faults are repeatable.
+    # A stub ignores a suffix of six hexadecimal digits when it seeds its faults, so the faults are
+    # repeatable.
     launcher = ProcessLauncher(entry.world, entry.driver, suffix=f"_{entry.index}_{uuid4().hex[:6]}")
     with ExitStack() as undo:
         undo.callback(launcher.close)
@@ -170,8 +171,8 @@ def new_simulator(
 
 
 def _process(configuration: Configuration, entry: SimulatorConfiguration, run: Path) -> ProcessLauncher:
-    # The run directory may have been moved, so its worlds are searched for in it. Worlds that the image ships
-    # are outside of the run directory.
+    # The run directory may have been moved, so its worlds are searched for inside its current path. Worlds
+    # that the image ships are outside of the run directory.
     inside = run / "worlds" / Path(entry.world).name
     world = inside if inside.exists() else Path(entry.world)
     if not world.exists() or entry.driver == "command":

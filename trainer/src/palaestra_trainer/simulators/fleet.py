@@ -68,8 +68,9 @@ class Fleet:
         the background.
 
         Args:
-            check: called every tenth of a second. If it raises, for example `Interrupted`, this method raises
-                at once. A running start may then continue in its thread, but no new start begins.
+            check: called every tenth of a second. If `check` raises, for example `Interrupted`, this method
+                raises the same error at once. A running start may then continue in its thread, but no new
+                start begins.
             stepped: whether the run has already taken steps, which proves that its worlds are right.
 
         Raises:

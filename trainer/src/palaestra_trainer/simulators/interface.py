@@ -44,7 +44,7 @@ class Member(Protocol):
         ...
 
     def restart(self) -> None:
-        """Stop the simulator, in any state, and start it; raise `SimulatorFault` if that fails."""
+        """Stop the simulator, in any state, and start it; raise `SimulatorFault` if the start fails."""
         ...
 
     def abandon(self) -> None:
@@ -97,7 +97,7 @@ class Watcher(Protocol):
     """Receives the events of simulators, in the thread in which they occur."""
 
     def stepped(self, steps: int) -> None:
-        """Receive that `steps` environment steps were taken."""
+        """Receive the number of environment steps that were just taken."""
         ...
 
     def fault(self, simulator: str, fault: SimulatorFault, steps_lost: int) -> None:
@@ -105,27 +105,27 @@ class Watcher(Protocol):
         ...
 
     def started(self, simulator: str) -> None:
-        """Receive that a simulator is up for the first time."""
+        """Receive the name of a simulator that is up for the first time."""
         ...
 
     def restarted(self, simulator: str, *, recycled: bool) -> None:
-        """Receive that a simulator is up again, after a fault or after recycling."""
+        """Receive the name of a simulator that is up again, after a fault or after recycling."""
         ...
 
     def slow(self, simulator: str, seconds: float) -> None:
-        """Receive that a step took much longer than the simulator's usual steps, which is not a fault."""
+        """Receive the seconds of a step that took much longer than usual, which is not a fault."""
         ...
 
     def flapping(self, simulator: str) -> None:
-        """Receive that a simulator is being restarted again, after several restarts in a short time."""
+        """Receive the name of a simulator that is restarted again after several restarts in a short time."""
         ...
 
     def given_up(self, simulator: str) -> None:
-        """Receive that a simulator failed too often and is not restarted; its group is still large enough."""
+        """Receive the name of a simulator that failed too often and stays down; its group is large enough."""
         ...
 
     def spending(self, cause: Cause) -> AbstractContextManager[None]:
-        """Count the training thread's time inside the context under `cause`; do not switch turns inside."""
+        """Count the training thread's time in the context under `cause`; do not call `let_others` inside."""
         ...
 
 
@@ -133,27 +133,27 @@ class NullWatcher:
     """A watcher that ignores all events."""
 
     def stepped(self, steps: int) -> None:
-        """Ignore it."""
+        """Ignore the event."""
 
     def fault(self, simulator: str, fault: SimulatorFault, steps_lost: int) -> None:
-        """Ignore it."""
+        """Ignore the event."""
 
     def started(self, simulator: str) -> None:
-        """Ignore it."""
+        """Ignore the event."""
 
     def restarted(self, simulator: str, *, recycled: bool) -> None:
-        """Ignore it."""
+        """Ignore the event."""
 
     def slow(self, simulator: str, seconds: float) -> None:
-        """Ignore it."""
+        """Ignore the event."""
 
     def flapping(self, simulator: str) -> None:
-        """Ignore it."""
+        """Ignore the event."""
 
     def given_up(self, simulator: str) -> None:
-        """Ignore it."""
+        """Ignore the event."""
 
     def spending(self, cause: Cause) -> AbstractContextManager[None]:
-        """Ignore it."""
+        """Return a context that does nothing."""
         del cause
         return nullcontext()

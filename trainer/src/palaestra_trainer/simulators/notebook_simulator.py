@@ -1,6 +1,6 @@
-"""Use the simulator of a facade that a program created before its environment, as in the paper.
+"""Use the simulator of a facade that a program created before its environment.
 
-The program starts, pauses and stops the simulator, and steps it inside `with webots:` and `webots.run`.
+The program starts, pauses and stops the simulator. Steps run inside `with webots:` and `webots.run`.
 """
 
 from __future__ import annotations
@@ -132,7 +132,7 @@ class _OneLife(gymnasium.Wrapper[Any, Any, Any, Any]):
         """Return the result of the environment's step.
 
         Raises:
-            SimulatorDead: the simulator of this episode has ended, or the environment raised it.
+            SimulatorDead: the simulator of this episode has ended, or the environment raised this error.
         """
         if self.ended:
             raise SimulatorDead(self._name, "was restarted during the episode")

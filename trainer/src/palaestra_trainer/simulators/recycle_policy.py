@@ -14,7 +14,7 @@ _MIB = 2**20
 
 
 class RecyclePolicy:
-    """Compares the use of one simulator, since it was last taken into use, with its limits.
+    """Compares the resets, the minutes and the memory of one simulator with its limits.
 
     Args:
         limits: the limits of the simulator; None: no limits.
@@ -34,11 +34,11 @@ class RecyclePolicy:
         self._since = self._asked = clock()
 
     def begin(self) -> None:
-        """Count from now on; call this method after the simulator was started or has taken over."""
+        """Count resets and minutes from now on; call this method after a start or a takeover."""
         self._since = self._clock()
 
     def due(self, resets: int, episodes: int = 1) -> str | None:
-        """Return the reason to restart the simulator after `resets`, before the next `episodes`; else None.
+        """Return the reason to restart the simulator before the next `episodes`; None without a reason.
 
         Before several episodes, the limit of resets is a reason only if a restart now avoids a restart
         between these episodes.

@@ -1,9 +1,9 @@
 """Start one simulator and restart it after faults.
 
-A `Restarter` owns one member. It starts the member, restarts it after a fault if its budget allows, recycles
-it between episodes, and pauses it. A start or restart takes seconds, so it runs in a thread of the restarter.
-While that thread works, the restarter is `busy`, and other code must not use the member. Other modules decide
-the seed of an episode and the effect of a fault on learning.
+A `Restarter` owns one member. It starts the member, restarts the member after a fault if the budget allows,
+recycles the member between episodes, and pauses it. A start or restart takes seconds, so it runs in a thread
+of the restarter. While that thread works, the restarter is `busy`, and other code must not use the member.
+Other modules decide the seed of an episode and the effect of a fault on learning.
 """
 
 from __future__ import annotations
@@ -201,7 +201,7 @@ class Restarter:
         self._switch(self.member.pause)
 
     def recycle_resting(self, episodes: int) -> None:
-        """Begin to recycle the paused member if that would be due by the end of the next `episodes`."""
+        """Begin to recycle the paused member if a recycling would be due within the next `episodes`."""
         if self.up() and (reason := self.member.due(episodes)):
             self._log_recycling(reason)
             self._recycles_resting = True

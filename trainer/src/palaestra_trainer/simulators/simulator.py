@@ -85,7 +85,7 @@ class Simulator:
 
     @property
     def resets(self) -> int:
-        """Resets since the simulator was last started."""
+        """The number of resets since the simulator was last started."""
         return self.scene.resets
 
     @property

@@ -65,7 +65,7 @@ class Standby:
 
     @property
     def resets(self) -> int:
-        """Resets since the active simulator was last started."""
+        """The number of resets since the active simulator was last started."""
         return self._active.simulator.resets
 
     @property
@@ -82,7 +82,7 @@ class Standby:
         return self._both[0].left_out()
 
     def sight(self) -> Sight | None:
-        """Return the positions of robot and target in the active simulator; None: not on a floor."""
+        """Return the positions of robot and target in the active simulator; None without a floor."""
         return self._active.simulator.sight()
 
     def due(self, episodes: int = 1) -> str | None:

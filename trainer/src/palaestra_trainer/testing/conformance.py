@@ -2,7 +2,7 @@
 
 A fake, a simulated and a real robot of the same class pass the same checks, so an environment works with each
 of them. Each rule is a constant; its sentence is also the error message for a robot that breaks the rule. The
-checks move the robot, so it needs half a meter of free floor on every side.
+checks move the robot, so the robot needs half a meter of free floor on every side.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def check_robot(robot: RobotAbc) -> None:
     """Check a robot that stands on free floor against the rules for robots and for its capabilities.
 
     Raises:
-        NotConforming: with the broken rule and the observed value.
+        NotConforming: a rule is broken; the message has the rule and the observed value.
     """
     _check_time(robot)
     for capability, check in _CHECKS:
@@ -84,7 +84,7 @@ def check_scene(robot: Any, scene: Scene, start: Pose, target: tuple[float, floa
         target: x, y in meters of another free position.
 
     Raises:
-        NotConforming: with the broken rule and the observed value.
+        NotConforming: a rule is broken; the message has the rule and the observed value.
     """
     first = _drive_after_reset(robot, scene, start, target)
     second = _drive_after_reset(robot, scene, start, target)
@@ -142,7 +142,7 @@ def _knows_where_it_is(robot: object) -> bool:
 
 
 def _check_motion(robot: Any, drive: Callable[[Twist], None], wanted: Twist, rule: str) -> None:
-    """Compare the driven distance (m, m, rad) with the commanded distance, then stop the robot."""
+    """Compare the motion of the robot with the commanded motion, then stop the robot."""
     before = robot.pose()
     drive(wanted)
     elapsed_s = sum(robot.period_s * (1 + robot.advance()) for _ in range(PERIODS))

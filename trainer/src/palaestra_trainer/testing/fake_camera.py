@@ -33,7 +33,8 @@ Colors = NDArray[np.uint8]
 Depths = NDArray[np.float32]
 _Row = NDArray[np.floating[Any]]
 
-# The ray of a pixel per meter forward: meters to the left by column, and meters up by row.
+# The direction of each pixel's ray, per meter forward: meters to the left for each column, and meters up for
+# each row.
 _FOCAL = 0.5 * WIDTH / math.tan(0.5 * FIELD_OF_VIEW_RAD)  # pixels
 _LEFT: _Row = (0.5 * WIDTH - 0.5 - np.arange(WIDTH)) / _FOCAL
 _UP: _Row = (0.5 * HEIGHT - 0.5 - np.arange(HEIGHT))[:, None] / _FOCAL
@@ -42,7 +43,7 @@ _FLOOR_M: _Row = np.where(_UP < 0.0, ABOVE_M / np.maximum(-_UP, 1e-9), math.inf)
 
 @dataclass(frozen=True, slots=True)
 class _Thing:
-    """An object in an image: the meters forward to it by column, its height and its color."""
+    """An object in an image: for each column the meters forward to the object, its height and its color."""
 
     forward_m: _Row
     height_m: float
@@ -82,14 +83,14 @@ def _things(pose: Pose, target: Point, cylinders: Sequence[Point]) -> Iterator[_
 
 
 def _to_wall(position_m: float, way: _Row) -> _Row:
-    """Return for each column the meters forward to the wall that it faces."""
+    """Return, for each column, the meters forward to the wall that the column faces."""
     away = np.copysign(np.maximum(np.abs(way), 1e-9), way)
     wall: _Row = (np.copysign(HALF_SIDE_M, way) - position_m) / away
     return wall
 
 
 def _to_circle(middle: Point, ways: tuple[_Row, _Row], radius_m: float) -> _Row:
-    """Return meters forward to a circle on the floor by column; infinite if the column misses it."""
+    """Return, for each column, the meters forward to a circle on the floor; infinite without a hit."""
     x, y = ways
     squared = x**2 + y**2
     along = (middle[0] * x + middle[1] * y) / squared

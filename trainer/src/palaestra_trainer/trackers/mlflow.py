@@ -59,7 +59,7 @@ class MLflow(Tracker):
         self._client.update_run(self._run, status="RUNNING")
 
     def log_scalars(self, step: int, scalars: Mapping[str, float]) -> None:
-        """Send the scalars; if that fails, they are lost, and the first failure is logged."""
+        """Send the scalars; if the request fails, the scalars are lost, and the first failure is logged."""
         now_ms = int(time.time() * 1000)
         metrics = [Metric(name, value, now_ms, step) for name, value in scalars.items()]
         try:

@@ -19,7 +19,7 @@ from stable_baselines3.common.logger import KVWriter
 
 from palaestra_trainer.job.run_directory import RunDirectory, replace_file
 
-TENSORBOARD = "tensorboard"  # TensorBoard does not get a record whose exclusions have this name
+TENSORBOARD = "tensorboard"  # the name by which a logged value can exclude TensorBoard
 
 
 class Tracker(BaseCallback):

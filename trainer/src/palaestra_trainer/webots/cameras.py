@@ -1,4 +1,4 @@
-"""The sensors of a robot with arrays as readings: cameras, depth cameras and lidars.
+"""The sensors of a robot whose readings are arrays: cameras, depth cameras and lidars.
 
 An array is valid until the next step, which writes the next array into the same memory; see `image_decoding`.
 """
@@ -56,7 +56,7 @@ class Camera(_Rendered):
 class RangeFinder(_Rendered):
     """A depth camera; `value` is a read-only array of meters: shape (height, width), float32.
 
-    An infinite value means out of range.
+    An infinite value means that no object is in range.
     """
 
     __slots__ = ()
@@ -77,8 +77,8 @@ class RangeFinder(_Rendered):
 class Lidar(Sensor):
     """A lidar; `value` is a read-only array of meters: shape (layers, rays), float32.
 
-    An infinite value means out of range. Layers are ordered from the top down. The rays of a layer are
-    ordered from left to right.
+    An infinite value means that no object is in range. The layers are ordered from the top down. The rays of
+    a layer are ordered from left to right.
     """
 
     __slots__ = ()
@@ -88,7 +88,7 @@ class Lidar(Sensor):
 
 
 class LidarPoints(Sensor):
-    """The point cloud of a lidar, which this sensor enables too.
+    """The point cloud of a lidar; this sensor also enables the lidar.
 
     A robot may have a `Lidar` of the same device in addition. `value` is a read-only array: shape (layers *
     rays, 3), float32, with x, y and z in meters in the lidar's frame. The values of a ray without a hit are

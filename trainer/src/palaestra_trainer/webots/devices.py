@@ -61,7 +61,7 @@ class Sensor:
         return self._value
 
     def enable(self, period_ms: int) -> None:
-        """Make the sensor publish every `period_ms` of simulated time, and subscribe to it.
+        """Make the sensor publish every `period_ms` of simulated time, and subscribe to its topic.
 
         Raises:
             WrongData: the period is not a multiple of the step.

@@ -1,7 +1,7 @@
-"""The facade of the paper, which starts Webots on demand.
+"""The facade `Webots`, which starts a simulator on demand; CITATION.cff cites the paper that describes it.
 
-Simulated time passes only inside `with webots:` and `webots.run(...)`. Outside of these, every simulator is
-paused, because a running simulator uses a whole core even between steps.
+Simulated time passes only inside `with webots:` and `webots.run(...)`. Outside of these blocks and calls,
+every simulator is paused, because a running simulator uses a whole core even between steps.
 """
 
 from __future__ import annotations
@@ -144,10 +144,10 @@ class Webots:
         """Start the simulator and wait until it responds and its robots are connected.
 
         If the simulator already runs, its connections are opened again. If it hangs, it is restarted. Outside
-        `with webots:` it is paused afterwards.
+        `with webots:`, the simulator is paused afterwards.
 
         Raises:
-            SimulatorDead: its process ended.
+            SimulatorDead: the process of the simulator ended.
             SimulatorHung: it did not respond in time.
             WrongData: the simulator refuses to pause, or refuses the devices of a robot.
         """

@@ -1,8 +1,8 @@
 """The registry of the open facades of this process, which environments may use.
 
-If a notebook creates an environment after `Webots(...)`, the environment should use that simulator. A facade
-is offered until it is closed, except while an environment uses it. A forked process does not use the facades
-of its parent.
+If a notebook creates an environment after `Webots(...)`, the environment should use the simulator of this
+facade. A facade is offered until it is closed, except while an environment uses it. A forked process does not
+use the facades of its parent.
 """
 
 from __future__ import annotations

@@ -4,8 +4,9 @@ An array is a read-only view of the bytes that the connection received. The arra
 step, because the next message is written into the same memory. The numbers of the array may be unaligned in
 memory; a copy is aligned.
 
-All messages of one device have the same head except for sequence number and time. So a head is parsed once,
-and the heads of later messages are only compared with the parsed head.
+The head of a message is all bytes before the numbers. All messages of one device have the same head except
+for sequence number and time. So a head is parsed once, and the heads of later messages are only compared with
+the parsed head.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The sensors of a robot that measure its place, its motion and its environment, as tuples of numbers."""
+"""Sensors that measure the position, the motion and the environment of a robot, as tuples of numbers."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class _AxesSensor(Sensor):
         robot: the ROS name of the robot's controller.
         device: the device's name in the world.
         axes: the axes to read, in their order in `value`. Leave out an axis that is switched off in the
-            world, because the simulator then sends NaN for it.
+            world, because the simulator then sends NaN for this axis.
 
     Raises:
         ConfigurationError: `axes` contains other letters than x, y and z.
@@ -63,7 +63,7 @@ class Gyro(_AxesSensor):
 class Accelerometer(_AxesSensor):
     """An accelerometer; `value` is the acceleration along the sensor's axes in m/s2: x, y, z.
 
-    At rest it is the reaction to gravity, so the axis that points up reads 9.81.
+    At rest, `value` is the reaction to gravity, so the axis that points up reads 9.81.
     """
 
     __slots__ = ()
@@ -99,8 +99,8 @@ class InertialUnit(Sensor):
     def roll_pitch_yaw(self) -> tuple[float, float, float] | None:
         """The same rotation as angles in radians, about x, then y, then z of a world whose z axis points up.
 
-        None before the first step. At a pitch of 90 degrees, only the sum or the difference of roll and yaw
-        is defined.
+        The value is None before the first step. At a pitch of 90 degrees, only the sum or the difference of
+        roll and yaw is defined.
         """
         if self.value is None:
             return None

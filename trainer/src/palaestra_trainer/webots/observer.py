@@ -144,7 +144,7 @@ class Observer:
         return self._surroundings.read()
 
     def scene(self) -> VisibleScene | None:
-        """Return the visible objects of the world; None if the simulator does not describe them (Webots)."""
+        """Return the visible objects of the world; None: the simulator, such as Webots, cannot list them."""
         if not is_served(f"/{self.node_name}/{_SCENE}"):
             return None
         return self._read(VisibleScene, _SCENE, MOST_SCENE_BYTES)

@@ -1,10 +1,10 @@
 """Read the objects in a world from its nodes, through the supervisor.
 
 An object is a Solid at the top of the scene tree whose boundingObject consists of boxes, cylinders, capsules
-and spheres. The shapes of an object are read once after each start. Its position is read at every `read`, so
-a moved object has its current position. The floor is the Solid with DEF `FLOOR` and a box, or a
-RectangleArena or Floor of Webots. The reader ignores Solids inside other nodes, and Solids that a program
-adds while the simulation runs.
+and spheres. The shapes of an object are read once after each start. The position of an object is read at
+every `read`, so a moved object has its current position. The floor is the Solid with DEF `FLOOR` and a box,
+or a RectangleArena or Floor of Webots. The reader ignores Solids inside other nodes, and Solids that a
+program adds while the simulation runs.
 """
 
 from __future__ import annotations

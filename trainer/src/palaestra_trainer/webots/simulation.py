@@ -2,8 +2,7 @@
 
 One step lasts one period for all robots of the world, and in this period every sensor sends one message. The
 controller can miss its own wake-up, and then sends no messages for that step. So the wait for a message is
-limited. After this wait, the simulation steps once more. Such an extra step is not a fault, but it is
-counted.
+limited. After this wait, the simulation steps once more. An extra step is not a fault, but it is counted.
 
 While the simulation is paused, no step is requested. The controller would wait for simulated time to pass,
 and could not receive the request that ends the pause.
@@ -88,7 +87,8 @@ class Stepper:
         """Add a sensor unless it is already known; if the simulator is connected, enable the sensor.
 
         Raises:
-            WorldMisfit: the robot lacks the sensor, or the sensor cannot be enabled; it is then not added.
+            WorldMisfit: the robot lacks the sensor, or the sensor cannot be enabled; the sensor is then not
+                added.
             SimulatorDead, SimulatorHung, WrongData
         """
         if sensor in self._sensors:
@@ -129,7 +129,7 @@ class Stepper:
 
         Raises:
             KeyError: the node is not tracked.
-            SimulatorDead, SimulatorHung, WrongData: before the first step, a request reads the pose, and it
+            SimulatorDead, SimulatorHung, WrongData: no step has been taken yet, and the request for the pose
                 failed.
         """
         return self._tracked[name] or self._observer.pose(name)
@@ -156,7 +156,7 @@ class Stepper:
         """Simulate one period and read every sensor; return the number of extra steps, normally 0.
 
         Raises:
-            Paused: the simulation is paused; nothing was sent.
+            Paused: the simulation is paused; no request was sent.
             SimulatorDead, SimulatorHung: also if a sensor does not send a message.
             WrongData: the simulator refused the period, or a reading is invalid.
         """
@@ -177,7 +177,7 @@ class Stepper:
         """Reset the simulation with a seed; afterwards the scene places its nodes.
 
         Raises:
-            Paused: the simulation is paused; nothing was sent.
+            Paused: the simulation is paused; no request was sent.
             SimulatorDead, SimulatorHung, WrongData
         """
         if self._supervisor.paused:
@@ -219,7 +219,7 @@ class Stepper:
             silent = self._read_sensors()
             for name in self._tracked:
                 self._tracked[name] = self._observer.finish_pose(name)
-        except BaseException:  # after Ctrl-C too: messages that arrive later belong to this step
+        except BaseException:  # after Ctrl-C too, because messages that arrive later belong to this step
             for sensor in self._sensors:
                 sensor.late = True
             raise
@@ -254,5 +254,5 @@ class Stepper:
 
 
 def _busy_s() -> float:
-    """Return a clock that counts only the seconds in which this thread works for this simulator."""
+    """Return the time on a clock that runs only while this thread works for this simulator."""
     return time.perf_counter() - away_s() - waited_s()

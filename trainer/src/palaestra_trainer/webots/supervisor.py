@@ -122,8 +122,9 @@ class Supervisor:
     def get_field(self, name: str, field: str, index: int = 0) -> Value:
         """Return the value of a field of the node with DEF `name`, in the type of the field.
 
-        The value is a bool, int, float or str, or a tuple: x, y (, z); red, green, blue; or a rotation as x,
-        y, z of its axis and the angle in radians. `index` selects a value of a field with several values.
+        The value is a bool, int, float or str, or a tuple. The tuple is a vector (x, y or x, y, z), a color
+        (red, green, blue), or a rotation: x, y, z of its axis and the angle in radians. `index` selects a
+        value of a field with several values.
 
         Raises:
             ConfigurationError: the field holds nodes.

@@ -49,12 +49,12 @@ class Zero:
         self._action = zero_of(space)
 
     def act(self, mask: np.ndarray | None) -> Any:
-        """Return the action."""
+        """Return the same action at each call."""
         del mask
         return self._action
 
     def got(self, step: int, reward: float) -> None:
-        """Ignore it."""
+        """Ignore the reward."""
 
 
 class Random:
@@ -66,7 +66,7 @@ class Random:
         self._space.seed(seed)
 
     def act(self, mask: np.ndarray | None) -> Any:
-        """Return the action."""
+        """Return a random allowed action."""
         if mask is None:
             return self._space.sample()
         parts = np.split(mask, np.cumsum(choices_of(self._space))[:-1])
@@ -77,7 +77,7 @@ class Random:
         return np.asarray(np.reshape(np.array(chosen), space.shape) + getattr(space, "start", 0), space.dtype)
 
     def got(self, step: int, reward: float) -> None:
-        """Ignore it."""
+        """Ignore the reward."""
 
 
 def zero_of(space: spaces.Space[Any]) -> Any:

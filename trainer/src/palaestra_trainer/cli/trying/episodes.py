@@ -167,7 +167,7 @@ def _equal(one: Any, other: Any) -> bool:
 
 
 def _transport_s(restarter: Restarter) -> float:
-    """Return the seconds so far that the member spent on transport; 0 without a simulation."""
+    """Return the seconds that the member has spent on transport so far; 0 if it has no simulation."""
     robot = getattr(restarter.member, "robot", None)
     return float(robot.simulation.transport_s) if robot is not None else 0.0
 

@@ -24,7 +24,7 @@ _MOST_BYTES = 64
 
 @contextmanager
 def keys_at_once() -> Iterator[int]:
-    """Set the terminal so that each key arrives at once, and yield its descriptor; restore it at the end."""
+    """Make each key of the terminal arrive at once; yield its descriptor; restore the terminal at the end."""
     descriptor = sys.stdin.fileno()
     before = termios.tcgetattr(descriptor)
     try:
@@ -56,7 +56,8 @@ class Keyboard:
         """Return the action of the next key.
 
         Raises:
-            EndEpisode, EndTry: the person pressed the key for that, or closed the terminal.
+            EndEpisode, EndTry: the person pressed the key for the next episode or for the end, or closed the
+                terminal.
         """
         del mask
         while True:

@@ -62,7 +62,7 @@ def beyond(space: spaces.Space[Any], observation: Any) -> str:
     for name, part in parts:
         value = observation[name] if name else observation
         if fact := mismatch(part, value):
-            # The sentence omits the value, because with it each step would add a different problem.
+            # The sentence omits the value, because otherwise each step would add a different problem.
             where = f"observation {name}".rstrip()
             known = fact if not isinstance(part, spaces.Box) else _outside(part, np.asarray(value))
             return f"{where} is not in its space: {known}; widen the space, or clip the observation"

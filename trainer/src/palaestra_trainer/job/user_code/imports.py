@@ -47,10 +47,10 @@ def object_named(name: str, subject: str) -> Any:
 
     Args:
         name: `module:object`.
-        subject: the subject of messages: a field of the job and its value.
+        subject: beginning of error messages, a field of the job and its value.
 
     Raises:
-        ConfigurationError: it cannot be imported.
+        ConfigurationError: the import failed, or the name does not exist.
     """
     module, _, attribute = name.partition(":")
     found = module_named(module, subject)
@@ -62,7 +62,7 @@ def module_named(name: str, subject: str) -> ModuleType:
     """Import and return the module with this name; for `subject` see `object_named`.
 
     Raises:
-        ConfigurationError: it cannot be imported.
+        ConfigurationError: the import failed, or the name does not exist.
     """
     with _reported(subject, "correct the module", _INSTALL):
         return importlib.import_module(name)

@@ -28,7 +28,7 @@ class Manifest:
         step: number of valid environment steps that the model has learned from.
         seed: the replica's seed.
         algorithm: name and hyperparameters of the run.
-        environment: id, reward and options of the run.
+        environment: id, reward, options and wrappers of the run's environment.
         counters: counters of the run, see `progress.Counters`.
         files: sha256 of each file of the checkpoint except the manifest.
         format: version of this format.

@@ -17,7 +17,7 @@ _ARRAY, _TENSOR, _PLAIN = "array:", "tensor:", "plain"
 
 
 def write(model: BaseAlgorithm, folder: Path) -> None:
-    """Write the state of the model's buffer, if its class is a job author's.
+    """Write the state of the model's buffer, if the buffer's class is from the job's author.
 
     Raises:
         ConfigurationError: the buffer has a value that a checkpoint cannot hold.

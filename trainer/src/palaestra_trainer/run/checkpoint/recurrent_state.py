@@ -12,7 +12,7 @@ from palaestra_trainer.algorithms.rollout_state import rollout_state_of
 
 
 def networks(model: BaseAlgorithm) -> list[torch.Tensor]:
-    """Return the tensors of the networks that a rollout changes, not copies."""
+    """Return the tensors themselves, not copies, of the networks that a rollout changes."""
     return [
         tensor
         for name in rollout_state_of(model).networks

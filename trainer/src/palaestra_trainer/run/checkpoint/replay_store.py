@@ -1,7 +1,8 @@
-"""Save and load a replay buffer: chunks of rows as in memory, which later checkpoints share.
+"""Save and load a replay buffer in chunks of rows; later checkpoints share the unchanged chunks.
 
 Few rows change between two checkpoints. For a chunk without a changed row, the new checkpoint has a hard link
-to the file of the previous checkpoint. If the volume does not support hard links, it has a copy.
+to the file of the previous checkpoint. If the volume does not support hard links, the new checkpoint has a
+copy of the file.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """The state on which the next step of a run depends, except for saved tensors and experience.
 
 The training callback records this state at each boundary between rollouts, for off-policy algorithms every
-few steps. So it must be fast, and takes some ten microseconds. The state holds references to objects that
-later steps do not change, and copies of small objects.
+few steps. So the recording must be fast; it takes some ten microseconds. The state holds references to
+objects that later steps do not change, and copies of small objects.
 """
 
 from __future__ import annotations
@@ -55,9 +55,10 @@ class TrainingState:
             model.zip has them.
         memories: states of recurrent networks, each of shape (layers, members, units).
         action_noise: state of the noise on each member's actions; None if the noise has no state.
-        scales: statistics of observations and rewards, if they are normalized; `write` omits them too.
-        running_returns: for each member the discounted reward of its episode so far; None without
-            normalization.
+        scales: statistics of observations and rewards, if these are normalized; `write` omits the statistics
+            too.
+        running_returns: for each member, the discounted sum of the rewards in its open episode so far; None
+            without normalization.
     """
 
     numbers: dict[str, float]

@@ -24,7 +24,8 @@ MOST_BYTES = 2**20  # size limit of the file; the counters of the run still coun
 class FaultLog:
     """Writes the faults of one attempt; any thread may call its methods.
 
-    A full disk is logged once. It does not end the run here, because the next checkpoint reports it.
+    A full disk is logged once. This class does not end the run, because the next checkpoint reports the full
+    disk.
 
     Args:
         path: the file; it may be missing.

@@ -31,10 +31,10 @@ class MetricValues:
         lengths: histogram of the lengths of training episodes, in steps.
         successes: success of the last training episodes, if the environment reports success.
         evaluations: number of evaluations.
-        evaluation: the last evaluation; None before the first.
+        evaluation: the last evaluation; None before the first evaluation.
         saves: histogram of the seconds to write a checkpoint.
-        saved_at: Unix time of the newest checkpoint; None before the first.
-        saved_bytes: size of the newest checkpoint's files; None before the first.
+        saved_at: Unix time of the newest checkpoint; None before the first checkpoint.
+        saved_bytes: size of the newest checkpoint's files; None before the first checkpoint.
         saves_refused: number of checkpoints that could not be written.
         logged: the values that the learner logged last, by their names in TensorBoard.
         meters: the statistics of each simulator, by its name.

@@ -52,7 +52,8 @@ class Counters:
 
     Attributes:
         episodes: number of collected episodes that ended without a fault.
-        faults: number of faults by kind: dead, hung and wrong_data; also of slow steps, which are not faults.
+        faults: number of faults by kind: `dead`, `hung` and `wrong_data`; `slow` counts slow steps, which are
+            not faults.
         restarts: number of restarts of simulators after faults.
         recycled: number of restarts of healthy simulators.
         given_up: number of simulators that were given up while the run continued.
@@ -77,7 +78,7 @@ class Counters:
 
     @property
     def broken(self) -> int:
-        """Number of faults of all kinds except slow."""
+        """Number of faults of all kinds except `slow`."""
         return self.faults.total() - self.faults[FaultKind.SLOW]
 
     def to_json(self) -> dict[str, Any]:
@@ -100,10 +101,10 @@ class Progress:
         step: number of valid environment steps so far, over all attempts.
         target: number of steps at which the run ends.
         counters: counts over all attempts, without the time of this attempt; `counted` adds that time.
-        success_rate: success rate of this attempt's last evaluation or confirmation; None before the first,
-            or if the environment does not report success.
+        success_rate: success rate of this attempt's last evaluation or confirmation; None before the first
+            evaluation, or if the environment does not report success.
         success_interval: the interval around `success_rate`; None if the rate is None.
-        checkpoint: the newest checkpoint; None before the first.
+        checkpoint: the newest checkpoint; None before the first checkpoint.
         attempt: number of this attempt in the run directory; None before the attempt is recorded.
         figures: values of this attempt only, for /metrics.
         fault_log: the file of faults; None: faults are not written to a file.
@@ -211,11 +212,11 @@ class Progress:
             self._standings.add(simulator, role)
 
     def has_standby(self, simulator: str, ask: AskStandby) -> None:
-        """Set the function that returns the state of the simulator's spare; any thread may call it."""
+        """Set the function, called by any thread, that returns the state of the simulator's spare."""
         self._standings.has_standby(simulator, ask)
 
     def reports_left_out(self, simulator: str, ask: AskLeftOut) -> None:
-        """Set the function that returns the parts that the simulator left out; any thread may call it."""
+        """Set the function, called by any thread, that returns the parts that the simulator left out."""
         self._standings.reports_left_out(simulator, ask)
 
     def left_out(self) -> tuple[str, ...]:
@@ -295,17 +296,17 @@ class Progress:
         return totals | faults | spent
 
     def faults_by_kind(self) -> Mapping[tuple[str, ...], int]:
-        """Return the faults in this attempt by simulator and kind."""
+        """Return the number of faults in this attempt by simulator and kind."""
         with self._lock:
             return self._standings.faults_by_kind()
 
     def restarts_by_cause(self) -> Mapping[tuple[str, ...], int]:
-        """Return the restarts in this attempt by simulator and cause: a kind of fault, or recycling."""
+        """Return the number of restarts in this attempt by simulator and cause: a fault kind or recycling."""
         with self._lock:
             return self._standings.restarts_by_cause()
 
     def restarts(self) -> int:
-        """Return the restarts of simulators after faults, in this attempt.
+        """Return the number of restarts of simulators after faults in this attempt.
 
         This method never blocks, because the watchdog calls it while other threads hang.
         """

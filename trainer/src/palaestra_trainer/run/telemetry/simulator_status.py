@@ -89,11 +89,11 @@ class SimulatorStatuses:
         standing.state, standing.given_up = "failed", True
 
     def has_standby(self, simulator: str, ask: AskStandby) -> None:
-        """Set the function that returns the state of the simulator's spare; any thread may call it."""
+        """Set the function, called by any thread, that returns the state of the simulator's spare."""
         self._all[simulator].standby = ask
 
     def reports_left_out(self, simulator: str, ask: AskLeftOut) -> None:
-        """Set the function that returns the parts that the simulator left out; any thread may call it."""
+        """Set the function, called by any thread, that returns the parts that the simulator left out."""
         self._all[simulator].left_out = ask
 
     def left_out(self) -> tuple[str, ...]:
@@ -105,7 +105,7 @@ class SimulatorStatuses:
         return tuple(f"{group}: {line}" for group, lines in reports.items() for line in lines)
 
     def restarts(self) -> int:
-        """Return the restarts after faults of all simulators."""
+        """Return the number of restarts after faults, of all simulators together."""
         return sum(standing.restarts.total() for standing in self._all.values())
 
     def down(self) -> list[str]:

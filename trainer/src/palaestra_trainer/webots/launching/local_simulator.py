@@ -1,4 +1,4 @@
-"""Run simulators as processes of this machine, for notebooks and scripts without a pod or a runner.
+"""Run simulators as processes of this machine, for notebooks and scripts outside of a pod.
 
 The trainer starts a sidecar, which starts the simulator. So restarts, kills and clean ends use the same code
 as in a pod.
@@ -29,7 +29,7 @@ class ProcessLauncher(Sidecar):
 
     Args:
         world: path of the world, or the name of a world that Palaestra ships.
-        driver: the simulator program: stub, mujoco or webots.
+        driver: the simulator program, `stub`, `mujoco` or `webots`.
         options: command-line options for the simulator.
         names: sidecar options that set the ROS names of the robots.
         suffix: text that is appended to the ROS names in the world.
@@ -102,6 +102,6 @@ class ProcessLauncher(Sidecar):
 
 
 def _program(name: str) -> list[str]:
-    """Return the command of a program: its path next to this interpreter, or else its name for PATH."""
+    """Return the command of a program: its path next to this interpreter, or else its name."""
     installed = Path(sys.executable).with_name(name)
     return [str(installed) if installed.exists() else name]

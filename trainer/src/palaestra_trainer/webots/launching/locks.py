@@ -1,8 +1,8 @@
 """File locks between processes of one machine; the kernel releases a lock when its process ends.
 
 The locks are POSIX record locks, which a forked process does not inherit. A forked process would inherit a
-lock of `flock`, but it must neither share nor release the lock of its parent. A record lock does not exclude
-other threads of its process. So this module keeps a set of the locks that this process holds.
+lock of `flock`, but the process must neither share nor release its parent's lock. A record lock does not
+exclude other threads of its process. So this module keeps a set of the locks that this process holds.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class FileLock:
 
     @property
     def held(self) -> bool:
-        """Whether this process holds the lock; in a process that was forked later, it is False."""
+        """Whether this process holds the lock; False in a process that was forked later."""
         return self._descriptor is not None and self._owner == os.getpid()
 
     def release(self) -> None:
