@@ -1,8 +1,7 @@
 """Copy a run's results out of its volume, through the running pod or through a temporary pod.
 
 The target folder is either complete or absent. The files are written to a temporary folder next to it, which
-is renamed at the end. The reason for which a command in a container sends the files is in
-docs/decisions/0011.
+is renamed at the end. docs/decisions/0011 explains why a command in a container sends the files.
 """
 
 import secrets

@@ -286,7 +286,7 @@ class Api:
         fields: str | None = None,
         seconds: float,
     ) -> Watch:
-        """Return the changes after `version`: that of a list, or of the last event of an earlier watch.
+        """Return the changes after `version`, the version of a list or of an earlier watch's last event.
 
         The API server ends the watch after `seconds`. Iterate over the watch once, until it ends or is
         closed.

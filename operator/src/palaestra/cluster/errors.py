@@ -74,7 +74,7 @@ class AlreadyExists(ApiError):
 
 
 class Conflict(ApiError):
-    """Another client changed the object since it was read, or it has another uid."""
+    """Another client changed the object since it was read, or replaced it by an object with another uid."""
 
     retryable = True
 

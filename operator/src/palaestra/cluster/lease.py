@@ -24,7 +24,7 @@ from palaestra.objects import Object
 log = structlog.get_logger("palaestra.cluster")
 
 DURATION_S = 15.0
-RENEW_S = 3.0  # between renewals; three may fail before the leader must stop
+RENEW_S = 3.0  # seconds between renewals; three may fail before the leader must stop
 
 
 def _nothing() -> None:
@@ -135,7 +135,7 @@ class Leadership:
         except NotFound:
             self._create(sent)
             return
-        # Another process wrote the Lease, or this process did but did not receive the response.
+        # Another process wrote the Lease, or this process wrote it but did not receive the response.
         except Conflict:
             found = self._api.get(LEASES, self._namespace, self._name)
         claim = LeaseSpec.read(found)

@@ -98,7 +98,7 @@ def _message(command: websocket.WebSocket, deadline: float) -> tuple[int, bytes]
     if opcode == websocket.ABNF.OPCODE_CLOSE:
         raise Unreachable(0, "Unreachable", "the command's output broke off (the connection was closed)")
     if opcode not in (websocket.ABNF.OPCODE_BINARY, websocket.ABNF.OPCODE_TEXT) or not frame.data:
-        return -1, b""  # the frame is a ping, to which the library has responded, or empty
+        return -1, b""  # the frame is empty, or a ping to which the library has responded
     return frame.data[0], frame.data[1:]
 
 

@@ -10,7 +10,7 @@ from palaestra.cluster.transport import read_some
 
 
 def lines(response: BaseHTTPResponse, deadline: float) -> Iterator[str]:
-    """Yield each line without its line end, as soon as the line is complete; the last may lack a line end.
+    """Yield each line, without its line end, as soon as it is complete; at the end, yield an incomplete line.
 
     Args:
         response: the response, which is closed at the end.

@@ -17,7 +17,7 @@ class Resource:
         namespaced: whether objects are in namespaces; False for cluster-scoped kinds.
         metadata_only: whether to read only the metadata of objects, for example so that the content of
             Secrets is not transferred.
-        page: number of objects that a cache reads in one page, so that pages stay small.
+        page: number of objects that a cache requests in one page of a list.
     """
 
     api_version: str

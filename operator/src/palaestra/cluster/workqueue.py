@@ -161,6 +161,6 @@ class WorkQueue(Generic[Item]):
     def _promote(self, now: float) -> None:
         while self._later and self._later[0][0] <= now:
             due, _, key = heapq.heappop(self._later)
-            if self._due.get(key) == due:  # otherwise a request with an earlier time has replaced this one
+            if self._due.get(key) == due:  # otherwise `add_after` has set an earlier time since
                 del self._due[key]
                 self._add(key, due)

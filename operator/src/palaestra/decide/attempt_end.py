@@ -127,7 +127,7 @@ def deleted(attempt: EndedAttempt) -> Explanation | None:
         return stop
     if job is not None and (job.suspended or ended_by_suspension(attempt.situation.seen, pod)):
         return paused(attempt.situation)
-    # The Job counts this end as a failure too.
+    # The trainer failed before the deletion ended it, so the Job counts a failure too.
     if attempt.code not in {None, ExitCode.INTERRUPTED} or failed_by_itself(pod):
         how = f"{how_it_failed(attempt.situation, pod)}; its pod was deleted, and it did not save in time"
         return explain(Reason.TRAINER_FAILED, how=how)
@@ -203,7 +203,7 @@ def storage_full(attempt: EndedAttempt) -> Explanation | None:
     return full_volume(attempt.word)
 
 
-# These causes would end a new pod too.
+# These causes would also end the next pod, so a retry cannot help.
 CAUSES: tuple[EndCheck, ...] = (
     configuration_refused,
     simulator_budget_spent,

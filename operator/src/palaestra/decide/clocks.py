@@ -13,7 +13,7 @@ from datetime import UTC, datetime, timedelta
 
 from palaestra.decide.explanation import Explanation
 
-WaitKey = tuple[int | str, ...]  # the replica, then `Wait.key`
+WaitKey = tuple[int | str, ...]  # the number of the replica, then the items of `Wait.key`
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

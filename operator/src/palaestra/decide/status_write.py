@@ -34,7 +34,7 @@ _OF_REPLICA = frozenset(
 )  # fmt: skip
 _AMOUNT = re.compile(r"\d[\w.]*")  # an amount, such as 425m or 1.5Gi
 
-# Of the whole object in a request; etcd accepts 1,572,864 bytes, including managedFields.
+# Limit of the whole object in a request; etcd accepts 1,572,864 bytes, including managedFields.
 MOST_BYTES = 1_400_000
 SHORT = 100  # bytes of a shortened message in a request
 
@@ -130,7 +130,7 @@ def _size(data: Any) -> int:
 
 
 def _taken(job: Mapping[str, Any]) -> int:
-    """Return the bytes of a job without its status; all small jobs count as the largest small job."""
+    """Return the bytes of a job without its status; a job without a noted size counts as `SMALL` bytes."""
     noted = text(part(job, "metadata", "annotations"), SIZE)
     return int(noted) if noted.isdecimal() else SMALL
 

@@ -5,7 +5,7 @@ other end only the runner has. So the pipe closes when the runner ends or closes
 the signals of a terminal.
 
 A marker in the environment identifies a pod's processes. Grandchildren inherit the marker through `setsid`,
-double forks and new process groups, in which a parent-death signal or a process group would miss them.
+double forks and new process groups. A parent-death signal or a signal to a process group would miss them.
 Between its fork and its exec, a child of the runner has no marker yet, but keeps the pipe open, so the
 program waits for it.
 

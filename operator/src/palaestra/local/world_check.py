@@ -39,7 +39,7 @@ class WorldCheckResult:
 
 
 def check_world(world: Path, options: Sequence[str] = ()) -> tuple[WorldCheckResult, ...]:
-    """Return the result of each simulator; a simulator that does not respond counts as not starting.
+    """Return the result of each simulator; without a response, `starts` is False.
 
     The stub is always run, and MuJoCo if it is installed. Each program gets the options with which it would
     start.

@@ -30,7 +30,9 @@ class ReferenceKind(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReferencedObject:
-    """An object of the job's namespace to which its spec refers; `field` is the first such field.
+    """An object in the job's namespace to which the job's spec refers.
+
+    `field` is the first field of the spec that refers to the object.
 
     Two references are equal if they name the same object.
     """
@@ -54,8 +56,8 @@ class Objects:
 
     Attributes:
         jobs, pods, claims, config_maps, policies: objects in the TrainingJob's namespace whose label
-            palaestra.dev/job has its name; `jobs` also has Jobs of other owners with a name that the
-            TrainingJob needs.
+            palaestra.dev/job has the TrainingJob's name. `jobs` also has Jobs of other owners with a name
+            that the TrainingJob needs.
         events: FailedCreate events about those Jobs, warnings about pods that wait for volumes, and events
             about trainers that the kubelet ended.
         unadmitted: Kueue's reason not to admit a Job, by the Job's uid; absent if it was not requested.
@@ -140,7 +142,7 @@ class PodView:
 
     Attributes:
         version: its resourceVersion.
-        started: the time at which a kubelet accepted the pod; None if no kubelet has.
+        started: the time at which a kubelet accepted the pod; None if no kubelet has accepted it.
         phase: Pending, Running, Succeeded, Failed or Unknown.
         reason, message: the pod's own reason and message, for example after an eviction; usually "".
         ready: whether the kubelet reports the pod as ready; False if unknown.
@@ -250,10 +252,10 @@ class JobView:
         suspended: the current value of `spec.suspend`.
         suspend_set: the value of `spec.suspend` that the operator set last, from its annotation; None: the
             Job has no annotation, for example because the operator created the Job for a queue.
-        suspension: the operator's mark about the pod that its last suspension ended, or None.
+        suspension: the operator's mark about the pod that the Job's last suspension ended, or None.
         paused: the time of the suspension by the Job controller's clock; None: the Job is not suspended.
         resumed: the time of the last resumption by the Job controller's clock; None: the Job was never
-            suspended, or still is.
+            suspended, or is suspended now.
         stopped: reason and message of the operator's stop mark, or None.
         replaced: the operator's mark about the pods that it replaced, or None.
         failures: number of pods that failed and count against backoffLimit.
@@ -261,7 +263,7 @@ class JobView:
         settings: fields of the Job's spec that other clients may change; a missing field is absent.
         deleting: whether the Job is being deleted.
         volumes: names of the ConfigMaps and claims that the Job's pods mount.
-        queue: the Job's Kueue queue, from the spec or a namespace's default, or "".
+        queue: the name of the Job's Kueue queue, from the spec or the namespace's default; "" without one.
     """
 
     name: str
@@ -286,7 +288,7 @@ class JobView:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ForeignJob:
-    """A Job of another owner whose name a TrainingJob needs; `deleting`: whether it is being deleted."""
+    """A Job of another owner with a name that a TrainingJob needs; `deleting`: the Job is being deleted."""
 
     name: str
     deleting: bool

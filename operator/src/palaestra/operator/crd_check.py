@@ -84,7 +84,7 @@ class CrdCheck:
         """Return a status without the conditions whose types the definition does not allow.
 
         Until the definition was read, a new type is allowed only if the `stored` status has a condition of
-        it.
+        this type.
         """
         if self._knows_new:
             return status

@@ -115,7 +115,7 @@ class Workers:
         return "done"
 
     def _retry_conflict(self, key: Key, error: Exception) -> None:
-        """Retry later; log no single conflict, and repeated conflicts of a key ever more rarely."""
+        """Retry later; log only repeated conflicts of a key, and log them ever more rarely."""
         again_s = self._retry(key)
         times = self._queue.failures(key)
         if times >= REPEATS and times & (times - 1) == 0:

@@ -33,7 +33,7 @@ class Ports:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Images:
-    """The release's images, which jobs use that do not name images."""
+    """The release's images, for jobs that do not name images."""
 
     trainer: str
     stub: str
@@ -74,7 +74,7 @@ class ContainerPaths:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Allowed:
-    """The settings with effects outside of its own pods that an installation allows a job to have.
+    """The values that an installation allows in those settings of a job that affect other users.
 
     Attributes:
         pod_labels: keys of labels that jobs may give their pods, or domains that end in `/`.
@@ -164,7 +164,7 @@ class Layout(Protocol):
         ...
 
     def another_run(self, uid: str, replica: int) -> str:
-        """Return the directory of a run on the same volume: that of a replica of the job with `uid`.
+        """Return the directory of another run on the same volume: of a replica of the job with `uid`.
 
         Raises:
             PlanError: in this layout, jobs cannot share a volume.
@@ -223,7 +223,7 @@ class LocalLayout:
     # An address, because a minimal chroot has no /etc/hosts that defines localhost.
     ros_hostname: str = "127.0.0.1"
     health_host: str = "127.0.0.1"
-    # Short, because a person waits, and the start includes no image pull and no mount.
+    # This limit is short, because a person waits, and the start includes no image pull and no mount.
     longest_start_s: int = 600
     operator_namespace: None = None
     monitoring_namespace: None = None
