@@ -260,7 +260,7 @@ class Api:
         """Evict the pod with this uid.
 
         If a disruption budget refuses the eviction, the API server responds with 429, as if it were busy.
-        This may last for days, so the request is not retried.
+        The refusal may last for days, so the request is not retried.
 
         Raises:
             NotFound: no pod has this name.

@@ -60,7 +60,7 @@ def output(command: websocket.WebSocket, deadline: float) -> Iterator[bytes]:
         deadline: the time at which the command must have ended, on the monotonic clock.
 
     Raises:
-        CommandFailed: its exit code is not 0.
+        CommandFailed: the exit code of the command is not 0.
         ApiError: the command could not be started.
         Unreachable: the connection broke, or the command did not end in time.
     """

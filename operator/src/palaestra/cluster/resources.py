@@ -46,7 +46,7 @@ class Resource:
         return "/".join(parts)
 
     def only_metadata(self) -> "Resource":
-        """Return the same kind, of whose objects only the metadata is read."""
+        """Return the same kind with `metadata_only`, so that only the metadata of objects is read."""
         return replace(self, metadata_only=True)
 
 

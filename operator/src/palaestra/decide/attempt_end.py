@@ -1,7 +1,7 @@
 """The reason for the end of an attempt: the first check that holds for its pod and its last message.
 
-A disruption is checked before the exit code with which the trainer reacts to it. The Job's podFailurePolicy
-has the same order.
+A disruption is checked before the exit code with which the trainer reacts to the disruption. The Job's
+podFailurePolicy has the same order.
 """
 
 from collections.abc import Callable
@@ -41,9 +41,9 @@ class EndedAttempt:
     Attributes:
         situation: the replica of the attempt.
         number: the number of the attempt, from 1.
-        name: the name of its pod.
-        pod: its pod; None if the pod was deleted.
-        code: the exit code of its trainer; None if unknown.
+        name: the name of the attempt's pod.
+        pod: the attempt's pod; None if the pod was deleted.
+        code: the exit code of the attempt's trainer; None if unknown.
     """
 
     situation: ReplicaContext
@@ -74,7 +74,7 @@ def of_pod(situation: ReplicaContext, pod: PodView, number: int) -> EndedAttempt
 
 
 def ended_silently(attempt: EndedAttempt) -> Explanation | None:
-    """The built-in loop did not report that it was complete: a library ended its process."""
+    """The built-in loop did not report that the training was complete: a library ended its process."""
     if attempt.code != ExitCode.DONE or attempt.pod is None or attempt.word is not None:
         return None
     own = attempt.situation.job.spec.trainer.command

@@ -29,8 +29,8 @@ from palaestra.plan.job import GIVEN_UP
 from palaestra_protocol.pod.status import ExitCode
 
 STALL_GRACE_S = 120  # seconds in which the trainer's own watchdog should end the trainer
-# Seconds after which the operator assumes that the kubelet will not start the trainer. The start normally takes
-# seconds, because the ROS master has the same image, which the node has already pulled.
+# Seconds after which the operator assumes that the kubelet will not start the trainer. The start normally
+# takes seconds, because the ROS master has the same image, which the node has already pulled.
 FORGOTTEN_S = 300
 OUTLIVED_S = 60  # seconds; a proxy that ends after the main process normally ends within this time
 

@@ -4,10 +4,10 @@ Five conditions always exist, each with a reason, whether true or false. The job
 of the job's phase. No condition exists for the phase Pending. In this phase, the message is in Accepted while
 Accepted is false, and in Running afterwards.
 
-Two more conditions exist only while they are true. Flux and `helm --wait` read them through the library
-kstatus. A job is `Reconciling` while its state differs from its spec, and `Stalled` if only a person can make
-them equal. If a job has neither condition, its state matches its spec: it trains, has succeeded, or is
-suspended.
+Two more conditions exist only while they are true. Flux and `helm --wait` read these two conditions through
+the library kstatus. A job is `Reconciling` while its state differs from its spec, and `Stalled` if only a
+person can make state and spec equal. If a job has neither condition, its state matches its spec: the job
+trains, has succeeded, or is suspended.
 """
 
 from collections import Counter

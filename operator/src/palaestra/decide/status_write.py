@@ -68,8 +68,8 @@ def write_in_s(old: Mapping[str, Any] | None, new: Mapping[str, Any], since_s: f
     Args:
         old: the status from the API server.
         new: the status from `as_data`.
-        since_s: seconds since this process last wrote the job's status, on a monotonic clock; None: it has
-            not written the status.
+        since_s: seconds since this process last wrote the job's status, on a monotonic clock; None: this
+            process has not written the status.
     """
     # An older CRD has defaults for lists, so the API server adds the empty lists again.
     before = _without_empty(_without(old if isinstance(old, Mapping) else {}, _WITH_OTHERS))

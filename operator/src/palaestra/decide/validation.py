@@ -1,4 +1,4 @@
-"""Read a TrainingJob from the API server's JSON, or refuse it: invalid objects must not delay others."""
+"""Read a TrainingJob from the API server's JSON, or refuse it: invalid jobs must not delay other jobs."""
 
 from collections.abc import Mapping
 from datetime import datetime

@@ -43,7 +43,7 @@ POINTLESS: Mapping[Check, frozenset[Check]] = {
 
 
 def examine(site: Site) -> Iterator[CheckResult]:
-    """Yield the results of each check; after a failed check, skip those that `POINTLESS` lists for it."""
+    """Yield the results of each check; if a check fails, skip the checks that `POINTLESS` has for it."""
     skipped: frozenset[Check] = frozenset()
     for what, check in CHECKS:
         if check in skipped:

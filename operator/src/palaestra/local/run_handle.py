@@ -149,7 +149,7 @@ class RunHandle:
                 self._control.write(b"\n")
 
     def stop(self, deadline_s: float = STOP_S) -> Result:
-        """Save a checkpoint, end the run and return the result; kill it after `deadline_s`."""
+        """Save a checkpoint, end the run and return the result; after `deadline_s`, kill the run."""
         self.interrupt()
         if not self.wait(deadline_s):
             self.kill()

@@ -61,8 +61,8 @@ class Objects:
         events: FailedCreate events about those Jobs, warnings about pods that wait for volumes, and events
             about trainers that the kubelet ended.
         unadmitted: Kueue's reason not to admit a Job, by the Job's uid; absent if it was not requested.
-        unasked: uids of incomplete Jobs and pods about which the operator sends no request, because of their
-            number.
+        unasked: uids of incomplete Jobs and pods about which the operator sends no request, because there
+            are too many.
         polled: the last responses of trainers by pod UID; absent if the last request to the pod failed.
         denied: the API server's message of the last refused creation, by replica; None: an object of the
             whole job. A replica without a refusal is absent.
