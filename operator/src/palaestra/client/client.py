@@ -251,7 +251,7 @@ class Client:
         return job
 
     def restart(self, name: str) -> TrainingJob:
-        """Restart the replicas of a job that have lost their runs, from the content of their run directories.
+        """Restart those replicas of a job that have lost their runs, from the content of the run directories.
 
         A replica starts at step 0 again if its run directory is empty or its claim does not exist.
 

@@ -82,7 +82,7 @@ def fetch(
 
 
 def _usual_bytes(job: TrainingJob) -> int:
-    """Return the default limit for the files of a run; for an existing claim, it is a constant."""
+    """Return the default limit for the files of a run; the size of an existing claim is not known."""
     storage = job.spec.storage
     return TIMES * in_bytes(storage.size) if storage.existing_claim is None else OF_EXISTING_BYTES
 

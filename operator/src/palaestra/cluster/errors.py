@@ -194,7 +194,7 @@ def from_status(code: int, status: Mapping[str, Any], retry_after: str | None = 
 
 
 def _by_cause(status: Mapping[str, Any]) -> type[ApiError] | None:
-    """Return the exception for the cause in a Status, or None; several exceptions share a reason."""
+    """Return the exception for the cause in a Status, or None; one reason may have several exceptions."""
     causes = (status.get("details") or {}).get("causes") or ()
     return next((BY_CAUSE[cause["reason"]] for cause in causes if cause.get("reason") in BY_CAUSE), None)
 

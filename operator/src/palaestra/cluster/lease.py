@@ -1,10 +1,10 @@
 """Leader election: only one of several operators reconciles at a time.
 
-Candidates take and renew one Lease object with its resourceVersion, so the API server refuses the second of
-two concurrent writes. `leads()` reads the clock at each call. So the first call after a process was paused
-for a minute returns False (see lease_timing.py). The election only avoids duplicate work. Correctness does
-not depend on the election: names are deterministic, and the API server refuses a second object of the same
-name.
+Candidates take and renew one Lease object. Each write names the resourceVersion that the candidate has read,
+so the API server refuses the second of two concurrent writes. `leads()` reads the clock at each call. So the
+first call after a process was paused for a minute returns False (see lease_timing.py). The election only
+avoids duplicate work. Correctness does not depend on the election: names are deterministic, and the API
+server refuses a second object of the same name.
 """
 
 import threading

@@ -1,4 +1,6 @@
-"""The controller's queue of names of objects; it has each name at most once, for one worker at a time.
+"""The controller's queue of names of objects.
+
+The queue has each name at most once, and only one worker at a time has a name from the queue.
 
 If a name is added while a worker has it, `get` returns the name again after that worker is done. So no change
 is missed, and two workers never work on one object. The queue contains names, not events: a worker reads the

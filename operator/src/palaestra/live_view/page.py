@@ -179,7 +179,7 @@ class ViewPage:
         return gui.add_markdown("waits for the first pose")
 
     def _add_fault(self, label: str, hint: str, number: int) -> None:
-        """Add a button that sends a signal to the simulator; only the page of a local run has such buttons."""
+        """Add a button that sends a signal to the simulator; only a local run's page has such buttons."""
         button = self._server.gui.add_button(label, hint=hint)
         self._gate.allow(button)
 

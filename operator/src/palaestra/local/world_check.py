@@ -41,8 +41,8 @@ class WorldCheckResult:
 def check_world(world: Path, options: Sequence[str] = ()) -> tuple[WorldCheckResult, ...]:
     """Return the result of each simulator; without a response, `starts` is False.
 
-    The stub is always run, and MuJoCo if it is installed. Each program gets the options with which it would
-    start.
+    The stub is always run, and MuJoCo if it is installed. Each program gets the options with which a run
+    would start it.
     """
     asked = [driver for driver in _CHECKERS if driver is Driver.STUB or lack(PROGRAMS[driver]) is None]
     return tuple(asyncio.run(_ask(driver, world, options)) for driver in asked)

@@ -263,7 +263,7 @@ class JobView:
         settings: fields of the Job's spec that other clients may change; a missing field is absent.
         deleting: whether the Job is being deleted.
         volumes: names of the ConfigMaps and claims that the Job's pods mount.
-        queue: the name of the Job's Kueue queue, from the spec or the namespace's default; "" without one.
+        queue: the name of the Job's Kueue queue, from the spec or the namespace's default; "": no queue.
     """
 
     name: str

@@ -27,7 +27,7 @@ from palaestra.observe.json_access import part, parts, text
 READ_S = 5.0
 FIRST_PAUSE_S = 10.0  # the API server publishes a definition some seconds after it was applied
 MOST_SHOWN = 20
-# An older definition does not allow these types.
+# An older definition does not allow these types of conditions.
 _NEW = frozenset({ConditionType.RECONCILING.value, ConditionType.STALLED.value})
 
 Schema = Mapping[str, Any]

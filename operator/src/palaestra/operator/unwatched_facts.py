@@ -23,7 +23,7 @@ RECHECK_S = 10.0  # seconds between two reads of a foreign Job
 JOB_UID_LABEL = "kueue.x-k8s.io/job-uid"  # on Workloads; from Kueue's pkg/controller/constants/constants.go
 
 Denied = Mapping[int | None, ApiError]  # errors by replica; None: an object of the whole job
-Lacking = tuple[str, str]  # uid of a Job or pod, and the field selector of its explaining events
+Lacking = tuple[str, str]  # uid of a Job or pod, and the field selector of the events to read
 Change = tuple[str, int]  # uid and generation of a Job
 
 # The message has this word if a webhook does not respond. The response is then an internal error.
@@ -104,7 +104,7 @@ def _lasting(error: ApiError) -> bool:
 
 
 class PodEvents(RateLimitedLookup[Lacking, Object]):
-    """The last event about each Job without a pod, pod without its volumes, or trainer ended by a signal.
+    """The last events about Jobs without pods, pods with unmounted volumes, and trainers that a signal ended.
 
     Only events report that a quota refuses a pod, or that a volume is not mounted. If a signal ended a
     trainer, only events report that the cause was a failed probe.

@@ -17,7 +17,7 @@ from palaestra.operator.fenced_client import NotLeading
 from palaestra.operator.preconditions import Outdated
 
 IDLE_S = 1.0  # seconds between two checks of the stop condition
-REPEATS = 4  # consecutive conflicts of a key before the first log line; then each power of two is logged
+REPEATS = 4  # consecutive conflicts of a key before the first log line; later lines come at powers of two
 IN_DOUBT_S = 1.0  # seconds until the next try of a key while it is uncertain whether this operator leads
 # Seconds after which a reconcile counts as stuck. Every call has a deadline, so a reconcile is normally
 # shorter.

@@ -24,8 +24,8 @@ SECURITY = {
     "capabilities": {"drop": ["ALL"]},
     "readOnlyRootFilesystem": True,
 }
-# A kubelet's shortest period is a second, but the ROS master starts in a quarter of a second. So the command
-# of one try waits for the port itself. A TCP probe of the kubelet cannot reach the port, which is on
+# The shortest period of a probe is a second, but the ROS master starts in a quarter of a second. So the
+# command of one try waits for the port itself. A TCP probe of the kubelet cannot reach the port, which is on
 # loopback.
 MASTER_ANSWERS = "until (exec 3<>/dev/tcp/{host}/{port}) 2>/dev/null; do sleep 0.05; done"
 
