@@ -65,7 +65,7 @@ def fetch(
         job: the job of the run.
         replica: the number of the replica.
         into: the folder for results.
-        deadline: the end of the call, on the monotonic clock.
+        deadline: the time on the monotonic clock by which the call must have ended.
         most_bytes: the limit for all files together; None: `TIMES` times the volume that the job requests.
 
     Raises:

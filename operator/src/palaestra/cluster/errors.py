@@ -106,7 +106,7 @@ class TooManyRequests(ApiError):
     """The API server is busy.
 
     Attributes:
-        retry_after_s: seconds to wait before a retry, from the API server.
+        retry_after_s: seconds that the API server asks the client to wait before a retry.
     """
 
     retryable = True

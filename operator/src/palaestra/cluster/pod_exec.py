@@ -57,7 +57,7 @@ def output(command: websocket.WebSocket, deadline: float) -> Iterator[bytes]:
 
     Args:
         command: the socket from `open_socket`; it is closed at the end.
-        deadline: the time at which the command must have ended, on the monotonic clock.
+        deadline: the time on the monotonic clock by which the command must have ended.
 
     Raises:
         CommandFailed: the exit code of the command is not 0.

@@ -14,8 +14,8 @@ def lines(response: BaseHTTPResponse, deadline: float) -> Iterator[str]:
 
     Args:
         response: the response, which is closed at the end.
-        deadline: the latest time for the end of the response, on the monotonic clock; checked after each
-            read.
+        deadline: the time on the monotonic clock by which the response must have ended; it is checked after
+            each read.
 
     Raises:
         Unreachable: the connection broke or was silent for too long, or the response did not end in time.

@@ -12,8 +12,8 @@ class Resource:
 
     Attributes:
         api_version: group and version, such as `batch/v1`; `v1` for the core group.
-        kind: the kind, as in objects, such as `Job`.
-        plural: the plural name, as in paths and RBAC rules, such as `jobs`.
+        kind: the name of the kind in objects, such as `Job`.
+        plural: the plural name of the kind in paths and RBAC rules, such as `jobs`.
         namespaced: whether objects are in namespaces; False for cluster-scoped kinds.
         metadata_only: whether to read only the metadata of objects, for example so that the content of
             Secrets is not transferred.

@@ -27,8 +27,8 @@ class JobRefused(TrainingJobError, ValueError):
     """The operator cannot run this TrainingJob, and a retry cannot help.
 
     Attributes:
-        reason: the reason, one word.
-        message: the message for the status, a sentence.
+        reason: the reason, as one word.
+        message: the message for the status, as a sentence.
     """
 
     def __init__(self, reason: Reason, problem: str) -> None:

@@ -65,7 +65,7 @@ class EpisodeReader:
 
     Args:
         fetch: sends a request to the trainer, with the interface of `SidecarSource.fetch`.
-        clock: returns seconds, from any origin.
+        clock: returns the time in seconds since any fixed moment.
     """
 
     def __init__(self, fetch: Fetch, clock: Callable[[], float] = time.monotonic) -> None:
@@ -92,7 +92,7 @@ class StatusReader:
 
     Args:
         fetch: sends a request to the trainer, with the interface of `SidecarSource.fetch`.
-        clock: returns seconds, from any origin.
+        clock: returns the time in seconds since any fixed moment.
     """
 
     def __init__(self, fetch: Fetch, clock: Callable[[], float] = time.monotonic) -> None:

@@ -28,7 +28,7 @@ class WorldCheckResult:
     """The result of one simulator's check.
 
     Attributes:
-        driver: the driver, as in a TrainingJob.
+        driver: the name of the driver in a TrainingJob.
         starts: whether the simulator can start the world with the options.
         text: the simulator's output.
     """

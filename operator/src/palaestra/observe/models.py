@@ -60,12 +60,13 @@ class Objects:
             that the TrainingJob needs.
         events: FailedCreate events about those Jobs, warnings about pods that wait for volumes, and events
             about trainers that the kubelet ended.
-        unadmitted: Kueue's reason not to admit a Job, by the Job's uid; absent if it was not requested.
+        unadmitted: Kueue's reason not to admit a Job, by the Job's uid; a Job is absent if the reason was not
+            requested.
         unasked: uids of incomplete Jobs and pods about which the operator sends no request, because there
             are too many.
         polled: the last responses of trainers by pod UID; absent if the last request to the pod failed.
-        denied: the API server's message of the last refused creation, by replica; None: an object of the
-            whole job. A replica without a refusal is absent.
+        denied: the API server's message of the last refused creation, by replica; the key None stands for
+            objects of the whole job. A replica without a refusal is absent.
         switchers: the field manager that set `spec.suspend` of a Job, by the Job's uid; absent if the value
             is the operator's.
     """

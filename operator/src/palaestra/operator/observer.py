@@ -75,7 +75,7 @@ class JobObserver:
         strangers: the foreign Jobs, which belong to other owners and have names that this operator's Jobs
             need.
         denials: refused creations.
-        polled: returns the responses of the trainers, by the pod's uid.
+        polled: returns the responses of the trainers, by the uids of their pods.
         checking: checks the worlds of jobs.
     """
 

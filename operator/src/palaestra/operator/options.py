@@ -26,7 +26,7 @@ class OperatorOptions:
         workers: the number of jobs that are reconciled at the same time.
         resync_s: seconds after which every job is reconciled again, even without a change.
         leader_elect: whether to wait for the Lease.
-        metrics_address: host and port of /healthz, /readyz and /metrics.
+        metrics_address: host and port of the server for /healthz, /readyz and /metrics.
         node_selector: labels that the nodes of training pods must have.
         host_users: whether training pods use the user IDs of their nodes; if not, each pod has a user
             namespace.

@@ -71,7 +71,7 @@ class Poller:
         self._thread.join(deadline_s)
 
     def known(self) -> Mapping[str, Polled]:
-        """Return the newest responses by the pod's uid; a pod whose last request failed is absent."""
+        """Return the newest response by pod uid; a pod is absent if the last request to the pod failed."""
         return MappingProxyType(self._known)
 
     def _run(self) -> None:

@@ -35,7 +35,7 @@ class Workers:
         queue: the queue of keys.
         reconcile: reconciles one job; returns the seconds until the next reconcile, or None.
         gate: a reconcile starts only while this event is set.
-        seconds: the histogram of durations, by `result`.
+        seconds: the histogram for the durations of reconciles, with the label `result`.
         count: number of threads.
     """
 

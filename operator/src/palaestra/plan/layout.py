@@ -76,15 +76,16 @@ class ContainerPaths:
 class Allowed:
     """The values that an installation allows in those settings of a job that affect other users.
 
+    Among keys, an entry that ends in `/` is a domain, and allows every key of this domain.
+
     Attributes:
-        pod_labels: keys of labels that jobs may give their pods, or domains that end in `/`.
-        pod_annotations: keys of annotations that jobs may give their pods, or domains that end in `/`.
+        pod_labels: keys of labels that jobs may give their pods.
+        pod_annotations: keys of annotations that jobs may give their pods.
         priority_classes: names of allowed priority classes.
         runtime_classes: names of allowed runtime classes.
-        tolerations: keys of taints that jobs may tolerate, or domains that end in `/`.
+        tolerations: keys of taints that jobs may tolerate.
         affinity_namespaces: namespaces, besides the job's own, to whose pods a job may have an affinity.
-        anti_affinity_labels: keys of labels by which a required anti-affinity may select pods of other jobs,
-            or domains that end in `/`.
+        anti_affinity_labels: keys of labels by which a required anti-affinity may select pods of other jobs.
     """
 
     pod_labels: tuple[str, ...] = ()
