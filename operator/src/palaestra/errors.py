@@ -36,7 +36,7 @@
     │   ├── NoSuchJob                no such TrainingJob
     │   ├── NoSuchNamespace          no such namespace
     │   ├── NotFetched               a run could not be copied
-    │   ├── NothingLost              no replica has lost its run, so none is restarted
+    │   ├── NothingLost              no replica has lost its run, so no replica is restarted
     │   ├── NotInstalled             the cluster has no TrainingJobs
     │   ├── NotOfThisSweep           another job has the name of a sweep's trial (sweeps.cluster_backend)
     │   ├── QueueDecides             only Kueue suspends and resumes this job

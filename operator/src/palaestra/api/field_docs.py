@@ -15,7 +15,8 @@ from palaestra.api.model import Rule
 from palaestra.api.model_walk import fields_of, model_at
 from palaestra.api.structural import Schema
 
-# The names of the fields; the name of a list ends in `[]` if another name follows.
+# The names of the fields from the TrainingJob to one field. The name of a list ends in `[]` if the name of a
+# field of its items follows.
 FieldPath = tuple[str, ...]
 Quote = Callable[[str], str]
 
@@ -25,7 +26,7 @@ class FieldDoc:
     """The documentation of one field, or of the whole TrainingJob, whose path is empty.
 
     Attributes:
-        path: the names from the TrainingJob to this field.
+        path: the names of the fields from the TrainingJob to this field, whose name is the last.
         schema: the structural schema of the field's value.
         required: whether the parent must have this field.
         children: the fields of the value; for a list, the fields of each item.
@@ -88,7 +89,10 @@ def _doc(path: FieldPath, at: Schema, *, required: bool) -> FieldDoc:
 
 
 def kind_of(field: Schema, quote: Quote = str) -> str:
-    """Return type and range in words, such as `integer, 1 to 16`; `quote` formats each value of an enum."""
+    """Return the type and range of a field's values, such as `integer, 1 to 16`.
+
+    `quote` formats each value of an enum.
+    """
     if "enum" in field:
         return " | ".join(quote(member) for member in field["enum"])
     if "items" in field:
@@ -102,7 +106,7 @@ def kind_of(field: Schema, quote: Quote = str) -> str:
 
 
 def default_of(field: Schema) -> str | None:
-    """Return the default as JSON; None without a default, "" if only the inner fields have defaults."""
+    """Return a field's default as JSON; None without a default, "" if only inner fields have defaults."""
     if "default" not in field:
         return None
     text = json.dumps(_without_nested_defaults(field["default"], field))
@@ -110,7 +114,7 @@ def default_of(field: Schema) -> str | None:
 
 
 def _without_nested_defaults(default: Any, field: Schema) -> Any:
-    """Return `default` without values that equal the inner fields' own defaults, which those fields show."""
+    """Return `default` without the defaults of inner fields; the documentation of those fields has them."""
     if isinstance(default, list):
         return [_without_nested_defaults(item, field["items"]) for item in default]
     if not isinstance(default, dict):

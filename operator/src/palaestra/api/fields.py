@@ -61,7 +61,8 @@ ROBOT = f"^({'|'.join(ROBOTS)}|{CLASS})$"
 POLICY_FILE = "^(/.+|[A-Za-z0-9_][-A-Za-z0-9._]*(/[A-Za-z0-9_][-A-Za-z0-9._]*)*)[.]zip$"
 ENVIRONMENT_ID = "^([A-Za-z0-9_.]+:)?([-A-Za-z0-9_.]+/)?[-A-Za-z0-9_.]+$"  # the version -vN may be missing
 
-# The texts of the message about a value that does not match: "<value> is not <first>; <second>".
+# For each pattern, the two texts of the message about a value that does not match the pattern. The message is
+# "<value> is not <first text>; <second text>".
 PATTERNS: dict[str, tuple[str, str]] = {
     LABEL: ("a name", "use a-z first, then a-z, 0-9 and '-', no '-' at the end"),
     DIGIT_LABEL: ("a namespace", "use a-z, 0-9 and '-', no '-' at the beginning or the end"),
@@ -155,7 +156,7 @@ def _uniquely_named(items: tuple[N, ...]) -> tuple[N, ...]:
     return items
 
 
-# With these keywords the API server refuses equal names itself.
+# With these keywords of the schema, the API server itself refuses equal names.
 NamedList = Annotated[
     Listed[N],
     AfterValidator(_uniquely_named),

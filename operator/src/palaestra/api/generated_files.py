@@ -20,7 +20,8 @@ def crd_text() -> str:
 def generated_files(root: Path) -> dict[str, str]:
     """Return the text of each generated file, by path relative to the repository's `root`.
 
-    Of the two pages, only the tables are generated; all other text is read from the files below `root`.
+    In the two pages of the documentation, only the tables are generated. All other text of these pages is
+    read from the files below `root`.
     """
     reference, operations = "docs/reference/trainingjob.md", "docs/reference/reasons.md"
     return {

@@ -13,7 +13,7 @@ from palaestra.api.structural import Schema
 
 DIALECT = "http://json-schema.org/draft-07/schema#"
 
-# These keywords have the same meaning in both schemas.
+# These keywords have the same meaning in the schema of the CRD and in JSON Schema.
 _KEPT = (
     "description", "type", "pattern", "enum", "minimum", "maximum", "minLength", "maxLength", "minItems",
     "maxItems", "minProperties", "maxProperties", "default",

@@ -12,7 +12,7 @@ Schema = dict[str, Any]
 
 FROZEN = "cannot be changed; make a new TrainingJob"
 
-# These keywords have the same meaning in both schemas and are copied.
+# These keywords have the same meaning in JSON Schema and in a structural schema, so they are copied.
 _KEPT = (
     "description", "type", "format", "pattern", "enum", "minimum", "maximum", "required",
     "minLength", "maxLength", "minItems", "maxItems", "minProperties", "maxProperties",

@@ -242,7 +242,7 @@ _ACTIONS = ("environment", "id", "options", "actions", "algorithm", "name")
 
 
 def _needs(algorithm: str, actions: str, others: str) -> Rule:
-    """Return the rule that an algorithm requires `actions`, and not `others`, in a built-in task."""
+    """Return the rule that refuses `algorithm` in a built-in task whose actions are `others`."""
     return Rule(
         field="algorithm.name",
         holds=lambda trainer: trainer.algorithm.name != algorithm or _actions(trainer) != others,

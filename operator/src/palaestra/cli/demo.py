@@ -82,6 +82,6 @@ def playing_job(learns: TrainingJob, trained: Path) -> TrainingJob:
 
 
 def _shown(job: TrainingJob, runs: Path) -> int:
-    """Run a job on this machine, in a browser, and return its exit code."""
+    """Run a job on this machine, show it in a browser, and return its exit code."""
     with viewed(runs / job.metadata.name / "0", opened=True):
         return run(job, RunOptions(runs=runs, version=version("palaestra")))

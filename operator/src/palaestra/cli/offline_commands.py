@@ -80,7 +80,7 @@ def _world(options: argparse.Namespace) -> int:
 
 
 def _check(options: argparse.Namespace) -> int:
-    """Print the result of each simulator's check of a world with the given options."""
+    """Let each simulator check a world with the given options, and print the results."""
     read(options.file)
     given = [word for name in options.leave_out for word in ("--leave-out", name)]
     given += [word for file in options.stand_ins for word in ("--stand-ins", str(file))]

@@ -26,7 +26,8 @@ OBJECT = re.compile(r"[a-z0-9]([-a-z0-9.]{0,251}[a-z0-9])?")
 ALLOWED = re.compile(rf"({DOMAIN})?{NAME}|{DOMAIN}")
 NODE_LABEL = re.compile(rf"({DOMAIN})?{NAME}=({NAME})?")
 
-# Settings that an installation may allow to jobs: option, field of `Allowed`, kind of value, meaning.
+# Settings that an installation may allow to jobs. Each row has the end of the option's name, the field of
+# `Allowed`, the type of the option's value, and the meaning.
 ALLOWANCES = (
     ("pod-label", "pod_labels", "KEY", "label that jobs may set on their pods"),
     ("pod-annotation", "pod_annotations", "KEY", "annotation that jobs may set on their pods"),
@@ -71,7 +72,7 @@ def add(commands: Commands) -> None:
 
 
 def _add_looking(parser: argparse.ArgumentParser) -> None:
-    """Add the options for the reconciled jobs, their number at the same time, and the interval."""
+    """Add the options for the namespaces of the jobs, the number of workers, and the resync interval."""
     parser.add_argument(
         "--namespace",
         metavar="NS",

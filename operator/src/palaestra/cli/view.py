@@ -36,7 +36,7 @@ exit codes:
   1    the simulator describes no world, or the cluster has no such job or refused
   2    no such run or simulator, or viser is missing; nothing was started
 """
-# Without one of these variables, a text browser may take over the terminal.
+# If none of these variables is set, `webbrowser` may start a text browser in this terminal.
 DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY")
 
 
@@ -127,7 +127,10 @@ def _shown(options: argparse.Namespace, sources: Callable[[], Sequence[SidecarSo
 
 
 def _ended(*, by_stdin: bool) -> Callable[[], bool]:
-    """Return a function that returns whether the view must end: by request, when its input closes."""
+    """Return a function that returns whether the view must end.
+
+    With `by_stdin`, the view must end when its standard input closes; otherwise the result is always False.
+    """
     if not by_stdin:
         return lambda: False
     closed = threading.Event()

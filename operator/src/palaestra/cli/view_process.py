@@ -34,7 +34,7 @@ def require_viser() -> None:
 
 @contextmanager
 def viewed(folder: Path, *, opened: bool = False) -> Iterator[None]:
-    """Show a run in a separate process, which ends with this process, even after SIGKILL.
+    """Show a run in a separate process, which ends with this process, even if SIGKILL ends this process.
 
     Args:
         folder: the run directory; the run may start later.

@@ -150,7 +150,7 @@ class Client:
         """Wait until the job reaches a phase or ends, and return the job.
 
         Args:
-            name: of the job.
+            name: the name of the job.
             until: the phase, or `ended`.
             deadline_s: the longest wait in seconds.
             report: a function such as `print` or `logging.info`. The function is called with one line for
@@ -188,7 +188,7 @@ class Client:
         """Yield the lines of a container of a replica's newest pod.
 
         Args:
-            name: of the job.
+            name: the name of the job.
             replica: the number of the replica.
             container: `trainer`, `ros-master`, or `sim-<group>-<number>`.
             follow: whether to wait for further lines until the container has ended.
@@ -251,7 +251,7 @@ class Client:
         return job
 
     def restart(self, name: str) -> TrainingJob:
-        """Restart the replicas of a job that have lost their runs, from the content of their run directories.
+        """Restart those replicas of a job that have lost their runs, from the content of the run directories.
 
         A replica starts at step 0 again if its run directory is empty or its claim does not exist.
 
@@ -269,7 +269,9 @@ class Client:
             return _job(self.api.merge(TRAINING_JOBS, self.namespace, name, word))
 
     def delete(self, name: str, *, deadline_s: float | None = None) -> None:
-        """Delete a job and its pods; with a deadline, wait for the end. With `retain: Keep`, claims stay.
+        """Delete a job and its pods; with a deadline, wait until they are deleted.
+
+        With `retain: Keep`, claims stay.
 
         Raises:
             NoSuchJob: no job has this name.

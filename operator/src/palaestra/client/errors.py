@@ -119,7 +119,7 @@ class NotFetched(ClientError):
 
 @contextmanager
 def asked(name: str | None, namespace: str) -> Iterator[None]:
-    """Run requests about TrainingJobs; `name` is the name of one job, or None.
+    """Replace errors of requests in the block; `name` is the requested job, None for several jobs.
 
     Raises:
         NotInstalled: the cluster has no TrainingJob definition.

@@ -1,8 +1,7 @@
 """Copy a run's results out of its volume, through the running pod or through a temporary pod.
 
 The target folder is either complete or absent. The files are written to a temporary folder next to it, which
-is renamed at the end. The reason for which a command in a container sends the files is in
-docs/decisions/0011.
+is renamed at the end. docs/decisions/0011 explains why a command in a container sends the files.
 """
 
 import secrets
@@ -66,7 +65,7 @@ def fetch(
         job: the job of the run.
         replica: the number of the replica.
         into: the folder for results.
-        deadline: the end of the call, on the monotonic clock.
+        deadline: the time on the monotonic clock by which the call must have ended.
         most_bytes: the limit for all files together; None: `TIMES` times the volume that the job requests.
 
     Raises:
@@ -83,7 +82,7 @@ def fetch(
 
 
 def _usual_bytes(job: TrainingJob) -> int:
-    """Return the default limit for the files of a run; for an existing claim, it is a constant."""
+    """Return the default limit for the files of a run; the size of an existing claim is not known."""
     storage = job.spec.storage
     return TIMES * in_bytes(storage.size) if storage.existing_claim is None else OF_EXISTING_BYTES
 

@@ -109,8 +109,8 @@ class _Stream(io.RawIOBase):
     """An iterator of chunks as a readable file.
 
     Attributes:
-        left: bytes that may be read until the next member is known. The limit is for headers, because tarfile
-            keeps a whole header in memory.
+        left: number of bytes that may be read until the next member is known. The limit is for headers,
+            because tarfile keeps a whole header in memory.
     """
 
     def __init__(self, chunks: Iterator[bytes]) -> None:

@@ -53,8 +53,8 @@ def reading_pod(job: TrainingJob, template: Mapping[str, Any], name: str, lives_
 def _reader(template: Mapping[str, Any], lives_s: int) -> dict[str, Any]:
     """Return the container: the trainer's image and security context, with only the run mounted, read-only.
 
-    Its resources are the resources of the ROS master, which are small, and which the namespace's quotas have
-    admitted before.
+    The container has the resources of the ROS master's container. These are small, and the namespace's quotas
+    have admitted them before.
     """
     trainer = trainer_of(template)
     [master] = (each for each in template["spec"]["initContainers"] if each["name"] == ROS_MASTER)

@@ -42,7 +42,7 @@ def current(job: TrainingJob) -> bool:
 
 
 def why(status: Status) -> str:
-    """Return reason and message of the condition of the phase; "" if that condition is not true."""
+    """Return reason and message of the condition for the job's phase; "" if no such condition is true."""
     for condition in status.conditions:
         if (
             status.phase

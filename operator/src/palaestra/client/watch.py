@@ -31,7 +31,7 @@ def changes(
         resource: kind of the object.
         namespace: the namespace of the object.
         name: the name of the object.
-        deadline: the end of the iteration, on the monotonic clock.
+        deadline: the time on the monotonic clock by which the iteration must have ended.
         uid: uid of the object; empty: the uid of the first object found.
 
     Raises:

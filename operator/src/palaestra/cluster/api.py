@@ -260,7 +260,7 @@ class Api:
         """Evict the pod with this uid.
 
         If a disruption budget refuses the eviction, the API server responds with 429, as if it were busy.
-        This may last for days, so the request is not retried.
+        The refusal may last for days, so the request is not retried.
 
         Raises:
             NotFound: no pod has this name.
@@ -286,7 +286,7 @@ class Api:
         fields: str | None = None,
         seconds: float,
     ) -> Watch:
-        """Return the changes after `version`: that of a list, or of the last event of an earlier watch.
+        """Return the changes after `version`, the version of a list or of an earlier watch's last event.
 
         The API server ends the watch after `seconds`. Iterate over the watch once, until it ends or is
         closed.

@@ -21,7 +21,7 @@ class Access:
             function. The function raises Unreachable if the credentials cannot be read.
         headers: additional headers of every request, for impersonation. The same name may occur several
             times.
-        proxy: the proxy of all connections, which messages name.
+        proxy: the proxy of all connections, for error messages; None without a proxy.
     """
 
     host: str

@@ -1,4 +1,4 @@
-"""Connections to an API server, directly or through a proxy: a pool, and a single one for a websocket."""
+"""Connections to an API server, directly or through a proxy: a pool, and one for each websocket."""
 
 import socket
 import ssl
@@ -15,7 +15,7 @@ POOL = 32  # connections that stay open: more than the number of workers and wat
 # With these options the kernel detects dead peers, even behind proxies that do not report them.
 _TIMES = (("TCP_KEEPIDLE", 30), ("TCP_KEEPINTVL", 30), ("TCP_KEEPCNT", 9))
 KEPT_ALIVE = (
-    # Urllib3's own option, which must be repeated because these options replace it.
+    # This is urllib3's only default option. It is repeated here because these options replace the default.
     (socket.IPPROTO_TCP, socket.TCP_NODELAY, 1),
     (socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1),
     # macOS has no TCP_KEEPIDLE.

@@ -74,7 +74,7 @@ class AlreadyExists(ApiError):
 
 
 class Conflict(ApiError):
-    """Another client changed the object since it was read, or it has another uid."""
+    """Another client changed the object since it was read, or replaced it by an object with another uid."""
 
     retryable = True
 
@@ -106,7 +106,7 @@ class TooManyRequests(ApiError):
     """The API server is busy.
 
     Attributes:
-        retry_after_s: seconds to wait before a retry, from the API server.
+        retry_after_s: seconds that the API server asks the client to wait before a retry.
     """
 
     retryable = True
@@ -194,7 +194,7 @@ def from_status(code: int, status: Mapping[str, Any], retry_after: str | None = 
 
 
 def _by_cause(status: Mapping[str, Any]) -> type[ApiError] | None:
-    """Return the exception for the cause in a Status, or None; several exceptions share a reason."""
+    """Return the exception for the cause in a Status, or None; one reason may have several exceptions."""
     causes = (status.get("details") or {}).get("causes") or ()
     return next((BY_CAUSE[cause["reason"]] for cause in causes if cause.get("reason") in BY_CAUSE), None)
 

@@ -97,7 +97,10 @@ def namespace(files: str, context: str | None) -> str | None:
 
 
 def _merged(files: str) -> tuple[KubeConfigMerger, Any]:
-    """Return the kubeconfig's files and their merged content, with the first current context."""
+    """Return the kubeconfig's files and their merged content.
+
+    The current context is that of the first file that names one.
+    """
     merger = KubeConfigMerger(files)
     config = merger.config
     if config is None:
@@ -178,7 +181,10 @@ def _host(cluster: _Entry, *, secure: bool) -> str:
 
 
 def _proxy(cluster: _Entry, host: str) -> Proxy | None:
-    """Return the kubeconfig's proxy of a cluster, even if NO_PROXY lists the server, or the environment's."""
+    """Return the proxy of a cluster: from the kubeconfig, or else from the environment.
+
+    NO_PROXY has no effect on a proxy from the kubeconfig.
+    """
     named = cluster.content.get(PROXY)
     return proxy_named(str(named), PROXY) if named else proxy_of_environment(host, os.environ)
 
@@ -228,7 +234,7 @@ def _told_to_plugins(cluster: _Entry) -> dict[str, Any]:
 
 
 def _warn(files: str, host: str, proxy: Proxy | None) -> None:
-    """Log one warning; suppress urllib3's warning, which would appear at every request."""
+    """Log one warning that the certificate is not verified; suppress urllib3's warning at every request."""
     log.warning(
         "%s: %s is set, so the certificate of %s is not verified: others may read your credentials",
         files,

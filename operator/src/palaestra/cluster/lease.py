@@ -1,10 +1,10 @@
 """Leader election: only one of several operators reconciles at a time.
 
-Candidates take and renew one Lease object with its resourceVersion, so the API server refuses the second of
-two concurrent writes. `leads()` reads the clock at each call. So the first call after a process was paused
-for a minute returns False (see lease_timing.py). The election only avoids duplicate work. Correctness does
-not depend on the election: names are deterministic, and the API server refuses a second object of the same
-name.
+Candidates take and renew one Lease object. Each write names the resourceVersion that the candidate has read,
+so the API server refuses the second of two concurrent writes. `leads()` reads the clock at each call. So the
+first call after a process was paused for a minute returns False (see lease_timing.py). The election only
+avoids duplicate work. Correctness does not depend on the election: names are deterministic, and the API
+server refuses a second object of the same name.
 """
 
 import threading
@@ -24,7 +24,7 @@ from palaestra.objects import Object
 log = structlog.get_logger("palaestra.cluster")
 
 DURATION_S = 15.0
-RENEW_S = 3.0  # between renewals; three may fail before the leader must stop
+RENEW_S = 3.0  # seconds between renewals; three may fail before the leader must stop
 
 
 def _nothing() -> None:
@@ -135,7 +135,7 @@ class Leadership:
         except NotFound:
             self._create(sent)
             return
-        # Another process wrote the Lease, or this process did but did not receive the response.
+        # Another process wrote the Lease, or this process wrote it but did not receive the response.
         except Conflict:
             found = self._api.get(LEASES, self._namespace, self._name)
         claim = LeaseSpec.read(found)

@@ -17,8 +17,8 @@ from typing import Any
 from palaestra.cluster.errors import NotConfigured, Unreachable
 
 VERSIONS = ("client.authentication.k8s.io/v1", "client.authentication.k8s.io/v1beta1")
-WAIT_S = 300.0  # a person may have to log in
-MOST_SAID = 300  # the last characters of a failed plugin's standard error that a message quotes
+WAIT_S = 300.0  # seconds for the whole run of a plugin, in which a person may have to log in
+MOST_SAID = 300  # characters; a message quotes the end of a failed plugin's standard error
 ALWAYS, NEVER = "Always", "Never"
 MODES = (ALWAYS, NEVER, "IfAvailable")
 
@@ -30,7 +30,7 @@ class Credentials:
     Attributes:
         token: the bearer token for the header `Authorization`, or None.
         certificate: the certificate of the client, as PEM, or None.
-        key: the key of that certificate.
+        key: the private key of the certificate, as PEM, or None.
         expires: the time after which the plugin must run again; None: the credentials do not expire.
     """
 

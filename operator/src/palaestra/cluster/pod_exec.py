@@ -57,10 +57,10 @@ def output(command: websocket.WebSocket, deadline: float) -> Iterator[bytes]:
 
     Args:
         command: the socket from `open_socket`; it is closed at the end.
-        deadline: the time at which the command must have ended, on the monotonic clock.
+        deadline: the time on the monotonic clock by which the command must have ended.
 
     Raises:
-        CommandFailed: its exit code is not 0.
+        CommandFailed: the exit code of the command is not 0.
         ApiError: the command could not be started.
         Unreachable: the connection broke, or the command did not end in time.
     """
@@ -98,7 +98,7 @@ def _message(command: websocket.WebSocket, deadline: float) -> tuple[int, bytes]
     if opcode == websocket.ABNF.OPCODE_CLOSE:
         raise Unreachable(0, "Unreachable", "the command's output ended early (the connection was closed)")
     if opcode not in (websocket.ABNF.OPCODE_BINARY, websocket.ABNF.OPCODE_TEXT) or not frame.data:
-        return -1, b""  # the frame is a ping, to which the library has responded, or empty
+        return -1, b""  # the frame is empty, or a ping to which the library has responded
     return frame.data[0], frame.data[1:]
 
 

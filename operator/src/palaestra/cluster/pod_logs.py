@@ -10,12 +10,12 @@ from palaestra.cluster.transport import read_some
 
 
 def lines(response: BaseHTTPResponse, deadline: float) -> Iterator[str]:
-    """Yield each line without its line end, as soon as the line is complete; the last may lack a line end.
+    """Yield each line, without its line end, as soon as it is complete; at the end, yield an incomplete line.
 
     Args:
         response: the response, which is closed at the end.
-        deadline: the latest time for the end of the response, on the monotonic clock; checked after each
-            read.
+        deadline: the time on the monotonic clock by which the response must have ended; it is checked after
+            each read.
 
     Raises:
         Unreachable: the connection broke or was silent for too long, or the response did not end in time.

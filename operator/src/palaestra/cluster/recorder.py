@@ -53,7 +53,7 @@ class Recorder:
             kind: `Normal` or `Warning`.
             reason: one word.
             message: a sentence; cut at 1024 characters.
-            once: if the event exists, do not increase its count.
+            once: whether to leave the count unchanged if the event already exists.
 
         Raises:
             NamespaceTerminating: events about this object can no longer be written.

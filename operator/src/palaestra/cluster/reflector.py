@@ -50,8 +50,8 @@ class Reflector:
             resource: the kind of objects.
             namespace: the namespace to watch; None for all namespaces.
             labels: a label selector.
-            keep: returns the reduced copy of an object that is cached; the metadata must keep namespace, name
-                and labels.
+            keep: reduces an object to the copy that the store gets. The metadata of the copy must have
+                namespace, name and labels.
             changed: called after the store is updated, with the cached copy of the object; for a deleted
                 object, with the last cached copy. The reflector's thread calls this function, so it must
                 return at once.

@@ -12,12 +12,12 @@ class Resource:
 
     Attributes:
         api_version: group and version, such as `batch/v1`; `v1` for the core group.
-        kind: the kind, as in objects, such as `Job`.
-        plural: the plural name, as in paths and RBAC rules, such as `jobs`.
+        kind: the name of the kind in objects, such as `Job`.
+        plural: the plural name of the kind in paths and RBAC rules, such as `jobs`.
         namespaced: whether objects are in namespaces; False for cluster-scoped kinds.
         metadata_only: whether to read only the metadata of objects, for example so that the content of
             Secrets is not transferred.
-        page: number of objects that a cache reads in one page, so that pages stay small.
+        page: number of objects that a cache requests in one page of a list.
     """
 
     api_version: str
@@ -46,7 +46,7 @@ class Resource:
         return "/".join(parts)
 
     def only_metadata(self) -> "Resource":
-        """Return the same kind, of whose objects only the metadata is read."""
+        """Return the same kind with `metadata_only`, so that only the metadata of objects is read."""
         return replace(self, metadata_only=True)
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from palaestra.objects import Key, Object
 
-JOB_LABEL = "palaestra.dev/job"  # the label by which children are looked up
+JOB_LABEL = "palaestra.dev/job"  # the label by which the objects of a TrainingJob are looked up
 
 FASTEST = 1  # compression level of zlib, which compresses 5 kB to 1.4 kB in 50 µs
 

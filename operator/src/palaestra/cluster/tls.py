@@ -49,7 +49,8 @@ def add_identity(context: ssl.SSLContext, certificate: bytes, key: bytes) -> Non
     Raises:
         OSError: the certificate or key is unusable.
     """
-    # Ssl reads only files, so they are in a folder that other users cannot read.
+    # The `ssl` module reads a certificate and a key only from files. So they are written to a folder that
+    # other users cannot read.
     with tempfile.TemporaryDirectory() as folder:
         files = Path(folder) / "certificate", Path(folder) / "key"
         for file, content in zip(files, (certificate, key), strict=True):

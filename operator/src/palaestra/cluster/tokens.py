@@ -5,7 +5,7 @@ from pathlib import Path
 
 from palaestra.cluster.errors import Unreachable
 
-FRESH_S = 60.0  # a kubelet replaces a token minutes before it expires
+FRESH_S = 60.0  # seconds until the next read; a kubelet replaces a token minutes before the token expires
 
 
 class FileToken:

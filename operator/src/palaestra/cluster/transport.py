@@ -48,7 +48,8 @@ class Call:
         verb: the verb in metrics and RBAC: `list`, `get`, `create`, `patch`, `apply`, `delete`, `watch`.
         plural: the plural name of the kind, for metrics.
         path: the path from the root of the API server.
-        query: the parameters of the URL; None is left out, and for a list the name is repeated.
+        query: the parameters of the URL. A parameter with the value None is left out; for a list, the name is
+            repeated for each item.
         accept: the requested media type of the response.
         body: an object, which is sent as JSON.
         waits: whether to retry within the deadline if the server responds with 429.

@@ -1,4 +1,6 @@
-"""The controller's queue of names of objects; it has each name at most once, for one worker at a time.
+"""The controller's queue of names of objects.
+
+The queue has each name at most once, and only one worker at a time has a name from the queue.
 
 If a name is added while a worker has it, `get` returns the name again after that worker is done. So no change
 is missed, and two workers never work on one object. The queue contains names, not events: a worker reads the
@@ -161,6 +163,6 @@ class WorkQueue(Generic[Item]):
     def _promote(self, now: float) -> None:
         while self._later and self._later[0][0] <= now:
             due, _, key = heapq.heappop(self._later)
-            if self._due.get(key) == due:  # otherwise a request with an earlier time has replaced this one
+            if self._due.get(key) == due:  # otherwise `add_after` has set an earlier time since
                 del self._due[key]
                 self._add(key, due)

@@ -148,7 +148,7 @@ def _terms(job: TrainingJob, kind: str, strength: str) -> Iterator[tuple[str, Te
 
 
 def _selects_own(job: TrainingJob, term: Term) -> bool:
-    """Return whether a term selects only the job's pods: one of its requirements must ensure that."""
+    """Return whether a term selects only the job's own pods, by the job's label or by its uid."""
     own, selector = job.metadata.name, term.get("labelSelector")
     return (
         _mapping(selector, "matchLabels").get(JOB_LABEL) == own

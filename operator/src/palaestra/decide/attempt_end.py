@@ -1,7 +1,7 @@
 """The reason for the end of an attempt: the first check that holds for its pod and its last message.
 
-A disruption is checked before the exit code with which the trainer reacts to it. The Job's podFailurePolicy
-has the same order.
+A disruption is checked before the exit code with which the trainer reacts to the disruption. The Job's
+podFailurePolicy has the same order.
 """
 
 from collections.abc import Callable
@@ -41,9 +41,9 @@ class EndedAttempt:
     Attributes:
         situation: the replica of the attempt.
         number: the number of the attempt, from 1.
-        name: the name of its pod.
-        pod: its pod; None if the pod was deleted.
-        code: the exit code of its trainer; None if unknown.
+        name: the name of the attempt's pod.
+        pod: the attempt's pod; None if the pod was deleted.
+        code: the exit code of the attempt's trainer; None if unknown.
     """
 
     situation: ReplicaContext
@@ -74,7 +74,7 @@ def of_pod(situation: ReplicaContext, pod: PodView, number: int) -> EndedAttempt
 
 
 def ended_silently(attempt: EndedAttempt) -> Explanation | None:
-    """The built-in loop did not report that it was complete: a library ended its process."""
+    """The built-in loop did not report that the training was complete: a library ended its process."""
     if attempt.code != ExitCode.DONE or attempt.pod is None or attempt.word is not None:
         return None
     own = attempt.situation.job.spec.trainer.command
@@ -127,7 +127,7 @@ def deleted(attempt: EndedAttempt) -> Explanation | None:
         return stop
     if job is not None and (job.suspended or ended_by_suspension(attempt.situation.seen, pod)):
         return paused(attempt.situation)
-    # The Job counts this end as a failure too.
+    # The trainer failed before the deletion ended it, so the Job counts a failure too.
     if attempt.code not in {None, ExitCode.INTERRUPTED} or failed_by_itself(pod):
         how = f"{how_it_failed(attempt.situation, pod)}; its pod was deleted, and it did not save in time"
         return explain(Reason.TRAINER_FAILED, how=how)
@@ -203,7 +203,7 @@ def storage_full(attempt: EndedAttempt) -> Explanation | None:
     return full_volume(attempt.word)
 
 
-# These causes would end a new pod too.
+# These causes would also end the next pod, so a retry cannot help.
 CAUSES: tuple[EndCheck, ...] = (
     configuration_refused,
     simulator_budget_spent,

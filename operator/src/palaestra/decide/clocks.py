@@ -13,7 +13,7 @@ from datetime import UTC, datetime, timedelta
 
 from palaestra.decide.explanation import Explanation
 
-WaitKey = tuple[int | str, ...]  # the replica, then `Wait.key`
+WaitKey = tuple[int | str, ...]  # the number of the replica, then the items of `Wait.key`
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -23,8 +23,8 @@ class Wait:
     Attributes:
         key: identifies the wait within a replica; a wait with another key begins again.
         seconds: the deadline.
-        begun_s: the time at which the wait began, on the monotonic clock; None: the time of the first
-            reconcile that found it.
+        begun_s: the time on the monotonic clock at which the wait began; None: the time of the first
+            reconcile that found the wait.
     """
 
     key: tuple[str, ...]
@@ -38,8 +38,8 @@ class WaitingReason:
 
     Attributes:
         explanation: the reason and its message.
-        gone_s: time of the first reconcile that no longer found the cause, on the monotonic clock; None: the
-            cause still exists.
+        gone_s: the time on the monotonic clock of the first reconcile that no longer found the cause; None:
+            the cause still exists.
     """
 
     explanation: Explanation
@@ -51,10 +51,10 @@ class ReconcileRecord:
     """The data that one reconcile passes to the next reconcile of the same process; a restart loses it.
 
     Attributes:
-        waits: time at which each open wait was first found, on the monotonic clock.
+        waits: the time on the monotonic clock at which each open wait was first found.
         troubles: waiting reason of each replica that waits for its first step.
         active_s: seconds for which this process knows that the job was active.
-        active_at_s: time up to which `active_s` is counted, on the monotonic clock; None: the job is not
+        active_at_s: the time on the monotonic clock up to which `active_s` is counted; None: the job is not
             active.
     """
 

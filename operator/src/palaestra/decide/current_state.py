@@ -16,7 +16,7 @@ DESCRIBE_WORKLOAD = "; `kubectl describe workload` shows it"  # only the Workloa
 
 
 def held(situation: ReplicaContext) -> Finding | None:
-    """The replica does not start: its run is lost, or an object in the spec is missing or not for jobs."""
+    """The replica does not start: its run is lost, or an object of the spec is missing or not for jobs."""
     if situation.hold is None:
         return None
     job = situation.seen.job
@@ -25,7 +25,7 @@ def held(situation: ReplicaContext) -> Finding | None:
 
 
 def suspending(situation: ReplicaContext) -> Finding | None:
-    """The replica is or was just suspended, and its pod still saves a checkpoint."""
+    """The replica is suspended, or was just resumed, and its old pod still saves a checkpoint."""
     pod = situation.pod if situation.seen.job is not None else None
     if pod is None or not (situation.suspended or ended_by_suspension(situation.seen, pod)):
         return None

@@ -29,7 +29,7 @@ class Basis:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Create:
-    """Create `object` in its namespace; `replica` is None if it belongs to the whole job.
+    """Create `object` in its namespace; `replica` is None if the object belongs to the whole job.
 
     AlreadyExists is not an error for a ConfigMap, claim or NetworkPolicy, because their names determine their
     content. An existing Job is added to `Objects.jobs`, even if another object owns it; `observe` checks the
@@ -134,7 +134,7 @@ class Delete:
     after_s: int = 0
 
 
-Change = Stop | Replace | SetSuspend | Discard  # of a Job
+Change = Stop | Replace | SetSuspend | Discard  # the actions that change or delete a Job
 Action = Create | Change | Delete
 
 

@@ -117,7 +117,7 @@ def _of_lost_run(old: ReplicaStatus | None, new: ReplicaStatus) -> Iterator[Emit
 
 
 def edits(job: TrainingJob, observed: Observed) -> Iterator[EmittedEvent]:
-    """Yield an event for each edit by another client that still exists; the operator does not revert edits.
+    """Yield an event for each current edit by another client; the operator does not revert edits.
 
     Each edit has a unique message, so its event is written once.
     """

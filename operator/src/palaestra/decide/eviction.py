@@ -29,7 +29,8 @@ from palaestra.plan.job import GIVEN_UP
 from palaestra_protocol.pod.status import ExitCode
 
 STALL_GRACE_S = 120  # seconds in which the trainer's own watchdog should end the trainer
-# A trainer normally starts in seconds, because the ROS master has already pulled the same image.
+# Seconds after which the operator assumes that the kubelet will not start the trainer. The start normally
+# takes seconds, because the ROS master has the same image, which the node has already pulled.
 FORGOTTEN_S = 300
 OUTLIVED_S = 60  # seconds; a proxy that ends after the main process normally ends within this time
 
@@ -43,7 +44,7 @@ def marked(situation: ReplicaContext) -> Finding | None:
 
 
 def restart_policy_dropped(situation: ReplicaContext) -> Finding | None:
-    """Sidecars became ordinary init containers: such a pod never starts its trainer."""
+    """The pod's sidecars have lost their `restartPolicy`, so they never end and the trainer never starts."""
     pod = situation.pod
     names = dropped(pod) if pod is not None else ()
     if pod is None or not names or pod.gone_by is not None:
@@ -64,7 +65,7 @@ def trainer_never_started(situation: ReplicaContext) -> Finding | None:
 
 
 def stalled(situation: ReplicaContext) -> Finding | None:
-    """The trainer responds, but its step count stays the same, and its watchdog has not ended it."""
+    """The trainer responds, but its step count stays the same, and its own watchdog has not acted."""
     wait = standstill(situation)
     if wait is None or situation.pod is None or situation.pod.gone_by is not None or not situation.fresh:
         return None

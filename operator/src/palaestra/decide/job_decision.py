@@ -108,7 +108,7 @@ def _replica(job: TrainingJob, seen: ReplicaObserved, prepared: Prepared, times:
 
 
 def _with_lost_run(found: Decided, job: TrainingJob, prepared: Prepared, times: Times) -> Decided:
-    """Return a replica with its lost run; a new annotation gives up a lost run that the status shows."""
+    """Return a replica with its lost run; a new value of the annotation gives up a lost run in the status."""
     shown, lost = found.status.lost, prepared.lost.get(found.status.index)
     if found.status.phase in TERMINAL:
         return found
@@ -127,7 +127,7 @@ def _kept(job: TrainingJob, decided: Sequence[Decided]) -> tuple[ReplicaStatus, 
 
 
 def _still_to_stop(old: ReplicaStatus, seen: ReplicaObserved) -> Explanation | None:
-    """Return the reason to stop a failed replica whose Job still runs, for example because it is new."""
+    """Return the reason to stop a failed replica whose Job still runs, for example a new Job."""
     going_on = seen.job is not None and seen.job.end is None and seen.job.stopped is None
     if not going_on or old.phase is not Phase.FAILED:
         return None

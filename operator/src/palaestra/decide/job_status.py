@@ -1,13 +1,13 @@
 """The status of the whole job: its phase, its reason, its conditions, and the columns of `kubectl get`.
 
 Five conditions always exist, each with a reason, whether true or false. The job's message is in the condition
-of the job's phase. No condition exists for the phase Pending: then the message is in Accepted while that is
-false, and in Running afterwards.
+of the job's phase. No condition exists for the phase Pending. In this phase, the message is in Accepted while
+Accepted is false, and in Running afterwards.
 
-Two more conditions exist only while they are true. Flux and `helm --wait` read them through the library
-kstatus. A job is `Reconciling` while its state differs from its spec, and `Stalled` if only a person can make
-them equal. If a job has neither condition, its state matches its spec: it trains, has succeeded, or is
-suspended.
+Two more conditions exist only while they are true. Flux and `helm --wait` read these two conditions through
+the library kstatus. A job is `Reconciling` while its state differs from its spec, and `Stalled` if only a
+person can make state and spec equal. If a job has neither condition, its state matches its spec: the job
+trains, has succeeded, or is suspended.
 """
 
 from collections import Counter
@@ -33,7 +33,7 @@ from palaestra.decide.explanation import Explanation
 from palaestra.decide.replica_context import ReplicaVerdict
 from palaestra.observe.models import Observed
 
-LONGEST_NODES = 256  # characters of the names of all nodes
+LONGEST_NODES = 256  # characters of the names of all nodes together
 LONGEST_LEFT_OUT = 230  # characters of one line: a group's name, and 200 characters from a simulator
 _CONDITION_OF = {
     Phase.RUNNING: ConditionType.RUNNING,
@@ -139,7 +139,7 @@ def _ended(replicas: Sequence[ReplicaStatus]) -> ReplicaVerdict:
 
 
 def as_first(replicas: Sequence[ReplicaStatus], phase: Phase) -> ReplicaVerdict:
-    """Return this phase with the reason of the first replica in it."""
+    """Return `phase` with the reason of the first replica in this phase."""
     first = next(replica for replica in replicas if replica.phase is phase)
     of = f"replica {first.index}: " if len(replicas) > 1 else ""
     explanation = Explanation(
@@ -186,8 +186,8 @@ def reconciliation(phase: Phase, why: Explanation, *, suspend: bool) -> Conditio
 def conditions_of_ended(ended: Status) -> tuple[Condition, ...]:
     """Return the conditions of an ended job: the existing ones, and `Stalled` if the job failed.
 
-    `Stalled` may be missing, because the status was written before the operator read that the cluster's
-    definition allows it.
+    `Stalled` may be missing: the operator may have written the status before it read that the cluster's CRD
+    allows this condition.
     """
     failed = condition(ended, ConditionType.FAILED)
     if ended.phase is not Phase.FAILED or failed is None or condition(ended, ConditionType.STALLED):

@@ -84,7 +84,8 @@ def _lacks_claim(
 def _is_empty(job: TrainingJob, old: ReplicaStatus, seen: ReplicaObserved) -> bool:
     """Return whether a later attempt reports number 1, because it found no record of earlier attempts.
 
-    An ephemeral run is deleted with its pod. A custom program does not report the number of its attempt.
+    The result is False for an ephemeral run, which is deleted with its pod. It is also False for a custom
+    program that does not report the number of its attempt.
     """
     if seen.polled is None or old.last_checkpoint is None or job.spec.storage.ephemeral:
         return False

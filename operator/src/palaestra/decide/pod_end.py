@@ -1,4 +1,4 @@
-"""The end of a pod and its containers: its description, and the count of out-of-memory kills.
+"""The end of a pod and its containers: a description of the end, and the count of out-of-memory kills.
 
 On cgroup v2 the kernel kills a whole container, including the sidecar process, and the kubelet restarts the
 container within a second. Then only the container's last termination state shows that the simulator ran out
@@ -18,7 +18,7 @@ from palaestra.plan.replica import TRAINER
 from palaestra_protocol.pod.status import Termination
 
 OUT_OF_MEMORY = "OOMKilled"
-MOST_CONTAINERS = 64  # the limit of the status field
+MOST_CONTAINERS = 64  # the limit of the list `memoryKills` in the status
 FULL = "StorageFull"  # the first word of a termination message
 
 
@@ -81,7 +81,7 @@ def full_volume(word: Termination | None) -> Explanation | None:
     """Return the reason if a trainer could not write to its full volume, else None."""
     if word is None or not word.reason.startswith(FULL):
         return None
-    # Cut the remedy, because the status reason has its own.
+    # Cut the remedy, because the text of the reason `StorageFull` has its own remedy.
     fact = word.reason.partition(": ")[2].partition("; ")[0]
     return explain(Reason.STORAGE_FULL, words=fact or "no space left")
 

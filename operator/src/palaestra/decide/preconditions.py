@@ -144,7 +144,7 @@ def unfinished(job: TrainingJob, observed: Observed) -> tuple[ReplicaObserved, .
 
 
 def worlds_are_checked(job: TrainingJob, observed: Observed) -> Hold | None:
-    """The checks of a namespace's large worlds run one after the other, and each takes seconds."""
+    """The worlds do not wait for a check; a namespace's large worlds are checked one after the other."""
     del job
     return held(Reason.CHECKING_WORLDS) if observed.worlds_wait else None
 

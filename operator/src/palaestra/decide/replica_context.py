@@ -142,7 +142,7 @@ def _container(group: SimulatorGroup, index: int) -> str:
 
 
 def next_pod(situation: ReplicaContext) -> str:
-    """Return the text about the start of a replica's next pod: it resumes only from a reported checkpoint.
+    """Return the text about a replica's next pod, which resumes only from a reported checkpoint.
 
     A custom program (`spec.trainer.command`) need not report its checkpoints, so its reported step counts as
     a checkpoint.

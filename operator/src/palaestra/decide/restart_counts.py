@@ -85,7 +85,10 @@ def newer_pods(old: ReplicaStatus, pods: Sequence[PodView]) -> tuple[PodView, ..
 
 
 def of_this_run(old: ReplicaStatus, pods: Sequence[PodView]) -> frozenset[str]:
-    """Return the uids of the pods whose reports count; after a lost run was given up, only of newer pods."""
+    """Return the uids of the pods whose reports count.
+
+    After a lost run was given up, only the reports of newer pods count.
+    """
     if old.lost is not None and old.lost.restarted is not None and old.lost.pod is not None:
         pods = newer_pods(old.model_copy(update={"pod": old.lost.pod}), pods)
         return frozenset(pod.uid for pod in pods if pod.uid != old.lost.pod.uid)

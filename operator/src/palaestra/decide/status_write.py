@@ -34,7 +34,7 @@ _OF_REPLICA = frozenset(
 )  # fmt: skip
 _AMOUNT = re.compile(r"\d[\w.]*")  # an amount, such as 425m or 1.5Gi
 
-# Of the whole object in a request; etcd accepts 1,572,864 bytes, including managedFields.
+# Limit of the whole object in a request; etcd accepts 1,572,864 bytes, including managedFields.
 MOST_BYTES = 1_400_000
 SHORT = 100  # bytes of a shortened message in a request
 
@@ -68,8 +68,8 @@ def write_in_s(old: Mapping[str, Any] | None, new: Mapping[str, Any], since_s: f
     Args:
         old: the status from the API server.
         new: the status from `as_data`.
-        since_s: seconds since this process last wrote the job's status, on a monotonic clock; None: it has
-            not written the status.
+        since_s: seconds since this process last wrote the job's status, on a monotonic clock; None: this
+            process has not written the status.
     """
     # An older CRD has defaults for lists, so the API server adds the empty lists again.
     before = _without_empty(_without(old if isinstance(old, Mapping) else {}, _WITH_OTHERS))
@@ -130,7 +130,7 @@ def _size(data: Any) -> int:
 
 
 def _taken(job: Mapping[str, Any]) -> int:
-    """Return the bytes of a job without its status; all small jobs count as the largest small job."""
+    """Return the bytes of a job without its status; a job without a noted size counts as `SMALL` bytes."""
     noted = text(part(job, "metadata", "annotations"), SIZE)
     return int(noted) if noted.isdecimal() else SMALL
 

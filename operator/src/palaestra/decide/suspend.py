@@ -55,7 +55,10 @@ def mark(seen: ReplicaObserved, current: PodReference | None, *, suspend: bool) 
 
 
 def ended_by_suspension(seen: ReplicaObserved, pod: PodView) -> bool:
-    """Return whether a pod was deleted because the operator suspended its Job, even if it resumed the Job."""
+    """Return whether a pod was deleted because the operator suspended its Job.
+
+    The operator may have resumed the Job since.
+    """
     mark = seen.job.suspension if seen.job is not None else None
     return mark is not None and mark.lived and mark.pod == pod.uid and pod.gone_by is not None
 

@@ -1,4 +1,4 @@
-"""Read a TrainingJob from the API server's JSON, or refuse it: invalid objects must not delay others."""
+"""Read a TrainingJob from the API server's JSON, or refuse it: invalid jobs must not delay other jobs."""
 
 from collections.abc import Mapping
 from datetime import datetime
@@ -27,8 +27,8 @@ class JobRefused(TrainingJobError, ValueError):
     """The operator cannot run this TrainingJob, and a retry cannot help.
 
     Attributes:
-        reason: the reason, one word.
-        message: the message for the status, a sentence.
+        reason: the reason, as one word.
+        message: the message for the status, as a sentence.
     """
 
     def __init__(self, reason: Reason, problem: str) -> None:

@@ -34,8 +34,8 @@ CHECKS: tuple[tuple[str, Check], ...] = (
     ("operator's rights", operator_rights),
     ("metrics", metrics),
 )
-# If the check that is the key fails, the checks in its set are skipped, because they would fail too or
-# mislead. For example, RBAC also grants permissions in a namespace that does not exist.
+# For each check, the checks to skip if it fails: these would fail too, or their results would mislead. For
+# example, RBAC also grants permissions in a namespace that does not exist.
 POINTLESS: Mapping[Check, frozenset[Check]] = {
     answers: frozenset(check for _, check in CHECKS),
     namespace: frozenset({own_rights, sidecars, operator_rights}),
@@ -43,7 +43,7 @@ POINTLESS: Mapping[Check, frozenset[Check]] = {
 
 
 def examine(site: Site) -> Iterator[CheckResult]:
-    """Yield the results of each check; after a failed check, skip those that `POINTLESS` lists for it."""
+    """Yield the results of each check; if a check fails, skip the checks that `POINTLESS` has for it."""
     skipped: frozenset[Check] = frozenset()
     for what, check in CHECKS:
         if check in skipped:

@@ -28,7 +28,7 @@ class LocalRun:
         folder: the run directory of the replica, or the folder of a job with one replica.
 
     Raises:
-        NoRun: the folder is neither of the two.
+        NoRun: the folder is neither a run directory nor the folder of a job with one replica.
     """
 
     def __init__(self, folder: Path) -> None:

@@ -70,7 +70,7 @@ class ViewPage:
 
     Args:
         title: the title of the page.
-        sources: returns the simulators; the page calls it again when a simulator does not respond.
+        sources: returns the simulators; the page calls this function again when a simulator does not respond.
         port: the port of the page; if it is in use, the next free port is taken.
         simulator: the name of the simulator that is shown first.
 
@@ -179,7 +179,7 @@ class ViewPage:
         return gui.add_markdown("waits for the first pose")
 
     def _add_fault(self, label: str, hint: str, number: int) -> None:
-        """Add a button that sends the simulator a signal; the page has it only for local simulators."""
+        """Add a button that sends a signal to the simulator; only a local run's page has such buttons."""
         button = self._server.gui.add_button(label, hint=hint)
         self._gate.allow(button)
 

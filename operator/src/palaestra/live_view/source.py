@@ -1,4 +1,4 @@
-"""Read the scene and the state of one simulator from its sidecar, or from a server like a sidecar."""
+"""Read the scene and the state of one simulator from its sidecar, or from a server with the same paths."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class EpisodeReader:
 
     Args:
         fetch: sends a request to the trainer, with the interface of `SidecarSource.fetch`.
-        clock: returns seconds, from any origin.
+        clock: returns the time in seconds since any fixed moment.
     """
 
     def __init__(self, fetch: Fetch, clock: Callable[[], float] = time.monotonic) -> None:
@@ -84,7 +84,7 @@ class EpisodeReader:
                 return {}
             return {str(name): SceneState.from_json(moment) for name, moment in content.items()}
         except (OSError, http.client.HTTPException, ProtocolError):
-            return {}  # the trainer is between two attempts, or of an older release
+            return {}  # no trainer runs between two attempts, or the trainer is of an older release
 
 
 class StatusReader:
@@ -92,7 +92,7 @@ class StatusReader:
 
     Args:
         fetch: sends a request to the trainer, with the interface of `SidecarSource.fetch`.
-        clock: returns seconds, from any origin.
+        clock: returns the time in seconds since any fixed moment.
     """
 
     def __init__(self, fetch: Fetch, clock: Callable[[], float] = time.monotonic) -> None:
@@ -119,7 +119,7 @@ class SidecarSource:
         name: the name of the simulator, for people.
         fetch: sends a GET request for a path, and returns status and body of the response. The body has at
             most the given number of bytes plus one, so that a longer body can be detected. The function
-            raises OSError or HTTPException without a response.
+            raises OSError or HTTPException if no response arrives.
         episodes: reads the episodes from the run's trainer; None if they are unknown.
         run: reads the progress of the run; None if it is unknown.
         here: whether the simulator's processes run on this machine as this user, so that `signal` works.
@@ -222,7 +222,7 @@ def at_address(host: str, port: int) -> Fetch:
 def of_either(fetch: Fetch) -> Fetch:
     """Return a function that reads the running simulator of a sidecar with a standby.
 
-    The function reads from the same simulator until the sidecar responds that it does not run.
+    The function reads from the same simulator until the sidecar responds that this simulator does not run.
     """
     slots = deque(("", _STANDBY))
 

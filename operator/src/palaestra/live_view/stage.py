@@ -71,7 +71,7 @@ class Stage:
             self.revision = scene.revision
 
     def move(self, state: SceneState) -> None:
-        """Move all nodes to their poses in a state; nodes that it lacks return to their first pose."""
+        """Move each node to its pose in `state`; a node without a pose returns to its first pose."""
         with self._server.atomic():
             for name, pose in state.poses.items():
                 if (frame := self._nodes.get(name)) is not None:

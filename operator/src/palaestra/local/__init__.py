@@ -6,8 +6,8 @@ passed. The trainer starts last. Containers restart with back-off, and the pod f
 shutdown is in reverse order, within one grace period.
 
 As in a cluster, no process is left behind. A marker in the environment identifies a pod's processes. The
-orphan killer (`orphan_killer`) ends these processes when the runner's end of a pipe closes. So they end with
-the runner, even if SIGKILL ends the runner.
+orphan killer (`orphan_killer`) ends these processes when the runner's end of a pipe closes. So the processes
+end with the runner, even if SIGKILL ends the runner.
 
 A Python program runs a job with `palaestra.run` (`run_handle`). Then the runner is a separate process
 (`child_main`), which ends with that program.

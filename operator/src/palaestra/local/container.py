@@ -24,7 +24,7 @@ TERMINATED = 128 + signal.SIGTERM
 class BackOff:
     """The waits of a container before its restarts, by the kubelet's rule, but with shorter times.
 
-    The wait doubles with each end, from `first_s` to `most_s`. After a run longer than `calm_s`, it is reset.
+    The wait doubles with each end, from `first_s` to `most_s`. A run longer than `calm_s` resets the wait.
     """
 
     first_s: float = 0.5

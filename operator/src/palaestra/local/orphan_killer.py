@@ -5,9 +5,9 @@ other end only the runner has. So the pipe closes when the runner ends or closes
 the signals of a terminal.
 
 A marker in the environment identifies a pod's processes. Grandchildren inherit the marker through `setsid`,
-double forks and new process groups, in which a parent-death signal or a process group would miss them.
-Between its fork and its exec, a child of the runner has no marker yet, but keeps the pipe open, so the
-program waits for it.
+double forks and new process groups. A parent-death signal or a signal to a process group would miss these
+grandchildren. Between its fork and its exec, a child of the runner has no marker yet. But the child keeps the
+pipe open, so the program waits for the child.
 
 The reaper of a sidecar works in another way. The reaper is the parent of a simulator's processes, so it needs
 no marker and also finds processes that change their environment. This program cannot be the parent, because
@@ -23,13 +23,13 @@ import sys
 import time
 
 MARKER = "PALAESTRA_LOCAL_CONTAINER"  # environment variable with the value <pod uid>/<container>/
-QUIET_ROUNDS = 3  # rounds without a found process; a round misses a process that is in an exec
+QUIET_ROUNDS = 3  # last rounds, which find no process; one round misses a process that is in an exec
 ROUND_S = 0.02
 DEADLINE_S = 20.0  # a process that survives SIGKILL for this long hangs in the kernel
 
 
 def kill_marked(prefix: str) -> int:
-    """Send SIGKILL to every process whose marker begins with `prefix`; return their number.
+    """Send SIGKILL to every process whose marker begins with `prefix`; return the number of processes.
 
     `prefix` is `<pod uid>/` for a whole pod, or `<pod uid>/<container>/` for one container.
     """

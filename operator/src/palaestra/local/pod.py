@@ -1,9 +1,10 @@
 """Run one attempt of a replica: a pod's containers, from the first start to the last end.
 
-The order is the order of KEP-753. The init containers start one after another; the successor of a sidecar
-waits for the sidecar's startup probe. Then the main container runs, and its end ends the pod. Then the
-sidecars stop in reverse order, within the remaining grace period. `stop` begins this shutdown early. The main
-container stops first, so that it can still use its simulators while it writes the last checkpoint.
+The containers start and stop in the order of KEP-753. The init containers start one after another; the
+successor of a sidecar waits for the sidecar's startup probe. Then the main container runs, and its end ends
+the pod. Then the sidecars stop in reverse order, within the remaining grace period. `stop` begins this
+shutdown early. The main container stops first, so that it can still use its simulators while it writes the
+last checkpoint.
 """
 
 import asyncio
@@ -20,7 +21,7 @@ from palaestra.local.pod_spec import Container, Pod
 from palaestra.local.process import OrphanKiller
 
 LONG_S = 10.0  # seconds after which a start is shown as slow; the import of PyTorch takes several seconds
-TRIES = 3  # failures of a sidecar before its startup after which the pod fails
+TRIES = 3  # the pod fails if a sidecar ends this many times before it has started
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -128,7 +129,7 @@ class RunningPod:
     def _reported(self, running: Running) -> Iterator[None]:
         """If the block takes longer than `long_s`, show that a container has not started, with the time.
 
-        The main container counts as started as soon as it has written a line; later waits it reports itself.
+        The main container counts as started as soon as it has written a line; it reports later waits itself.
         """
         since = time.strftime("%H:%M:%S")
         main = running.spec is self._pod.main

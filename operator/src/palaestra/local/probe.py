@@ -10,7 +10,7 @@ from http import HTTPStatus
 from palaestra.local.pod_spec import Probe
 from palaestra.local.process import Process
 
-# Without a proxy, because the address is on loopback.
+# This opener uses no proxy, because the address is on loopback.
 DIRECT = urllib.request.build_opener(urllib.request.ProxyHandler({}))
 
 

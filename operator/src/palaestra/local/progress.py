@@ -18,7 +18,7 @@ class RunProgress:
     """The newest values of a run; an unknown value is None.
 
     Attributes:
-        phase: `starting`, then the trainer's phase, finally `ended`.
+        phase: first `starting`, then the phase that the trainer reports, and finally `ended`.
         step: environment steps from which the run has learned, over all attempts.
         target: steps at which the run ends; 0 before the trainer's first response.
         steps_per_second: recent environment steps per second.

@@ -19,7 +19,7 @@ _WRITTEN_BY_THE_TRAINER = "end.json"
 def complete_report(run_directory: Path) -> None:
     """Write the report of a run if its trainer was killed or still trains; do nothing if this fails.
 
-    A run of a custom program gets no report, because it need not have the necessary files.
+    A run of a custom program gets no report, because such a run may lack the necessary files.
     """
     began = (run_directory / "attempts.jsonl").exists()
     if began and not (run_directory / _WRITTEN_BY_THE_TRAINER).exists() and lack(PROGRAM) is None:

@@ -70,8 +70,8 @@ def locked(directory: Path, taken: int | None = None) -> Iterator[int]:
     """Lock a run directory for this process, and yield the descriptor of the lock.
 
     The kernel releases the lock when every process with this descriptor has closed it or ended. A process
-    that inherited the descriptor passes the descriptor as `taken`. The lock is not a record lock, as in the
-    trainer, because a child process cannot inherit a record lock.
+    that inherited the descriptor passes the descriptor as `taken`. Unlike the trainer's lock, this
+    lock is not a record lock, because a child process cannot inherit a record lock.
 
     Raises:
         RunRefused: another runner has the lock, or the file system has no locks.

@@ -38,11 +38,11 @@ class Result:
     """The end of a run; a value is None if it was not measured.
 
     Attributes:
-        exit_code: the exit code, as of `palaestra run`.
+        exit_code: the exit code that `palaestra run` returns for this end.
         succeeded: whether the training is complete.
         reason: the reason for the end; empty if no reason was reported.
         directory: the run directory.
-        policy: the best policy by evaluation, `model.zip`; None if it does not exist yet.
+        policy: the path of `model.zip`, the policy with the best evaluation; None if the file does not exist.
         steps: environment steps from which the run has learned.
         success_rate: success rate of the policy, 0 to 1.
         steps_per_second: environment steps per second over the whole run.
@@ -143,13 +143,13 @@ class RunHandle:
         return self._result()
 
     def interrupt(self) -> None:
-        """Request a checkpoint and the end of the run, and return at once; the job can resume from there."""
+        """Request a checkpoint and the end of the run, and return at once; the job can resume later."""
         if not self.ended:
             with suppress(BrokenPipeError, ValueError):  # the run has just ended
                 self._control.write(b"\n")
 
     def stop(self, deadline_s: float = STOP_S) -> Result:
-        """Save a checkpoint, end the run and return the result; kill it after `deadline_s`."""
+        """Save a checkpoint, end the run and return the result; after `deadline_s`, kill the run."""
         self.interrupt()
         if not self.wait(deadline_s):
             self.kill()

@@ -1,4 +1,4 @@
-"""The simulators of this machine: the program of each driver, and a check whether it is installed.
+"""The simulators of this machine: the program of each driver, and a check whether this program is installed.
 
 This package does not import simulators, so it only checks that their programs and libraries exist.
 """

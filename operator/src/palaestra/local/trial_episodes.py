@@ -1,8 +1,8 @@
 """`palaestra try --local`: play a few episodes of a job's environment on this machine, without training.
 
-The job is planned and checked as by `palaestra run`, but into a temporary folder. There the trainer's program
-`palaestra-try` plays in the first collecting simulator. It starts this simulator in the same way as
-`palaestra-eval`.
+The job is checked and planned as by `palaestra run`, but its files are written to a temporary folder. The
+trainer's program `palaestra-try` then plays the episodes in the first collecting simulator. `palaestra-try`
+starts this simulator in the same way as `palaestra-eval`.
 """
 
 from __future__ import annotations

@@ -28,7 +28,7 @@ class WorldCheckResult:
     """The result of one simulator's check.
 
     Attributes:
-        driver: the driver, as in a TrainingJob.
+        driver: the name of the driver in a TrainingJob.
         starts: whether the simulator can start the world with the options.
         text: the simulator's output.
     """
@@ -39,10 +39,10 @@ class WorldCheckResult:
 
 
 def check_world(world: Path, options: Sequence[str] = ()) -> tuple[WorldCheckResult, ...]:
-    """Return the result of each simulator; a simulator that does not respond counts as not starting.
+    """Return the result of each simulator; without a response, `starts` is False.
 
-    The stub is always run, and MuJoCo if it is installed. Each program gets the options with which it would
-    start.
+    The stub is always run, and MuJoCo if it is installed. Each program gets the options with which a run
+    would start it.
     """
     asked = [driver for driver in _CHECKERS if driver is Driver.STUB or lack(PROGRAMS[driver]) is None]
     return tuple(asyncio.run(_ask(driver, world, options)) for driver in asked)

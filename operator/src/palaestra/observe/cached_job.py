@@ -1,4 +1,4 @@
-"""The copy of a TrainingJob in a cache, which is small whatever the content of the job's fields.
+"""The cached copy of a TrainingJob; the copy is small whatever the content of the job's fields.
 
 Only the plan needs the removed fields, so for a plan the operator reads the object from the API server. An
 annotation on the copy names the removed fields, so that the copy itself is never planned. Users cannot set

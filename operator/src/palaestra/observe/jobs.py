@@ -16,8 +16,8 @@ REPLACED = "palaestra.dev/replaced"  # annotation of a Job: "<times> <uid of the
 _REPLACED = re.compile(r"(\d{1,9}) (\S{1,253}) (\w{1,60}): (.{0,1024})")
 _SUSPENDED = re.compile(r"(\S{1,253}) (lived|ended)")
 
-# Kubernetes sets the last two conditions before the last pod has ended. The operator needs them because a pod
-# on a lost node never ends.
+# Kubernetes sets the last two conditions before the last pod has ended. The operator needs these conditions,
+# because a pod on a lost node never ends.
 _ENDS = (
     ("Complete", JobEnd.COMPLETE),
     ("Failed", JobEnd.FAILED),

@@ -30,7 +30,9 @@ class ReferenceKind(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReferencedObject:
-    """An object of the job's namespace to which its spec refers; `field` is the first such field.
+    """An object in the job's namespace to which the job's spec refers.
+
+    `field` is the first field of the spec that refers to the object.
 
     Two references are equal if they name the same object.
     """
@@ -54,16 +56,17 @@ class Objects:
 
     Attributes:
         jobs, pods, claims, config_maps, policies: objects in the TrainingJob's namespace whose label
-            palaestra.dev/job has its name; `jobs` also has Jobs of other owners with a name that the
-            TrainingJob needs.
+            palaestra.dev/job has the TrainingJob's name. `jobs` also has Jobs of other owners with a name
+            that the TrainingJob needs.
         events: FailedCreate events about those Jobs, warnings about pods that wait for volumes, and events
             about trainers that the kubelet ended.
-        unadmitted: Kueue's reason not to admit a Job, by the Job's uid; absent if it was not requested.
-        unasked: uids of incomplete Jobs and pods about which the operator sends no request, because of their
-            number.
+        unadmitted: Kueue's reason not to admit a Job, by the Job's uid; a Job is absent if the reason was not
+            requested.
+        unasked: uids of incomplete Jobs and pods about which the operator sends no request, because there
+            are too many.
         polled: the last responses of trainers by pod UID; absent if the last request to the pod failed.
-        denied: the API server's message of the last refused creation, by replica; None: an object of the
-            whole job. A replica without a refusal is absent.
+        denied: the API server's message of the last refused creation, by replica; the key None stands for
+            objects of the whole job. A replica without a refusal is absent.
         switchers: the field manager that set `spec.suspend` of a Job, by the Job's uid; absent if the value
             is the operator's.
     """
@@ -140,7 +143,7 @@ class PodView:
 
     Attributes:
         version: its resourceVersion.
-        started: the time at which a kubelet accepted the pod; None if no kubelet has.
+        started: the time at which a kubelet accepted the pod; None if no kubelet has accepted it.
         phase: Pending, Running, Succeeded, Failed or Unknown.
         reason, message: the pod's own reason and message, for example after an eviction; usually "".
         ready: whether the kubelet reports the pod as ready; False if unknown.
@@ -250,10 +253,10 @@ class JobView:
         suspended: the current value of `spec.suspend`.
         suspend_set: the value of `spec.suspend` that the operator set last, from its annotation; None: the
             Job has no annotation, for example because the operator created the Job for a queue.
-        suspension: the operator's mark about the pod that its last suspension ended, or None.
+        suspension: the operator's mark about the pod that the Job's last suspension ended, or None.
         paused: the time of the suspension by the Job controller's clock; None: the Job is not suspended.
         resumed: the time of the last resumption by the Job controller's clock; None: the Job was never
-            suspended, or still is.
+            suspended, or is suspended now.
         stopped: reason and message of the operator's stop mark, or None.
         replaced: the operator's mark about the pods that it replaced, or None.
         failures: number of pods that failed and count against backoffLimit.
@@ -261,7 +264,7 @@ class JobView:
         settings: fields of the Job's spec that other clients may change; a missing field is absent.
         deleting: whether the Job is being deleted.
         volumes: names of the ConfigMaps and claims that the Job's pods mount.
-        queue: the Job's Kueue queue, from the spec or a namespace's default, or "".
+        queue: the name of the Job's Kueue queue, from the spec or the namespace's default; "": no queue.
     """
 
     name: str
@@ -286,7 +289,7 @@ class JobView:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ForeignJob:
-    """A Job of another owner whose name a TrainingJob needs; `deleting`: whether it is being deleted."""
+    """A Job of another owner with a name that a TrainingJob needs; `deleting`: the Job is being deleted."""
 
     name: str
     deleting: bool

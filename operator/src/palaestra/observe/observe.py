@@ -48,7 +48,7 @@ def observe(job: TrainingJob, objects: Objects) -> Observed:
 
 
 def _edited(job: TrainingJob, objects: Objects) -> Iterator[tuple[str, int]]:
-    """Yield name and generation of each network policy of the job that was changed: generation above 1."""
+    """Yield name and generation of each changed network policy of the job; its generation is above 1."""
     for raw in objects.policies:
         metadata = part(raw, "metadata")
         generation = count(metadata, "generation")

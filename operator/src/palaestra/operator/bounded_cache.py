@@ -20,7 +20,7 @@ from typing import Generic, TypeVar
 from palaestra.objects import Key
 
 REMEMBERED = 4000  # limit of objects of all jobs together; one message is stored for each object
-PATIENCE_S = 5.0  # from the time an object is found incomplete until the first request about it
+PATIENCE_S = 5.0  # seconds after an object was found incomplete until the first request about the object
 # The pause between the first two requests about an object; each later pause is twice the previous one.
 RECHECK_S = 15.0
 LONGEST_PAUSE_S = 300.0
@@ -34,7 +34,10 @@ Ask = Callable[[str, Item], Fact | None]
 
 
 class BoundedCache(Generic[Item, Value]):
-    """Values by TrainingJob and item; threads may share it if only one thread at a time uses a job."""
+    """Values by TrainingJob and item.
+
+    Several threads may use one cache, but only one at a time may use the values of one TrainingJob.
+    """
 
     def __init__(self) -> None:
         self._lock = threading.RLock()
@@ -150,10 +153,13 @@ class _Turns:
     def __init__(self, now: float) -> None:
         self._lock = threading.Lock()
         self._tokens, self._filled = 1.0, now
-        self._end = now  # when the last turn in the queue ends
+        self._end = now  # the first future time that no waiting object has
 
     def wait_s(self, now: float, *, queued: bool) -> float:
-        """Return the seconds to wait before the request; 0: send it now."""
+        """Return the seconds until the request may be sent; 0: now.
+
+        `queued`: the object has waited for a future time before.
+        """
         with self._lock:
             self._tokens = min(self._tokens + (now - self._filled) * RATE, 1.0)
             self._filled = now

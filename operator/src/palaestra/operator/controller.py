@@ -1,4 +1,4 @@
-"""The control loop: compare the cluster with the job, and change it one step toward the job.
+"""The control loop: compare the cluster with the job, and change the cluster one step toward the job.
 
 The loop is level-triggered: a reconcile gets the key of a job, not the change. A reconcile derives the job's
 state from the cluster alone, so the operator can be killed between any two writes and restarted. The pure

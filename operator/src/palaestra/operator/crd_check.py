@@ -27,7 +27,7 @@ from palaestra.observe.json_access import part, parts, text
 READ_S = 5.0
 FIRST_PAUSE_S = 10.0  # the API server publishes a definition some seconds after it was applied
 MOST_SHOWN = 20
-# An older definition does not allow these types.
+# An older definition does not allow these types of conditions.
 _NEW = frozenset({ConditionType.RECONCILING.value, ConditionType.STALLED.value})
 
 Schema = Mapping[str, Any]
@@ -84,7 +84,7 @@ class CrdCheck:
         """Return a status without the conditions whose types the definition does not allow.
 
         Until the definition was read, a new type is allowed only if the `stored` status has a condition of
-        it.
+        this type.
         """
         if self._knows_new:
             return status

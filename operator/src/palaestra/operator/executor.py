@@ -26,7 +26,8 @@ class Executor:
     Args:
         api: the cluster, for reads that must not come from a cache.
         writer: writes to the cluster while this operator leads.
-        strangers: stores the Jobs of other owners whose names this operator's Jobs need.
+        strangers: stores the foreign Jobs, which belong to other owners and have names that this operator's
+            Jobs need.
         denials: stores refused creations.
     """
 
@@ -128,7 +129,7 @@ class Executor:
         """Check that an existing ConfigMap is immutable and has the planned data and owner.
 
         Raises:
-            AlreadyExists: one of these is false, so pods could train with wrong content.
+            AlreadyExists: the ConfigMap differs in one of these, so pods could train with wrong content.
         """
         name = obj["metadata"]["name"]
         found = self._api.get(CONFIG_MAPS, namespace, name)

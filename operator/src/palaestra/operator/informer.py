@@ -20,7 +20,7 @@ class Informer:
         resource: the kind.
         namespaces: the namespaces to watch; empty: all namespaces.
         labels: a label selector.
-        keep: returns the reduced copy of an object that is cached.
+        keep: reduces an object to the copy that the cache gets.
         changed: called with the reduced copy of each object that changed.
     """
 

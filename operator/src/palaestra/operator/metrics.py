@@ -44,7 +44,7 @@ class Metrics:
         ProcessCollector(registry=self.registry)
 
     def request(self, verb: str, resource: str, code: int, seconds: float) -> None:
-        """Count a request; `code` is 0 without a response, `seconds` ends with the response's head."""
+        """Count a request; `code` is 0 without a response, and `seconds` is the duration of the request."""
         self._requests.labels(verb, resource, str(code)).inc()
         if verb != "watch":
             self._request_seconds.labels(verb).observe(seconds)

@@ -4,7 +4,7 @@ Some facts are needed too rarely for a watch. The operator requests these facts 
 
 - the objects to which the job refers by name, and whether the cluster has Kueue;
 - the reasons for which the job's pods cannot be created or Kueue does not admit the job;
-- a Job of another owner whose name one of the TrainingJob's Jobs needs.
+- a Job of another owner that has the name of one of the TrainingJob's Jobs.
 """
 
 import time
@@ -47,9 +47,9 @@ from palaestra.operator.unwatched_facts import (
 from palaestra.operator.world_verdicts import WorldChecker
 from palaestra.plan import GivenWorld
 
-RECHECK_S = 10.0  # while an object may be missing
+RECHECK_S = 10.0  # seconds between two requests for an object that may be missing
 KUEUE = "kueue.x-k8s.io"
-KUEUE_S = 10.0  # seconds for which the answer whether the cluster has Kueue is reused
+KUEUE_S = 10.0  # seconds after which the operator requests again whether the cluster has Kueue
 
 _READ = {
     ReferenceKind.CONFIG_MAP: CONFIG_MAPS,
@@ -72,9 +72,10 @@ class JobObserver:
     Args:
         api: the cluster.
         caches: the watched objects.
-        strangers: Jobs of other owners whose names this operator's Jobs need.
+        strangers: the foreign Jobs, which belong to other owners and have names that this operator's Jobs
+            need.
         denials: refused creations.
-        polled: returns the responses of the trainers, by the pod's uid.
+        polled: returns the responses of the trainers, by the uids of their pods.
         checking: checks the worlds of jobs.
     """
 
@@ -188,7 +189,7 @@ class JobObserver:
             return observed, None
         key = (job.metadata.namespace, job.metadata.name)
         if self._checking.waits(key) and not resuming(job, observed):
-            return replace(observed, worlds_wait=True), None  # when the check ends, it queues the job again
+            return replace(observed, worlds_wait=True), None  # the end of the check queues the job again
         namespace, queued = job.metadata.namespace, job.spec.scheduling.queue_name is not None
         sources = {reference: self._source(namespace, reference) for reference in references(job)}
         kueue = queued and self._has_kueue()

@@ -19,17 +19,18 @@ class OperatorOptions:
     """The options of the command line.
 
     Attributes:
-        images: this release's images, which jobs use that do not name images.
+        images: this release's images, for jobs that do not name images.
         operator_namespace: the namespace of the operator and its Lease; its pods may connect to trainers.
         monitoring_namespace: the namespace whose pods may scrape trainers and simulators.
         namespaces: the namespaces whose jobs this operator runs; empty: all namespaces.
         workers: the number of jobs that are reconciled at the same time.
         resync_s: seconds after which every job is reconciled again, even without a change.
         leader_elect: whether to wait for the Lease.
-        metrics_address: host and port of /healthz, /readyz and /metrics.
+        metrics_address: host and port of the server for /healthz, /readyz and /metrics.
         node_selector: labels that the nodes of training pods must have.
-        host_users: whether training pods use the user IDs of their nodes; if not, each has a user namespace.
-        allowed: the settings with effects outside of its own pods that a job may have.
+        host_users: whether training pods use the user IDs of their nodes; if not, each pod has a user
+            namespace.
+        allowed: the values that jobs may have in settings that affect other users of the cluster.
         resources: the resources of containers for which a job does not set resources.
         fixed_user: whether training pods set their user ID; if not, the cluster chooses the user ID.
         kubeconfig: the kubeconfig file; None: kubectl's default, or the pod's own service account.

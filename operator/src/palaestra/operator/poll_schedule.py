@@ -19,7 +19,7 @@ FIRST_S = 1.0  # seconds within which a new trainer is polled for the first time
 class PollStatus(Enum):
     """The result of the last request to a trainer."""
 
-    # It ended soon, with or without a response: a refused connection does not delay other requests.
+    # The request ended soon, with or without a response: a refused connection delays no other request.
     PROMPT = "prompt"
     NEW = "new"  # no request was sent yet
     SLOW = "slow"
@@ -132,7 +132,10 @@ class PollSchedule:
         return self._entries.get(entry.target.uid) is entry
 
     def next_s(self) -> float | None:
-        """Return the time at which the next target is due, or None; an earlier free slot is not included."""
+        """Return the time at which the next target is due, or None.
+
+        A target that already waits for a slot does not count.
+        """
         return self._times[0][0] if self._times else None
 
     def _at(self, entry: PollState, due_s: float) -> None:

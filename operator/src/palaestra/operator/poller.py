@@ -22,11 +22,11 @@ from palaestra.operator.poll_schedule import PollSchedule, PollState, PollStatus
 from palaestra_protocol.pod.status import ProtocolError, TrainerStatus, decoded
 
 PERIOD_S = 10.0
-DEADLINE_S = 3.0  # for one whole response
+DEADLINE_S = 3.0  # seconds for one whole response
 # A prompt response takes less than this share of the deadline; most responses take milliseconds.
 PROMPT_SHARE = 1 / 3
-FOLLOW_S = 1.0  # between updates of the list of trainers
-MOST_BYTES = 65_536  # for one response: enough for the longest faults of 32 simulators
+FOLLOW_S = 1.0  # seconds between updates of the list of trainers
+MOST_BYTES = 65_536  # limit of one response: enough for the longest faults of 32 simulators
 MOST_HEAD_BYTES = 8192
 REQUEST = "GET /status HTTP/1.0\r\nHost: {host}\r\nAccept: application/json\r\n\r\n"
 
@@ -71,7 +71,7 @@ class Poller:
         self._thread.join(deadline_s)
 
     def known(self) -> Mapping[str, Polled]:
-        """Return the newest responses by the pod's uid; a pod whose last request failed is absent."""
+        """Return the newest response by pod uid; a pod is absent if the last request to the pod failed."""
         return MappingProxyType(self._known)
 
     def _run(self) -> None:

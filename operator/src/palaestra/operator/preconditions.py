@@ -56,7 +56,8 @@ def confirm(api: Api, raw: Object, actions: Sequence[Action]) -> None:
 def _occupies(pod: Object, jobs: Mapping[str, Object]) -> bool:
     """Return whether a pod may still write to the volume of one of `jobs` (the Jobs by replica).
 
-    A pod of an earlier TrainingJob of the same name can write to it only if pod and Job mount the same claim.
+    A pod of an earlier TrainingJob of the same name can write to this volume only if pod and Job mount
+    the same claim.
     """
     labels = pod["metadata"]["labels"]
     job = jobs.get(labels.get(REPLICA_LABEL))
@@ -69,8 +70,8 @@ def _occupies(pod: Object, jobs: Mapping[str, Object]) -> bool:
 def _is_news(pod: Object, stop: Stop | Replace, raw: Object) -> bool:
     """Return whether a pod is new or has changed, and belongs to the replica to be stopped.
 
-    As in `observe`, a pod with edited labels no longer belongs to the replica. If it did, it would prevent
-    the stop of the replica forever.
+    As in `observe`, a pod with edited labels no longer belongs to the replica. Otherwise such a pod would
+    prevent the stop of the replica forever.
     """
     uid, known, labels = pod["metadata"]["uid"], dict(stop.basis.pods), pod["metadata"]["labels"]
     if (labels.get(UID_LABEL), labels.get(REPLICA_LABEL)) != (raw["metadata"]["uid"], str(stop.replica)):

@@ -2,8 +2,8 @@
 
 A claim outlives its TrainingJob because its volume stores the run. A claim that was never bound stores no
 run, but counts against quotas forever. A claim has no owner, so the garbage collector does not delete it. A
-temporary owner reference, until the claim is bound, was rejected. If the operator did not remove it in time,
-the garbage collector would delete the run together with the job.
+claim could have an owner reference until it is bound. But if the operator did not remove this reference in
+time, the garbage collector would delete the run together with the job.
 """
 
 import structlog

@@ -19,16 +19,17 @@ from palaestra.observe.json_access import MOST_TEXT, count, holds, owners
 from palaestra.operator.bounded_cache import Answers, BoundedCache, RateLimitedLookup
 from palaestra.plan.job import QUEUE_LABEL
 
-RECHECK_S = 10.0  # between two reads of a foreign Job
+RECHECK_S = 10.0  # seconds between two reads of a foreign Job
 JOB_UID_LABEL = "kueue.x-k8s.io/job-uid"  # on Workloads; from Kueue's pkg/controller/constants/constants.go
 
 Denied = Mapping[int | None, ApiError]  # errors by replica; None: an object of the whole job
-Lacking = tuple[str, str]  # uid of a Job or pod, and the field selector of its explaining events
+Lacking = tuple[str, str]  # uid of a Job or pod, and the field selector of the events to read
 Change = tuple[str, int]  # uid and generation of a Job
 
-# In the message if a webhook does not respond; the API server's status is then an internal error.
+# The message has this word if a webhook does not respond. The response is then an internal error.
 _BY_A_WEBHOOK = "webhook"
-# In the message if a budget forbids an eviction; the API server's status is then 429, as if it were busy.
+# The message has these words if a budget forbids an eviction. The response is then 429, as if the API server
+# were busy.
 _BY_A_BUDGET = "disruption budget"
 
 
@@ -103,7 +104,7 @@ def _lasting(error: ApiError) -> bool:
 
 
 class PodEvents(RateLimitedLookup[Lacking, Object]):
-    """The last event about each Job without a pod, pod without its volumes, or trainer ended by a signal.
+    """The last events about Jobs without pods, pods with unmounted volumes, and trainers that a signal ended.
 
     Only events report that a quota refuses a pod, or that a volume is not mounted. If a signal ended a
     trainer, only events report that the cause was a failed probe.

@@ -17,7 +17,7 @@ from palaestra.operator.fenced_client import NotLeading
 from palaestra.operator.preconditions import Outdated
 
 IDLE_S = 1.0  # seconds between two checks of the stop condition
-REPEATS = 4  # consecutive conflicts of a key before the first log line; then each power of two is logged
+REPEATS = 4  # consecutive conflicts of a key before the first log line; later lines come at powers of two
 IN_DOUBT_S = 1.0  # seconds until the next try of a key while it is uncertain whether this operator leads
 # Seconds after which a reconcile counts as stuck. Every call has a deadline, so a reconcile is normally
 # shorter.
@@ -35,7 +35,7 @@ class Workers:
         queue: the queue of keys.
         reconcile: reconciles one job; returns the seconds until the next reconcile, or None.
         gate: a reconcile starts only while this event is set.
-        seconds: the histogram of durations, by `result`.
+        seconds: the histogram for the durations of reconciles, with the label `result`.
         count: number of threads.
     """
 
@@ -115,7 +115,7 @@ class Workers:
         return "done"
 
     def _retry_conflict(self, key: Key, error: Exception) -> None:
-        """Retry later; log no single conflict, and repeated conflicts of a key ever more rarely."""
+        """Retry later; log only repeated conflicts of a key, and log them ever more rarely."""
         again_s = self._retry(key)
         times = self._queue.failures(key)
         if times >= REPEATS and times & (times - 1) == 0:

@@ -60,7 +60,7 @@ class ReplicaPlan:
 
     @property
     def objects(self) -> tuple[Object, ...]:
-        """Return the objects in the order of their creation, with the Job last: its pods need the others."""
+        """Return the objects in the order of their creation; the Job comes last: its pods need the others."""
         found = (self.config_map, self.claim, self.job)
         return tuple(part for part in found if part is not None)
 

@@ -17,15 +17,15 @@ from palaestra.plan.yaml_text import literal
 Container = dict[str, Any]
 
 SIDECAR = "palaestra-sidecar"
-PERIOD_S = 10  # between two probes; also the time that one try of the ROS master's probe waits
+PERIOD_S = 10  # seconds between two probes; one try of the ROS master's probe waits as long
 BUILT_IN = "palaestra-train"  # the trainer's program in a job without a custom command
 SECURITY = {
     "allowPrivilegeEscalation": False,
     "capabilities": {"drop": ["ALL"]},
     "readOnlyRootFilesystem": True,
 }
-# A kubelet's shortest period is a second, but the ROS master starts in a quarter of a second. So the command
-# of one try waits for the port itself. A TCP probe of the kubelet cannot reach the port, which is on
+# The shortest period of a probe is a second, but the ROS master starts in a quarter of a second. So the
+# command of one try waits for the port itself. A TCP probe of the kubelet cannot reach the port, which is on
 # loopback.
 MASTER_ANSWERS = "until (exec 3<>/dev/tcp/{host}/{port}) 2>/dev/null; do sleep 0.05; done"
 
@@ -81,7 +81,7 @@ def sidecar(replica: Replica, simulator: PlannedSimulator, worlds: Mapping[str, 
 
 
 def _arguments(replica: Replica, simulator: PlannedSimulator, world: str) -> list[str]:
-    """Return the options of a sidecar, in which a kubelet expands no variables."""
+    """Return the options of a sidecar, escaped so that a kubelet does not expand variables in them."""
     group, layout = simulator.group, replica.layout
     words = [
         f"--driver={group.driver.value}",
@@ -167,7 +167,7 @@ def _environment(replica: Replica, container: str, threads: int) -> dict[str, di
         "ROS_MASTER_URI": f"http://{LOOPBACK}:{replica.layout.ports.ros_master}",
         "ROS_HOSTNAME": replica.layout.ros_hostname,
         "ROS_HOME": f"{places.scratch}/ros",
-        # Must exist already: ROS would give a new folder to the volume's owner, root.
+        # This folder must exist already: ROS would give a new folder to the volume's owner, root.
         "ROS_LOG_DIR": places.scratch,
         "PALAESTRA_CONFIG": f"{places.config}/{FILE}",
         "PALAESTRA_RUN": places.run,
@@ -231,7 +231,7 @@ def _least(replica: Replica, driver: Driver) -> Resources:
 
 
 def _of_ros_master(replica: Replica) -> planned.Planned:
-    """Return the resources of the ROS master, which the container that copies the sidecar has too."""
+    """Return the resources of the ROS master's container and of the container that copies the sidecar."""
     own = replica.job.spec.ros_master
     least = planned.by_default(replica.layout.resources.ros_master, planned.ROS_MASTER)
     return planned.resources(own.resources if own is not None else Resources(), least)

@@ -33,7 +33,7 @@ class Ports:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Images:
-    """The release's images, which jobs use that do not name images."""
+    """The release's images, for jobs that do not name images."""
 
     trainer: str
     stub: str
@@ -74,17 +74,18 @@ class ContainerPaths:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Allowed:
-    """The settings with effects outside of its own pods that an installation allows a job to have.
+    """The values that an installation allows in those settings of a job that affect other users.
+
+    Among keys, an entry that ends in `/` is a domain, and allows every key of this domain.
 
     Attributes:
-        pod_labels: keys of labels that jobs may give their pods, or domains that end in `/`.
-        pod_annotations: keys of annotations that jobs may give their pods, or domains that end in `/`.
+        pod_labels: keys of labels that jobs may give their pods.
+        pod_annotations: keys of annotations that jobs may give their pods.
         priority_classes: names of allowed priority classes.
         runtime_classes: names of allowed runtime classes.
-        tolerations: keys of taints that jobs may tolerate, or domains that end in `/`.
+        tolerations: keys of taints that jobs may tolerate.
         affinity_namespaces: namespaces, besides the job's own, to whose pods a job may have an affinity.
-        anti_affinity_labels: keys of labels by which a required anti-affinity may select pods of other jobs,
-            or domains that end in `/`.
+        anti_affinity_labels: keys of labels by which a required anti-affinity may select pods of other jobs.
     """
 
     pod_labels: tuple[str, ...] = ()
@@ -164,7 +165,7 @@ class Layout(Protocol):
         ...
 
     def another_run(self, uid: str, replica: int) -> str:
-        """Return the directory of a run on the same volume: that of a replica of the job with `uid`.
+        """Return the directory of another run on the same volume: of a replica of the job with `uid`.
 
         Raises:
             PlanError: in this layout, jobs cannot share a volume.
@@ -223,7 +224,7 @@ class LocalLayout:
     # An address, because a minimal chroot has no /etc/hosts that defines localhost.
     ros_hostname: str = "127.0.0.1"
     health_host: str = "127.0.0.1"
-    # Short, because a person waits, and the start includes no image pull and no mount.
+    # This limit is short, because a person waits, and the start includes no image pull and no mount.
     longest_start_s: int = 600
     operator_namespace: None = None
     monitoring_namespace: None = None

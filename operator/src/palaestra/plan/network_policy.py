@@ -1,4 +1,6 @@
-"""The NetworkPolicy of a job's pods. ROS 1 has no authentication, so it adds to the protection by loopback.
+"""The NetworkPolicy of a job's pods.
+
+ROS 1 has no authentication. Its programs listen on loopback only, and the policy protects them in addition.
 
 Ingress is allowed from the operator's pods and from the monitoring namespace, for metrics, the trainer's
 status and the simulators' states. The containers of a pod communicate on loopback, to which policies do not

@@ -10,7 +10,7 @@ from palaestra.plan.replica import TRAINER, Replica
 from palaestra.plan.resources import twice
 
 UNPRIVILEGED: Mapping[str, Any] = {"runAsNonRoot": True, "seccompProfile": {"type": "RuntimeDefault"}}
-# The time for the last checkpoint and the shutdown of the simulators. A spot node gives no longer notice.
+# Seconds for the last checkpoint and the shutdown of the simulators. A spot node gives no longer notice.
 GRACE_S = 60
 SCRATCH_SIZE = "1Gi"
 MEMORY_SIZE = "128Mi"

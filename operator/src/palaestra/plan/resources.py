@@ -1,7 +1,7 @@
 """CPU and memory of the containers, and the number of threads that follows from the CPU limit.
 
-With the defaults, a replica with two simulators requests 425m. So the operator and two such replicas fit on
-two cores. A second thread does not speed up small networks, so the trainer has one thread.
+With the defaults, a replica with two simulators requests 425m of CPU. So the operator and two such replicas
+fit on two cores. A second thread does not speed up small networks, so the trainer has one thread.
 """
 
 import math

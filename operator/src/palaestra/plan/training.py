@@ -96,7 +96,7 @@ class SimulatorAddress:
     """The address of one simulator's sidecar.
 
     Attributes:
-        name: group and number, such as collect-0.
+        name: group and number of the simulator, such as `collect-0`.
         control: `host:port` of the sidecar.
         standby: whether the sidecar runs a second simulator as a standby.
     """

@@ -1,4 +1,4 @@
-"""The worlds of a replica's ConfigMap: the source world of each group of simulators, once.
+"""The worlds of a replica's ConfigMap: one copy of the source world of each group of simulators.
 
 Each source is checked once for all replicas, so that an error in a world is found before objects are created.
 Either the plan checks the sources, or the operator checks them before the plan and passes the results

@@ -9,8 +9,8 @@ from typing import Any
 
 import yaml
 
-# YAML treats these characters as line ends and would read back other characters. In double quotes they are
-# escaped.
+# YAML treats these characters as line ends, so a reader would get other characters. PyYAML escapes the
+# characters in a text in double quotes.
 _BREAKS = frozenset("\x85\u2028\u2029")
 # PyYAML reads a value such as 5e-4 as text, but kubectl reads it as a number. So such texts are quoted.
 _NUMBER = re.compile(r"[-+]?[0-9.][0-9._]*([eE][-+]?[0-9]+)?")

@@ -27,14 +27,14 @@ Number = int | float
 
 
 class Objective(StrEnum):
-    """The figure by which trials are compared; more is better."""
+    """The figure by which trials are compared; a larger figure is better."""
 
     SUCCESS_RATE = "SuccessRate"
     MEAN_RETURN = "MeanReturn"
 
 
 class Distribution(ApiModel):
-    """The values of a field in trials at random: a range, or a choice."""
+    """The distribution of a field's random values: a range, or a choice."""
 
     low: Number | None = None
     """Least value of a range. If `low` and `high` are whole numbers, all values are."""

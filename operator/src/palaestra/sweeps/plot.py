@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from palaestra.sweeps.model import Objective
 from palaestra.sweeps.table import WORDS, TrialRow, quartiles
 
-MOST_CURVES = 10  # the number of colors
+MOST_CURVES = 10  # the number of different colors of the curves
 
 
 def draw(rows: Sequence[TrialRow], objective: Objective, file: Path) -> bool:

@@ -8,7 +8,7 @@ from palaestra.sweeps.trial import Trial, TrialFigures, TrialProgress
 
 
 class Search(Protocol):
-    """Chooses trials, also by the results of trials that have ended."""
+    """Chooses trials; the choice may depend on the results of ended trials."""
 
     @property
     def known(self) -> Sequence[Trial]:

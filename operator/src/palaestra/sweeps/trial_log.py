@@ -23,8 +23,8 @@ from palaestra.sweeps.trial import Point, RunFigures, TrialFigures, TrialProgres
 RECORD = "sweep.yaml"
 TRIALS = "trials.jsonl"
 MUTABLE = {"trials"}
-# This field may change without Optuna. trials.jsonl has both figures, but a search by Optuna used only one
-# figure.
+# In a sweep without Optuna, this field may change, because trials.jsonl has the figures of both objectives.
+# A search by Optuna has used the figures of only one objective.
 _COMPARING = {"objective"}
 
 

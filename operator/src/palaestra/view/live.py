@@ -53,7 +53,7 @@ def _replica(
 
 
 def _bar(step: int, target: int | None) -> Table:
-    """Return the bar as a separate line; empty without a target."""
+    """Return the progress bar as a separate line; empty without a target."""
     line = Table.grid()
     if target:
         line.add_row(ProgressBar(total=target, completed=step, width=BAR, complete_style="cyan"))

@@ -22,7 +22,7 @@ class Draft:
         wrappers: the wrappers of the environment.
         frame_stack: number of observations that are stacked.
         collecting: number of collecting simulators.
-        steps: length of training.
+        steps: length of training in environment steps.
         seed: seed of the job; None: the job's default.
         notes: "<key>: <fact>; <remedy>" for each difference from the entry.
     """
@@ -66,7 +66,7 @@ class Draft:
         return {**seed, "simulators": self._groups(), "trainer": {**trainer, **steps}}
 
     def _groups(self) -> list[dict[str, Any]]:
-        """Return the groups of simulators; a collecting group has at most 16."""
+        """Return the groups of simulators; a collecting group has at most 16 simulators."""
         first = min(self.collecting, MOST_OF_A_GROUP)
         groups: list[dict[str, Any]] = [{"name": "collect", "role": "Collect", "count": first}]
         if rest := self.collecting - first:

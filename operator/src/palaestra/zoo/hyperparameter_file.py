@@ -25,7 +25,7 @@ OF_FILES: Mapping[str, str] = {
     "tqc": "TQC",
     "trpo": "TRPO",
 }
-_SHARED = ("default", "atari")  # entries that apply to other environments
+_SHARED = ("default", "atari")  # entries that are not named after one environment
 # A key of Zoo's her.yml, from the time when HER was an algorithm and not a replay buffer.
 CHOOSES_ALGORITHM = "model_class"
 _LONGEST_LIST = 12

@@ -21,7 +21,7 @@ _OFF_POLICY = frozenset({"DQN", "SAC", "TD3", "DDPG", "QRDQN", "TQC", "CrossQ"})
 _LINEAR = re.compile(r"lin_\d+(\.\d*)?(e-?\d+)?")
 _HINDSIGHT = "HerReplayBuffer"
 _GOALS = ("n_sampled_goal", "goal_selection_strategy")
-# The options of replay buffers that have a fixed value in a run, with this value.
+# Options of replay buffers whose values are fixed in a run; the table has these values.
 _BUFFER_OPTIONS: Mapping[str, object] = {
     "copy_info_dict": False,
     "handle_timeout_termination": True,
