@@ -38,7 +38,7 @@ class ConnectionSlots:
         self._most = most
         self._most_of_peer = most_of_peer
         self._lock = threading.Lock()
-        self._taken: dict[socket.socket, _Slot] = {}  # the oldest first
+        self._taken: dict[socket.socket, _Slot] = {}  # the oldest connection first
 
     def take(self, connection: socket.socket, peer: str) -> bool:
         """Give a new connection a slot, and return True; return False if the server is busy.
@@ -73,7 +73,7 @@ class ConnectionSlots:
                 self._drop(connection)
 
     def _crowd(self, peer: str) -> list[socket.socket] | None:
-        """Return the connections of which one must close to free a slot for `peer`; None if one is free."""
+        """Return the connections of which one must close to give `peer` a slot; None if a slot is free."""
         of_peer = [one for one, slot in self._taken.items() if slot.peer == peer]
         if len(of_peer) >= self._most_of_peer:
             return of_peer

@@ -24,7 +24,7 @@ from palaestra_protocol.masking import masked
 T = TypeVar("T")
 Choice = TypeVar("Choice", bound=StrEnum)
 
-MOST_BYTES = 2**19  # maximum size of a response: enough for the longest texts, if each character is escaped
+MOST_BYTES = 2**19  # maximum size of a response: enough for the longest texts with each character escaped
 MOST_COUNT = 2**53  # JSON readers that use floats represent integers exactly up to this number
 MOST_NAME = 255
 MOST_TEXT = 500
@@ -158,11 +158,11 @@ class Fields:
         return text
 
     def part(self, name: str, read: Callable[[object, str], T]) -> T:
-        """Return the result of `read` for an object within this one."""
+        """Pass the object in the field `name` to `read`, and return the result."""
         return read(self._value(name), self._at(name))
 
     def parts(self, name: str, read: Callable[[object, str], T], most: int) -> tuple[T, ...]:
-        """Return the results of `read` for a list of at most `most` entries."""
+        """Pass each object of the list in the field `name` to `read`, and return the results in order."""
         value = self._value(name)
         if not isinstance(value, list):
             raise self.error(name, f"{_kind(value)} is not a list")
@@ -200,7 +200,7 @@ def _text(value: object, path: str, most: int, least: int = 0) -> str:
 
 
 def _kind(value: object) -> str:
-    """Return the type of a JSON value in words, for a message; the value itself may be too long for one."""
+    """Return the type of a JSON value in words, for a message; the value itself may be too long."""
     return _TYPES.get(type(value), "a number")
 
 

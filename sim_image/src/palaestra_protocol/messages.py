@@ -9,10 +9,10 @@ The writer cuts a value to the bounds that the reader checks. So a long error te
 its status unreadable. A reader of responses ignores unknown fields, because a newer release may add fields.
 `JsonRequest` refuses unknown fields, because a misspelled field of a request must not be ignored.
 
-Programs of different releases exchange messages, so each field is one of three:
+Programs of different releases exchange messages, so each field has one of three kinds:
 
-- a plain kind: the writer always writes the field, and the reader refuses a message without it; a default in
-  the class is only for programs that create messages
+- any other `ValueKind`: the writer always writes the field, and the reader refuses a message without it; a
+  default in the class is only for programs that create messages
 - `Maybe`: the writer always writes the field, as null if the value is unknown; a message of an older release
   may lack the field
 - `AddedLater`: release 0.1.0 does not have the field, so the writer leaves it out unless it is set
@@ -295,7 +295,7 @@ class Table(ValueKind):
 
 @dataclass(frozen=True, slots=True)
 class Maybe(ValueKind):
-    """A value that may be unknown: a field that is null or missing has the default of its class."""
+    """A value that may be unknown: for a null or missing field, the reader uses the field's default."""
 
     kind: ValueKind
     required: ClassVar[bool] = False

@@ -35,7 +35,7 @@ def settle_imports() -> None:
 
     Raises:
         ImportError: a module of the user shadows a module that Palaestra needs.
-        SystemExit: the same in a program of Palaestra, after the reason was printed.
+        SystemExit: instead of ImportError in a program of Palaestra, after it has printed the reason.
     """
     program = _program()
     if _is_ours(program) and program not in _WITH_CODE_OF_USERS:
@@ -139,7 +139,7 @@ def _hidden(folder: str, others: list[str]) -> list[tuple[str, str, str]]:
         if not (mine and mine.origin):  # a folder without `__init__.py` does not shadow a module
             continue
         # Some modules of the standard library, such as msvcrt, exist only on other systems. The library tries
-        # to import them to recognize the system. So a user's module with such a name shadows too.
+        # to import them to recognize the system. So a user's module with such a name also shadows a module.
         if name in sys.stdlib_module_names if other is None else not _same(mine.origin, other.origin):
             found.append((name, mine.origin, folder))
     return found

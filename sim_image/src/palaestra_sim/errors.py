@@ -36,7 +36,7 @@ class WorldError(SimError, ValueError):
         line: the line of the mistake, counted from 1.
         column: the column of the mistake, in characters, counted from 1.
         fact: a description of the mistake.
-        remedy: the change that corrects it.
+        remedy: the change that corrects the mistake.
     """
 
     def __init__(self, world: str, line: int, column: int, fact: str, remedy: str) -> None:

@@ -26,7 +26,7 @@ class ExitCode(IntEnum):
 
 
 class FaultKind(StrEnum):
-    """The kinds of a simulator's faults; the trainer counts SLOW, but does not restart the simulator."""
+    """The kinds of a simulator's faults; after the fault SLOW, the trainer does not restart the simulator."""
 
     DEAD = "dead"
     HUNG = "hung"

@@ -54,7 +54,7 @@ MOST_LINE = 200  # characters of such a log line, and of `FaultRecord.fact`
 MOST_REASON = 2000
 MOST_TERMINATION_BYTES = 4096  # Kubernetes cuts a container's termination message at this length
 
-_LONGEST_ESCAPE = 12  # bytes of one character in JSON: two \uXXXX
+_LONGEST_ESCAPE = 12  # maximum number of bytes of one character in JSON: two escapes \uXXXX
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,7 +85,7 @@ class SimulatorStatus(JsonMessage):
     """The status of one simulator, as its trainer reports it.
 
     Attributes:
-        name: group and number, such as collect-0.
+        name: the simulator's group and number, such as collect-0.
         role: Collect or Evaluate.
         state: a `SidecarState`.
         restarts: number of restarts after faults in this attempt; planned recycling is not counted.
@@ -129,7 +129,8 @@ class TrainerStatus(JsonMessage):
         goodput: seconds spent on each `Cause`, over all attempts.
         steps_lost: valid steps that were lost, over all attempts: steps after the checkpoint from which an
             attempt resumed, and steps in a training or evaluation episode that a fault cut short.
-        left_out: the nodes that the simulators leave out of their worlds, in lines that begin with the group.
+        left_out: the nodes that the simulators leave out of their worlds, as text for people; each line
+            begins with the name of the simulators' group.
     """
 
     step: Annotated[int, Whole()]
@@ -159,7 +160,7 @@ class FaultRecord(JsonMessage):
 
     Attributes:
         time: the time at which the trainer detected the fault (RFC 3339).
-        simulator: group and number, such as collect-0.
+        simulator: the simulator's group and number, such as collect-0.
         kind: one of `FaultKind`.
         fact: a description of the fault, in a sentence.
         step: number of valid environment steps of the run at that time.

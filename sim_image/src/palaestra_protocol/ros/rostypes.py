@@ -50,7 +50,8 @@ class ServiceType(NamedTuple):
     later_md5: str
 
 
-# A field of requests that Webots R2025a renamed. Source: its change log, ROS 1 API.
+# Webots R2025a renamed this field of requests from `proto` to `queryBaseNode`. Source: the change log of
+# Webots, ROS 1 API.
 _FORMER: Final = ("bool", "proto")
 _LATER: Final = "queryBaseNode"
 

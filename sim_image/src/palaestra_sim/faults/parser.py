@@ -96,9 +96,9 @@ _COUNT: Final = _whole(1, 10**12)
 class _Kind:
     """A kind of fault: its class, its keys, and the events at which it can occur.
 
-    The first of `events` is the event that the keys `every` and `probability` count. `topic` is the default
-    topic for a description that names neither a topic nor a service. If `needs` is not empty, a description
-    must contain at least one of these keys.
+    The first of `events` is the default of the key `on`: `every` counts these events, and `probability`
+    applies to each of them. `topic` is the default topic for a description that names neither a topic nor a
+    service. If `needs` is not empty, a description must contain at least one of these keys.
     """
 
     make: type[InjectedFault]

@@ -80,7 +80,7 @@ def add_links(ground: Ground, links: Sequence[Link], marks: Marks, body: MujocoB
         ground: the bodies on which the links are mounted.
         links: the links of one robot, or links without a robot; a link comes before the links on it.
         marks: gets an entry for each geom.
-        body: the body of the robot; None without a robot.
+        body: the body of the robot; None for links without a robot.
     """
     added: dict[Link, Added] = {}
     bit = 0 if body is None else len(body.build.outline)

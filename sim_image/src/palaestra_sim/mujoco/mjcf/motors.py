@@ -79,7 +79,7 @@ class ActuatorMotor(Motor):
         self._aim: float | None = None  # current target of a position servo
 
     def put(self, angle_rad: float) -> None:
-        """Handle the event that a client has set the joint position; a commanded motor then holds it."""
+        """Handle the event that a client has set the joint position; a commanded motor holds it."""
         if self._commanded and self._actuator.control is not Control.FORCE:
             super().put(angle_rad)
         self._aim = None
@@ -157,7 +157,7 @@ class ActuatorMotor(Motor):
         return self.speed_rad_s
 
     def _next_aim(self, aim: float, step_s: float) -> float:
-        """Return the next target of a position servo; in a basic step it moves at the commanded velocity."""
+        """Return the next target of a position servo; the target moves at the commanded velocity."""
         reach = abs(self.velocity_rad_s) * step_s
         if math.isfinite(self.target_rad):
             return max(aim - reach, min(aim + reach, self.target_rad))

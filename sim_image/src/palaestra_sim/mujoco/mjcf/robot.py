@@ -270,6 +270,6 @@ def _sensor_names(model: Any) -> list[str]:
 
 
 def _numbered(names: Sequence[str]) -> list[str]:
-    """Return `names`; to each name that occurs several times, its index is appended."""
+    """Return `names`; a name that occurs several times gets its index in the list as a suffix."""
     counts = Counter(names)
     return [f"{name}{index}" if counts[name] > 1 else name for index, name in enumerate(names)]
