@@ -65,9 +65,9 @@ class Program:
         name: the name of the program.
         description: the description in the program's help.
         physics: returns a new physics object for a world that is about to be loaded.
-        mjcf: returns the simulation of an MJCF world; None if the program does not simulate MJCF. Its last
-            argument is the folder that holds all files of the world. For None, the simulation uses the
-            nearest folder that holds all of them.
+        mjcf: returns the simulation of an MJCF world; None if the program does not simulate MJCF. The last
+            argument of the function is the folder that holds all files of the world. If this argument is
+            None, the simulation uses the nearest folder that holds all these files.
     """
 
     name: str
@@ -186,7 +186,7 @@ class _Process:
             self._nodes[name].unregister()
 
     def _start(self) -> None:
-        # The report comes first, because a sidecar reads the file as soon as the simulator is ready.
+        # The report is written first, because a sidecar reads the file as soon as the simulator is ready.
         self._report_left_out()
         self._simulator.start()
         silent = silent_devices(self._simulator.simulation.robots)
@@ -198,7 +198,7 @@ class _Process:
         self._loop.later(_CHECK_MASTER_S, self._check_master)
 
     def _viewing(self) -> LocalSocket | None:
-        """Return the socket for viewers; None if the environment names no socket, or it cannot be created."""
+        """Return the socket for viewers; None if none is set in the environment, or if creating it fails."""
         path = os.environ.get(VIEW_SOCKET)
         if path is None:
             return None

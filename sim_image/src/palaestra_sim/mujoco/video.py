@@ -2,7 +2,7 @@
 
 The file has a hidden name in the same folder until it is complete; then it is renamed. While a simulator
 writes a file, it holds a lock on the file. So a hidden file without a lock belongs to a simulator that was
-killed. The next movie with the same name removes such a file.
+killed. The simulator that records the next movie of this name removes such a file.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class MujocoVideo:
         self._stream.pix_fmt = "yuv420p"
         rate = _WORST - _STEPS * movie.quality // 100
         self._stream.options = {"crf": str(rate), "preset": "veryfast"}
-        # One thread, because several simulators share the processor.
+        # The encoder uses one thread, because several simulators share the processor.
         self._stream.thread_count = 1
 
     def add(self, pixels: bytes | memoryview) -> None:

@@ -1,6 +1,6 @@
 """The XML-RPC interface of a node: its calls to the ROS master, and the slave API that other nodes call.
 
-The slave API is used rarely, so it runs in a separate thread. It passes all work to the event loop.
+The slave API is used rarely, so it runs in a separate thread. This thread passes all work to the event loop.
 Source: http://wiki.ros.org/ROS/Master_API and http://wiki.ros.org/ROS/Slave_API
 """
 

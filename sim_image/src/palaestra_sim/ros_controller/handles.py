@@ -20,7 +20,7 @@ _SPACING: Final = 0x90
 
 
 class NoSuchHandleError(SimError, LookupError):
-    """The handle is not one of the loaded world; Webots might crash at such a handle."""
+    """The loaded world has no node or field for the handle; Webots might crash at such a handle."""
 
 
 class Handles:
@@ -53,7 +53,8 @@ class Handles:
         """Return the node of a handle.
 
         Raises:
-            NoSuchHandleError: the handle is 0, from another load, of a removed node, or not that of a node.
+            NoSuchHandleError: the handle is 0, or belongs to another load of a world, to a removed node, or
+                to a field.
         """
         held = self._held.get(handle)
         if not isinstance(held, SceneNode) or self._is_gone(held):
@@ -64,7 +65,8 @@ class Handles:
         """Return the field of a handle.
 
         Raises:
-            NoSuchHandleError: the handle is 0, from another load, of a removed node, or not that of a field.
+            NoSuchHandleError: the handle is 0, or belongs to another load of a world, to a field of a removed
+                node, or to a node.
         """
         held = self._held.get(handle)
         if not isinstance(held, NodeField) or self._is_gone(held.node):

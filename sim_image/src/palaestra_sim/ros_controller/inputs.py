@@ -26,8 +26,8 @@ class Input:
     """A device that is not a node of the world.
 
     Attributes:
-        name: the first part of its paths.
-        topics: its topics.
+        name: the first part of the paths of the device's topics and services.
+        topics: the topics of the device.
         enable: returns whether the device accepts a sampling period.
         rows: its services besides `enable` and `get_sampling_period`.
         own_rows: its services that Webots does not have; their paths begin with `palaestra/`.

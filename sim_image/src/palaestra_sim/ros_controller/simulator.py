@@ -42,7 +42,7 @@ class RunningSimulator:
     Attributes:
         simulation: the simulation of the loaded world.
         controllers: the controllers of robots whose controller is "ros", by ROS name.
-        quit_status: the exit status that a client set with `simulation_quit`; None before.
+        quit_status: the exit status that a client set with `simulation_quit`; None before that call.
 
     Raises:
         WorldError: the file is wrong, or contains a node that cannot be simulated.

@@ -8,7 +8,8 @@ from typing import Final, Protocol
 
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 
-# Left, top, right and bottom in pixels from the top left; right and bottom are exclusive.
+# A rectangle in an image: left, top, right and bottom in pixels from the top left corner of the image. The
+# pixels at right and bottom are not part of the rectangle.
 Corners = tuple[int, int, int, int]
 
 MOST_PIXELS: Final = 4096  # limit for a row and for a column

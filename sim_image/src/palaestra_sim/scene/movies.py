@@ -29,7 +29,7 @@ class Movie:
     Attributes:
         path: the path of its file, absolute or relative to the working directory of the simulator.
         size: width and height in pixels.
-        quality: from 1 to 100.
+        quality: the quality of the video, from 1 to 100.
         acceleration: simulated seconds per second of the movie.
         frames_s: frames in a second of the movie; set when the recording starts.
     """

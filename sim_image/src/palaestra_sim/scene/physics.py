@@ -32,7 +32,8 @@ class Figure(Protocol):
 
     Attributes:
         place: its frame.
-        body: its body in this physics; None if it cannot drive and is not a free-standing obstacle.
+        body: the robot's body in this physics; None if the robot cannot drive and is not a free-standing
+            obstacle.
         powered: whether its motors have energy to turn.
     """
 
@@ -126,7 +127,7 @@ class Physics(Protocol):
         ...
 
     def see(self, figure: Figure, beams: Sequence[Beam]) -> Cast:
-        """Return such a function for beams that stop at visible objects, but not at the robot itself."""
+        """Return a function as `look` does, for beams that stop at visible shapes, but not at the robot."""
         ...
 
     def push(self, target: Figure | DynamicSolid, push: Push) -> None:

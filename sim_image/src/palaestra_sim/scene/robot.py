@@ -41,7 +41,8 @@ class Robot:
         samplers: functions that set the values of all sensors, in this order.
         gauss: returns the next number of the robot's noise, from mean and deviation.
         place: its frame.
-        body: its body in the physics; None if it cannot drive and is not a free-standing obstacle.
+        body: the robot's body in the physics; None if the robot cannot drive and is not a free-standing
+            obstacle.
         time_s: the time of the world since its start or its last reset.
         powered: whether its motors have energy to turn.
         links: the parts on its joints that forces move.
@@ -95,7 +96,7 @@ class Robot:
         return self._physics.look(self, beams)
 
     def see(self, beams: Sequence[Beam]) -> Cast:
-        """Return such a function for beams that stop at visible objects; see `Carrier`."""
+        """Return a function as `look` does, for beams that stop at visible shapes; see `Carrier`."""
         return self._physics.see(self, beams)
 
     def reflect(self, beams: Sequence[Beam]) -> Callable[[], Sequence[Glance]]:

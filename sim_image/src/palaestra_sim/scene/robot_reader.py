@@ -65,7 +65,8 @@ class RobotParts:
     """A robot of the world file.
 
     Attributes:
-        body: its body in the physics; None if it cannot drive and is not a free-standing obstacle.
+        body: the robot's body in the physics; None if the robot cannot drive and is not a free-standing
+            obstacle.
         standing: the outline of a robot that cannot move and does not stand upright on the floor.
         arguments: its controllerArgs; None if its controller is not "ros".
         links: the parts on its joints that forces move.

@@ -50,7 +50,7 @@ class Simulation:
         robots: the robots, in the order of the world file.
         time_ms: simulated time; a reset sets it to 0.
         mode: the mode, which the program that paces the steps reads; `step` works in every mode.
-        quit_status: the exit status that `quit` requested; None before.
+        quit_status: the exit status that `quit` requested; None before that request.
         motion: the motion of robots and dynamic solids, for a supervisor.
         movies: recordings of the Viewpoint's view.
         appearance: the visible shapes and poses, for viewers.

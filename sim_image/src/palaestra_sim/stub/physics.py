@@ -134,7 +134,7 @@ class StubPhysics:
         return lambda: level.cast((body.x, body.y, body.c, body.s), place.height_m)
 
     def see(self, figure: Figure, beams: Sequence[Beam]) -> Cast:
-        """Return such a function for beams that meet visible shapes; they pass through the robot itself."""
+        """Return a function as `look` does, for beams that stop at visible shapes, but not at the robot."""
         sight = VisualRays(self._view, figure.place, beams)
         return lambda: [glance.distance_m for glance in sight.cast()]
 

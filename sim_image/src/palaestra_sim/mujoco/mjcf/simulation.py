@@ -151,7 +151,7 @@ class MjcfSimulation:
     def contact_points(self, node: SceneNode, *, descendants: bool) -> list[tuple[Vector, int]]:
         """Return the contact points of a body: each has a position in meters and the number of a node.
 
-        With `descendants`, the contact points of all bodies inside it are included.
+        With `descendants`, the contact points of all bodies inside the body are included.
         """
         self._model.settle()
         asked = {node, *node.descendants()} if descendants else {node}

@@ -142,7 +142,7 @@ class Outlet:
         self._periods_ms: set[int] = set()
 
     def enable(self, period_ms: int, step_ms: int) -> bool:
-        """Start to publish with the period `period_ms`, or stop if it is 0.
+        """Start to publish with the period `period_ms`, or stop if the period is 0.
 
         Return whether the device accepts the period.
 

@@ -236,7 +236,7 @@ class NodeServices:
         return {"success": 1}
 
     def _accept(self, request: Any) -> Fields:
-        """Accept a hint that affects only the speed of Webots' responses, or its rendering."""
+        """Accept a hint that affects only the speed of Webots' responses, or only Webots' rendering."""
         self._node(request)
         return {"success": 1}
 

@@ -62,7 +62,7 @@ class Shaft:
 
     @property
     def type_number(self) -> int:
-        """The response of `get_type` of its devices: 0 for a hinge, 1 for a slider."""
+        """The response of `get_type` of the joint's devices: 0 for a hinge, 1 for a slider."""
         return int(self.joint is not None and self.joint.slides)
 
     @property
@@ -81,9 +81,9 @@ class DevicePart:
         reading: the reader of the world's nodes.
         lacks: records that a node of the robot cannot be simulated.
         node: the node of the device.
-        name: its name in the world file, else the default name of its type.
+        name: the name of the device in the world file; without one, the default name of its type.
         place: its frame, in the robot's frame; for a device on a joint, the frame of the joint.
-        shaft: the joint to which it belongs; None if it is not on a joint.
+        shaft: the joint on which the device is; None if the device is not on a joint.
         outline: the shapes with which the robot collides.
         measured: the links whose force on the robot is measured.
         forces: whether the physics has forces.
@@ -108,7 +108,7 @@ class DevicePart:
         return self.node.text(name) or default
 
     def inner(self, name: str) -> SceneNode | None:
-        """Return the node in a field; None if it is NULL."""
+        """Return the node in a field; None if the field is NULL."""
         return next(iter(self.node.nodes(name)), None)
 
     def world_numbers(self, name: str, default: tuple[float, ...]) -> tuple[float, ...]:
@@ -134,7 +134,7 @@ class DevicePart:
         self.lacks(self.node, fact)
 
     def take_outline(self) -> list[Shape]:
-        """Return the shapes of its boundingObject, after adding them to the robot's outline."""
+        """Return the shapes of the device's boundingObject, after adding them to the robot's outline."""
         shapes = list(bounding_shapes(self.reading, self.node, self.place))
         self.outline += shapes
         return shapes
@@ -150,7 +150,8 @@ class Carrier(Protocol):
     """The interface of the robot that carries a device.
 
     Attributes:
-        body: its body in the physics; None if it cannot drive and is not a free-standing obstacle.
+        body: the robot's body in the physics; None if the robot cannot drive and is not a free-standing
+            obstacle.
         time_s: the time of the world since its start or its last reset.
     """
 
@@ -166,7 +167,7 @@ class Carrier(Protocol):
         ...
 
     def see(self, beams: Sequence[Beam]) -> Callable[[], Sequence[float]]:
-        """Return such a function for beams that stop at visible objects, but not at the robot itself."""
+        """Return a function as `look` does, for beams that stop at visible shapes, but not at the robot."""
         ...
 
     def reflect(self, beams: Sequence[Beam]) -> Callable[[], Sequence[Glance]]:
@@ -251,7 +252,7 @@ Enable = Callable[[int, int], bool]  # period and step in ms; returns whether th
 
 
 def whole_steps(period_ms: int, step_ms: int) -> bool:
-    """Accept a period that is a multiple of the controller's last step."""
+    """Return whether the period is a multiple of the duration of the controller's last step."""
     return period_ms % step_ms == 0
 
 
@@ -284,7 +285,8 @@ class DeviceType(Generic[DeviceT]):
         enable: returns whether a period is accepted; 0, which stops publishing, is always accepted.
         silent: returns whether an attached device has no readings, so that all periods are refused.
         enabled: called with a device and its new sampling period in ms after a change; 0 means off.
-        sensor: the path of `enable` relative to the name of the device, "" for the name itself.
+        sensor: a prefix of the paths of `enable` and of the topics, after the name of the device; "" for no
+            prefix.
     """
 
     node: str
@@ -310,12 +312,12 @@ class DeviceType(Generic[DeviceT]):
 
     @property
     def on_joint(self) -> bool:
-        """Whether it is a device of a joint."""
+        """Whether the device is a device of a joint."""
         return bool(self.role)
 
     @property
     def body(self) -> bool:
-        """Whether its node is a Solid, with which other objects may collide."""
+        """Whether the device's node is a Solid, with which other objects may collide."""
         return self.solid and not self.on_joint
 
 

@@ -4,9 +4,9 @@ Each layer is a row of the image, from the top down. In a row, the rays go from 
 cast at each step, but only while the lidar is enabled, because they cost time. The distance of an object
 nearer than `minRange` or beyond `maxRange` is infinite.
 
-At each step, a rotating lidar casts the rays over which its head has turned since the step before. Its first
-ray points ahead, and the following rays go to the right, through a full turn. The distance of a ray is 0
-until the head has passed this ray. Source: WbLidar.cpp and RosLidar.cpp of Webots.
+At each step, a rotating lidar casts the rays over which its head has turned since the step before. The first
+ray of a layer points ahead, and the following rays go to the right, through a full turn. The distance of a
+ray is 0 until the head has passed this ray. Source: WbLidar.cpp and RosLidar.cpp of Webots.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _FLOAT_BYTES: Final = 4
 _MOST_RAYS: Final = 1_000_000
 _ROUNDING: Final = 1e-6  # tolerance, so that a turn by exactly the angle of one ray includes that ray
 _POINT: Final = struct.Struct("<fffif")  # x, y, z, layer, time
-_FLOAT32, _INT32 = 7, 5  # sensor_msgs/PointField
+_FLOAT32, _INT32 = 7, 5  # the numbers of these types in sensor_msgs/PointField
 _POINT_FIELDS: Final = [
     {"name": name, "offset": offset, "datatype": datatype, "count": 1}
     for name, offset, datatype in (

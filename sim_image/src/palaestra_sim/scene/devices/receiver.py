@@ -30,7 +30,7 @@ class Receiver:
     """A receiver.
 
     Attributes:
-        listening: whether it is enabled; otherwise it receives nothing.
+        listening: whether the receiver is enabled; otherwise it receives nothing.
         channel: the channel on which it listens; -1 means all channels.
         queue: the packets that arrived, the oldest first.
     """

@@ -1,4 +1,4 @@
-"""TouchSensor: a bumper, or a sensor of the force that it exerts on the robot.
+"""TouchSensor: a bumper, or a sensor of the force that the sensor exerts on the robot.
 
 A sensor of type `force` measures the pressure along its x axis. A sensor of type `force-3d` measures the
 force along each of its axes. Both types need a Physics node, and a physics with forces. Source:
