@@ -201,8 +201,8 @@ class VisibleScene:
         nodes: at most MOST_NODES nodes; a parent comes before its children.
         meshes: the meshes; several shapes may use the same mesh.
         sky: red, green and blue of the background, from 0 to 1.
-        simplified: the number of shapes that were too large; each was replaced by its bounding box, or left
-            out.
+        simplified: the number of shapes that were too large; each of them was replaced by its bounding box,
+            or left out.
     """
 
     world: str

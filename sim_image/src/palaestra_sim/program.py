@@ -113,7 +113,7 @@ class Program:
         return _Process(options, self._loader(options, _leave_out(options.leave_out))).run()
 
     def _loader(self, options: argparse.Namespace, leave_out: LeaveOut) -> Load:
-        """Return the function that loads a world; a file that begins with `<` is MJCF."""
+        """Return the function that loads a world; the loader treats a file that begins with `<` as MJCF."""
         wbt = Loader(physics=self.physics, stand_ins=_stand_ins(options.stand_ins), leave_out=leave_out)
 
         def load(world_path: Path, mode: Mode) -> Backend:

@@ -138,7 +138,7 @@ class MujocoBody:
         self.s = math.sin(heading_rad)
 
 
-_RESERVE: Final = 2.0  # factor on the force for the largest acceleration, so that a servo can catch up
+_RESERVE: Final = 2.0  # multiplies the force for the largest acceleration, so that a servo can catch up
 GAIN: Final = 500.0  # in 1/s: a servo reaches its target speed within one or two MuJoCo steps of 4 ms
 
 

@@ -1,8 +1,8 @@
 """The OpenGL context of the process; it has no window.
 
 The context is opened for the first image, because a simulator without cameras must work without OpenGL. All
-worlds of a process share the context, one at a time. The OpenGL objects of a world are freed when another
-world renders, and at the end of the process.
+worlds of a process share the context; only one world uses it at a time. The OpenGL objects of a world are
+freed when another world renders, and at the end of the process.
 """
 
 from __future__ import annotations

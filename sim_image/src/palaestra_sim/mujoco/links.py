@@ -33,7 +33,7 @@ class Added:
     Attributes:
         link: the link in the scene.
         body: the body of the link.
-        joint, servo, sensor: the joint, the servo and the force sensor; None if the link does not have it.
+        joint, servo, sensor: the joint, the servo and the force sensor; None if the link has no such part.
     """
 
     link: Link

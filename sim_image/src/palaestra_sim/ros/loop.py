@@ -53,7 +53,7 @@ class Loop:
         self._wakes_on_signals = False
 
     def watch(self, file: _File, ready: Callback, *, writing: bool = False) -> None:
-        """Call `ready` whenever `file` can be read, or with `writing` also when it can be written."""
+        """Call `ready` whenever `file` can be read; with `writing`, also whenever it can be written."""
         number = _number(file)
         change = self._epoll.modify if number in self._watched else self._epoll.register
         change(number, select.EPOLLIN | (select.EPOLLOUT if writing else 0))

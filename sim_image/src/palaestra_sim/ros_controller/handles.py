@@ -28,7 +28,7 @@ class Handles:
 
     Args:
         simulation: the simulation of that world.
-        load: the number of earlier loads; it makes the handles of different loads differ.
+        load: the number of earlier loads, so that different loads have different handles.
     """
 
     def __init__(self, simulation: Backend, load: int = 0) -> None:

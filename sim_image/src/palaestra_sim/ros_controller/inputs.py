@@ -29,8 +29,8 @@ class Input:
         name: the first part of the paths of the device's topics and services.
         topics: the topics of the device.
         enable: returns whether the device accepts a sampling period.
-        rows: its services besides `enable` and `get_sampling_period`.
-        own_rows: its services that Webots does not have; their paths begin with `palaestra/`.
+        rows: the services of the device besides `enable` and `get_sampling_period`.
+        own_rows: the services that Webots does not have; their paths begin with `palaestra/`.
     """
 
     name: str

@@ -107,8 +107,8 @@ class DynamicSolid:
     """One dynamic solid.
 
     Attributes:
-        node: its Solid.
-        place: its frame.
+        node: the node of the solid.
+        place: the frame of the solid.
         shapes: the shapes with which the solid and the Solids inside it collide.
         densities: the densities of the shapes, in kg/m3.
     """

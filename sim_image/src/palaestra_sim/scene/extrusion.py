@@ -83,7 +83,7 @@ def _placed(
 
 
 def _index(count: int, corners: int, *, begin_cap: bool, end_cap: bool) -> list[int]:
-    """Return the faces: the first cap, the sides, and the last cap. The last corner repeats the first."""
+    """Return the faces: first cap, sides, last cap; the last corner, which repeats the first, is left out."""
     index: list[int] = []
     if begin_cap:
         index += [*range(corners - 1), -1]

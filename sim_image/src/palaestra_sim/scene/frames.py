@@ -82,12 +82,12 @@ class Frame:
 
     @property
     def world_position(self) -> Vector:
-        """Return the position of its origin in the world, in meters."""
+        """The position of the frame's origin in the world, in meters."""
         return self.translation if self.parent is None else self.world_pose.position
 
     @property
     def axes(self) -> Matrix | None:
-        """The rotation from the axes of the world file to those of the ground; None if they are the same."""
+        """The rotation from the file's axes to the axes of the ground; None if both are the same."""
         return None if self.parent is None else self.parent.axes
 
     def to_ground(self, vector: Vector) -> Vector:
@@ -106,7 +106,7 @@ class Frame:
 
     @property
     def height_m(self) -> float:
-        """The height of its origin in the world."""
+        """The height of the frame's origin in the world, in meters."""
         return self.ground_pose.position[2]
 
     def chain(self) -> Iterator[Frame]:

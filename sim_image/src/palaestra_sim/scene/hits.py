@@ -28,7 +28,7 @@ def first_hit(shape: Shape, origin: Vector, direction: Vector) -> float:
 
 
 def _span(shape: Shape, origin: Vector, direction: Vector) -> tuple[float, float]:
-    """Return the distances at which a line enters and leaves a convex shape; enter > leave if it misses."""
+    """Return the distances at which a line enters and leaves a convex shape; if it misses, enter > leave."""
     half = shape.size[0] / 2.0, shape.size[1] / 2.0, shape.size[2] / 2.0
     match shape.kind:
         case "ball":

@@ -7,7 +7,7 @@ projects/robots/festo/robotino3/controllers/robotino3/base.c). The same factor s
 `base_accelerate` of that controller. A motor's own `acceleration` is an additional limit. The three limits do
 not apply to a robot without physics, whose wheel accelerations Webots itself limits (`Motor.kinematic`).
 
-Every simulator uses this speed, so a robot responds to the same commands in the same way in all of them.
+Every simulator uses this module, so a robot responds to the same commands in the same way in all simulators.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class MobileBase:
 
     Attributes:
         drive: the kinematics of the wheels, or None, as passed.
-        vx, vy, omega: the speed of the robot in m/s and rad/s, in its own axes.
+        vx, vy, omega: the speed of the robot in m/s and rad/s, in the robot's own axes.
     """
 
     __slots__ = ("_kinematic", "_step_s", "_wheels", "drive", "omega", "vx", "vy")

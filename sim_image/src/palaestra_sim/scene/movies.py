@@ -27,7 +27,7 @@ class Movie:
     """A movie that a client requests.
 
     Attributes:
-        path: the path of its file, absolute or relative to the working directory of the simulator.
+        path: the path of the movie's file, absolute or relative to the working directory of the simulator.
         size: width and height in pixels.
         quality: the quality of the video, from 1 to 100.
         acceleration: simulated seconds per second of the movie.
@@ -42,7 +42,7 @@ class Movie:
 
 
 class VideoWriter(Protocol):
-    """The file of a movie, which appears at its path when it is finished; to abandon it, drop this object."""
+    """The file of a movie; without a call of `finish`, no file is left."""
 
     def add(self, pixels: bytes | memoryview) -> None:
         """Add a frame: blue, green, red and alpha of each pixel.

@@ -26,19 +26,19 @@ def of_old_axes(node: SceneNode) -> bool:
 
 
 def standing(node: SceneNode, frame: Pose) -> Pose:
-    """Return the frame of a shape or a Track that stands along z; in an old file, along y."""
+    """Return the frame of a shape or Track, which stands along z, or along y in an old file."""
     if not of_old_axes(node) or any(around.stand_in for around in node.ancestors()):
         return frame
     return frame.after(_STANDING)
 
 
 def looking(node: SceneNode, place: Frame) -> Frame:
-    """Return the frame of a device that looks along x with z up; in an old file, along -z with y up."""
+    """Return the frame of a device, which looks along x with z up, or in an old file along -z with y up."""
     return _in_axes(node, place, _LOOKING)
 
 
 def pointing(node: SceneNode, place: Frame) -> Frame:
-    """Return the frame of a device that points along x with z up; in an old file, along z with y up."""
+    """Return the frame of a device, which points along x with z up, or in an old file along z with y up."""
     return _in_axes(node, place, _POINTING)
 
 

@@ -45,7 +45,7 @@ def outlines_of(nodes: Collection[SceneNode], floors_m: Callable[[], tuple[float
 
 
 def robot_around(node: SceneNode) -> frozenset[SceneNode]:
-    """Return the nodes of the robot that carries a device; without a robot, those of the device."""
+    """Return the nodes of the robot that carries a device; without a robot, the nodes of the device."""
     robot = next((it for it in node.ancestors() if it.type_name == "Robot"), node)
     return frozenset((robot, *robot.descendants()))
 
@@ -62,6 +62,6 @@ def free_path(shapes: Iterable[Shape], start: Vector, end: Vector) -> float:
 
 
 def _entry(shape: Shape, start: Vector, direction: Vector) -> float:
-    """Return the distance in meters at which a ray meets a shape; infinite if it misses."""
+    """Return the distance in meters at which a ray meets a shape; infinite if it misses it."""
     frame = shape.pose.inverse
     return first_hit(shape, frame.carry(start), frame.turned(direction))

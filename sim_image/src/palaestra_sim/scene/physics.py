@@ -31,10 +31,10 @@ class Figure(Protocol):
     """A robot, whether it moves or not.
 
     Attributes:
-        place: its frame.
+        place: the frame of the robot.
         body: the robot's body in this physics; None if the robot cannot drive and is not a free-standing
             obstacle.
-        powered: whether its motors have energy to turn.
+        powered: whether the robot's motors have energy to turn.
     """
 
     place: Frame
@@ -88,7 +88,7 @@ class Physics(Protocol):
     """The motion of one loaded world.
 
     Attributes:
-        abilities: the contents that it simulates.
+        abilities: the contents that this physics simulates.
     """
 
     abilities: Abilities

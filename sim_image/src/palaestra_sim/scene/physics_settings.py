@@ -21,8 +21,8 @@ class Floor:
     """A level Plane of a boundingObject; in Webots it is infinite.
 
     Attributes:
-        place: the frame of its Solid.
-        local: its pose in that frame.
+        place: the frame of the Solid that has the boundingObject.
+        local: the pose of the Plane in that frame.
     """
 
     place: Frame
@@ -55,7 +55,7 @@ class PhysicsSettings:
         return tuple(floor.height_m for floor in self.floors)
 
     def heights_m(self) -> tuple[float, ...]:
-        """Return the current heights of the floors; without a floor in the file, that of a floor at 0."""
+        """Return the current heights of the floors; 0 if the file has no floor."""
         return self.floors_m() or (0.0,)
 
     def friction(self, one: str, other: str) -> float:

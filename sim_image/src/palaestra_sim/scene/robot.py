@@ -36,17 +36,17 @@ class Robot:
 
     Attributes:
         name: Robot.name in the world file.
-        motors: its motors, by device name.
-        sensors: its sensors, by device name; each has a `value` after a step.
-        samplers: functions that set the values of all sensors, in this order.
+        motors: the motors, by device name.
+        sensors: the sensors, by device name; each sensor has a `value` after a step.
+        samplers: the functions that set the values of all sensors; they are called in this order.
         gauss: returns the next number of the robot's noise, from mean and deviation.
-        place: its frame.
+        place: the frame of the robot.
         body: the robot's body in the physics; None if the robot cannot drive and is not a free-standing
             obstacle.
         time_s: the time of the world since its start or its last reset.
-        powered: whether its motors have energy to turn.
-        links: the parts on its joints that forces move.
-        battery: its battery; its value is -1 if the robot has no battery.
+        powered: whether the motors have energy to turn.
+        links: the parts on the robot's joints that forces move.
+        battery: the battery; its value is -1 if the robot has no battery.
     """
 
     def __init__(self, parts: RobotParts, random_seed: int, physics: Physics, view: View) -> None:
@@ -138,7 +138,7 @@ class Robot:
             trail.begin(step_s)
 
     def turn(self, step_s: float) -> None:
-        """Turn for one basic step the motors that neither drive a wheel nor move by forces."""
+        """Turn for one basic step the motors that neither drive a wheel nor are moved by forces."""
         if self.powered:
             for motor in self._stray_motors:
                 motor.advance(step_s)

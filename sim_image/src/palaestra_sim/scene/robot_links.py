@@ -31,7 +31,7 @@ class Parts:
         nodes: each node with its frame, outer nodes first.
         shapes: all shapes that can collide with something.
         wheels: the wheels that drive the robot.
-        steering: the motors that steer its wheels.
+        steering: the motors that steer the robot's wheels.
         measured: links whose force on the robot a sensor measures; they have no shapes and masses yet.
     """
 

@@ -68,8 +68,8 @@ class RobotParts:
         body: the robot's body in the physics; None if the robot cannot drive and is not a free-standing
             obstacle.
         standing: the outline of a robot that cannot move and does not stand upright on the floor.
-        arguments: its controllerArgs; None if its controller is not "ros".
-        links: the parts on its joints that forces move.
+        arguments: the robot's controllerArgs; None if the robot's controller is not "ros".
+        links: the parts on the robot's joints that forces move.
     """
 
     node: SceneNode
@@ -83,7 +83,7 @@ class RobotParts:
 
 
 def read_robot(reading: NodeReader, node: SceneNode, parent: Frame | None, physics: Physics) -> RobotParts:
-    """Return the robot at `node`, and give it and its parts their frames."""
+    """Return the robot at `node`, after setting the frames of the robot and of its parts."""
     return _RobotReader(reading, node, parent, physics).read()
 
 

@@ -106,8 +106,8 @@ class Simulation:
 
         Args:
             world: the parsed world.
-            physics: the physics that moves its robots.
-            name: the name of its file, in errors.
+            physics: the physics that moves the robots.
+            name: the name of the world file, in errors.
             mode: the mode at the start.
             descriptions: the descriptions of the types that are not base types.
             leave_out: the nodes that may be left out, if they cannot be simulated.
@@ -274,7 +274,8 @@ class Simulation:
         """Save the Viewpoint's view as a PNG or JPEG file; return whether that was possible.
 
         Raises:
-            UnsimulatedError: the name is not that of a PNG or JPEG file, or this machine cannot render.
+            UnsimulatedError: the path does not end like that of a PNG or JPEG file, or this machine cannot
+                render.
         """
         return save_view(self.tree.root, self.scene.physics, path, quality)
 

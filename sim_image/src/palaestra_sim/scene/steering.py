@@ -50,9 +50,9 @@ class Tire:
     """A plain tire on the floor.
 
     Attributes:
-        wheel: its position, axle and radius in the world file.
-        driven: whether a motor turns it.
-        steer: the joint that steers it; None on a fixed axle.
+        wheel: the tire's position, axle and radius in the world file.
+        driven: whether a motor turns the tire.
+        steer: the joint that steers the tire; None on a fixed axle.
     """
 
     wheel: Wheel

@@ -21,8 +21,8 @@ class Simulated(Protocol):
     """The interface of a simulation for its steps; another simulator can implement it too.
 
     Attributes:
-        mode: the simulation mode; nothing moves in PAUSE.
-        quit_status: None until a client has requested the end; after that nothing moves.
+        mode: the simulation mode; in PAUSE the world does not move.
+        quit_status: None until a client has requested the end; after that the world does not move.
     """
 
     mode: Mode
@@ -62,7 +62,7 @@ class Stepping:
         self.advance()
 
     def ask(self, robot: Robot, duration_ms: int, done: Done) -> None:
-        """Request a step; when the world has advanced by `duration_ms`, maybe at once, call `done(True)`.
+        """Request a step; when the world has advanced by `duration_ms`, maybe immediately, call `done(True)`.
 
         If the simulator ends before that, `done(False)` is called.
         """

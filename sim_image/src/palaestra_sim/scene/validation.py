@@ -58,7 +58,8 @@ class NodeReader:
         world_info: the WorldInfo of the world; None if it is missing.
         system: one letter for the direction of each axis, such as "ENU" for east, north and up.
         top: the frame around the whole world; None if z of the world points up.
-        floors: the frame, and the pose in it, of each level Plane that faces up.
+        floors: for each level Plane that faces up, the frame that contains the Plane, and the Plane's pose in
+            this frame.
     """
 
     def __init__(
@@ -94,7 +95,7 @@ class NodeReader:
         """Raise an error if a node was refused.
 
         Raises:
-            WorldError: it lists all mistakes and all refused nodes.
+            WorldError: the error lists all mistakes and all refused nodes.
         """
         if error := refusal(self._refused):
             raise error

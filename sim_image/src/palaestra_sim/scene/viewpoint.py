@@ -19,7 +19,8 @@ def save_view(root: SceneNode, physics: Physics, path: str, quality: int) -> boo
     """Save the view of a world as a PNG or JPEG file; return whether that was possible.
 
     Raises:
-        UnsimulatedError: the name is not that of a PNG or JPEG file, or this machine cannot render.
+        UnsimulatedError: the path does not end like that of a PNG or JPEG file, or this machine cannot
+            render.
     """
     camera = view(root, physics, SIZE)
     return camera is not None and picture_files.save(path, SIZE, camera.colors(), quality=quality)

@@ -1,6 +1,7 @@
 """The command line of the sidecar.
 
-It checks the options and the world, opens the two ports, logs their addresses, and runs the simulators.
+The program checks the options and the world, opens the two ports, logs their addresses, and runs the
+simulators.
 """
 
 import argparse

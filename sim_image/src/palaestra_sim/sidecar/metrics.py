@@ -36,7 +36,7 @@ class _Simulators(Collector):
     def _values(self) -> Mapping[Family, Values]:
         them = self._simulators.items()
         used = {slot: simulator.usage() for slot, simulator in them}
-        states = {slot: simulator.state for slot, simulator in them}  # one read, because a state may change
+        states = {slot: simulator.state for slot, simulator in them}  # read once, because states change
         return {
             metric_definitions.UP: {(slot,): state.pid is not None for slot, state in states.items()},
             metric_definitions.STATES: {

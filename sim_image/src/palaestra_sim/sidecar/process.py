@@ -169,7 +169,8 @@ def _spawn(command: CommandLine, descriptors: Mapping[int, int]) -> int:
 
     Args:
         command: the command line of the simulator.
-        descriptors: for each descriptor of the reaper, the descriptor of this process that becomes it.
+        descriptors: maps each descriptor of the reaper to the descriptor of this process that the reaper
+            inherits as that number.
     """
     with _reapers_lock:
         pid = os.posix_spawn(

@@ -44,10 +44,10 @@ def lay_out(world: Path, project: Path, root: Path, *, linked: bool) -> Path:
     Args:
         world: the absolute path of the source world.
         project: the absolute path of the project to make.
-        root: the absolute path of the outermost source folder. For each folder from `root` to that of
+        root: the absolute path of the outermost source folder. For each folder from `root` to the folder of
             `world`, the project gets a folder.
-        linked: whether to link everything next to `world`, and next to each folder from it up to `root`, at
-            the same relative path. Links of an earlier start are renewed.
+        linked: whether to link every other entry of the world's folder, and of each folder above it up to and
+            including `root`, at the same relative path. Links of an earlier start are renewed.
 
     Raises:
         SidecarError: `project` is the project of `world` itself, or a folder cannot be read.

@@ -14,8 +14,8 @@ That holds even after `setsid`, a double fork or a change of environment. A proc
 signal or a marker in the environment would lose such a process.
 
 To end the simulator, the reaper kills its children until it has no more. When a killed process ends, the
-kernel first makes its children those of the reaper (exit_notify). Then the kernel sends SIGCHLD, at which the
-reaper searches for children again. So the reaper needs no timer.
+kernel first makes the children of this process children of the reaper (exit_notify). Then the kernel sends
+SIGCHLD, at which the reaper searches for children again. So the reaper needs no timer.
 
 The sidecar starts this file directly, so it imports only the standard library.
 """

@@ -58,7 +58,7 @@ class SupervisedSimulator:
     Args:
         command: the command line that starts the simulator.
         state: the state before the first start.
-        left_out: the file in which the simulator reports the nodes that it leaves out; None if it has no such
+        left_out: the file in which the simulator reports the nodes that it leaves out; None without such a
             file.
         viewing: see Attributes; None if the simulator has no socket for viewers.
         clock: returns seconds, from any origin.

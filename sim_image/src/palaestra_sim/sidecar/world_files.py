@@ -51,8 +51,9 @@ def named(
     """Generate this simulator's world from `world`, write it into the folder `work`, and return its path.
 
     With `as_project`, or if the world names files by relative paths, the result is a Webots project in
-    `work`, with links to the files around `world`. These are the files in all folders from that of `world` up
-    to `root`. If `root` is None, it is the nearest folder that holds all files that the world names.
+    `work`, with links to the files around `world`. These are the files in all folders from the folder of
+    `world` up to `root`. If `root` is None, the function uses the nearest folder that holds all files that
+    the world names.
 
     Raises:
         WorldError: the world is wrong.

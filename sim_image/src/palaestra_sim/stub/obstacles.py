@@ -170,7 +170,7 @@ class Block:
         return dx * self.c + dy * self.s, dy * self.c - dx * self.s
 
     def _way_out(self, x: float, y: float, radius: float) -> Contact:
-        """Return the contact of a robot whose center is inside the block; it leaves by the nearest face."""
+        """Return the contact of a robot, whose center is inside the block, with the block's nearest face."""
         out_x = self.half_x - abs(x)
         out_y = self.half_y - abs(y)
         if out_x < out_y:
@@ -294,7 +294,7 @@ class Neighborhood:
         self._squares: dict[int, tuple[FlatObstacle, ...]] = {}
 
     def near(self, x: float, y: float) -> tuple[FlatObstacle, ...]:
-        """Return all obstacles within reach of x, y, in their order; the result may have others nearby."""
+        """Return all obstacles within reach of x, y, in their order; the result may have other obstacles."""
         column = int(x * 8.0 + 4096.0)  # 8 = 1 / SIDE_M; the shift makes usual coordinates positive
         row = int(y * 8.0 + 4096.0)
         key = column * 65536 + row

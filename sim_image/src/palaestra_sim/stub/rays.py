@@ -134,7 +134,7 @@ class SlopedBeams:
         self._floors = tuple(floors_m)
 
     def cast(self, frame: tuple[float, float, float, float], height_m: float) -> list[float]:
-        """Return the distance in meters that each beam travels; `height_m` is that of the robot's frame."""
+        """Return the distance in meters that each beam travels; `height_m` is the height of the robot."""
         for index, beam in enumerate(self._beams):
             self.distances[index] = self._first(beam, frame, height_m)
         return self.distances

@@ -27,7 +27,8 @@ def asks_for_clock(robot: Node) -> bool:
 def argument_edits(world: World, robot: Node, ros_name: str, *, clock: bool) -> tuple[Patch, ...]:
     """Return the edits that give a robot its `--name=` and `--synchronize`.
 
-    If `clock`, the first `--clock` stays, and the others are removed. The edits never add a `--clock`.
+    If `clock` is True, the first `--clock` stays, and every other `--clock` is removed. The edits never add a
+    `--clock`.
     """
     value = robot.fields.get("controllerArgs")
     if value is None:
@@ -92,7 +93,7 @@ def _new_row(world: World, token: Token, row: tuple[bytes, ...], separator: byte
 
 
 def _new_list(value: Value, string: Token, ros_name: str, *, clock: bool) -> Patch:
-    """Replace a bare string by a list; an empty string means that there are no arguments."""
+    """Replace a bare string by a list; an empty string means no arguments."""
     strings = [string] if unquoted(string) else []
     texts = tuple(chain(*_rows(strings, ros_name, clock=clock)))
     text = b"[" + b" ".join(texts) + b"]"

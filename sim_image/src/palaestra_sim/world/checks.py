@@ -62,7 +62,8 @@ def robot_used_twice(candidate: Candidate) -> Iterator[WorldError]:
     starts = [robot.span[0] for robot in candidate.robots]
     containers = {}
     for node in candidate.world.walk():
-        # A robot that begins inside a node is part of that node. The last such robot gives the name.
+        # A robot that begins inside a node is part of that node. If a node contains several robots, the error
+        # names the last one.
         last = bisect_left(starts, node.span[1]) - 1
         if node.def_name is not None and last >= 0 and starts[last] >= node.span[0]:
             containers[node.def_name] = candidate.robots[last]

@@ -5,8 +5,8 @@
 
 The readable part is for people. It may be cut, and some characters may be replaced. The hash covers the
 original values, so two names with the same readable part still differ. A name is valid in ROS 1 (a letter
-first, then `[A-Za-z0-9_]`). It has at most 63 bytes, because the `ros` controller copies it into a buffer of
-64 bytes without a check.
+first, then `[A-Za-z0-9_]`). A name has at most 63 bytes, because the `ros` controller copies it into a buffer
+of 64 bytes without a check.
 """
 
 import hashlib

@@ -17,7 +17,7 @@ def root_of(world: Path, source: bytes, given: Path | None = None) -> Path:
     """Return `given`, or the nearest folder around a world that holds all files that the world names.
 
     The nearest folder is the Webots project of the world, or a folder above that project. `world` is a path
-    from `placed`.
+    that `placed` has returned.
 
     Raises:
         RootError: `given` is not above the world, or does not hold all files that the world names.

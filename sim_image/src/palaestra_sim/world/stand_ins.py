@@ -42,7 +42,7 @@ _FIELDS_OF_FORM: dict[FormKind, tuple[str, ...]] = {
 }
 
 Values: TypeAlias = Mapping[str, Sequence[Item]]
-"""The items of an object's fields; a field that is missing or has items of a wrong type has its default."""
+"""The items of an object's fields; a missing field, or one with items of a wrong type, has its default."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

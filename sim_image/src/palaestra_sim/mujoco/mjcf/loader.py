@@ -76,7 +76,7 @@ def _robot(tree: ModelTree, equipment: Equipment, description: Description, leav
     )
     return Robot(
         parts, 0, MujocoPhysics(), View(tree.scene.root)
-    )  # this physics is never used: sensors read the model
+    )  # this physics is never used, because the sensors read the model
 
 
 def _compiled(world_path: Path) -> Any:

@@ -210,7 +210,7 @@ def kind_of(model: Any, index: int) -> str:
 def gear_of(model: Any, index: int) -> float:
     """Return the force at the joint for an actuator force of 1.
 
-    For an actuator on a site, it is the force in the direction of the actuator's gear.
+    For an actuator on a site, this is the force in the direction of the actuator's gear.
     """
     gear: list[float] = model.actuator_gear[index].tolist()
     if model.actuator_trntype[index] in _TURNED:

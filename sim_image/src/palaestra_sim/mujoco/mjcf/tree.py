@@ -1,8 +1,8 @@
 """Make nodes from the bodies, joints and devices of a model, for a supervisor.
 
 A body becomes a Solid, whose DEF is the name of the body. The body of the robot becomes a Robot; it has all
-devices that are not on a joint. The DEF of a joint is the name of the joint. If a body has the same name, `_joint`
-is appended to the DEF of the joint.
+devices that are not on a joint. The DEF of a joint is the name of the joint. If a body has the same name,
+`_joint` is appended to the DEF of the joint.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def grow(
     Args:
         model: the model.
         description: the names that the file gives to robot and devices.
-        equipment: the devices; their nodes are added to it.
+        equipment: the devices; `grow` adds their nodes to this object.
         body: the number of the robot's body.
         basic_step_ms: the basic step in milliseconds.
     """

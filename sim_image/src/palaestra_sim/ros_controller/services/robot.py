@@ -15,7 +15,7 @@ from palaestra_sim.scene.robot import Robot
 
 Fields = dict[str, Any]
 
-_MOST_TEXTS: Final = 100  # maximum number of queued texts from the robot's window
+_MOST_TEXTS: Final = 100  # maximum number of texts from the robot's window that wait to be read
 
 
 class RobotServices:

@@ -82,7 +82,7 @@ class DevicePart:
         lacks: records that a node of the robot cannot be simulated.
         node: the node of the device.
         name: the name of the device in the world file; without one, the default name of its type.
-        place: its frame, in the robot's frame; for a device on a joint, the frame of the joint.
+        place: the device's frame, in the robot's frame; for a device on a joint, the frame of the joint.
         shaft: the joint on which the device is; None if the device is not on a joint.
         outline: the shapes with which the robot collides.
         measured: the links whose force on the robot is measured.
@@ -209,13 +209,13 @@ class DeviceTopic:
     """A topic of one device.
 
     Attributes:
-        name: relative to the device's name.
-        type_name: the type of its messages.
+        name: the name of the topic, relative to the device's name.
+        type_name: the type of the messages.
         source: the source of the reading; None if the topic never has a reading.
         constants: the values of the other fields.
         reading: the field of the value. "" means the last field, which must consist of numbers; this is the
             fastest choice.
-        many: whether `value` is a sequence, with a message for each of its items.
+        many: whether `value` is a sequence; each of its items is sent in a separate message.
         whole: whether the value is a mapping of all fields except the header.
         stamped: whether the messages begin with a header; without a header, `reading` must name the field.
     """
@@ -266,7 +266,7 @@ class DeviceType(Generic[DeviceT]):
     """A row of the table: one type of device.
 
     Attributes:
-        node: the type of its node.
+        node: the type of the device's node.
         name: the name of a device whose node has no name.
         fields: the fields of the node, in the syntax of `field_types`, except `name` and, if the node is a
             Solid, except the fields that every Solid has.

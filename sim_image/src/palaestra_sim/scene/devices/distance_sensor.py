@@ -75,7 +75,7 @@ class DistanceSensor:
     A sonar has five beams for each ray: the ray itself, and two pairs of beams next to it.
 
     Attributes:
-        rows: the rows of its lookup table, as the world has them.
+        rows: the rows of the lookup table, as in the world.
         sensitivity: the effect of the color on an infra-red sensor; 0 for no effect.
         resolution: the resolution of the value; -1 for exact values.
     """

@@ -21,7 +21,7 @@ class Emitter:
 
     Attributes:
         range_m: the maximum distance of receivers in meters; -1 means without limit.
-        channel: the channel of its packets; -1 means all receivers.
+        channel: the channel of the packets; -1 means all receivers.
         outbox: the texts to send, each with the channel and the range at the time of `send`.
     """
 

@@ -52,11 +52,11 @@ class Lidar:
         frequency: the response of `get_frequency_info`.
         noise: standard deviation of a distance, as a fraction of the maximum range.
         resolution: the resolution of a distance; -1 for exact values.
-        rays: its rays.
-        period_ms: its sampling period; 0 while it is not enabled.
+        rays: the rays of the lidar.
+        period_ms: the sampling period; 0 while the lidar is not enabled.
         clouded: whether the point cloud is enabled.
         layers: the distances of the last step in meters, by layer.
-        timing: `scan_time` and `time_increment` of its scans.
+        timing: `scan_time` and `time_increment` of the laser scans.
     """
 
     name: str

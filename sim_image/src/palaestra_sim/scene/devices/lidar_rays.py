@@ -24,7 +24,7 @@ class LidarRays:
         wide_rad: the angle over which a fixed lidar spreads the rays of a layer.
         high_rad: the angle from the first layer to the last.
         tilt_rad: the angle by which the lidar is tilted upward.
-        reach_m: the length of its rays.
+        reach_m: the length of the rays.
         rotates: whether the rays are on a rotating head, and spread over a full turn.
     """
 

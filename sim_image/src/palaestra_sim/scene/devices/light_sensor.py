@@ -33,7 +33,7 @@ class LightSensor:
     Attributes:
         place: the frame of the sensor; the sensor looks along the x axis of this frame.
         axes: the axes of the world that point east, north and up.
-        filter: the shares of red, green and blue light that it measures.
+        filter: the shares of red, green and blue light that the sensor measures.
         occlusion: whether shapes hide lights.
         period_ms: the sampling period; 0 while the sensor is not enabled, so that it measures darkness.
     """

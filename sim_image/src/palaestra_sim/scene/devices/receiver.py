@@ -31,7 +31,7 @@ class Receiver:
 
     Attributes:
         listening: whether the receiver is enabled; otherwise it receives nothing.
-        channel: the channel on which it listens; -1 means all channels.
+        channel: the channel on which the receiver listens; -1 means all channels.
         queue: the packets that arrived, the oldest first.
     """
 

@@ -22,12 +22,12 @@ class SceneTree:
 
     Args:
         world: the parsed world.
-        name: the name of its file, in errors.
+        name: the name of the world file, in errors.
         descriptions: the descriptions of the types that are not base types.
 
     Attributes:
         source: the bytes of the world.
-        nodes: by number.
+        nodes: all nodes, by number.
         root: a Group that has the nodes of the file as its children.
         refused: mistakes in the file because of which a node is missing, such as `USE` of an unknown name.
         ignored: fields that a PROTO does not have, each with its position in the file.

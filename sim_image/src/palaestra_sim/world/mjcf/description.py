@@ -43,9 +43,9 @@ class Description:
     """An MJCF world as text.
 
     Attributes:
-        source: its bytes.
-        root: its elements.
-        texts: the elements `text` of `custom` by name; if several have the same name, the first.
+        source: the bytes of the file.
+        root: the root of the elements.
+        texts: the elements `text` of `custom` by name; if several have the same name, only the first.
         numbers: the elements `numeric` of `custom`, in the same way.
     """
 
@@ -58,7 +58,7 @@ class Description:
 
     @property
     def robot(self) -> str:
-        """The name of the robot: from `custom`, else that of the model, else "robot"."""
+        """The name of the robot: from `custom`, else the name of the model, else "robot"."""
         return self._text(ROBOT) or self.root.attributes.get("model") or "robot"
 
     @property
@@ -68,7 +68,7 @@ class Description:
 
     @property
     def keyframe(self) -> str:
-        """The name of the keyframe at which the world begins; "" for the model's own positions."""
+        """The name of the keyframe at which the world begins; "" for the model's initial positions."""
         return self._text(KEYFRAME)
 
     @property

@@ -11,7 +11,7 @@ from typing import Final
 
 from palaestra_sim.world.mjcf.elements import Element
 
-_MOST: Final = 1_000_000  # elements of a model with all its copies
+_MOST: Final = 1_000_000  # maximum number of elements of a model, including all copies
 
 
 class PartFiles:

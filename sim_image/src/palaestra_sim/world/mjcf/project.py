@@ -49,7 +49,7 @@ class Project:
 
     Args:
         world: path of the world.
-        description: the description of its main file.
+        description: the description of the model's main file.
         root: the folder that the user names; None for the nearest folder that holds all files.
 
     Attributes:
@@ -126,7 +126,7 @@ class Project:
         return max(1, len(self._folder.parents))
 
     def _is_outside(self, named: _Named, root: Path | None) -> bool:
-        """Return whether a file is outside `root`; if that is None, only a path to the top is outside."""
+        """Return whether a file is outside `root`; if `root` is None, only a path to the top is outside."""
         if root is None:
             return climb(named.path) >= self._top
         return not self._real(named).is_relative_to(root.resolve())
