@@ -1,9 +1,10 @@
 """Read JSON from an untrusted process.
 
-A pod may run a program of a user. Its response may have a value of a wrong type, be endless, or contain
-characters that cannot be encoded. So each method of `Fields` checks the type and the bounds of a value, and
-raises `ProtocolError` if the check fails. Readers of responses ignore unknown fields, because a newer release
-may add fields. Readers of requests refuse an unknown field, because it is probably a misspelling.
+A pod may run a program of a user. The response of this program may have a value of a wrong type, be endless,
+or contain characters that cannot be encoded. So each method of `Fields` checks the type and the bounds of a
+value, and raises `ProtocolError` if the check fails. Readers of responses ignore unknown fields, because a
+newer release may add fields. Readers of requests refuse an unknown field, because it is probably a
+misspelling.
 
 Writers keep the same bounds with `clipped`, `enumerated` and `known`. For messages whose fields declare their
 bounds, `palaestra_protocol.messages` provides reader and writer.

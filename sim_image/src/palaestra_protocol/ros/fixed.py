@@ -103,7 +103,7 @@ class Record:
         )
 
     def unfit(self, fields: Mapping[str, Any]) -> str:
-        """Return the name of the first field whose value does not fit; it packs each field separately."""
+        """Return the name of the first field whose value does not fit; pack each field separately."""
         for name in filter(fields.__contains__, self.names):
             try:
                 struct.pack(f"<{self.codes}", *self.flatten({name: fields[name]}))

@@ -127,7 +127,7 @@ class _Requests:
 
 
 class _Answers:
-    """The connection of a service's client; it changes responses as faults require.
+    """The connection of a service's client; the class changes responses as faults require.
 
     Attributes:
         link: the wrapped connection.
@@ -160,7 +160,7 @@ class _Answers:
 
 
 class _Messages:
-    """The connection of a subscriber; it drops, delays or changes messages as faults require.
+    """The connection of a subscriber; the class drops, delays or changes messages as faults require.
 
     Attributes:
         link: the wrapped connection.

@@ -36,7 +36,7 @@ class GlContext:
         atexit.register(self.close)  # runs before the exit hook of mujoco.egl, which was registered earlier
 
     def take(self, owner: object, model: Any, size: tuple[int, int]) -> Any:
-        """Return MuJoCo's rendering context for a model; it can render images up to `size`.
+        """Return MuJoCo's rendering context for a model; this context can render images up to `size`.
 
         The OpenGL objects of `owner` are kept until another owner calls this method. An owner must always
         pass the same model.

@@ -1,8 +1,8 @@
 """Links in MuJoCo: bodies on joints, the servos that move the joints, and force sensors in fixed links.
 
-A servo moves its joint at the speed that the motor demands; its force is at most that of the motor. The servo
-also compensates for gravity, so a motor that holds a weight does not sag. Links may touch all bodies except
-those of their own robot.
+A servo moves its joint at the speed that the motor demands; its force is at most the force of the motor. The
+servo also compensates for gravity, so a motor that holds a weight does not sag. Links may touch all bodies
+except the bodies of their own robot.
 """
 
 from __future__ import annotations

@@ -31,7 +31,7 @@ _LOOKS = 30
 _EVENTS = 32  # maximum number of ready files in one poll; the next poll returns the others
 
 # If a callback, such as the end of a step, is due within this time, the peers wait for its result. They send
-# nothing before that, so polls would only take processor time from other programs.
+# nothing before the result, so polls would only take processor time from other programs.
 _NEAR_S = 10e-3
 
 

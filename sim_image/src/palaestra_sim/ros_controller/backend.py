@@ -43,7 +43,7 @@ class MotionBackend(Protocol):
         Args:
             node: the node.
             force: the force.
-            relative: whether the force is in the axes of the node, not in those of the world.
+            relative: whether the force is in the axes of the node, not in the axes of the world.
             offset: the point at which the force acts, in the node's frame; None for the center of mass.
         """
         ...

@@ -1,7 +1,7 @@
 """Battery, keyboard and joystick: the controller of every robot has these devices, although no node has them.
 
 In a pod nobody can press keys, so clients press them through services below `palaestra/`. Webots does not
-have these services. They do not depend on the backend, so they work with every simulator.
+have these services. These services do not depend on the backend, so they work with every simulator.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
 """A running simulator: the simulation of a world, and the controllers of its robots.
 
 When a client loads another world, the controllers of the old world end and those of the new world start; the
-simulator continues. The module `program` has the command line, the event loop and the signals. It gives the
-simulator ROS nodes and a clock, and ends the process when the simulator calls its callback.
+simulator continues. The module `program` has the command line, the event loop and the signals. That module
+gives the simulator ROS nodes and a clock, and ends the process when the simulator calls the callback of
+`on_quit`.
 """
 
 from __future__ import annotations

@@ -62,7 +62,7 @@ class Body(Protocol):
         ...
 
     def halt(self) -> None:
-        """Stop all motion, including that of the motors."""
+        """Stop all motion, including the motion of the motors."""
         ...
 
     def push(self, vx: float, vy: float, omega: float) -> None:

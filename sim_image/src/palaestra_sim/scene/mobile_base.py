@@ -2,7 +2,7 @@
 
 `wheel_kinematics` relates wheel speeds to the robot's motion. In Webots torque and friction limit the
 acceleration of a robot. Here three limits replace torque and friction: 10 m/s2 along x, 6 m/s2 along y, and
-20 rad/s2 about z. These limits are those of the Robotino 3's own controller (Webots,
+20 rad/s2 about z. These limits come from the Robotino 3's own controller (Webots,
 projects/robots/festo/robotino3/controllers/robotino3/base.c). The same factor slows all three axes, as in
 `base_accelerate` of that controller. A motor's own `acceleration` is an additional limit. The three limits do
 not apply to a robot without physics, whose wheel accelerations Webots itself limits (`Motor.kinematic`).
@@ -52,7 +52,7 @@ class MobileBase:
         return motor in self._wheels
 
     def halt(self) -> None:
-        """Stop all motion, including that of the motors."""
+        """Stop all motion, including the motion of the motors."""
         self.vx = self.vy = self.omega = 0.0
         for wheel in self._wheels:
             wheel.halt()

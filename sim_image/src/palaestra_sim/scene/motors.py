@@ -45,7 +45,7 @@ class MotorSpec:
 class Motor:
     """One motor: its commands, and the speed of its shaft.
 
-    The names are those of a rotational motor; the angles of a linear motor are lengths in meters.
+    The names are for a rotational motor; the angles of a linear motor are lengths in meters.
 
     Attributes:
         speed_rad_s: the speed of the shaft.
@@ -183,7 +183,8 @@ class Motor:
     def set_effort(self, torque_nm: float) -> None:
         """Apply a torque, times the multiplier, until the next position command. NaN is ignored.
 
-        The torque is clamped to the available torque. It has an effect only if the motor is `forceful`.
+        The torque is clamped to the available torque. The command has an effect only if the motor is
+        `forceful`.
         """
         if math.isnan(torque_nm):
             return

@@ -74,7 +74,7 @@ class NodeMotion:
         Args:
             node: the node on which the force acts.
             force: the force in N.
-            relative: whether `force` is in the axes of the node, and not in those of the world.
+            relative: whether `force` is in the axes of the node, not in the axes of the world.
             offset: the point at which the force acts, in meters in the node's frame; None for the center of
                 mass.
 

@@ -56,7 +56,8 @@ _LOOSE_JOINTS: Final = frozenset(("BallJoint", "Hinge2Joint"))
 _NAME_IT: Final = (
     "give it a name of its own of letters, digits and underscores, or leave it out (--leave-out)"
 )
-# Robots drive over lower steps. Real worlds need this, because their robots start slightly inside the floor.
+# Robots drive over steps that are lower than this. Real worlds need this tolerance, because their robots
+# start slightly inside the floor.
 _STEP_M: Final = 0.005
 
 

@@ -179,7 +179,7 @@ class Simulation:
         """Request a reset of the world within the next basic step.
 
         The reset restores the time, the poses of all solids and robots, the motors, and the noise with the
-        current seed in customData. It does not restore other fields that a client has written.
+        current seed in customData. The reset does not restore other fields that a client has written.
         """
         self._reset_asked = True
 
@@ -274,7 +274,7 @@ class Simulation:
         """Save the Viewpoint's view as a PNG or JPEG file; return whether that was possible.
 
         Raises:
-            UnsimulatedError: the path does not end like that of a PNG or JPEG file, or this machine cannot
+            UnsimulatedError: the path does not have the suffix of a PNG or JPEG file, or this machine cannot
                 render.
         """
         return save_view(self.tree.root, self.scene.physics, path, quality)
@@ -308,7 +308,7 @@ class Simulation:
         self._arrange()
 
     def set_joint_position(self, node: SceneNode, position: float, index: int) -> None:
-        """Set the position of a joint, in rad or m; its motor holds it there.
+        """Set the position of a joint, in rad or m; the joint's motor holds this position.
 
         Raises:
             UnsimulatedError: the node is not a joint with an axis `index`, counted from 1.

@@ -93,7 +93,7 @@ class SteeredDrive:
         self.changed()
 
     def changed(self) -> bool:
-        """Read the current angles; return whether they differ from those of the previous call."""
+        """Read the current angles; return whether they have changed since the previous call."""
         angles = tuple(0.0 if it is None else it.angle_rad for it in self._steers)
         if angles == self._angles:
             return False

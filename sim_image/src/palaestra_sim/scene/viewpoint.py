@@ -19,7 +19,7 @@ def save_view(root: SceneNode, physics: Physics, path: str, quality: int) -> boo
     """Save the view of a world as a PNG or JPEG file; return whether that was possible.
 
     Raises:
-        UnsimulatedError: the path does not end like that of a PNG or JPEG file, or this machine cannot
+        UnsimulatedError: the path does not have the suffix of a PNG or JPEG file, or this machine cannot
             render.
     """
     camera = view(root, physics, SIZE)

@@ -116,7 +116,7 @@ class StubPhysics:
                 body.advance(step_s)
 
     def reset(self) -> None:
-        """Do nothing: the physics has no state besides that of the bodies."""
+        """Do nothing: the physics has no state besides the state of the bodies."""
 
     def look(self, figure: Figure, beams: Sequence[Beam]) -> Cast:
         """Return a function that computes the distance in meters that each beam of a robot travels now."""

@@ -229,7 +229,7 @@ class _Fitter:
 
 
 def _actuator_names(model: Any) -> list[str]:
-    """Return a name for each actuator: its own name, or that of its joint, or "actuator" and its number.
+    """Return a name for each actuator: its own name, the name of its joint, or "actuator" and its number.
 
     Several actuators of one joint may lack names; for example, a position servo and a velocity servo. Their
     names then end with their kinds, or with their numbers if the kinds are equal.

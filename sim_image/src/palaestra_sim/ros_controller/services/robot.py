@@ -19,7 +19,7 @@ _MOST_TEXTS: Final = 100  # maximum number of texts from the robot's window that
 
 
 class RobotServices:
-    """The services of one robot, except `time_step` and those of its devices."""
+    """The services of one robot, except `time_step` and the services of devices."""
 
     def __init__(self, host: Host, simulation: Backend, robot: Robot) -> None:
         self._host = host

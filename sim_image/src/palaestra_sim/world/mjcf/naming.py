@@ -27,7 +27,7 @@ def generate(
     name: str = "world",
     relative_addresses: bool = False,
 ) -> bytes:
-    """Return the world of one simulator; the parameters are those of `world.generate`.
+    """Return the world of one simulator; the parameters are the same as for `world.generate`.
 
     Raises:
         WorldError: as for `check`.
