@@ -1,8 +1,8 @@
 """The connection slots of a server: their number is limited, in total and for each peer.
 
 A connection is idle while its request is not complete. If no slot is free, a new connection takes the slot of
-the oldest idle one. So clients that connect and send nothing cannot block a kubelet's probe, which sends its
-request as soon as it is connected.
+the oldest idle connection. So clients that connect and send nothing cannot block a kubelet's probe, which
+sends its request as soon as it is connected.
 
 If the peer of the new connection has reached its own limit, an idle connection of the same peer is closed. So
 a peer with many connections cannot take the slots of other peers. A connection with a complete request keeps
@@ -80,7 +80,7 @@ class ConnectionSlots:
         return list(self._taken) if len(self._taken) >= self._most else None
 
     def _drop(self, connection: socket.socket) -> None:
-        """Close a connection; the thread that reads from it ends."""
+        """Close a connection; this also ends the thread that reads from the connection."""
         del self._taken[connection]
         with contextlib.suppress(OSError):  # the peer may have closed the connection already
             connection.shutdown(socket.SHUT_RDWR)

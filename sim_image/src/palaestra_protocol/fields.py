@@ -181,7 +181,7 @@ class Fields:
         return f"{self._path}.{name}" if self._path else name
 
     def error(self, name: str, fact: str) -> ProtocolError:
-        """Return an error that names a field and what is wrong with it."""
+        """Return an error with the path of a field and a fact, such as "is missing"."""
         return ProtocolError(f"{self._at(name)}: {fact}")
 
 

@@ -17,7 +17,8 @@ Programs of different releases exchange messages, so each field has one of three
   may lack the field
 - `AddedLater`: release 0.1.0 does not have the field, so the writer leaves it out unless it is set
 
-`palaestra_protocol.scene` has its own reader, which also checks that the parts of a message fit together.
+`palaestra_protocol.scene` has its own reader, which also checks references inside a message: for example,
+from a shape to its mesh.
 """
 
 from __future__ import annotations
@@ -248,7 +249,7 @@ class NewestPartList(PartList):
 class Lines(ValueKind):
     """A list of at most `most_entries` texts of at most `most` characters each.
 
-    If the writer drops texts, the last entry says how many.
+    If the writer drops texts, the last entry has their number.
     """
 
     most: int
@@ -259,7 +260,7 @@ class Lines(ValueKind):
         return fields.texts(name, self.most, self.most_entries)
 
     def write(self, value: tuple[str, ...]) -> list[str]:
-        """Return the first texts; if texts are dropped, the last entry says how many."""
+        """Return the first texts; if texts are dropped, the last entry has their number."""
         return enumerated(value, self.most, self.most_entries)
 
 

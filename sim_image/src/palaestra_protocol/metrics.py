@@ -37,7 +37,7 @@ class Label:
 
     Attributes:
         name: the name as in PromQL.
-        values: all possible values; empty if they depend on the job or the cluster.
+        values: all possible values; empty if the values depend on the job or the cluster.
         bound: if `values` is empty, the kind of object for which each value stands, such as "release".
     """
 

@@ -1,8 +1,8 @@
 """Find modules of a user that shadow modules of Python or of Palaestra's dependencies.
 
 Python searches the folders of PYTHONPATH and the folder of a script before the standard library. If such a
-folder holds a `queue.py`, all libraries import that file instead of Python's `queue`. They then fail with a
-traceback that does not name the file.
+folder holds a `queue.py`, all libraries import that file instead of Python's `queue`. The libraries then fail
+with a traceback that does not name the user's file.
 
 A program that runs no code of the user moves these folders to the end of the search path. Any other program
 exits with an error, because the user's code may need its own `queue` while the libraries need Python's.
@@ -31,7 +31,7 @@ _UNNAMED = (
 
 
 def settle_imports() -> None:
-    """Make sure that imports in this process find the right modules; our packages call this first.
+    """Make sure that imports in this process find the right modules; our packages call this function first.
 
     Raises:
         ImportError: a module of the user shadows a module that Palaestra needs.
@@ -119,7 +119,8 @@ def _shadows(folders: list[str], others: list[str]) -> list[tuple[str, str]]:
         for name, file, _ in found
         if name in sys.stdlib_module_names
     ]
-    # `_is_needed` imports many modules of the standard library. So it runs only if none of them is shadowed.
+    # `_is_needed` imports many modules of the standard library. So the function runs only if no such module
+    # is shadowed.
     return library or [
         (name, f"{file}: shadows the module {name}, which Palaestra needs; rename it")
         for name, file, folder in found

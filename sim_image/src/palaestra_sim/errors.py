@@ -80,7 +80,7 @@ class WorldRefusedError(WorldError):
 
 
 def refusal(errors: Iterable[WorldError]) -> WorldError | None:
-    """Return one error that stands for the first `MOST_PLACES` of `errors`; None if there are no errors."""
+    """Return one error that combines the first `MOST_PLACES` of `errors`; None if there are no errors."""
     by_text: dict[str, WorldError] = {}
     for error in errors:
         by_text[str(error)] = error  # a node that is used twice reports the same error twice

@@ -303,7 +303,7 @@ def _parser(program: Program) -> argparse.ArgumentParser:
 
 
 def _stand_ins(files: Sequence[Path]) -> Mapping[str, StandIn]:
-    """Return the stand-ins in these files by name; a later entry replaces an earlier one of that name.
+    """Return the stand-ins in these files by name; a later entry replaces an earlier entry of the same name.
 
     Raises:
         StandInError: a file is not a valid table of stand-ins.

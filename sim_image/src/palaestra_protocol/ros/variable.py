@@ -1,7 +1,7 @@
 """Messages with strings and lists, written and read section by section.
 
 Consecutive fields of fixed size form one section, which one struct packs. Each string, each list, and each
-nested message of variable size is a section of its own.
+nested message of variable size is a separate section.
 
 Peers are not trusted. So the reader compares a length with the number of remaining bytes before it creates an
 object of that length.
@@ -139,7 +139,7 @@ class _Text:
 
 
 class _Octets:
-    """A list of `uint8` or `char`, as bytes; writing does not copy them, because images are large."""
+    """A list of `uint8` or `char`, as bytes; writing does not copy the bytes, because images are large."""
 
     empty = b""
 

@@ -104,7 +104,7 @@ class FaultState:
     def closed(self, robot: str) -> None:
         """Record that a robot's controller has ended.
 
-        If its steps were counted, the steps of another robot are counted from now on.
+        If the steps of this robot were counted, the steps of another robot are counted from now on.
         """
         if self._stepping == robot:
             self._stepping = None

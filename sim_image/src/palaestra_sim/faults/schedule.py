@@ -1,4 +1,4 @@
-"""Decide which faults occur at the k-th event of a life, one run of the simulator's process.
+"""Decide which faults occur at the k-th event of a life; a life is one run of the simulator's process.
 
 Pure: the random number for an event is a hash of the seed, the simulator, its life, the fault and the number
 of the event. So the number does not depend on earlier events, and an additional fault does not change the

@@ -2,8 +2,8 @@
 
 If two geoms touch, MuJoCo uses the friction of the geom with the higher priority. Here, geoms of rarer
 materials have higher priorities. The friction of a geom is the friction between its own material and the most
-common material. This friction is wrong for some pairs of materials. The model lists the pairs of geoms with
-these materials explicitly.
+common material. This friction is wrong for some pairs of materials. For pairs of geoms with these materials,
+the model has explicit entries with the right friction.
 """
 
 from __future__ import annotations

@@ -155,7 +155,7 @@ def put(position: Any, quaternion: Any, pose: Pose) -> None:
 def _inertia(matter: MassProperties) -> tuple[float, ...]:
     """Return the default inertia of a mass, for a world that does not set the inertia.
 
-    The mass fills the bounding boxes of its shapes. If it has no shapes, it is a ball with the density of
+    The mass fills the bounding boxes of its shapes. A mass without shapes is a ball with the density of
     water.
     """
     if not matter.shapes:

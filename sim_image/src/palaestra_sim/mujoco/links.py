@@ -61,7 +61,7 @@ class Ground:
     names: Iterator[str] = field(default_factory=lambda: (f"link {number}" for number in range(10**9)))
 
     def under(self, place: Frame | None) -> tuple[Frame | None, Any]:
-        """Return the body to which the frame `place` belongs, preceded by the frame of this body."""
+        """Return the body to which the frame `place` belongs; the frame of this body comes first."""
         around = () if place is None else place.chain()
         for outer in around:
             if outer in self.roots:

@@ -1,7 +1,7 @@
 """Build MuJoCo's model from the robots, shapes and links of a world.
 
 The base of a robot is a body with three joints; an obstacle is a body without joints. As in the stub, a robot
-may touch an obstacle only if they are at the same height. The robot does not touch an obstacle that it drives
+may touch an obstacle only if both are at the same height. The robot does not touch an obstacle that it drives
 over or under.
 """
 

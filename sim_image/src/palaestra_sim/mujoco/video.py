@@ -88,7 +88,7 @@ def _new_file(path: Path) -> tuple[int, str]:
             fcntl.flock(lock, fcntl.LOCK_EX)
         if os.fstat(lock).st_nlink:
             return lock, name
-        os.close(lock)  # another simulator removed the file before this one locked it
+        os.close(lock)  # another simulator removed the file before this simulator locked it
 
 
 def _abandon(lock: int, name: str) -> None:

@@ -69,8 +69,8 @@ Greet = Callable[["RosLink", Mapping[str, str]], Endpoint]
 class Lingering:
     """The finished connections; each is closed between one and two LINGER_S after it was added.
 
-    All of them share one timer. A timer for each would be expensive: a client that opens a connection for
-    each call may make a thousand calls a second.
+    All of them share one timer. A timer for each connection would be expensive: a client that opens a
+    connection for each call may make a thousand calls a second.
     """
 
     def __init__(self, loop: Loop) -> None:

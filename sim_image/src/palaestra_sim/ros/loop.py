@@ -60,7 +60,7 @@ class Loop:
         self._watched[number] = ready
 
     def forget(self, file: _File) -> None:
-        """Stop watching `file`; call this before it is closed."""
+        """Stop watching `file`; call this method before the file is closed."""
         number = _number(file)
         if self._watched.pop(number, None) is not None:
             self._epoll.unregister(number)

@@ -1,8 +1,8 @@
 """The handles by which clients of a supervisor refer to nodes and fields.
 
 A handle is a number that looks like a memory address, because Webots' handles are memory addresses. A handle
-is valid until the world is loaded again; after that, services refuse it. In Webots an old handle is a
-dangling pointer and may crash the controller, so clients must request new handles after each load.
+is valid until the world is loaded again; after that, services refuse the old handle. In Webots an old handle
+is a dangling pointer and may crash the controller, so clients must request new handles after each load.
 """
 
 from __future__ import annotations

@@ -33,7 +33,7 @@ class RunningSimulator:
     """A simulator; its constructor loads and checks the world, and `start` starts the controllers.
 
     Args:
-        world_path: the world file; each reload reads it again.
+        world_path: the world file; each reload reads the file again.
         load: returns the simulation of a world file, which starts in the given mode.
         make_node: returns the ROS node for a name.
         options: the options of controllers.

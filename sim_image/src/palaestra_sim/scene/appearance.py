@@ -164,7 +164,7 @@ class Appearance:
         )
 
     def _refresh(self) -> None:
-        """Collect the nodes again if a visible shape changed; else find the nodes that a client has moved."""
+        """Collect the nodes again if a visible shape changed; otherwise find the nodes that clients moved."""
         if self._view.changes != self._changes:
             self._collect()
         elif self._view.moves != self._moves:

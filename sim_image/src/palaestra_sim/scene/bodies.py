@@ -41,7 +41,7 @@ class Body(Protocol):
         c, s: cosine and sine of the heading.
         velocity: vx, vy in m/s and omega in rad/s, in world axes, over the last basic step.
         touched: one bit for each part that was touched since the bumpers were last read; the code that reads
-            the bumpers clears it.
+            the bumpers clears the bits.
     """
 
     base: MobileBase

@@ -57,7 +57,7 @@ class CameraInterface(Protocol):
         """Return a float32 for each pixel: its distance along the axis of the lens, in meters.
 
         A distance below `nearest_m`, or beyond the far end of the lens, is infinite. Other distances are
-        multiples of `resolution_m`, if that is positive.
+        multiples of `resolution_m`, if `resolution_m` is positive.
         """
         ...
 

@@ -28,7 +28,7 @@ class DynamicFrame(Frame):
         changed: the frames that the physics has to read; a frame that a client changed adds itself.
         put: whether a client has set this frame since the physics last read it; the physics clears the flag.
         speed: the linear and angular velocity that a client set, in the axes of the ground; the physics uses
-            them and then sets None, which means no change.
+            both and then sets None, which means no change.
     """
 
     moves = True

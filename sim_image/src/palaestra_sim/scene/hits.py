@@ -18,7 +18,7 @@ _NEVER: Final = (math.inf, -math.inf)
 
 
 def first_hit(shape: Shape, origin: Vector, direction: Vector) -> float:
-    """Return the meters from `origin` along a unit vector to the shape; infinite if the ray misses it."""
+    """Return the meters from `origin` along a unit vector to the shape; infinite if the ray misses."""
     if shape.mesh is not None:
         return nearest_triangle(shape.mesh, origin, direction)
     enter, leave = _span(shape, origin, direction)

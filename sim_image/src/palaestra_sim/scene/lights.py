@@ -118,7 +118,7 @@ def lights_in(root: SceneNode) -> Iterator[SceneNode]:
 
 
 def unknown_light(root: SceneNode) -> str | None:
-    """Return a description of a node whose light is not simulated, such as "a CeilingLight"; else None."""
+    """Return a description of a node whose light is not simulated, such as "a CeilingLight", or None."""
     for node in root.descendants():
         if node.type_name == _BACKGROUND and (node.text("texture") or _MOUNTAINS) != _MOUNTAINS:
             return f"a {_BACKGROUND} with the texture {node.text('texture')}"

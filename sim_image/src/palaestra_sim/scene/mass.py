@@ -1,6 +1,6 @@
 """The masses of Solids, for a physics with masses.
 
-A Solid without a Physics node has no mass of its own. Source: Webots reference, Physics.
+A Solid without a Physics node has no mass. Source: Webots reference, Physics.
 """
 
 from __future__ import annotations

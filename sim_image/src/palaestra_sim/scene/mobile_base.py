@@ -29,10 +29,10 @@ class MobileBase:
 
     Args:
         wheels: the motors of the wheels.
-        drive: the kinematics of these wheels; None if they do not move the robot.
+        drive: the kinematics of these wheels; None if the wheels do not move the robot.
 
     Attributes:
-        drive: the kinematics of the wheels, or None, as passed.
+        drive: the argument `drive`.
         vx, vy, omega: the speed of the robot in m/s and rad/s, in the robot's own axes.
     """
 

@@ -199,7 +199,7 @@ class Motor:
             self.changed = True
 
     def demand(self, step_s: float) -> float:
-        """Return the speed in rad/s that the motor demands in the next step; call this once for each step."""
+        """Return the speed in rad/s that the motor demands in the next step; call it once for each step."""
         if self.kinematic:
             return self._kinematic_speed(step_s)
         if not self.available_torque_nm:

@@ -65,7 +65,8 @@ class Movies:
     """Records the movies of one world, one at a time.
 
     Args:
-        view: returns a camera of that size at the current Viewpoint; None if the simulator does not render.
+        view: returns a camera of the movie's size at the current Viewpoint; None if the simulator does not
+            render.
         film: returns a writer for a movie; None if the simulator does not render.
         basic_step_ms: the basic step of the simulation.
 

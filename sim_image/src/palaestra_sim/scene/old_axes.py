@@ -1,9 +1,9 @@
-"""Nodes of files from before R2022a, whose axes Webots converts when it loads them.
+"""Nodes of files from before R2022a, whose axes Webots converts when it loads the files.
 
 In these files robots looked along -z, cylinders stood along y, and many devices looked along other axes.
 Webots rotates these nodes, and the instances of its own PROTOs, whose files have the current axes. This
-module also rotates a RangeFinder, so that it looks in the direction that its author intended. Source:
-WbNodeUtilities::fixBackwardCompatibility of Webots.
+module also rotates a RangeFinder, so that it looks in the direction that the author of the world intended.
+Source: WbNodeUtilities::fixBackwardCompatibility of Webots.
 """
 
 from __future__ import annotations

@@ -21,7 +21,8 @@ class Outlines:
     """The shapes and the floors of a world.
 
     Attributes:
-        shapes: the shapes of each Solid, robot and device with a boundingObject, but not of their parts.
+        shapes: the shapes of each Solid, robot and device with a boundingObject, but not the shapes of their
+            parts.
         floors_m: returns the current heights of the floors.
     """
 
@@ -62,6 +63,6 @@ def free_path(shapes: Iterable[Shape], start: Vector, end: Vector) -> float:
 
 
 def _entry(shape: Shape, start: Vector, direction: Vector) -> float:
-    """Return the distance in meters at which a ray meets a shape; infinite if it misses it."""
+    """Return the distance in meters at which a ray meets a shape; infinite if the ray misses the shape."""
     frame = shape.pose.inverse
     return first_hit(shape, frame.carry(start), frame.turned(direction))

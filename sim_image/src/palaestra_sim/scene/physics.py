@@ -43,7 +43,7 @@ class Figure(Protocol):
 
     @property
     def links(self) -> Sequence[Link]:
-        """The parts on its joints that forces move, outer parts first."""
+        """The parts on the robot's joints that forces move, outer parts first."""
         ...
 
 

@@ -3,7 +3,7 @@
 The size of a Solid is the size of the box around its shapes, along the axes of the radar. A Solid without
 shapes is a point. Parts outside the field of view do not count. Floors and the radar's own robot hide no
 target.
-Source: WbObjectDetection.cpp of Webots, which cuts boxes at the edge of the field of view by their corners.
+Source: WbObjectDetection.cpp of Webots; Webots cuts boxes at the edge of the field of view by their corners.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ class RadarTargets:
 
 
 def echoes_of(nodes: Collection[SceneNode], outlines: Outlines) -> RadarTargets:
-    """Return the current radar targets among these nodes, which have these outlines."""
+    """Return the current radar targets among `nodes`, whose outlines are in `outlines`."""
     shapes = outlines.shapes
     targets = []
     for node in nodes:

@@ -87,7 +87,7 @@ class SceneContents:
 
 
 def read_scene(tree: SceneTree, physics: Physics, leave_out: LeaveOut | None = None) -> SceneContents:
-    """Return the contents of a world, and give its nodes their frames; `physics` makes the robots' bodies.
+    """Return the contents of a world, and set the frames of its nodes; `physics` makes the robots' bodies.
 
     Raises:
         WorldError: the world has objects that cannot be simulated; the error lists all of them.
@@ -117,7 +117,7 @@ def read_scene(tree: SceneTree, physics: Physics, leave_out: LeaveOut | None = N
 
 
 def read_added(tree: SceneTree, nodes: Iterable[SceneNode], to: SceneContents) -> SceneContents:
-    """Return the contents that nodes inside one parent add to a world, and give these nodes their frames.
+    """Return the contents that nodes inside one parent add to a world, and set the frames of these nodes.
 
     `to` has the contents of the world so far.
 

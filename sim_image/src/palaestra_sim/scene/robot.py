@@ -112,7 +112,7 @@ class Robot:
         return self._physics.eye(place, lens)
 
     def device(self, name: str) -> object | None:
-        """Return one of its devices; see `Carrier`."""
+        """Return one of the robot's devices; see `Carrier`."""
         _, device = self.parts.devices.rows.get(name, (None, None))
         return device
 

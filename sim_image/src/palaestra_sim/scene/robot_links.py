@@ -25,7 +25,7 @@ _CLEARANCE_M: Final = 0.01  # a joint's end that is nearer than this to the floo
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parts:
-    """The parts of one robot, in its own frame, with all joints as in the world file.
+    """The parts of one robot, in the robot's own frame, with all joints as in the world file.
 
     Attributes:
         nodes: each node with its frame, outer nodes first.

@@ -96,7 +96,8 @@ class _RobotReader:
         self._parent = parent
         self._by_ros = node.text("controller") == "ros"
         self._devices = Devices()
-        # The robot's pose does not affect its parts, so they are read in its own frame, with z up.
+        # The robot's pose does not affect its parts, so the parts are read in the robot's own frame, with z
+        # up.
         self._y_points_up = self._has_y_up()
         self._frame = Frame(None, (0.0, 0.0, 0.0), to_axis_angle(Y_UP if self._y_points_up else IDENTITY))
         self._outline: list[Shape] = []  # shapes of parts that are fixed to the robot
@@ -217,7 +218,7 @@ class _RobotReader:
         return RobotFrame(self._parent, translation, rotation, body)
 
     def _on(self, place: Frame, shape: Shape) -> Shape:
-        """Return a shape that was read in the robot's own frame, with the robot's final frame."""
+        """Return a shape that was read in the robot's own frame, attached to the robot's final frame."""
         return replace(shape, place=place) if shape.place is self._frame else shape
 
     def _settle(self, place: Frame) -> None:
@@ -312,7 +313,7 @@ class _RobotReader:
         self._read_frame(end, inner)
 
     def _read_loose_joint(self, node: SceneNode, place: Frame) -> None:
-        """Read a joint without motors, such as that of a caster, as a fixed joint, with all parts on it."""
+        """Read a joint without motors, such as a caster's joint, as a fixed joint, with all parts on it."""
         if node.nodes("device") or node.nodes("device2") or node.nodes("device3"):
             self._lacks(node, f"{self._reading.simulator} simulates no {node.type_name} with devices")
         for end in node.nodes("endPoint"):

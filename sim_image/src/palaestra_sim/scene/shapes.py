@@ -46,7 +46,7 @@ class Shape:
 
     @property
     def upright(self) -> bool:
-        """Whether one of its axes is vertical, so that its outline is the same at every height.
+        """Whether one of the shape's axes is vertical, so that its outline is the same at every height.
 
         A ball, a mesh and a shape that `lies` count as upright too. So does every shape of a stand-in,
         because stand-ins are approximations: a tilted stand-in has the outline of an upright stand-in.

@@ -49,7 +49,7 @@ class Simulation:
         tree: the nodes of the world.
         robots: the robots, in the order of the world file.
         time_ms: simulated time; a reset sets it to 0.
-        mode: the mode, which the program that paces the steps reads; `step` works in every mode.
+        mode: the mode, for the program that paces the steps; `step` works in every mode.
         quit_status: the exit status that `quit` requested; None before that request.
         motion: the motion of robots and dynamic solids, for a supervisor.
         movies: recordings of the Viewpoint's view.
@@ -280,7 +280,7 @@ class Simulation:
         return save_view(self.tree.root, self.scene.physics, path, quality)
 
     def contact_points(self, node: SceneNode, *, descendants: bool) -> list[tuple[Vector, int]]:
-        """Return a node's contact points: positions in meters, each with the number of the touching node."""
+        """Return a node's contact points: positions in meters, each with the number of a touching node."""
         asked = {node, *node.descendants()} if descendants else {node}
         return [
             (point if self.scene.top is None else self.scene.top.from_ground(point), touching.number)

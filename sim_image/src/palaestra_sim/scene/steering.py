@@ -2,8 +2,8 @@
 
 The plain tires of a fixed axle permit two motions: ahead, and a turn about a point on the axle. A steered
 tire must not slide sideways, which fixes the ratio of these two motions. If the angles of two steered tires
-contradict each other, the drive uses the motion in which both slide least. The speeds of the driven tires
-then give the speed of the robot by least squares, whichever axle is driven.
+contradict each other, the drive uses the motion in which both tires slide least. The speeds of the driven
+tires then give the speed of the robot by least squares, whichever axle is driven.
 """
 
 from __future__ import annotations

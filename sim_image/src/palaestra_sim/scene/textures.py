@@ -1,8 +1,8 @@
 """Textures for infra-red sensors: the share of light that a shape returns at the point that a ray meets.
 
 The red of the texture's pixel is multiplied by the red of the base color. The coordinates of a point in the
-texture are those that Webots computes for its rays. Source: WbShape::pickColor, pickUVCoordinate of WbBox,
-WbCylinder, WbPlane and WbSphere, WbImageTexture::pickColor and wren's TextureTransform of Webots.
+texture are computed as Webots computes them for its rays. Source: WbShape::pickColor, pickUVCoordinate of
+WbBox, WbCylinder, WbPlane and WbSphere, WbImageTexture::pickColor and wren's TextureTransform of Webots.
 """
 
 from __future__ import annotations
@@ -210,7 +210,7 @@ MAPPINGS: Final[Mapping[str, Mapped]] = {
 
 
 def _transform(node: SceneNode | None) -> Callable[[Coordinates], Coordinates]:
-    """Return the function of a TextureTransform: move, turn and scale about its center, with v down."""
+    """Return the function of a TextureTransform: move, turn and scale about `center`, with v down."""
     if node is None:
         return lambda place: place
     move_u, move_v = _pair(node, "translation", (0.0, 0.0))

@@ -83,7 +83,7 @@ class NodeReader:
             self._refused.append(node.origin.error(fact, remedy))
 
     def lacks(self, node: SceneNode, fact: str, remedy: str = ELSEWHERE) -> None:
-        """Record that `node` is not supported; if the user leaves out its type, mark it as left out."""
+        """Record that `node` is not supported; if the user leaves out its type, mark the node as left out."""
         if not self.leave_out.covers(node):
             self.refuse(node, fact, remedy)
             return

@@ -12,7 +12,7 @@ from palaestra_sim.scene.old_axes import looking
 from palaestra_sim.scene.physics import Physics
 from palaestra_sim.scene.validation import NodeReader
 
-SIZE: Final = (800, 600)  # Webots uses the size of its window instead
+SIZE: Final = (800, 600)  # width and height in pixels; Webots uses the size of its window instead
 
 
 def save_view(root: SceneNode, physics: Physics, path: str, quality: int) -> bool:

@@ -154,7 +154,7 @@ class View:
 
 
 class _Frame(NamedTuple):
-    """A frame relative to `place`, and the factors by which it scales its contents along its axes."""
+    """A frame relative to `place`, and the factors by which the frame scales its contents along its axes."""
 
     place: Frame | None = None
     pose: Pose = Pose()
@@ -211,7 +211,7 @@ def _stand_in(node: SceneNode, frame: _Frame) -> Iterator[Drawn]:
 
 
 def _stand_in_look(node: SceneNode, but: str) -> _Look:
-    """Return the look of a stand-in's first appearance outside of the field `but`; else one without color."""
+    """Return the look of a stand-in's first appearance outside the field `but`; if none, an empty look."""
     looks = (
         item
         for name, content in node.fields.items()
@@ -243,7 +243,7 @@ class _Look(NamedTuple):
 
 
 def _geometry(node: SceneNode, frame: _Frame, look: _Look, owner: SceneNode) -> Iterator[Drawn]:
-    """Yield the shape of a geometry, or nothing if its numbers are invalid or another file contains it."""
+    """Yield the shape of a geometry, or nothing if its numbers are invalid or it is in another file."""
     solid = _solid(node, frame.pose)
     if solid is None or not look.color or look.color[3] <= 0.0:
         return

@@ -113,7 +113,7 @@ class Ring(Drive):
     """Three omnidirectional wheels around the middle, in closed form, which keeps zeros exact.
 
     Source: Webots, projects/robots/festo/robotino3/controllers/robotino3/base.c. In that file the first wheel
-    is at the rear. The rotation by `c`, `s` turns its frame into the robot's frame.
+    is at the rear. The rotation by `c`, `s` turns the frame of that file into the robot's frame.
     """
 
     radius_m: float
@@ -273,7 +273,7 @@ def _pivot(wheels: Sequence[Wheel], forward: Direction, middle: Direction) -> Di
 
 
 def _at_origin(row: Twist, center: Direction, gain_m: float) -> Twist:
-    """Return the motion of the origin for 1 rad/s of a wheel, from that for 1 m/s of its hold at `center`."""
+    """Return the motion of the origin for 1 rad/s of a wheel; `row` is for 1 m/s of its hold at `center`."""
     vx, vy, omega = row
     return (vx + omega * center[1]) * gain_m, (vy - omega * center[0]) * gain_m, omega * gain_m
 

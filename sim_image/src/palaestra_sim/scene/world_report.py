@@ -55,7 +55,7 @@ def summary(simulation: Described, *, chosen: bool = False) -> Iterator[str]:
     """Yield lines about robots, stand-ins, and all nodes that were left out.
 
     By default, the world was read without any unsupported node, so that the report covers all other nodes. If
-    `chosen`, the world was read without the nodes that the user has chosen to leave out.
+    `chosen` is True, the world was read without the nodes that the user has chosen to leave out.
     """
     for robot in simulation.robots:
         yield f'robot "{robot.name}": {", ".join(_of_robot(robot))}'

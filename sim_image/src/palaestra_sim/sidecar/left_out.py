@@ -10,7 +10,7 @@ _MOST_BYTES = 2**16
 
 
 def read_left_out(file: Path) -> tuple[str, ...]:
-    """Return the lines of the file without empty ones; () if the file cannot be read."""
+    """Return the non-empty lines of the file; () if the file cannot be read."""
     try:
         if not file.is_file():  # opening a pipe would block
             return ()

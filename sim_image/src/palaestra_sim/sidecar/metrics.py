@@ -23,7 +23,7 @@ def registry(simulators: Sequence[SupervisedSimulator]) -> CollectorRegistry:
 
 
 class _Simulators(Collector):
-    """Creates the metrics of the simulators; each series exists from the first scrape, even if it is 0."""
+    """Creates the metrics of the simulators; each series exists from the first scrape, even at 0."""
 
     def __init__(self, simulators: Sequence[SupervisedSimulator]) -> None:
         self._simulators = dict(zip(SLOTS, simulators, strict=False))

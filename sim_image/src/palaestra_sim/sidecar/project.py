@@ -3,8 +3,8 @@
 Webots uses the parent of a world's folder as the project, and searches it for `controllers/<name>/`, PROTOs
 and plugins. If a controller is missing, Webots only prints a warning and starts `<generic>`. So the project
 of the generated world has links to all files and folders next to the source world, and next to the source
-world's folder. If the world names files above its project, the project has folders up to these files, with
-links in each folder.
+world's folder. If the source world names files above its project, the new project has folders up to these
+files, with links in each folder.
 
 A world from a ConfigMap has no project. The files next to its folder do not belong to the world, so they are
 not linked.

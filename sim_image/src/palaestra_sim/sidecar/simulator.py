@@ -2,7 +2,7 @@
 
 Requests, reports of the process, the deadline of a stop, and the shutdown of the container become messages in
 one queue. One thread handles the messages in order, so no lock is needed. Other threads may read `state`; it
-is an immutable value, which the owner replaces as a whole.
+is an immutable value, and the owner replaces the whole value.
 """
 
 import logging

@@ -92,7 +92,7 @@ class Viewing:
     def _read(self, newest: _Newest) -> bytes:
         if self._reason:
             raise NothingToSee(self._reason)
-        with self._lock:  # other threads wait here, and then return the same response
+        with self._lock:  # other threads wait here for the lock, and then return the same response
             now = self._clock()
             if now >= newest.due:
                 newest.content = self._link.ask(newest.request, newest.most_bytes)

@@ -111,7 +111,7 @@ class StubBody(Disc):
         return deepest
 
     def scan(self, frame: tuple[float, float, float, float], rays: Sequence[Ray], reach: list[float]) -> None:
-        """Shorten each `reach` to the distance at which its ray, of a robot at `frame`, meets this robot."""
+        """Shorten each `reach` to the distance at which its ray meets this robot; the rays are in `frame`."""
         for disc in self.discs:
             disc.scan(frame, rays, reach)
 

@@ -90,7 +90,7 @@ class StubPhysics:
         doors: Sequence[Link] = (),
     ) -> None:
         """Set the obstacles of each robot and of its rays."""
-        del loose, doors  # both are empty: `abilities` excludes them, so the checks of a world refuse them
+        del loose, doors  # both are empty, because `abilities` excludes such objects
         self._solids = tuple(solids)
         self._tall = [(shape, shape.heights()) for shape in solids]
         self._moving = [(it, it.body) for it in figures if isinstance(it.body, StubBody)]

@@ -45,7 +45,7 @@ class Fan:
         self._others = tuple(others)
 
     def cast(self, frame: tuple[float, float, float, float]) -> list[float]:
-        """Return the distance in meters that each ray travels; at most its reach.
+        """Return the distance in meters that each ray travels; at most the reach of the ray.
 
         `frame` is x, y, cosine and sine of the robot's heading. The next call changes the returned list.
         """

@@ -78,7 +78,7 @@ def _rows(strings: list[Token], ros_name: str, *, clock: bool) -> list[tuple[byt
 
 
 def _options(text: str) -> list[str]:
-    """Return the options in a string; it is split only if each of its words begins with `--`."""
+    """Return the options in a string; a string is split only if each word begins with `--`."""
     words = text.split()
     several = len(words) > 1 and all(word.startswith("--") for word in words)
     return words if several else [text]

@@ -56,8 +56,8 @@ def no_robot_speaks_ros(candidate: Candidate) -> Iterator[WorldError]:
 def robot_used_twice(candidate: Candidate) -> Iterator[WorldError]:
     """A `USE` repeats a robot with the same ROS name.
 
-    All DEFs with that name are compared, although a `USE` refers only to the last DEF before it. A world with
-    different DEF names is clearer anyway.
+    All DEFs with that name are compared, although a `USE` refers only to the last DEF before the `USE`. A
+    world with different DEF names is clearer anyway.
     """
     starts = [robot.span[0] for robot in candidate.robots]
     containers = {}

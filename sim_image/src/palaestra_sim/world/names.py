@@ -41,8 +41,8 @@ class RunIdentity:
 def name_prefix(identity: RunIdentity) -> str:
     """Return the readable part before the robot, such as `move_to_target_r0_collect_1a`.
 
-    All robots of a simulator share this prefix. It has at most 40 bytes; a long job name is cut first. The
-    prefix is not unique by itself.
+    All robots of a simulator share this prefix. The prefix has at most 40 bytes; a long job name is cut
+    first. The prefix is not unique by itself.
     """
     group = _legal(identity.group)[:_MAX_GROUP]
     place = _legal(f"_r{identity.replica}_{group}_{identity.index}{identity.slot}")

@@ -209,7 +209,7 @@ class _Entry:
         return tuple(self._formula(length, place) for length in written)
 
     def _path(self, written: object, place: str) -> tuple[str, bool]:
-        """Return the field with the points of a wall, and whether it is closed."""
+        """Return the field with the points of a wall, and whether the wall is closed."""
         path = str(written.get("path", "")) if isinstance(written, dict) else ""
         closed = written.get("closed", False) if isinstance(written, dict) else None
         declared = self._fields.get(path)

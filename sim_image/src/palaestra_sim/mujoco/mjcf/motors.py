@@ -1,9 +1,9 @@
 """Actuators as motors of Webots: translate a motor's commands to MuJoCo's `ctrl`.
 
 The control of an actuator sets a position, a velocity or a force, and its motor accepts the matching
-commands. If the control sets a velocity, the motor also accepts a target position, and turns to it as a motor
-of Webots does. Until a client commands a motor, the control keeps its initial value: 0, or the value in the
-keyframe.
+commands. If the control sets a velocity, the motor also accepts a target position, and turns to this position
+as a motor of Webots does. Until a client commands a motor, the control keeps its initial value: 0, or the
+value in the keyframe.
 """
 
 from __future__ import annotations

@@ -32,7 +32,7 @@ class Equipment:
 
     Attributes:
         devices: all devices, by name.
-        joints: for each device on a joint, the number of the joint, by name of the device.
+        joints: the number of the joint, for each device on a joint, by the name of the device.
         motors: the actuators that are motors.
         actuators: the actuators that are not motors.
         samples: functions that set the values of the sensors.

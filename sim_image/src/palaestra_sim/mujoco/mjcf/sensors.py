@@ -71,7 +71,7 @@ def in_webots(model: Any, number: int) -> bool:
 
 
 def measured(sensor: ModelSensor) -> Measured:
-    """Return the device of a sensor: a device of Webots, or one that publishes the numbers unchanged."""
+    """Return the device of a sensor: a device of Webots, or a device that publishes the numbers unchanged."""
     make = _maker(sensor.model.model, sensor.number) or _numbers
     return make(sensor)
 
@@ -125,7 +125,7 @@ def _number(sensor: ModelSensor) -> Measured:
 
 
 def _distance(sensor: ModelSensor) -> Measured:
-    """Return a distance sensor; if its ray meets no surface, its value is its maximum range."""
+    """Return a distance sensor; its value is the maximum range if the ray meets no surface."""
     model = sensor.model.model
     reach_m = float(model.sensor_cutoff[sensor.number]) or float(model.vis.map.zfar * model.stat.extent)
     table = LookupTable([(0.0, 0.0, 0.0), (reach_m, reach_m, 0.0)])

@@ -73,7 +73,8 @@ class Feed:
     def publish(self, elapsed_ms: int) -> None:
         """Send the value to the subscribers, once for each publisher that is due.
 
-        If the topic has no subscriber, the value is not read, because it takes time to render an image.
+        If the topic has no subscriber, the value is not read, because, for example, rendering an image takes
+        time.
         """
         source = self.source
         if source is None:

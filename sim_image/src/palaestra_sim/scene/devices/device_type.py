@@ -213,7 +213,7 @@ class DeviceTopic:
         type_name: the type of the messages.
         source: the source of the reading; None if the topic never has a reading.
         constants: the values of the other fields.
-        reading: the field of the value. "" means the last field, which must consist of numbers; this is the
+        reading: the field of the value. "" means the last field, which must consist of numbers; "" is the
             fastest choice.
         many: whether `value` is a sequence; each of its items is sent in a separate message.
         whole: whether the value is a mapping of all fields except the header.
@@ -268,10 +268,10 @@ class DeviceType(Generic[DeviceT]):
     Attributes:
         node: the type of the device's node.
         name: the name of a device whose node has no name.
-        fields: the fields of the node, in the syntax of `field_types`, except `name` and, if the node is a
-            Solid, except the fields that every Solid has.
-        without_effect: the names of the fields that have an effect in Webots but in no simulator here,
-            separated by spaces.
+        fields: the fields of the node, in the syntax of `field_types`, without `name`, and, if the node is a
+            Solid, without the fields that every Solid has.
+        without_effect: the names, separated by spaces, of the fields that have an effect in Webots but in no
+            simulator of this package.
         solid: whether a node that is not on a joint is a Solid.
         role: one of `ROLES` for a device of a joint; "" for a device with its own frame on the robot.
         read: returns the device of a node.
@@ -357,7 +357,7 @@ class Devices:
         return {name: it for name, (kind, it) in self.rows.items() if kind.sampler is not None}
 
     def trouble_with(self, name: str) -> str | None:
-        """Return the reason to refuse another device of that name; None to accept the device."""
+        """Return the reason to refuse another device of the name `name`; None to accept the device."""
         if name in self.rows:
             return f"a second device {name!r}"
         if not is_ros_name(name):

@@ -249,7 +249,7 @@ def _measured(sensor: DistanceSensor, distances_m: Sequence[float]) -> float:
 
 
 def _returned(distances_m: Sequence[float]) -> Iterator[float]:
-    """Yield the distances of those rays of a sonar that meet a surface within 22.5 degrees of its normal.
+    """Yield the distances of a sonar's rays that meet a surface within 22.5 degrees of the normal.
 
     At an edge, the two beams of a pair may have different lengths. Of these two beams, the beam whose length
     is closer to the length of the ray decides.

@@ -210,7 +210,7 @@ def _rotating(lidar: Lidar, robot: Carrier) -> Sample:
 
 
 def _sweep(lidar: Lidar, robot: Carrier, before: float, turns: float) -> None:
-    """Cast the rays that the head passes from the angle `before` to the angle `turns`, both in turns."""
+    """Cast the rays that the head passes between the angles `before` and `turns`, given in full turns."""
     rays = lidar.rays
     first, end = (math.floor(it * rays.columns + _ROUNDING) for it in (before, turns))
     columns = [column % rays.columns for column in range(max(first, end - rays.columns), end)]

@@ -1,4 +1,4 @@
-"""Radar: distances and speeds of the Solids with a `radarCrossSection` in its field of view.
+"""Radar: distances and speeds of the Solids with a `radarCrossSection` in the radar's field of view.
 
 A speed is the change of position since the previous sample, so it is 0 in the first sample. With the default
 limits, Webots detects only targets that move away at 1 to 2 m/s. If both limits are 0, a target may have any

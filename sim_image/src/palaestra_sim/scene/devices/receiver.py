@@ -1,4 +1,4 @@
-"""Receiver: the queue of the packets that emitters on its channel have sent while it was enabled."""
+"""Receiver: the queue of the packets that emitters sent on the receiver's channel while it was enabled."""
 
 from __future__ import annotations
 

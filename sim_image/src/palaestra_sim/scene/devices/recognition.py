@@ -1,8 +1,8 @@
 """The objects that a camera recognizes: solids with `recognitionColors` that are at least partly visible.
 
-The position of an object is the position of its solid, in the frame of the camera. Its position in the image
-is the middle of the rectangle around its visible part. The segmentation image shows each object in its first
-color, on black.
+The position of an object is the position of its solid, in the frame of the camera. The position of an object
+in the image is the middle of the rectangle around the object's visible part. The segmentation image shows
+each object in its first color, on black.
 """
 
 from __future__ import annotations

@@ -55,7 +55,7 @@ class SceneNode:
         parent: the node that contains this node; None for the root.
         fields: the fields that the file or a client has set, by name.
         twins: this node and all nodes that are the same node in the file by `DEF` and `USE`; a write changes
-            all of them.
+            all twins.
         place: the frame of the node; None for a node without a frame, such as an appearance.
         outline: whether the node, or one of its twins, is part of a boundingObject.
         shipped: whether the node is an instance of a Webots PROTO whose built-in file has the current axes.

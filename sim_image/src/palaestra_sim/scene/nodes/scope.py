@@ -45,7 +45,7 @@ class Scope:
         """Return the node itself, or the node to which its `USE` refers.
 
         Raises:
-            WorldError: no node with that DEF name precedes it.
+            WorldError: no node with that DEF name precedes the `USE`.
         """
         if node.uses is None:
             return node

@@ -51,7 +51,7 @@ _TYPES: Final = {name: type_ for type_, name in _NAMES.items()}
 
 
 class FieldKind(NamedTuple):
-    """The declaration of a field: its type, whether it has several values, and the default as in a world."""
+    """The declaration of a field: its type, whether it has several values, and its default as in a world."""
 
     type: FieldType
     multiple: bool

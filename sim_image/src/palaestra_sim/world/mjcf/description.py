@@ -73,7 +73,7 @@ class Description:
 
     @property
     def devices(self) -> Mapping[str, str]:
-        """The names of devices that differ from those in the model, by kind and name: "sensor/x"."""
+        """The new names of devices, by the kind and the name in the model, such as "sensor/x"."""
         return {name.removeprefix(DEVICE): self._text(name) for name in self.texts if name.startswith(DEVICE)}
 
     @property
@@ -89,7 +89,7 @@ class Description:
         return None if element is None else _number(element.attributes.get("data", ""))
 
     def error(self, section: str, name: str, fact: str, remedy: str) -> WorldError:
-        """Return an error at the element of that name in a section such as "sensor", else at the root."""
+        """Return an error at the element `name` in a section such as "sensor"; without it, at the root."""
         if section not in self._places:
             elements = (it for section_ in self.root.named(section) for it in section_.walk())
             named = ((it.attributes.get("name", ""), it.start) for it in elements)

@@ -49,7 +49,7 @@ def assets(root: Element) -> Iterator[tuple[Element, str]]:
 
 
 def absolutes(source: Source, root: Element) -> Iterator[WorldError]:
-    """Yield an error for each name in a file that is not relative to the folder of the world."""
+    """Yield an error for each file name that is not relative to the folder of the world."""
     for element, path in (*named_folders(root), *named_files(root)):
         if not is_relative(path):
             fact = f"{path!r} is not relative to the folder of the world"

@@ -1,9 +1,9 @@
-"""The files of a model on disk, and its project: the folder that holds them all.
+"""The files of a model on disk, and its project: the folder that holds all these files.
 
-Models of a package share meshes, so a model may name files in folders above its own. The project is the
-nearest folder that holds all files that the model names, unless the user names a folder. The project is never
-the whole file system, and no link may lead out of the project: an untrusted model must not read files of the
-pod.
+Models of a package share meshes, so a model may name files in folders above its own folder. The project is
+the nearest folder that holds all files that the model names, unless the user names a folder. The project is
+never the whole file system, and no link may lead out of the project: an untrusted model must not read files
+of the pod.
 """
 
 from __future__ import annotations
