@@ -1,4 +1,4 @@
-"""The steps that robots request; the world moves when every robot with `synchronization` has requested a step.
+"""The steps that robots request; the world moves when each robot with `synchronization` requested a step.
 
 A robot whose `synchronization` is TRUE holds the world until it requests a step. Steps of different lengths
 are served in parts: the world advances by the shortest remaining time. While the simulation is paused, all
