@@ -278,7 +278,7 @@ class NewestLines(Lines):
 class Table(ValueKind):
     """Values of one kind, by name; the reader ignores names that are not in `rows`.
 
-    A newer release may have added such a name.
+    A newer release may have added a name that this release does not know.
     """
 
     rows: Iterable[StrEnum]

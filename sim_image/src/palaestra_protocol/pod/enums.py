@@ -35,7 +35,7 @@ class FaultKind(StrEnum):
 
 
 class Cause(StrEnum):
-    """The uses of a trainer's time; every second of an attempt belongs to exactly one.
+    """The uses of a trainer's time; every second of an attempt belongs to exactly one use.
 
     - STEPPING: training waited for a step of the simulators.
     - TRANSPORT: the other parts of a step: requests, reading of messages, the environment.

@@ -81,7 +81,7 @@ class Crash(InjectedFault):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Exit(InjectedFault):
-    """The process closes all connections and exits, although no client requested that."""
+    """The process closes all connections and exits, although no client requested the end."""
 
     code: int = 0
 

@@ -47,7 +47,7 @@ class KnownPaths:
 
 
 def survey(load: Load, world_path: Path) -> KnownPaths:
-    """Return the services and topics of the world in a file, which `load` loads.
+    """Return the services and topics of the world in the file `world_path`; `load` loads this world.
 
     Raises:
         WorldError: the file is wrong, or contains a node that cannot be simulated.

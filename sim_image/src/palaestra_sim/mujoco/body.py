@@ -35,7 +35,7 @@ class MujocoBody:
         self.build = build
         self.base = build.base
         self.radius_m = max((_reach(shape) for shape in build.outline), default=0.1)
-        # The poses are now relative to the robot; later they are poses in the world.
+        # The robot is still at the origin of the world, so these poses are relative to the robot.
         self.poses = tuple(shape.pose for shape in build.outline)
         self.touched = 0
         self.velocity = (0.0, 0.0, 0.0)

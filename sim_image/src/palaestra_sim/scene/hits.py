@@ -68,7 +68,7 @@ def _in_slab(origin: float, direction: float, half: float) -> tuple[float, float
 
 
 def _in_ball(origin: Sequence[float], direction: Sequence[float], radius: float) -> tuple[float, float]:
-    """Return the two distances at which a line enters and leaves a ball, or a circle of the plane."""
+    """Return the two distances at which a line enters and leaves a ball, or, in two dimensions, a circle."""
     square = sum(part * part for part in direction)
     half_linear = sum(part * at for part, at in zip(direction, origin, strict=True))
     constant = sum(at * at for at in origin) - radius * radius

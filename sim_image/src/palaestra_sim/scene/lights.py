@@ -69,7 +69,7 @@ class Light:
         return white * dot(shares, _vector(self.node, "color", (1.0, 1.0, 1.0))) / 3.0
 
     def _white(self, at: Vector, normal: Vector) -> tuple[float, float, Vector]:
-        """Return the ambient and the direct irradiance of a white light, and the way to it in meters."""
+        """Return the ambient and the direct irradiance of a white light, and the way to it, in meters."""
         node = self.node
         if node.type_name == _BACKGROUND:
             way = _far(_opposite(self._from_mountains()))

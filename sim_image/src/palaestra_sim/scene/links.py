@@ -39,7 +39,7 @@ class Link:
 
     @property
     def start(self) -> Pose:
-        """Its pose in the parent's frame, at the joint's position in the world file."""
+        """The pose of the link in the parent's frame, at the joint's position in the world file."""
         return self.place.start if isinstance(self.place, JointFrame) else self.place.pose
 
 

@@ -24,8 +24,8 @@ class MotorSpec:
     The units of a linear motor are m, m/s and N. An `acceleration_rad_s2` of -1 means no limit. Equal
     `min_rad` and `max_rad` mean that commands have no limits. The shaft never passes the `stops`; equal
     `stops` mean that the joint has no stops. `start_rad` is the position in the world file. `gains` are P, I
-    and D of its controller. `multiplier` scales the positions, velocities and torques that a client sets.
-    `forces` is True if the physics has forces.
+    and D of the motor's controller. `multiplier` scales the positions, velocities and torques that a client
+    sets. `forces` is True if the physics has forces.
     """
 
     name: str
@@ -51,7 +51,7 @@ class Motor:
         speed_rad_s: the speed of the shaft.
         angle_rad: the angle of the shaft, since the start or the last reset.
         asked_rad, asked_velocity_rad_s: the commands as a client reads them back, before the multiplier.
-        gains: P, I and D of its controller.
+        gains: P, I and D of the motor's controller.
         kinematic: whether the joint of the motor has no physics. Then, as in Webots, the available torque
             limits the acceleration, and the motor keeps the commanded velocity up to the target.
         changed: whether a command came since the physics last read the motor; the physics clears this flag.

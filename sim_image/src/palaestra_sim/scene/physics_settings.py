@@ -18,7 +18,7 @@ _ENDLESS: Final = 100.0  # replaces -1, which stands for infinite friction in We
 
 @dataclass(frozen=True, slots=True)
 class Floor:
-    """A level Plane of a boundingObject; in Webots it is infinite.
+    """A level Plane of a boundingObject; Webots treats the Plane as infinite.
 
     Attributes:
         place: the frame of the Solid that has the boundingObject.
@@ -30,7 +30,7 @@ class Floor:
 
     @property
     def height_m(self) -> float:
-        """Its current height, in the axes of the ground."""
+        """The current height of the Plane in meters, in the axes of the ground."""
         return self.place.ground_pose.after(self.local).position[2]
 
 

@@ -25,7 +25,7 @@ class Steer:
     """The joint that steers a tire: its axis is vertical in the robot's frame.
 
     Args:
-        motor: the motor of the joint; the motor has the joint's angle.
+        motor: the motor of the joint; the motor's angle is the angle of the joint.
         start_rad: the joint's angle when the tire has its pose of the world file.
         pivot: x and y of the axis, in meters.
         up: 1 if a positive angle turns to the left, -1 if it turns to the right.

@@ -1,7 +1,7 @@
 """Latitude and longitude on the ellipsoid WGS84, and meters on the grid of a UTM zone. Pure.
 
 Source: J. P. Snyder, Map Projections: A Working Manual (USGS Professional Paper 1395), pages 60 to 64. Webots
-has the same formulas, in WbGps.cpp. Within a zone they are exact to a millimeter.
+has the same formulas, in WbGps.cpp. Within a zone the formulas are exact to a millimeter.
 """
 
 from __future__ import annotations

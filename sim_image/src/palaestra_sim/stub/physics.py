@@ -74,7 +74,7 @@ class StubPhysics:
         parts = covering(build.outline)
         outline, rim = [part for part, _ in parts], [shape for _, shape in parts]
         body = StubBody(build.base, outline, rim, build.heights)
-        # The poses are now relative to the robot; later they are poses in the world.
+        # The robot is still at the origin of the world, so these poses are relative to the robot.
         self._parts[body] = [(shape, shape.pose.inverse) for shape in build.outline]
         return body
 

@@ -177,7 +177,7 @@ class SlopedBeams:
 
 
 def _between(low_m: float, high_m: float, slope: float) -> tuple[float, float]:
-    """Return the distances along the floor between which a beam is between two heights.
+    """Return the distances along the floor at which a beam enters and leaves the space between two heights.
 
     The heights are relative to the origin of the beam.
     """

@@ -15,7 +15,7 @@ from palaestra_sim.world.tokens import Token, quoted, unquoted
 from palaestra_sim.world.tree import Node, Value, World
 
 _UP_TO_COMMENT = re.compile(rb"\A.*#[^\n]*\n?", re.DOTALL)  # up to the last comment, with its line end
-_LONGEST_GAP = 200  # bytes; a longer gap between two strings is not copied between new strings
+_LONGEST_GAP = 200  # maximum number of bytes of a gap between two strings that is copied between new strings
 _INDENT = re.compile(rb"\r?\n[ \t]*\Z")
 
 
@@ -115,6 +115,6 @@ def _new_field(world: World, robot: Node, ros_name: str) -> Patch:
 
 
 def _gap_before(world: World, token: Token) -> bytes:
-    """Return the bytes between a token and the previous one: blanks, commas, comments."""
+    """Return the bytes between a token and the previous token: blanks, commas, comments."""
     before = world.tokens[world.index(token.start) - 1]
     return world.source[before.end : token.start]

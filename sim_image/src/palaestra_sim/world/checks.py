@@ -19,7 +19,7 @@ from palaestra_sim.world.tree import Node, Value, World
 
 _ADDRESS_FIELD = re.compile(r"(?:url|sound|texture)\Z", re.IGNORECASE)
 _ABSOLUTE = re.compile(r"[a-z][a-z0-9+.-]*://|/", re.IGNORECASE)
-_MOST_NAMED = 20  # robots that an error lists
+_MOST_NAMED = 20  # maximum number of robots that an error lists
 _ROS_REMAPPING = re.compile(r"__\w+:=")
 
 

@@ -21,8 +21,8 @@ class WorldRobot:
     """A robot whose controller is "ros".
 
     `robot` is its Robot.name. `ros_name` is the value of its `--name=`, or None without this argument. A
-    `supervisor` may read and change the whole scene. If `synchronize`, the simulation waits until a client
-    steps the robot. `definition` is its DEF name.
+    `supervisor` may read and change the whole scene. If `synchronize` is True, the simulation waits until a
+    client steps the robot. `definition` is its DEF name.
     """
 
     robot: str

@@ -69,7 +69,7 @@ class ActuatorMotor(Motor):
         self.forceful = True  # MuJoCo moves all bodies by forces
 
     def reset(self) -> None:
-        """Discard all commands; call this after the model was reset."""
+        """Discard all commands; call this method after the model was reset."""
         super().reset()
         self._commanded = False
         if self._actuator.length is not None:

@@ -88,7 +88,7 @@ class _Builder:
     """Builds the nodes; each node gets a unique number as its span, by which the tree finds the node later.
 
     Attributes:
-        kinds: for each number, the kind and the number or name of the model's object.
+        kinds: for each span number, the kind of the model's object, and the object's number or name.
     """
 
     def __init__(self, model: Model, description: Description, equipment: Equipment, body: int) -> None:

@@ -73,8 +73,8 @@ class Feed:
     def publish(self, elapsed_ms: int) -> None:
         """Send the value to the subscribers, once for each publisher that is due.
 
-        If the topic has no subscriber, the value is not read, because, for example, rendering an image takes
-        time.
+        If the topic has no subscriber, the value is not read, because reading may take time: for example, a
+        camera renders an image.
         """
         source = self.source
         if source is None:

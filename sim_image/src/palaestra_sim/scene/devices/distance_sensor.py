@@ -27,7 +27,7 @@ from palaestra_sim.scene.lookup_table import Row as TableRow
 from palaestra_sim.scene.sensor_rays import Beam, beam_along
 from palaestra_sim.scene.visual_rays import Glance
 
-_MOST_RAYS: Final = 10_000  # limit for the rays of a sensor, because each ray is cast at every step
+_MOST_RAYS: Final = 10_000  # maximum number of rays of a sensor, because each ray is cast at every step
 _BESIDE_M: Final = 1e-4  # distance of the additional rays from the ray of a sonar
 _BEAMS_OF_SONAR: Final = 5  # number of beams for each ray of a sonar
 _STEEPEST: Final = math.tan(math.pi / 8.0)  # slope of the steepest surface that returns a sonar's ray
@@ -263,7 +263,7 @@ def _returned(distances_m: Sequence[float]) -> Iterator[float]:
 
 
 def _reflected(sensor: DistanceSensor, glances: Sequence[Glance]) -> float:
-    """Return the average distance, increased if less than the full light returns."""
+    """Return the average distance, increased if the surface does not return all light."""
     light = sum(it.reflection * weight for it, weight in zip(glances, sensor.weights, strict=True))
     distance_m = _measured(sensor, [it.distance_m for it in glances])
     return distance_m + (distance_m / light - distance_m) * sensor.sensitivity

@@ -105,18 +105,18 @@ class SceneNode:
         return tuple(item for item in self._items(name) if isinstance(item, SceneNode))
 
     def inside(self) -> Iterator[SceneNode]:
-        """Yield the nodes in its fields, in the order of the fields."""
+        """Yield the nodes in the fields of this node, in the order of the fields."""
         for content in self.fields.values():
             yield from (item for item in content.items if isinstance(item, SceneNode))
 
     def descendants(self) -> Iterator[SceneNode]:
-        """Yield all nodes inside it at any depth, parents before children."""
+        """Yield all nodes inside this node at any depth, parents before children."""
         for node in self.inside():
             yield node
             yield from node.descendants()
 
     def ancestors(self) -> Iterator[SceneNode]:
-        """Yield its outer nodes, from the parent to the root."""
+        """Yield the nodes that contain this node, from the parent to the root."""
         node = self.parent
         while node is not None:
             yield node

@@ -46,7 +46,7 @@ class Description:
         source: the bytes of the file.
         root: the root of the elements.
         texts: the elements `text` of `custom` by name; if several have the same name, only the first.
-        numbers: the elements `numeric` of `custom`, in the same way.
+        numbers: the elements `numeric` of `custom` by name; if several have the same name, only the first.
     """
 
     source: Source
