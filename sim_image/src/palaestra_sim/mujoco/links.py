@@ -79,7 +79,7 @@ def add_links(ground: Ground, links: Sequence[Link], marks: Marks, body: MujocoB
     Args:
         ground: the bodies on which the links are mounted.
         links: the links of one robot, or links without a robot; a link comes before the links on it.
-        marks: gets an entry for each geom.
+        marks: the geoms of the model; `add_links` adds an entry for each new geom.
         body: the body of the robot; None for links without a robot.
     """
     added: dict[Link, Added] = {}

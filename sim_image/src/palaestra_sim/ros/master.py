@@ -58,7 +58,7 @@ class Master:
         """Call a method of the master and return its value.
 
         Raises:
-            MasterUnreachable: the master sent no response or an invalid one, or refused the call.
+            MasterUnreachable: the master sent no response or an invalid response, or refused the call.
         """
         return self._checked(method, self._sent(method, self._node, *arguments))
 

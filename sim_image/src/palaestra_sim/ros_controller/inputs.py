@@ -41,7 +41,7 @@ class Input:
 
 
 def inputs(robot: Robot) -> tuple[Input, ...]:
-    """Return the pseudo devices of a robot."""
+    """Return the battery, the keyboard and the joystick of a robot."""
     battery = DeviceTopic(name="value", type_name="webots_ros/Float64Stamped", source=robot.battery)
     return Input(name="battery_sensor", topics=(battery,)), _keyboard(), _joystick()
 

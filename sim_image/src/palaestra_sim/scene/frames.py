@@ -1,7 +1,8 @@
 """The frames of a world's nodes, each relative to the frame of its parent node.
 
 A frame has the `translation` and `rotation` that clients read and write. Only the frames of a robot with a
-body, of a dynamic solid, and of a joint's end point move by themselves. Only clients move all other frames.
+body, of a dynamic solid, and of a joint's end point move by themselves. All other frames move only when a
+client sets them.
 
 Clients see poses in the axes of the world file, where z or y points up. Shapes and physics use the axes of
 the *ground*, where z points up.

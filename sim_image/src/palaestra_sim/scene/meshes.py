@@ -161,7 +161,10 @@ def nearest_triangle(mesh: Mesh, origin: Vector, direction: Vector, *, front: bo
 
 
 def _to_triangle(origin: Vector, direction: Vector, corners: Corners, least: float) -> float:
-    """Return the meters to a triangle, as in Möller and Trumbore (1997); `volume` is negative from behind."""
+    """Return the meters to a triangle, as in Möller and Trumbore (1997).
+
+    `volume` is negative if the ray meets the triangle from behind.
+    """
     a, b, c = corners
     first, second, apart = minus(b, a), minus(c, a), minus(origin, a)
     across = cross(direction, second)

@@ -91,12 +91,12 @@ class Motor:
 
     @property
     def name(self) -> str:
-        """Its name in the world file."""
+        """The name of the motor in the world file."""
         return self.spec.name
 
     @property
     def model(self) -> str:
-        """The node's `model`."""
+        """The field `model` of the motor's node."""
         return self.spec.model
 
     def join(self, start_rad: float, stops: tuple[float, float]) -> None:

@@ -213,7 +213,7 @@ def _is_loose(node: SceneNode) -> bool:
 
 
 def _is_fixed(node: SceneNode) -> bool:
-    """Return whether a Solid is inside another Solid without a joint; Webots makes both one body.
+    """Return whether a Solid is in another Solid without a joint between them; Webots makes both one body.
 
     If the outer Solid has no physics, both are fixed to the world.
     """

@@ -39,7 +39,8 @@ class Robot:
         motors: the motors, by device name.
         sensors: the sensors, by device name; each sensor has a `value` after a step.
         samplers: the functions that set the values of all sensors; they are called in this order.
-        gauss: returns the next number of the robot's noise, from mean and deviation.
+        gauss: returns the next number of the robot's noise; its arguments are the mean and the standard
+            deviation.
         place: the frame of the robot.
         body: the robot's body in the physics; None if the robot cannot drive and is not a free-standing
             obstacle.

@@ -89,7 +89,7 @@ class Textures:
 
     Args:
         read: returns the bytes of an image; its arguments are the file that refers to the image, and the
-            address in that file. None if the world has no images.
+            address in that file. `read` is None if the world has no images.
     """
 
     def __init__(self, read: ReadFile | None = None) -> None:

@@ -30,7 +30,7 @@ def view(root: SceneNode, physics: Physics, size: tuple[int, int]) -> CameraInte
     """Return a camera at the current Viewpoint; None if the simulator does not render."""
     reading = NodeReader()
     viewpoint = next((it for it in root.nodes() if it.type_name == "Viewpoint"), root)
-    fov_rad = reading.number(viewpoint, "fieldOfView", 0.7854)  # along the longer side, as in Webots
+    fov_rad = reading.number(viewpoint, "fieldOfView", 0.7854)  # along the image's longer side, as in Webots
     near_m, far_m = reading.number(viewpoint, "near", 0.05), reading.number(viewpoint, "far", 0.0)
     x, y, z = reading.vector(viewpoint, "position", (-10.0, 0.0, 0.0))
     ax, ay, az, angle_rad = reading.vector(viewpoint, "orientation", (0.0, 0.0, 1.0, 0.0))

@@ -263,7 +263,10 @@ def _middle(wheels: Sequence[Wheel]) -> Direction:
 
 
 def _pivot(wheels: Sequence[Wheel], forward: Direction, middle: Direction) -> Direction:
-    """Return the point without lateral speed: the middle of all wheels, moved `forward` to the tires."""
+    """Return the point without lateral speed.
+
+    It is the middle of all wheels, moved along `forward` until it is level with the plain tires.
+    """
     plain = [wheel for wheel in wheels if wheel.roller is None]
     if not plain:
         return middle

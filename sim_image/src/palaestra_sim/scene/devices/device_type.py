@@ -31,12 +31,12 @@ class Device(Protocol):
 
     @property
     def name(self) -> str:
-        """Its name in the world file."""
+        """The name of the device in the world file."""
         ...
 
     @property
     def model(self) -> str:
-        """The node's `model`."""
+        """The field `model` of the device's node."""
         ...
 
 

@@ -161,7 +161,7 @@ class NodeField:
 
 
 def quaternion_to_axis_angle(x: float, y: float, z: float, w: float) -> AxisAngle:
-    """Return the axis and angle that the Webots controller computes from a quaternion, with the same bug.
+    """Return the axis and angle that Webots' controller computes from a quaternion, including a bug.
 
     The controller's RosMathUtils set an angle below 1e-4 to 0, but still compute the axis as xyz / |xyz|. For
     the exact identity this axis is NaN, so a client cannot write back a zero rotation that it has read. If
