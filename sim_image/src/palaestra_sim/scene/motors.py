@@ -14,7 +14,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Final
 
-_REACHED: Final = 1e-6  # rad or m: a joint without physics stops this close to its target, as in Webots
+_REACHED: Final = 1e-6  # a joint without physics stops this close to its target, in rad or m, as in Webots
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

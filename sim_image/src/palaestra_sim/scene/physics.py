@@ -119,7 +119,7 @@ class Physics(Protocol):
         ...
 
     def reset(self) -> None:
-        """Discard the past: the motion then depends only on the state and the commands."""
+        """Discard what earlier steps left: the motion then depends only on the state and the commands."""
         ...
 
     def look(self, figure: Figure, beams: Sequence[Beam]) -> Cast:

@@ -41,7 +41,7 @@ class Shape:
 
     @property
     def pose(self) -> Pose:
-        """The shape's frame, in the axes of the ground."""
+        """The pose of the shape in the world, in the axes of the ground."""
         return self.place.ground_pose.after(self.local)
 
     @property

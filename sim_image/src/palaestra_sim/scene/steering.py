@@ -26,7 +26,7 @@ class Steer:
 
     Args:
         motor: the motor of the joint; the motor's angle is the angle of the joint.
-        start_rad: the joint's angle when the tire has its pose of the world file.
+        start_rad: the joint's angle at which the tire has the same pose as in the world file.
         pivot: x and y of the axis, in meters.
         up: 1 if a positive angle turns to the left, -1 if it turns to the right.
     """

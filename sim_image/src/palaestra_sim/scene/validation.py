@@ -141,7 +141,7 @@ class NodeReader:
         return of_instance(node, (x, y, z, angle_rad))
 
     def scale(self, node: SceneNode) -> Vector:
-        """Return `scale`, which a Transform has, and before R2023a a Solid; 1 1 1 if it is absent."""
+        """Return `scale`, a field of Transform and, before R2023a, of Solid; 1 1 1 if it is absent."""
         if node.stand_in:  # the shapes of the stand-in already include its PROTO's scale
             return 1.0, 1.0, 1.0
         x, y, z = self.vector(node, "scale", (1.0, 1.0, 1.0))

@@ -44,7 +44,7 @@ def parts(root: Element) -> tuple[tuple[Element, str], ...]:
 
 
 def assets(root: Element) -> Iterator[tuple[Element, str]]:
-    """Yield the name of each file that contains no elements, such as a mesh, with the element that names it."""
+    """Yield the name of each file without elements, such as a mesh, with the element that names the file."""
     return (row for row in named_files(root) if row[0].tag not in _PARTS)
 
 
