@@ -38,7 +38,7 @@ class VisualModel:
     Attributes:
         things: the visible shapes; a shape's index is the number of its geom. The last geom is the sky.
         model, data: the model and the data of MuJoCo.
-        positions, rotations: the pose of each geom in the frame of its shape, as arrays (n, 3) and (n, 3, 3).
+        positions, rotations: arrays of the geoms' poses in the frames of their shapes, (n, 3) and (n, 3, 3).
         planes: the numbers of the geoms that are Planes.
         sun: the direction of the sun's light.
         scene, option, camera: the objects of MuJoCo's visualizer.
