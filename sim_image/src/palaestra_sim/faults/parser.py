@@ -20,7 +20,7 @@ from palaestra_sim.faults.kinds import FaultEvent, InjectedFault, Trigger
 
 _MOST_MS: Final = 3_600_000.0
 _MOST_MIB: Final = 1_048_576.0
-_FLOAT32: Final = struct.Struct("<f")  # the type with the smallest range among fields that get a wrong value
+_FLOAT32: Final = struct.Struct("<f")  # of all fields that get a wrong value, these have the smallest range
 _SIGNALS: Final = ("SIGABRT", "SIGBUS", "SIGFPE", "SIGILL", "SIGKILL", "SIGSEGV")
 
 

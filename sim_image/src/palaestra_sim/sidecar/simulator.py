@@ -200,7 +200,7 @@ class SupervisedSimulator:
         return self._after(message.ended or Ended(), state, expected=True)
 
     def _after(self, ended: Ended, state: SimulatorState, *, expected: bool) -> SimulatorState:
-        """Close the process that ended; return the state with its last exit."""
+        """Close the pipe to the reaper of the ended process; return the state with the last exit."""
         if self._process is not None:
             self._process.close()
         self._process = None
