@@ -207,8 +207,8 @@ class Termination(JsonMessage):
     def to_message(self) -> str:
         """Return the termination message: JSON of at most 4096 bytes.
 
-        If the message is too long, the oldest log lines and faults are dropped. If it is still too long
-        without them, the reason is cut.
+        If the message is too long, the oldest log lines and faults are dropped. If the message is still too
+        long without log lines and faults, the reason is cut.
         """
         word = self
         while (excess := _length(word.to_json()) - MOST_TERMINATION_BYTES) > 0:
