@@ -1,7 +1,7 @@
 """The newest picture of a robot's camera, as JSON data for viewers.
 
-A viewer may read it through the proxy of a Kubernetes API server. Our client for that server returns text, so
-the pixels are base64.
+A viewer may read the picture through the proxy of a Kubernetes API server. Our client for that server returns
+text, so the pixels are encoded in base64.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from typing import Any, Final, Self
 
 from palaestra_protocol.fields import MOST_NAME, Fields, ProtocolError, clipped
 
-MOST_SIDE: Final = 320  # pixels; a writer leaves out rows and columns of a larger picture
+MOST_SIDE: Final = 320  # pixels in a row or column; a writer leaves out rows and columns of a larger picture
 MOST_PICTURE_BYTES: Final = 2**19
 _COLORS: Final = 3
-_FAST: Final = 1  # zlib's level
-_MOST_TEXT: Final = MOST_PICTURE_BYTES - 2**10  # the longest base64 of a picture
+_FAST: Final = 1  # the compression level for zlib: the fastest
+_MOST_TEXT: Final = MOST_PICTURE_BYTES - 2**10  # maximum length of a picture in base64
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

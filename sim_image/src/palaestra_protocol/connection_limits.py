@@ -1,8 +1,8 @@
 """The connection slots of a server: their number is limited, in total and for each peer.
 
 A connection is idle while its request is not complete. If no slot is free, a new connection takes the slot of
-the oldest idle one. So clients that connect and send nothing cannot block a kubelet's probe, which sends its
-request as soon as it is connected.
+the oldest idle connection. So clients that connect and send nothing cannot block a kubelet's probe, which
+sends its request as soon as it is connected.
 
 If the peer of the new connection has reached its own limit, an idle connection of the same peer is closed. So
 a peer with many connections cannot take the slots of other peers. A connection with a complete request keeps
@@ -38,7 +38,7 @@ class ConnectionSlots:
         self._most = most
         self._most_of_peer = most_of_peer
         self._lock = threading.Lock()
-        self._taken: dict[socket.socket, _Slot] = {}  # the oldest first
+        self._taken: dict[socket.socket, _Slot] = {}  # the oldest connection first
 
     def take(self, connection: socket.socket, peer: str) -> bool:
         """Give a new connection a slot, and return True; return False if the server is busy.
@@ -73,14 +73,14 @@ class ConnectionSlots:
                 self._drop(connection)
 
     def _crowd(self, peer: str) -> list[socket.socket] | None:
-        """Return the connections of which one must close to free a slot for `peer`; None if one is free."""
+        """Return the connections of which one must close to give `peer` a slot; None if a slot is free."""
         of_peer = [one for one, slot in self._taken.items() if slot.peer == peer]
         if len(of_peer) >= self._most_of_peer:
             return of_peer
         return list(self._taken) if len(self._taken) >= self._most else None
 
     def _drop(self, connection: socket.socket) -> None:
-        """Close a connection; the thread that reads from it ends."""
+        """Close a connection; this also ends the thread that reads from the connection."""
         del self._taken[connection]
         with contextlib.suppress(OSError):  # the peer may have closed the connection already
             connection.shutdown(socket.SHUT_RDWR)

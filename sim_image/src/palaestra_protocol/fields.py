@@ -1,9 +1,10 @@
 """Read JSON from an untrusted process.
 
-A pod may run a program of a user. Its response may have a value of a wrong type, be endless, or contain
-characters that cannot be encoded. So each method of `Fields` checks the type and the bounds of a value, and
-raises `ProtocolError` if the check fails. Readers of responses ignore unknown fields, because a newer release
-may add fields. Readers of requests refuse an unknown field, because it is probably a misspelling.
+A pod may run a program of a user. The response of this program may have a value of a wrong type, be endless,
+or contain characters that cannot be encoded. So each method of `Fields` checks the type and the bounds of a
+value, and raises `ProtocolError` if the check fails. Readers of responses ignore unknown fields, because a
+newer release may add fields. Readers of requests refuse an unknown field, because it is probably a
+misspelling.
 
 Writers keep the same bounds with `clipped`, `enumerated` and `known`. For messages whose fields declare their
 bounds, `palaestra_protocol.messages` provides reader and writer.
@@ -24,7 +25,7 @@ from palaestra_protocol.masking import masked
 T = TypeVar("T")
 Choice = TypeVar("Choice", bound=StrEnum)
 
-MOST_BYTES = 2**19  # maximum size of a response: enough for the longest texts, if each character is escaped
+MOST_BYTES = 2**19  # maximum size of a response: enough for the longest texts with each character escaped
 MOST_COUNT = 2**53  # JSON readers that use floats represent integers exactly up to this number
 MOST_NAME = 255
 MOST_TEXT = 500
@@ -158,11 +159,11 @@ class Fields:
         return text
 
     def part(self, name: str, read: Callable[[object, str], T]) -> T:
-        """Return the result of `read` for an object within this one."""
+        """Pass the object in the field `name` to `read`, and return the result."""
         return read(self._value(name), self._at(name))
 
     def parts(self, name: str, read: Callable[[object, str], T], most: int) -> tuple[T, ...]:
-        """Return the results of `read` for a list of at most `most` entries."""
+        """Pass each object of the list in the field `name` to `read`, and return the results in order."""
         value = self._value(name)
         if not isinstance(value, list):
             raise self.error(name, f"{_kind(value)} is not a list")
@@ -180,7 +181,7 @@ class Fields:
         return f"{self._path}.{name}" if self._path else name
 
     def error(self, name: str, fact: str) -> ProtocolError:
-        """Return an error that names a field and what is wrong with it."""
+        """Return an error with the path of a field and a fact, such as "is missing"."""
         return ProtocolError(f"{self._at(name)}: {fact}")
 
 
@@ -200,7 +201,7 @@ def _text(value: object, path: str, most: int, least: int = 0) -> str:
 
 
 def _kind(value: object) -> str:
-    """Return the type of a JSON value in words, for a message; the value itself may be too long for one."""
+    """Return the type of a JSON value in words, for a message; the value itself may be too long."""
     return _TYPES.get(type(value), "a number")
 
 

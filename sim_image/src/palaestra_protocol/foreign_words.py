@@ -16,9 +16,9 @@ _COUNT = "write the count of a group of spec.simulators with role Collect"
 _STEPS = "write trainer.steps"
 _NORMALIZE = "write trainer.algorithm.normalize"
 
-# The keys of RL-Baselines3-Zoo's files, the arguments that a run itself passes to classes of
-# Stable-Baselines3, and the arguments of `learn`, of callbacks and of other libraries that a field of a job
-# replaces. The values are the remedies.
+# The keys of this table are names of three kinds. A key of RL-Baselines3-Zoo's files is one kind. The second
+# is an argument that a run itself passes to a class of Stable-Baselines3. The third is an argument of
+# `learn`, of a callback or of another library, which a field of a job replaces. The values are the remedies.
 ELSEWHERE: Mapping[str, str] = MappingProxyType(
     {
         "_init_setup_model": "a run sets up its model itself; leave it out",

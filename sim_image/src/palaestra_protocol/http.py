@@ -24,7 +24,7 @@ from palaestra_protocol.connection_limits import MOST_CONNECTIONS, ConnectionSlo
 from palaestra_protocol.numbers import MOST_PORT
 from palaestra_protocol.tcp_server import TcpServer
 
-MOST_REQUEST_BYTES = 2**17  # the server can read a path of 64 KiB, the limit of http.server, and reply 414
+MOST_REQUEST_BYTES = 2**17  # above the limit of http.server for a path, 64 KiB, so the server can reply 414
 MOST_BODY_BYTES = 4096
 DEADLINE_S = 5.0
 
@@ -92,8 +92,8 @@ class Server(TcpServer):
     """A server on one port; see `TcpServer`.
 
     Args:
-        address: the address on which it listens. `0.0.0.0` and `::` both mean every address of the machine,
-            IPv4 and IPv6, because the cluster decides which of the two a pod has.
+        address: the address on which the server listens. `0.0.0.0` and `::` both mean every address of the
+            machine, IPv4 and IPv6, because the cluster decides which of the two a pod has.
         routes: the function for each method and path.
         name: the name of the program, for the header `Server` and the thread.
         deadline_s: time limit for reading a request; the same limit applies to writing the response.
@@ -122,8 +122,8 @@ class Server(TcpServer):
     def server_bind(self) -> None:
         """Bind the socket.
 
-        A server for all addresses accepts IPv4 also on an IPv6 socket, even if the system's default forbids
-        that.
+        A server for all addresses accepts IPv4 connections also on an IPv6 socket, even if the system's
+        default forbids that.
         """
         if self._every and self.address_family == socket.AF_INET6:
             self.socket.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 0)

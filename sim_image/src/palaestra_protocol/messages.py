@@ -9,15 +9,16 @@ The writer cuts a value to the bounds that the reader checks. So a long error te
 its status unreadable. A reader of responses ignores unknown fields, because a newer release may add fields.
 `JsonRequest` refuses unknown fields, because a misspelled field of a request must not be ignored.
 
-Programs of different releases exchange messages, so each field is one of three:
+Programs of different releases exchange messages, so each field has one of three kinds:
 
-- a plain kind: the writer always writes the field, and the reader refuses a message without it; a default in
-  the class is only for programs that create messages
+- any other `ValueKind`: the writer always writes the field, and the reader refuses a message without it; a
+  default in the class is only for programs that create messages
 - `Maybe`: the writer always writes the field, as null if the value is unknown; a message of an older release
   may lack the field
 - `AddedLater`: release 0.1.0 does not have the field, so the writer leaves it out unless it is set
 
-`palaestra_protocol.scene` has its own reader, which also checks that the parts of a message fit together.
+`palaestra_protocol.scene` has its own reader, which also checks references inside a message: for example,
+from a shape to its mesh.
 """
 
 from __future__ import annotations
@@ -248,7 +249,7 @@ class NewestPartList(PartList):
 class Lines(ValueKind):
     """A list of at most `most_entries` texts of at most `most` characters each.
 
-    If the writer drops texts, the last entry says how many.
+    If the writer drops texts, the last entry has their number.
     """
 
     most: int
@@ -259,7 +260,7 @@ class Lines(ValueKind):
         return fields.texts(name, self.most, self.most_entries)
 
     def write(self, value: tuple[str, ...]) -> list[str]:
-        """Return the first texts; if texts are dropped, the last entry says how many."""
+        """Return the first texts; if texts are dropped, the last entry has their number."""
         return enumerated(value, self.most, self.most_entries)
 
 
@@ -277,7 +278,7 @@ class NewestLines(Lines):
 class Table(ValueKind):
     """Values of one kind, by name; the reader ignores names that are not in `rows`.
 
-    A newer release may have added such a name.
+    A newer release may have added a name that this release does not know.
     """
 
     rows: Iterable[StrEnum]
@@ -295,7 +296,7 @@ class Table(ValueKind):
 
 @dataclass(frozen=True, slots=True)
 class Maybe(ValueKind):
-    """A value that may be unknown: a field that is null or missing has the default of its class."""
+    """A value that may be unknown: for a null or missing field, the reader uses the field's default."""
 
     kind: ValueKind
     required: ClassVar[bool] = False

@@ -1,12 +1,12 @@
 """Declarations of metrics, as data.
 
 A family is a metric name with its type, help text and labels. Each program declares its families in one
-table. Its /metrics and docs/reference/metrics.md are generated from that table, so they always match. The
-table also gives the maximum number of series of the program.
+table. The program's /metrics and the page docs/reference/metrics.md are generated from that table, so they
+always match. The maximum number of series of the program also follows from the table.
 
 Events that occur thousands of times a second are counted in plain Python (`Tally`) and exported at a scrape.
 `Tally.observe` takes a tenth of a microsecond. A histogram of `prometheus_client` takes half a microsecond,
-and more than one microsecond to find the child for a label value.
+and finding its child for a label value takes more than one microsecond.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class Label:
 
     Attributes:
         name: the name as in PromQL.
-        values: all possible values; empty if they depend on the job or the cluster.
+        values: all possible values; empty if the values depend on the job or the cluster.
         bound: if `values` is empty, the kind of object for which each value stands, such as "release".
     """
 
@@ -55,7 +55,7 @@ class Family:
         kind: counter, gauge or histogram.
         meaning: the help text.
         labels: the labels; empty if the family has only one series.
-        buckets: the upper bounds of a histogram's buckets, ascending, without the infinite one.
+        buckets: the upper bounds of a histogram's buckets, ascending, without infinity.
     """
 
     name: str
@@ -133,9 +133,9 @@ class Tally:
         counts = list(accumulate(self._counts))
         for bound, count in zip((*self._bounds, "+Inf"), counts, strict=True):
             yield "_bucket", {"le": str(bound)}, count
-        yield "_count", {}, counts[-1]  # OpenTelemetry's Prometheus receiver drops a histogram without it
-        # Negative values could make the sum fall. Prometheus' rate() and OpenTelemetry's receiver would take
-        # that for a restart of the program.
+        yield "_count", {}, counts[-1]  # OpenTelemetry's receiver drops a histogram that lacks `_count`
+        # Negative values could make the sum fall. Prometheus' rate() and OpenTelemetry's receiver would
+        # mistake a falling sum for a restart of the program.
         # Source: OpenMetrics 1.0, "Histogram"
         if self._bounds[0] >= 0:
             yield "_sum", {}, self.total

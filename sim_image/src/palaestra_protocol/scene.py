@@ -39,7 +39,7 @@ LARGEST: Final = 1e9  # largest absolute value of any number
 AT_ORIGIN: Final[PoseNumbers] = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 WORLD: Final = "world"  # the name of the node that holds all shapes that do not move
 TARGET_M: Final = 0.2  # radius of a drawn target; tasks of the arena end when the robot is within this radius
-_DIGITS: Final = 5  # digits behind the decimal point: hundredths of a millimeter
+_DIGITS: Final = 5  # digits after the decimal point: hundredths of a millimeter
 
 
 class ShapeKind(StrEnum):
@@ -201,8 +201,8 @@ class VisibleScene:
         nodes: at most MOST_NODES nodes; a parent comes before its children.
         meshes: the meshes; several shapes may use the same mesh.
         sky: red, green and blue of the background, from 0 to 1.
-        simplified: the number of shapes that were too large; each was replaced by its bounding box, or left
-            out.
+        simplified: the number of shapes that were too large; each of them was replaced by its bounding box,
+            or left out.
     """
 
     world: str

@@ -1,8 +1,8 @@
 """Find modules of a user that shadow modules of Python or of Palaestra's dependencies.
 
 Python searches the folders of PYTHONPATH and the folder of a script before the standard library. If such a
-folder holds a `queue.py`, all libraries import that file instead of Python's `queue`. They then fail with a
-traceback that does not name the file.
+folder holds a `queue.py`, all libraries import that file instead of Python's `queue`. The libraries then fail
+with a traceback that does not name the user's file.
 
 A program that runs no code of the user moves these folders to the end of the search path. Any other program
 exits with an error, because the user's code may need its own `queue` while the libraries need Python's.
@@ -31,11 +31,11 @@ _UNNAMED = (
 
 
 def settle_imports() -> None:
-    """Make sure that imports in this process find the right modules; our packages call this first.
+    """Make sure that imports in this process find the right modules; our packages call this function first.
 
     Raises:
         ImportError: a module of the user shadows a module that Palaestra needs.
-        SystemExit: the same in a program of Palaestra, after the reason was printed.
+        SystemExit: instead of ImportError in a program of Palaestra, after it has printed the reason.
     """
     program = _program()
     if _is_ours(program) and program not in _WITH_CODE_OF_USERS:
@@ -119,7 +119,8 @@ def _shadows(folders: list[str], others: list[str]) -> list[tuple[str, str]]:
         for name, file, _ in found
         if name in sys.stdlib_module_names
     ]
-    # `_is_needed` imports many modules of the standard library. So it runs only if none of them is shadowed.
+    # `_is_needed` imports many modules of the standard library. So the function runs only if no such module
+    # is shadowed.
     return library or [
         (name, f"{file}: shadows the module {name}, which Palaestra needs; rename it")
         for name, file, folder in found
@@ -139,7 +140,7 @@ def _hidden(folder: str, others: list[str]) -> list[tuple[str, str, str]]:
         if not (mine and mine.origin):  # a folder without `__init__.py` does not shadow a module
             continue
         # Some modules of the standard library, such as msvcrt, exist only on other systems. The library tries
-        # to import them to recognize the system. So a user's module with such a name shadows too.
+        # to import them to recognize the system. So a user's module with such a name also shadows a module.
         if name in sys.stdlib_module_names if other is None else not _same(mine.origin, other.origin):
             found.append((name, mine.origin, folder))
     return found

@@ -1,7 +1,7 @@
 """A TCP server with a limited number of connections, each in its own thread; the base class of our servers.
 
-A subclass supplies the handler that reads requests. While the handler processes a request, it marks its
-connection as busy in `slots`, so that the connection is not closed for a newer one.
+A subclass supplies the handler that reads requests. While the handler processes a request, the handler marks
+its connection as busy in `slots`, so that the server does not close this connection in favor of a newer one.
 """
 
 import logging

@@ -36,7 +36,7 @@ class WorldError(SimError, ValueError):
         line: the line of the mistake, counted from 1.
         column: the column of the mistake, in characters, counted from 1.
         fact: a description of the mistake.
-        remedy: the change that corrects it.
+        remedy: the change that corrects the mistake.
     """
 
     def __init__(self, world: str, line: int, column: int, fact: str, remedy: str) -> None:
@@ -80,7 +80,7 @@ class WorldRefusedError(WorldError):
 
 
 def refusal(errors: Iterable[WorldError]) -> WorldError | None:
-    """Return one error that stands for the first `MOST_PLACES` of `errors`; None if there are no errors."""
+    """Return one error that combines the first `MOST_PLACES` of `errors`; None if there are no errors."""
     by_text: dict[str, WorldError] = {}
     for error in errors:
         by_text[str(error)] = error  # a node that is used twice reports the same error twice

@@ -65,9 +65,9 @@ class Program:
         name: the name of the program.
         description: the description in the program's help.
         physics: returns a new physics object for a world that is about to be loaded.
-        mjcf: returns the simulation of an MJCF world; None if the program does not simulate MJCF. Its last
-            argument is the folder that holds all files of the world. For None, the simulation uses the
-            nearest folder that holds all of them.
+        mjcf: returns the simulation of an MJCF world; None if the program does not simulate MJCF. The last
+            argument of the function is the folder that holds all files of the world. If this argument is
+            None, the simulation uses the nearest folder that holds all these files.
     """
 
     name: str
@@ -113,7 +113,7 @@ class Program:
         return _Process(options, self._loader(options, _leave_out(options.leave_out))).run()
 
     def _loader(self, options: argparse.Namespace, leave_out: LeaveOut) -> Load:
-        """Return the function that loads a world; a file that begins with `<` is MJCF."""
+        """Return the function that loads a world; the loader treats a file that begins with `<` as MJCF."""
         wbt = Loader(physics=self.physics, stand_ins=_stand_ins(options.stand_ins), leave_out=leave_out)
 
         def load(world_path: Path, mode: Mode) -> Backend:
@@ -192,7 +192,7 @@ class _Process:
             self._nodes[name].unregister()
 
     def _start(self) -> None:
-        # The report comes first, because a sidecar reads the file as soon as the simulator is ready.
+        # The report is written first, because a sidecar reads the file as soon as the simulator is ready.
         self._report_left_out()
         self._simulator.start()
         silent = silent_devices(self._simulator.simulation.robots)
@@ -204,7 +204,7 @@ class _Process:
         self._loop.later(_CHECK_MASTER_S, self._check_master)
 
     def _viewing(self) -> LocalSocket | None:
-        """Return the socket for viewers; None if the environment names no socket, or it cannot be created."""
+        """Return the socket for viewers; None if none is set in the environment, or if creating it fails."""
         path = os.environ.get(VIEW_SOCKET)
         if path is None:
             return None
@@ -309,7 +309,7 @@ def _parser(program: Program) -> argparse.ArgumentParser:
 
 
 def _stand_ins(files: Sequence[Path]) -> Mapping[str, StandIn]:
-    """Return the stand-ins in these files by name; a later entry replaces an earlier one of that name.
+    """Return the stand-ins in these files by name; a later entry replaces an earlier entry of the same name.
 
     Raises:
         StandInError: a file is not a valid table of stand-ins.

@@ -49,7 +49,7 @@ class PublisherInterface(Protocol):
         ...
 
     def send_stamped(self, fields: Fields) -> None:
-        """Send the template with `fields` in place of its own; the wall clock is the time stamp."""
+        """Send the template with `fields` in place of its own fields; the wall clock is the time stamp."""
         ...
 
 
@@ -67,7 +67,7 @@ class NodeInterface(Protocol):
     current_call: object | None
 
     def serve(self, path: str, type_name: str, handler: Handler) -> None:
-        """Serve a service; `handler` returns the response to a request, or LATER if it will call `answer`."""
+        """Serve a service; `handler` returns the response to a request, or LATER to call `answer` later."""
         ...
 
     def together(self) -> AbstractContextManager[None]:

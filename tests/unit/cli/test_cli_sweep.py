@@ -58,5 +58,5 @@ def test_a_search_without_optuna_names_the_extra(file, tmp_path, monkeypatch, ca
 
     assert main(["sweep", str(file), "--dir", str(tmp_path / "runs")]) == 2
 
-    assert "spec.optuna: needs optuna; install palaestra[sweeps]" in capsys.readouterr().err
+    assert "spec.optuna: needs the package optuna; install palaestra[sweeps]" in capsys.readouterr().err
     assert not (tmp_path / "runs").exists()

@@ -78,7 +78,7 @@ def test_the_page_about_queues_installs_the_kueue_that_is_tested():
     page = (CLUSTER.parents[1] / "docs/howto/queues.md").read_text()
     version = images.version_of("kueue", "sigs.k8s.io/kueue").removeprefix("v")
 
-    assert re.findall(r"(?:--version|Tested with) (\d+\.\d+\.\d+)", page) == [version, version]
+    assert re.findall(r"(?:--version|tested with Kueue) (\d+\.\d+\.\d+)", page) == [version, version]
 
 
 def test_kueue_runs_as_nobody(tmp_path):

@@ -202,6 +202,6 @@ def test_a_model_of_mujoco_is_a_file_that_ends_with_xml(in_cluster):
 def test_a_model_of_mujoco_needs_a_driver_that_reads_it(in_cluster, world):
     """The stub would reject the model at each of its starts."""
     with pytest.raises(
-        PlanError, match=r"spec\.simulators\[0\]\.driver: stub reads no MJCF.*set driver mujoco"
+        PlanError, match=r"spec\.simulators\[0\]\.driver: stub cannot load the world.*set driver mujoco"
     ):
         in_cluster(simulators=[group(world=world), EVALUATE])

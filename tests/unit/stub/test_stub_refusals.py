@@ -50,7 +50,7 @@ BAD_ROBOTS = {
         "a touch sensor that measures force",
     ),
     "two devices of a name": (('"ir1"', '"touch sensor"'), "a second device 'touch sensor'"),
-    "a name that ROS refuses": (('"ir1"', '"ir::1"'), "a device 'ir::1', a name that ROS does not accept"),
+    "a name that ROS refuses": (('"ir1"', '"ir::1"'), "a device 'ir::1', whose name ROS does not accept"),
     "two names of one topic": (
         ('"ir1"', '"touch-sensor"'),
         "devices 'touch-sensor' and 'touch sensor', whose topics are both 'touch_sensor'",

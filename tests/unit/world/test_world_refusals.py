@@ -20,7 +20,7 @@ from tests.unit.world.robot_nodes import COMPLETE, robot
                 'my.wbt:3:1: no robot has the controller "ros": there are'
                 ' "khepera" (controller "braitenberg"), "EPuck" (controller "<generic>"),'
                 ' "robot" (controller "<generic>");'
-                ' set controller "ros" on those to be trained, and supervisor TRUE on one'
+                ' set controller "ros" on the robots to be trained, and supervisor TRUE on one of them'
             ),
         ),
     ],
@@ -49,7 +49,7 @@ def test_all_refusals_of_a_world_come_at_once(refusal: Callable[..., str]) -> No
         pytest.param(
             f"DEF A {robot('')}\nUSE A",
             'my.wbt:3:1: USE A repeats the robot "robotino" and its ROS name; '
-            "write the node out, with its own name",
+            "write the node out, with another name",
             id="a robot used again",
         ),
         pytest.param(
@@ -59,7 +59,7 @@ def test_all_refusals_of_a_world_come_at_once(refusal: Callable[..., str]) -> No
         ),
         pytest.param(
             robot("") + "\n" + robot(""),
-            'my.wbt:3:1: a second robot is called "robotino"; give it a name of its own',
+            'my.wbt:3:1: a second robot is called "robotino"; give it another name',
             id="two robots of one name",
         ),
         pytest.param(
@@ -74,7 +74,7 @@ def test_all_refusals_of_a_world_come_at_once(refusal: Callable[..., str]) -> No
         ),
         pytest.param(
             robot('controllerArgs [ "__name:=other" ]'),
-            'my.wbt:2:59: "__name:=other" overrules the generated ROS name; remove it',
+            'my.wbt:2:59: "__name:=other" overrides the generated ROS name; remove it',
             id="a remapping of the node's name",
         ),
         pytest.param(

@@ -26,7 +26,7 @@ class ExitCode(IntEnum):
 
 
 class FaultKind(StrEnum):
-    """The kinds of a simulator's faults; the trainer counts SLOW, but does not restart the simulator."""
+    """The kinds of a simulator's faults; after the fault SLOW, the trainer does not restart the simulator."""
 
     DEAD = "dead"
     HUNG = "hung"
@@ -35,7 +35,7 @@ class FaultKind(StrEnum):
 
 
 class Cause(StrEnum):
-    """The uses of a trainer's time; every second of an attempt belongs to exactly one.
+    """The uses of a trainer's time; every second of an attempt belongs to exactly one use.
 
     - STEPPING: training waited for a step of the simulators.
     - TRANSPORT: the other parts of a step: requests, reading of messages, the environment.

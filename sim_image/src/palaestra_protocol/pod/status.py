@@ -1,7 +1,7 @@
 """A trainer's reports: `/status` while it runs, and the termination message after it has ended.
 
-The operator does not trust the pod that sends them, so readers check the type and the bounds of each value.
-Writers keep the same bounds. So a long error message of a trainer does not make its status unreadable.
+The operator does not trust the pod that sends these reports, so readers check the type and the bounds of each
+value. Writers keep the same bounds. So a long error message of a trainer does not make its status unreadable.
 """
 
 from __future__ import annotations
@@ -48,13 +48,13 @@ __all__ = [
 ]
 
 MOST_SIMULATORS = 32
-MOST_FAULTS = 10  # in a termination message; older faults are dropped
-MOST_LINES = 10  # of the trainer's log, in a termination message; older lines are dropped
-MOST_LINE = 200  # characters of such a log line, and of `FaultRecord.fact`
+MOST_FAULTS = 10  # maximum number of faults in a termination message; older faults are dropped
+MOST_LINES = 10  # maximum number of log lines in a termination message; older lines are dropped
+MOST_LINE = 200  # maximum number of characters of a log line, and of `FaultRecord.fact`
 MOST_REASON = 2000
 MOST_TERMINATION_BYTES = 4096  # Kubernetes cuts a container's termination message at this length
 
-_LONGEST_ESCAPE = 12  # bytes of one character in JSON: two \uXXXX
+_LONGEST_ESCAPE = 12  # maximum number of bytes of one character in JSON: two escapes \uXXXX
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,13 +85,14 @@ class SimulatorStatus(JsonMessage):
     """The status of one simulator, as its trainer reports it.
 
     Attributes:
-        name: group and number, such as collect-0.
+        name: the simulator's group and number, such as collect-0.
         role: Collect or Evaluate.
         state: a `SidecarState`.
         restarts: number of restarts after faults in this attempt; planned recycling is not counted.
         last_fault: the last fault in this attempt, in a sentence; None if there was no fault.
         flapping: whether the simulator fails repeatedly.
-        given_up: whether the simulator's restart budget is spent, so that the run continues without it.
+        given_up: whether the simulator's restart budget is spent, so that the run continues without this
+            simulator.
         standby: the state of the simulator's standby, starting or ready; None if it has no standby.
     """
 
@@ -124,12 +125,14 @@ class TrainerStatus(JsonMessage):
         last_progress: time of the last environment step (RFC 3339); None before the first step.
         last_progress_age_s: seconds since the last environment step; None before the first step. The trainer
             measures them with a monotonic clock, so a change of the wall clock has no effect.
-        attempt: number of this attempt in the run directory's record, from 1; None if not recorded yet.
+        attempt: number of this attempt, counted from 1 in the run directory's record; None if not recorded
+            yet.
         faults: number of faults of each `FaultKind`, over all attempts.
         goodput: seconds spent on each `Cause`, over all attempts.
         steps_lost: valid steps that were lost, over all attempts: steps after the checkpoint from which an
             attempt resumed, and steps in a training or evaluation episode that a fault cut short.
-        left_out: the nodes that the simulators leave out of their worlds, in lines that begin with the group.
+        left_out: the nodes that the simulators leave out of their worlds, as text for people; each line
+            begins with the name of the simulators' group.
     """
 
     step: Annotated[int, Whole()]
@@ -159,7 +162,7 @@ class FaultRecord(JsonMessage):
 
     Attributes:
         time: the time at which the trainer detected the fault (RFC 3339).
-        simulator: group and number, such as collect-0.
+        simulator: the simulator's group and number, such as collect-0.
         kind: one of `FaultKind`.
         fact: a description of the fault, in a sentence.
         step: number of valid environment steps of the run at that time.
@@ -185,7 +188,7 @@ class Termination(JsonMessage):
             evaluation, or if the environment does not report success.
         success_interval: the confidence interval of `success_rate`; None if `success_rate` is None.
         last_checkpoint: the newest checkpoint; None if there is no checkpoint.
-        attempt: number of this attempt in the run directory's record, from 1; None if not recorded.
+        attempt: number of this attempt, counted from 1 in the run directory's record; None if not recorded.
         restarts: number of restarts of simulators after faults in this attempt; None if not reported.
         log: the last lines of the trainer's log, at most ten, the newest last.
         faults: the last faults of this attempt, at most ten, the newest last.
@@ -204,8 +207,8 @@ class Termination(JsonMessage):
     def to_message(self) -> str:
         """Return the termination message: JSON of at most 4096 bytes.
 
-        If the message is too long, the oldest log lines and faults are dropped. If it is still too long
-        without them, the reason is cut.
+        If the message is too long, the oldest log lines and faults are dropped. If the message is still too
+        long without log lines and faults, the reason is cut.
         """
         word = self
         while (excess := _length(word.to_json()) - MOST_TERMINATION_BYTES) > 0:

@@ -22,8 +22,8 @@ class Codec(Protocol):
     def encode(self, fields: Mapping[str, Any]) -> bytes:
         """Return the bytes of a message; a field that is absent from `fields` is zero, empty or False.
 
-        The value of a nested message is a mapping too, or a tuple of all its fields in order. `decode`
-        returns such tuples.
+        The value of a nested message is also a mapping, or a tuple of all fields of the nested message in
+        order. `decode` returns such tuples.
 
         Raises:
             ValueError: a value does not fit its field.
@@ -39,7 +39,7 @@ class Codec(Protocol):
         ...
 
     def decode(self, payload: bytes | memoryview) -> Any:
-        """Return a named tuple of the fields; if Python reserves a name, an underscore follows it: `from_`.
+        """Return a named tuple of the fields; a Python keyword as name gets an underscore: `from_`.
 
         An array of numbers is a tuple, or bytes for `uint8` and `char`. Any other array is a list. Bytes of a
         string that are not UTF-8 are replaced.

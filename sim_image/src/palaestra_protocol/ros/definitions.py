@@ -1,6 +1,7 @@
 """The definitions of the ROS types of the interface, as text and parsed.
 
-The file `definitions.txt` holds all of them, nested messages included. So no ROS package has to be installed.
+The file `definitions.txt` holds all these definitions, including those of nested messages. So no ROS package
+has to be installed.
 """
 
 from __future__ import annotations

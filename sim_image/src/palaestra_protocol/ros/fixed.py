@@ -1,6 +1,7 @@
 """Messages of fixed size: their values become one flat sequence of numbers, which one struct packs.
 
-Every motor command and every step is such a message, so the speed of this code limits that of a simulator.
+Every motor command and every step is such a message, so the speed of this code limits the speed of a
+simulator.
 """
 
 from __future__ import annotations
@@ -55,8 +56,8 @@ class Record:
 
     Attributes:
         names: the names of the fields.
-        parts: the part of each field; None if the field is one number.
-        placed: each part, with the index of its first number in the flat sequence.
+        parts: the `FixedPart` of each field; None if the field is one number.
+        placed: for each field, its entry in `parts`, and the index of its first number in the flat sequence.
         empties: the value that each field has if it is absent.
         codes: the format codes of all numbers, in order.
         make: makes a named tuple of the values.
@@ -102,7 +103,7 @@ class Record:
         )
 
     def unfit(self, fields: Mapping[str, Any]) -> str:
-        """Return the name of the first field whose value does not fit; each field is packed by itself."""
+        """Return the name of the first field whose value does not fit; pack each field separately."""
         for name in filter(fields.__contains__, self.names):
             try:
                 struct.pack(f"<{self.codes}", *self.flatten({name: fields[name]}))
@@ -163,7 +164,7 @@ def maker(message: Message, fields: Sequence[MessageField]) -> Callable[[Iterabl
 
 
 def message_of(type_: str, find: Find) -> Message:
-    """Return the definition of a message type; the built-in types of time count as messages."""
+    """Return the definition of a message type; the built-in types `time` and `duration` count as messages."""
     return TIMES.get(type_) or find(type_)
 
 

@@ -39,8 +39,8 @@ class ServiceType(NamedTuple):
         md5: the md5 sum in Webots R2023b.
         request: the codec of a call's request.
         response: the codec of a call's response.
-        later_md5: the md5 sum in Webots R2025a. It differs from `md5` if R2025a renamed a field. Both
-            releases send the same bytes.
+        later_md5: the md5 sum in Webots R2025a. The two sums differ if R2025a renamed a field. Both releases
+            send the same bytes.
     """
 
     name: str
@@ -50,7 +50,8 @@ class ServiceType(NamedTuple):
     later_md5: str
 
 
-# A field of requests that Webots R2025a renamed. Source: its change log, ROS 1 API.
+# Webots R2025a renamed this field of requests from `proto` to `queryBaseNode`. Source: the change log of
+# Webots, ROS 1 API.
 _FORMER: Final = ("bool", "proto")
 _LATER: Final = "queryBaseNode"
 

@@ -1,7 +1,7 @@
 """Messages with strings and lists, written and read section by section.
 
 Consecutive fields of fixed size form one section, which one struct packs. Each string, each list, and each
-nested message of variable size is a section of its own.
+nested message of variable size is a separate section.
 
 Peers are not trusted. So the reader compares a length with the number of remaining bytes before it creates an
 object of that length.
@@ -76,7 +76,7 @@ class Sections:
             pieces: the bytes written so far.
 
         Raises:
-            ValueError: a value does not fit its field, or a name is not that of a field.
+            ValueError: a value does not fit its field, or the message has no field of a name in `value`.
         """
         fields = dict(zip(self._names, value, strict=True)) if isinstance(value, tuple) else value
         if not fields.keys() <= self._known:
@@ -139,7 +139,7 @@ class _Text:
 
 
 class _Octets:
-    """A list of `uint8` or `char`, as bytes; writing does not copy them, because images are large."""
+    """A list of `uint8` or `char`, as bytes; writing does not copy the bytes, because images are large."""
 
     empty = b""
 
@@ -212,7 +212,7 @@ class _Elements:
     def read(self, data: bytes, at: int) -> tuple[Any, int]:
         count = self._length
         if count is None:
-            at, _, count = _counted(data, at, LENGTH.size)  # every element has at least a length
+            at, _, count = _counted(data, at, LENGTH.size)  # every element has at least one length
         items = []
         read = self._element.read
         for _ in range(count):
@@ -224,7 +224,7 @@ class _Elements:
 def _counted(data: bytes, at: int, size: int) -> tuple[int, int, int]:
     """Return the offset of a list's first element, the offset of its end, and the number of its elements.
 
-    Each element has `size` bytes.
+    Each element has at least `size` bytes.
 
     Raises:
         ValueError, struct.error: the data ends before the end of the list.

@@ -46,7 +46,8 @@ def _parts(uri: str) -> tuple[str, int, str]:
     try:
         parts = urlsplit(uri)
         if parts.scheme == "http" and parts.hostname and parts.port and uri.isascii():
-            # An invalid name raises UnicodeError, a ValueError, here and not in the lookup of its address.
+            # An invalid host name raises UnicodeError, which is a ValueError, already here and not later in
+            # the lookup of the address.
             parts.hostname.encode("idna")
             return parts.hostname, parts.port, parts.path or "/"
     except ValueError:

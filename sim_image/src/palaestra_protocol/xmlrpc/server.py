@@ -1,9 +1,9 @@
 """An XML-RPC server on one port, for the ROS master and for nodes.
 
 A connection stays open for further calls, because ROS clients expect that. The number of connections, the
-length of a request and the duration of every wait are limited. If all connections are in use, a new one
-replaces an idle one (`connection_limits`). One request may contain several calls (`system.multicall`); the
-server makes them in their order.
+length of a request and the duration of every wait are limited. If all connections are in use, a new
+connection replaces an idle connection (`connection_limits`). One request may contain several calls
+(`system.multicall`); the server makes them in their order.
 """
 
 from __future__ import annotations

@@ -62,7 +62,7 @@ def _with_reading_of_any_size(payload: bytes, type_name: str, field: str, value:
 
 
 def _with_reading(payload: bytes, reading: struct.Struct, behind: int, value: float) -> bytes:
-    """Return a message with `value` in place of each float in its reading, which `behind` bytes follow."""
+    """Return a message with `value` in place of each float of its reading; `behind` bytes follow it."""
     end = len(payload) - behind
     start = end - reading.size
     codes = reading.format.lstrip("<")

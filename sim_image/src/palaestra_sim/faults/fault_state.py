@@ -2,7 +2,7 @@
 
 Pure: this module only counts events, and uses no socket, process or clock. If a fault names a service and
 its trigger is a step or a reset, the service has the fault from that event to the end of the process. A
-service that hangs stays hung too.
+service that hangs also stays hung until the end of the process.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Ruling:
 
     Attributes:
         lost: whether the request or message is dropped.
-        delay_s: its delay in seconds.
+        delay_s: the delay of the request or message, in seconds.
         damages: the changes to the response or the message.
         effects: the faults of the process, which occur before the request is handled, in this order.
     """
@@ -104,7 +104,7 @@ class FaultState:
     def closed(self, robot: str) -> None:
         """Record that a robot's controller has ended.
 
-        If its steps were counted, the steps of another robot are counted from now on.
+        If the steps of this robot were counted, the steps of another robot are counted from now on.
         """
         if self._stepping == robot:
             self._stepping = None
@@ -139,7 +139,7 @@ class FaultState:
         return Ruling(lost=lost, delay_s=delay_s, damages=tuple(damages), effects=effects)
 
     def _befalls(self, fault: InjectedFault) -> bool:
-        """Count a call of a service that `fault` names; return whether the fault affects this call."""
+        """Count a call of a service that `fault` names; return whether the fault occurs at this call."""
         self._calls[fault] += 1
         if fault.trigger.event is FaultEvent.CALL and self._schedule.happens(fault, self._calls[fault]):
             if isinstance(fault, Hang):

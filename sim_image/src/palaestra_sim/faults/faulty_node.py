@@ -1,7 +1,8 @@
 """A ROS node that applies faults to its requests, responses and messages.
 
-It wraps each connection. After the header of a connection, it forwards, changes, delays or drops each
-message, as the fault state decides. It inherits everything else from the `RosNode` of a stub without faults.
+The node wraps each connection. After the header of a connection, the wrapper forwards, changes, delays or
+drops each message, as the fault state decides. The node inherits everything else from the `RosNode` of a stub
+without faults.
 """
 
 from __future__ import annotations
@@ -105,7 +106,7 @@ class FaultyNode(RosNode):
         return _Requests(self, self._path(name), answers, super()._greet(answers, header))
 
     def _path(self, name: str) -> str:
-        """Return a name as faults write it: relative to the robot, or global with a leading slash."""
+        """Return a name in the form of fault descriptions: relative to the robot, or global (`/`)."""
         return name.removeprefix(f"/{self.name}/")
 
 
@@ -126,7 +127,7 @@ class _Requests:
 
 
 class _Answers:
-    """The connection of a service's client; it changes responses as faults require.
+    """The connection of a service's client; the class changes responses as faults require.
 
     Attributes:
         link: the wrapped connection.
@@ -159,7 +160,7 @@ class _Answers:
 
 
 class _Messages:
-    """The connection of a subscriber; it drops, delays or changes messages as faults require.
+    """The connection of a subscriber; the class drops, delays or changes messages as faults require.
 
     Attributes:
         link: the wrapped connection.

@@ -18,8 +18,8 @@ class FaultEvent(StrEnum):
 
     A life is one run of the stub's process. In each life, the events of each kind are counted from 1.
 
-    - step: a `time_step` request of one robot, the first that sent such a request. So a world with several
-      robots also has one event for each step.
+    - step: a `time_step` request of one robot: the robot that was the first to send such a request. So in a
+      world with several robots, too, each step is one event.
     - reset: a request for a reset of the world.
     - call: a call of a service that the fault names.
     - start: a start of the stub. The program that starts the stub counts the starts.
@@ -33,12 +33,12 @@ class FaultEvent(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trigger:
-    """The events at which a fault occurs: one event, every n-th, a random share of them, or all of them.
+    """The events at which a fault occurs: one event, every n-th event, a random share of events, or all.
 
     Attributes:
         event: the kind of event.
         at: the number of the only event at which the fault occurs; None if the other attributes decide.
-        every: the fault occurs at each event whose number is a multiple of this.
+        every: the fault occurs at each event whose number is a multiple of `every`.
         probability: the probability of the fault at each such event.
     """
 
@@ -63,7 +63,7 @@ class InjectedFault:
         trigger: the events at which the fault occurs.
         service: a pattern for the paths of the affected services, relative to the robot; `*` matches any
             text, and "" means that no service is affected.
-        topic: a pattern for the affected topics, in the same form.
+        topic: a pattern for the names of the affected topics, in the same form.
     """
 
     text: str
@@ -81,7 +81,7 @@ class Crash(InjectedFault):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Exit(InjectedFault):
-    """The process closes all connections and exits, although no client requested that."""
+    """The process closes all connections and exits, although no client requested the end."""
 
     code: int = 0
 

@@ -37,7 +37,8 @@ class KnownPaths:
     Attributes:
         simulator: the name of the first robot, without the part that differs from job to job.
         services: the type of each service, by its path relative to the robot.
-        topics: the type of each topic, in the same form, including those of sensors that are not yet enabled.
+        topics: the type of each topic, by its path relative to the robot, including the topics of sensors
+            that are not yet enabled.
     """
 
     simulator: str
@@ -46,7 +47,7 @@ class KnownPaths:
 
 
 def survey(load: Load, world_path: Path) -> KnownPaths:
-    """Return the services and topics of the world in a file, which `load` loads.
+    """Return the services and topics of the world in the file `world_path`; `load` loads this world.
 
     Raises:
         WorldError: the file is wrong, or contains a node that cannot be simulated.
@@ -127,7 +128,7 @@ class _Listener:
         self.topics: dict[str, str] = {}
 
     def enable_all(self, period_ms: int) -> None:
-        """Enable every sensor, because a sensor's topic exists only then; ignore devices that refuse."""
+        """Enable every sensor, because only an enabled sensor has a topic; ignore devices that refuse."""
         for path, handler in self.services.items():
             if path.endswith(_ENABLES):
                 with contextlib.suppress(ServiceFailed):

@@ -22,7 +22,8 @@ class Ordered:
     """The faults of this process.
 
     Attributes:
-        faults: the faults of the command line, then those of the environment, each in the written order.
+        faults: first the faults of the command line, then the faults of the environment, both in their
+            written order.
         seed: the seed of all random draws.
         life: the number of this start of the simulator, from 1.
         counted: whether a sidecar or a person chose `life`; otherwise `life` is random.

@@ -20,7 +20,7 @@ from palaestra_sim.faults.kinds import FaultEvent, InjectedFault, Trigger
 
 _MOST_MS: Final = 3_600_000.0
 _MOST_MIB: Final = 1_048_576.0
-_FLOAT32: Final = struct.Struct("<f")  # the type with the smallest range among fields that get a wrong value
+_FLOAT32: Final = struct.Struct("<f")  # of all fields that get a wrong value, these have the smallest range
 _SIGNALS: Final = ("SIGABRT", "SIGBUS", "SIGFPE", "SIGILL", "SIGKILL", "SIGSEGV")
 
 
@@ -96,9 +96,9 @@ _COUNT: Final = _whole(1, 10**12)
 class _Kind:
     """A kind of fault: its class, its keys, and the events at which it can occur.
 
-    The first of `events` is the event that the keys `every` and `probability` count. `topic` is the default
-    topic for a description that names neither a topic nor a service. If `needs` is not empty, a description
-    must contain at least one of these keys.
+    The first of `events` is the default of the key `on`: `every` counts these events, and `probability`
+    applies to each of them. `topic` is the default topic for a description that names neither a topic nor a
+    service. If `needs` is not empty, a description must contain at least one of these keys.
     """
 
     make: type[InjectedFault]

@@ -95,6 +95,6 @@ class ProcessFaults:
     def _grow(self, fault: MemoryGrowth) -> bool:
         if self._kept_mib + fault.mib <= fault.most_mib:
             self._kept_mib += fault.mib
-            # Not zeros, because the kernel could keep pages of zeros without using memory.
+            # The bytes are not zeros, because the kernel could keep pages of zeros without using memory.
             self._kept.append(b"\1" * int(fault.mib * _MIB))
         return True

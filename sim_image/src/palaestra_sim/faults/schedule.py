@@ -1,8 +1,9 @@
-"""Decide which faults occur at the k-th event of a life, one run of the simulator's process.
+"""Decide which faults occur at the k-th event of a life; a life is one run of the simulator's process.
 
 Pure: the random number for an event is a hash of the seed, the simulator, its life, the fault and the number
-of the event. So it does not depend on earlier events, and an additional fault does not change when the others
-occur. Two lives of a simulator, or two simulators of a group, get different random numbers.
+of the event. So the number does not depend on earlier events, and an additional fault does not change the
+events at which other faults occur. Two lives of a simulator, or two simulators of a group, get different
+random numbers.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from dataclasses import dataclass
 
 from palaestra_sim.faults.kinds import Delayed, FaultEvent, InjectedFault
 
-_DRAW_BYTES = 7  # 56 bits: more than a float's 53
+_DRAW_BYTES = 7  # 56 bits: more than the 53 bits of a float's mantissa
 _DRAWS = float(256**_DRAW_BYTES)
 
 

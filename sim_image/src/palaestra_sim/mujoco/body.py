@@ -35,7 +35,7 @@ class MujocoBody:
         self.build = build
         self.base = build.base
         self.radius_m = max((_reach(shape) for shape in build.outline), default=0.1)
-        # The poses are now relative to the robot; later they are poses in the world.
+        # The robot is still at the origin of the world, so these poses are relative to the robot.
         self.poses = tuple(shape.pose for shape in build.outline)
         self.touched = 0
         self.velocity = (0.0, 0.0, 0.0)
@@ -61,7 +61,7 @@ class MujocoBody:
         self._speeds[:] = self.velocity
 
     def bits(self, outline: Sequence[Shape]) -> int:
-        """Return the bits in `touched` of the parts that have these shapes."""
+        """Return the bits that represent the parts with these shapes in `touched`."""
         parts = (*self.build.outline, *(shape for link in self.build.links for shape in link.shapes))
         return sum(1 << index for index, shape in enumerate(parts) if shape in outline)
 
@@ -108,9 +108,9 @@ class MujocoBody:
     def _lagged(self, heading_rad: float) -> list[float]:
         """Return the mean difference between the target speeds and the actual speeds in this step.
 
-        The differences are in the robot's axes at the middle of the step. Each is at most the change of the
-        target speed in this step. So while an obstacle stops the robot and the target speed is constant, no
-        difference accumulates, and the robot does not jump when it is free again.
+        The differences are in the robot's axes at the middle of the step. Each difference is at most the
+        change of the target speed in this step. So while an obstacle stops the robot and the target speed is
+        constant, no difference accumulates, and the robot does not jump when it is free again.
         """
         c, s = math.cos(heading_rad), math.sin(heading_rad)
         vx, vy, omega = self.velocity
@@ -138,7 +138,7 @@ class MujocoBody:
         self.s = math.sin(heading_rad)
 
 
-_RESERVE: Final = 2.0  # factor on the force for the largest acceleration, so that a servo can catch up
+_RESERVE: Final = 2.0  # multiplies the force for the largest acceleration, so that a servo can catch up
 GAIN: Final = 500.0  # in 1/s: a servo reaches its target speed within one or two MuJoCo steps of 4 ms
 
 

@@ -12,7 +12,7 @@ _SPEED: Final = 6  # a velocity in world axes, and an angular velocity in the ax
 
 
 class FreeBody:
-    """One dynamic solid of a model; the solid's frame in the scene gets its pose from here.
+    """One dynamic solid of a model; this object sets the pose of the solid's frame in the scene.
 
     Attributes:
         place: the frame of the solid in the scene.

@@ -1,8 +1,9 @@
 """Set the friction between each pair of materials, although a geom of MuJoCo has only one friction.
 
 If two geoms touch, MuJoCo uses the friction of the geom with the higher priority. Here, geoms of rarer
-materials have higher priorities. The friction of a geom is that between its own material and the most common
-material. This is wrong for some pairs of materials. Pairs of such geoms are listed in the model explicitly.
+materials have higher priorities. The friction of a geom is the friction between its own material and the most
+common material. This friction is wrong for some pairs of materials. For pairs of geoms with these materials,
+the model has explicit entries with the right friction.
 """
 
 from __future__ import annotations

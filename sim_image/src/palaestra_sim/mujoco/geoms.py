@@ -52,7 +52,7 @@ class Touch:
 class Marks:
     """The geoms of a model that is not compiled yet.
 
-    Each entry has a geom and its shape. For a part of a robot it also has the robot's body, and the bit of
+    Each entry has a geom and its shape. The entry of a robot's part also has the robot's body, and the bit of
     the part in `touched`.
     """
 
@@ -112,7 +112,7 @@ def fill(geom: Any, shape: Shape, density: float) -> None:
     """Set the mass of a geom from its shape and a density in kg/m3."""
     if shape.mesh is None:
         geom.density = density
-    else:  # MuJoCo would compute the mass of the convex hull
+    else:  # for a mesh, MuJoCo would compute the mass of its convex hull
         geom.mass = density * volume_m3(shape)
 
 
@@ -153,9 +153,9 @@ def put(position: Any, quaternion: Any, pose: Pose) -> None:
 
 
 def _inertia(matter: MassProperties) -> tuple[float, ...]:
-    """Return a default inertia for a mass, if the user did not set one.
+    """Return the default inertia of a mass, for a world that does not set the inertia.
 
-    The mass fills the bounding boxes of its shapes. If it has no shapes, it is a ball with the density of
+    The mass fills the bounding boxes of its shapes. A mass without shapes is a ball with the density of
     water.
     """
     if not matter.shapes:

@@ -1,8 +1,8 @@
 """The OpenGL context of the process; it has no window.
 
 The context is opened for the first image, because a simulator without cameras must work without OpenGL. All
-worlds of a process share the context, one at a time. The OpenGL objects of a world are freed when another
-world renders, and at the end of the process.
+worlds of a process share the context; only one world uses it at a time. The OpenGL objects of a world are
+freed when another world renders, and at the end of the process.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class GlContext:
         atexit.register(self.close)  # runs before the exit hook of mujoco.egl, which was registered earlier
 
     def take(self, owner: object, model: Any, size: tuple[int, int]) -> Any:
-        """Return MuJoCo's rendering context for a model; it can render images up to `size`.
+        """Return MuJoCo's rendering context for a model; this context can render images up to `size`.
 
         The OpenGL objects of `owner` are kept until another owner calls this method. An owner must always
         pass the same model.

@@ -21,7 +21,7 @@ def _imported() -> Any:
     except ImportError as error:
         fact = f"MuJoCo cannot be imported ({error})"
         raise MissingLibraryError(f"{fact}; install palaestra-sim[mujoco]") from error
-    # Without this, MuJoCo writes its warnings into a file MUJOCO_LOG.TXT in the working directory.
+    # Without this handler, MuJoCo writes its warnings into a file MUJOCO_LOG.TXT in the working directory.
     library.set_mju_user_warning(_warn)
     return library
 

@@ -17,7 +17,7 @@ from palaestra_sim.scene.sensor_rays import Beam
 
 _GROUPS: Final = np.array([int(group == 0) for group in range(mujoco.mjNGROUP)], dtype=np.uint8)
 
-_PAST_M: Final = 1e-6  # a ray that passed a triangle continues at this distance behind it
+_PAST_M: Final = 1e-6  # a ray that has passed a triangle continues at this distance behind the triangle
 _MOST_TRIANGLES: Final = 100  # maximum number of triangles that one ray passes from behind
 
 

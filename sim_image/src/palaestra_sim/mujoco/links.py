@@ -1,8 +1,8 @@
 """Links in MuJoCo: bodies on joints, the servos that move the joints, and force sensors in fixed links.
 
-A servo moves its joint at the speed that the motor demands; its force is at most that of the motor. The servo
-also compensates for gravity, so a motor that holds a weight does not sag. Links may touch all bodies except
-those of their own robot.
+A servo moves its joint at the speed that the motor demands; its force is at most the force of the motor. The
+servo also compensates for gravity, so a motor that holds a weight does not sag. Links may touch all bodies
+except the bodies of their own robot.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Added:
     Attributes:
         link: the link in the scene.
         body: the body of the link.
-        joint, servo, sensor: the joint, the servo and the force sensor; None if the link does not have it.
+        joint, servo, sensor: the joint, the servo and the force sensor; None if the link has no such part.
     """
 
     link: Link
@@ -61,7 +61,7 @@ class Ground:
     names: Iterator[str] = field(default_factory=lambda: (f"link {number}" for number in range(10**9)))
 
     def under(self, place: Frame | None) -> tuple[Frame | None, Any]:
-        """Return the body to which the frame `place` belongs, preceded by the frame of this body."""
+        """Return the body to which the frame `place` belongs; the frame of this body comes first."""
         around = () if place is None else place.chain()
         for outer in around:
             if outer in self.roots:
@@ -79,8 +79,8 @@ def add_links(ground: Ground, links: Sequence[Link], marks: Marks, body: MujocoB
     Args:
         ground: the bodies on which the links are mounted.
         links: the links of one robot, or links without a robot; a link comes before the links on it.
-        marks: gets an entry for each geom.
-        body: the body of the robot; None without a robot.
+        marks: the geoms of the model; `add_links` adds an entry for each new geom.
+        body: the body of the robot; None for links without a robot.
     """
     added: dict[Link, Added] = {}
     bit = 0 if body is None else len(body.build.outline)

@@ -1,8 +1,8 @@
 """Build MuJoCo's model from the robots, shapes and links of a world.
 
 The base of a robot is a body with three joints; an obstacle is a body without joints. As in the stub, a robot
-may touch an obstacle only if they are at the same height. It does not touch an obstacle that it drives over
-or under.
+may touch an obstacle only if both are at the same height. The robot does not touch an obstacle that it drives
+over or under.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ from palaestra_sim.scene.physics import Figure, Push
 from palaestra_sim.scene.physics_settings import PhysicsSettings, material_of
 from palaestra_sim.scene.shapes import Shape
 
-MASS_KG: Final = 23.0  # mass of a robot without Physics: that of a Robotino 3 with batteries
+MASS_KG: Final = 23.0  # mass of a robot without Physics: the mass of a Robotino 3 with batteries
 STANDING_KG: Final = 1e5  # mass of a robot without a drive, so that other robots cannot push it
 _LEAST_KG: Final = 1e-6
 _LEAST_KG_M2: Final = 1e-9
@@ -54,14 +54,14 @@ class Built:
     Attributes:
         model, data: the model and the data of MuJoCo.
         figures: the robots that move, each with its body, and the number of this body in the model.
-        geoms: by number of the geom: its shape, the body of its robot (None for other shapes), and the bit of
-            the shape in `touched`.
-        stands: the number of the body of each frame that has obstacles, or on which links are mounted.
+        geoms: for each geom, by its number: the shape, the body of the robot to which the shape belongs (None
+            if it belongs to no robot), and the bit of the shape in `touched`.
+        stands: for each frame that has obstacles or carries links, the number of the frame's body.
         loose: the dynamic solids, by their frames.
         links: the links of each robot; the key None has the links without a robot.
-        own_geoms: the numbers of the geoms of these links, by the same keys.
+        own_geoms: the numbers of the geoms of the links in `links`, by the same keys.
         fixed: the poses of the obstacles that cannot move in this model, by their frames.
-        of_robots: whether a geom is a part of a robot, by number of the geom.
+        of_robots: for each geom, by its number: whether the geom is a part of a robot.
         changed: the dynamic solids that a client has moved since the last `take`.
         floors_m: the heights of the Planes of the world.
     """
@@ -98,7 +98,7 @@ class Built:
             self.model.geom_group[own] = SEEN
 
     def put_obstacles(self) -> None:
-        """Set the poses of the obstacles to those of their frames."""
+        """Set the poses of the obstacles to the poses of their frames."""
         for place, number in self.stands.items():
             mocap = self.model.body_mocapid[number]
             if mocap < 0:

@@ -1,8 +1,8 @@
 """The physics of a world in MuJoCo.
 
-One model has all robots and obstacles. It is built again when an object is added or removed. A basic step is
-a whole number of MuJoCo's steps. After each basic step, the poses are copied to the scene, where devices read
-them. Rays are cast when a sensor is sampled. Images are rendered from a separate model.
+One model has all robots and obstacles. The model is built again when an object is added or removed. A basic
+step is a whole number of MuJoCo's steps. After each basic step, the poses are copied to the scene, where
+devices read them. Rays are cast when a sensor is sampled. Images are rendered from a separate model.
 """
 
 from __future__ import annotations
@@ -143,7 +143,7 @@ class MujocoPhysics:
         return cast
 
     def see(self, figure: Figure, beams: Sequence[Beam]) -> Cast:
-        """Return such a function for beams that meet visible shapes; they pass through the robot itself."""
+        """Return a function as `look` does, for beams that stop at visible shapes, but not at the robot."""
         return LidarBeams(self._pictures, figure, beams).cast
 
     def push(self, target: Figure | DynamicSolid, push: Push) -> None:

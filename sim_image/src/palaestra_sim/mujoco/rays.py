@@ -1,4 +1,4 @@
-"""The distances that the sensor beams of a robot travel; they pass through the robot itself."""
+"""The distances that the sensor beams of a robot travel; the beams pass through the robot itself."""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@
 
 The file has a hidden name in the same folder until it is complete; then it is renamed. While a simulator
 writes a file, it holds a lock on the file. So a hidden file without a lock belongs to a simulator that was
-killed. The next movie with the same name removes such a file.
+killed. The simulator that records the next movie of this name removes such a file.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class MujocoVideo:
         self._stream.pix_fmt = "yuv420p"
         rate = _WORST - _STEPS * movie.quality // 100
         self._stream.options = {"crf": str(rate), "preset": "veryfast"}
-        # One thread, because several simulators share the processor.
+        # The encoder uses one thread, because several simulators share the processor.
         self._stream.thread_count = 1
 
     def add(self, pixels: bytes | memoryview) -> None:
@@ -88,7 +88,7 @@ def _new_file(path: Path) -> tuple[int, str]:
             fcntl.flock(lock, fcntl.LOCK_EX)
         if os.fstat(lock).st_nlink:
             return lock, name
-        os.close(lock)  # another simulator removed the file before this one locked it
+        os.close(lock)  # another simulator removed the file before this simulator locked it
 
 
 def _abandon(lock: int, name: str) -> None:

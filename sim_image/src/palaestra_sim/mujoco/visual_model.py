@@ -20,7 +20,8 @@ _GEOMS: Final = {
     "capsule": mujoco.mjtGeom.mjGEOM_CAPSULE,
     "mesh": mujoco.mjtGeom.mjGEOM_MESH,
 }
-# No shadows, no smoothed edges and few corners: without a graphics card, rendering is then 10 times as fast.
+# With these settings, shadows are off, edges are not smoothed, and round shapes have few corners. Without a
+# graphics card, this makes rendering 10 times as fast.
 _QUALITY: Final = {"shadowsize": 0, "offsamples": 0, "numslices": 20, "numstacks": 10, "numquads": 1}
 _AMBIENT: Final = 0.45
 _FROM_CAMERA: Final = 0.25
@@ -37,7 +38,7 @@ class VisualModel:
     Attributes:
         things: the visible shapes; a shape's index is the number of its geom. The last geom is the sky.
         model, data: the model and the data of MuJoCo.
-        positions, rotations: the poses of the geoms in the frames of their shapes, (n, 3) and (n, 3, 3).
+        positions, rotations: arrays of the geoms' poses in the frames of their shapes, (n, 3) and (n, 3, 3).
         planes: the numbers of the geoms that are Planes.
         sun: the direction of the sun's light.
         scene, option, camera: the objects of MuJoCo's visualizer.

@@ -14,8 +14,8 @@ from palaestra_protocol.ros import sockets
 from palaestra_protocol.ros.tcpros import FrameReader, FramingError, decode_header, encode_header
 from palaestra_sim.ros.loop import Loop
 
-# The node closes a finished connection after this time. By then roscpp and rospy have closed it themselves. A
-# client that reads until the end of the stream waits for the node.
+# The node closes a finished connection after this time. By then roscpp and rospy have closed the connection
+# themselves. A client that reads until the end of the stream waits for the node.
 LINGER_S = 1.0
 
 # If a client stops reading in the middle of a long response, the node closes the connection after this time.
@@ -23,7 +23,7 @@ SEND_S = 60.0
 
 
 class Endpoint(Protocol):
-    """The receiver of a connection's frames; a node creates it when it has read the connection's header."""
+    """The receiver of a connection's frames; a node creates it after it has read the connection's header."""
 
     def receive(self, payload: bytes) -> None:
         """Handle one frame from the peer."""
@@ -69,8 +69,8 @@ Greet = Callable[["RosLink", Mapping[str, str]], Endpoint]
 class Lingering:
     """The finished connections; each is closed between one and two LINGER_S after it was added.
 
-    All of them share one timer. A timer for each would be expensive: a client that opens a connection for
-    each call may make a thousand calls a second.
+    All of them share one timer. A timer for each connection would be expensive: a client that opens a
+    connection for each call may make a thousand calls a second.
     """
 
     def __init__(self, loop: Loop) -> None:
@@ -165,7 +165,7 @@ class RosLink:
 
         The node must not close at once: roscpp would drop a response that it has not read yet
         (ros/ros_comm#1976). A long response is dropped after SEND_S, because a client that has stopped
-        reading would otherwise keep it in memory.
+        reading would otherwise keep the response in memory.
         """
         if self.closed:
             return

@@ -31,7 +31,7 @@ _LOOKS = 30
 _EVENTS = 32  # maximum number of ready files in one poll; the next poll returns the others
 
 # If a callback, such as the end of a step, is due within this time, the peers wait for its result. They send
-# nothing before that, so polls would only take processor time from other programs.
+# nothing before the result, so polls would only take processor time from other programs.
 _NEAR_S = 10e-3
 
 
@@ -53,14 +53,14 @@ class Loop:
         self._wakes_on_signals = False
 
     def watch(self, file: _File, ready: Callback, *, writing: bool = False) -> None:
-        """Call `ready` whenever `file` can be read, or with `writing` also when it can be written."""
+        """Call `ready` whenever `file` can be read; with `writing`, also whenever it can be written."""
         number = _number(file)
         change = self._epoll.modify if number in self._watched else self._epoll.register
         change(number, select.EPOLLIN | (select.EPOLLOUT if writing else 0))
         self._watched[number] = ready
 
     def forget(self, file: _File) -> None:
-        """Stop watching `file`; call this before it is closed."""
+        """Stop watching `file`; call this method before the file is closed."""
         number = _number(file)
         if self._watched.pop(number, None) is not None:
             self._epoll.unregister(number)

@@ -1,6 +1,6 @@
 """The XML-RPC interface of a node: its calls to the ROS master, and the slave API that other nodes call.
 
-The slave API is used rarely, so it runs in a separate thread. It passes all work to the event loop.
+The slave API is used rarely, so it runs in a separate thread. This thread passes all work to the event loop.
 Source: http://wiki.ros.org/ROS/Master_API and http://wiki.ros.org/ROS/Slave_API
 """
 
@@ -58,7 +58,7 @@ class Master:
         """Call a method of the master and return its value.
 
         Raises:
-            MasterUnreachable: the master sent no response or an invalid one, or refused the call.
+            MasterUnreachable: the master sent no response or an invalid response, or refused the call.
         """
         return self._checked(method, self._sent(method, self._node, *arguments))
 

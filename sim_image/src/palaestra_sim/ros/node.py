@@ -2,8 +2,8 @@
 
 The controller of a robot uses this interface. The handler of a service gets the decoded request and returns
 the fields of the response. A handler may return `LATER` instead; the controller then calls `answer` when the
-response is ready. The handler of a step does so while the step waits for another robot or for the end of a
-pause.
+response is ready. The handler of a step returns `LATER` while the step waits for another robot or for the end
+of a pause.
 """
 
 from __future__ import annotations
@@ -95,8 +95,8 @@ class RosNode:
         """Return a new publisher of a topic; all publishers of one topic share its subscribers.
 
         Args:
-            path: relative to the node, or global with a leading slash.
-            type_name: e.g. sensor_msgs/Range
+            path: the path of the topic: relative to the node, or global with a leading slash.
+            type_name: the message type, e.g. sensor_msgs/Range
             latched: whether a late subscriber gets the last message.
             template: the constant fields, for `Publisher.send_value`.
             reading: the field with the sensor's value, which faults change; "" means the last field.
@@ -186,8 +186,8 @@ class RosNode:
     def on_end(self, callback: Callable[[str], None]) -> None:
         """Set the function to call when another program requests the end of this node.
 
-        The argument is the reason. `rosnode kill` sends such a request. The master sends one when another
-        node registers the same name.
+        The argument of the function is the reason. `rosnode kill` sends such a request. The master sends such
+        a request when another node registers the same name.
         """
         self._ended = callback
 
@@ -249,7 +249,7 @@ class RosNode:
 
 
 def _agreed_md5(header: Mapping[str, str], type_name: str, *known: str) -> str:
-    """Return the md5 sum that the header of a client names, or the first known sum if it accepts any.
+    """Return the md5 sum that the header of a client names, or the first known sum if it accepts any sum.
 
     Raises:
         HeaderRefused: the client's md5 sum is not one of `known`.

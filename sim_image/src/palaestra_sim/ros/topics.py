@@ -99,11 +99,11 @@ class Publisher:
         return bool(self.topic.links)
 
     def send(self, fields: Mapping[str, Any]) -> None:
-        """Send the template with `fields` in place of its own."""
+        """Send the template with `fields` in place of the template's own fields."""
         self.topic.send(self.topic.type.codec.frame({**self._template, **fields}))
 
     def send_value(self, value: Any, stamp_ns: int | None = None) -> None:
-        """Send the template with `value` in its last field; its header gets a time stamp and a number.
+        """Send the template with `value` in its last field, a time stamp, and the next sequence number.
 
         If the topic has no subscriber, this method does nothing; the sequence number does not increase.
 
@@ -123,7 +123,7 @@ class Publisher:
         self.topic.send(bytes(data))
 
     def send_stamped(self, fields: Mapping[str, Any]) -> None:
-        """Send the template with `fields` in place of its own; the wall clock is the time stamp.
+        """Send the template with `fields` in place of its own fields; the wall clock is the time stamp.
 
         If the topic has no subscriber, this method does nothing; the sequence number does not increase.
         """

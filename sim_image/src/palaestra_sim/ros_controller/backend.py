@@ -1,7 +1,7 @@
 """The interface of a simulation: robots with devices, nodes with fields, and steps.
 
 `ros_controller` offers a simulation to clients as ROS services and topics. The package `scene` implements
-this Protocol. Another simulator that implements it can serve the same clients.
+this Protocol. Another simulator that implements this Protocol can serve the same clients.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ class MotionBackend(Protocol):
         Args:
             node: the node.
             force: the force.
-            relative: whether the force is in the axes of the node, not in those of the world.
-            offset: the point of the force in the node's frame; None for the center of mass.
+            relative: whether the force is in the axes of the node, not in the axes of the world.
+            offset: the point at which the force acts, in the node's frame; None for the center of mass.
         """
         ...
 
@@ -72,7 +72,7 @@ class Backend(Protocol):
         tree: the nodes of the world.
         time_ms: simulated time in milliseconds; a reset sets it to 0.
         mode: the simulation mode; in PAUSE no steps run.
-        quit_status: the exit status that `quit` requested; None before.
+        quit_status: the exit status that `quit` requested; None before that request.
         movies: recordings of the Viewpoint's view.
     """
 
@@ -150,7 +150,7 @@ class Backend(Protocol):
         ...
 
     def add(self, text: str, field: NodeField, index: int) -> bool:
-        """Insert the nodes of `text` into a field; return False if `index` is not a valid position there."""
+        """Insert the nodes of `text` into a field; return False if `index` is not a valid position."""
         ...
 
     def remove(self, node: SceneNode) -> None:
@@ -167,7 +167,7 @@ class Backend(Protocol):
     def contact_points(self, node: SceneNode, *, descendants: bool) -> Sequence[tuple[Vector, int]]:
         """Return the contact points of a node: each has a position in meters and the number of a node.
 
-        With `descendants`, the contact points of all nodes inside it are included.
+        With `descendants`, the contact points of all nodes inside the node are included.
         """
         ...
 
@@ -180,5 +180,5 @@ class Backend(Protocol):
         ...
 
     def set_joint_position(self, node: SceneNode, position: float, index: int) -> None:
-        """Set the position of a joint, in rad or m; `index` counts its axes from 1."""
+        """Set the position of a joint, in rad or m; `index` is the number of the axis, counted from 1."""
         ...

@@ -1,15 +1,17 @@
 """The `ros` controller of one robot: its services, its steps, and the messages that it sends after each step.
 
-Webots' controller has a main loop in a thread that polls. This controller imitates its behavior:
+Webots' controller has a main loop in a thread that polls. This module imitates the behavior of that
+controller:
 
 - A `time_step` of 0 or of a positive multiple of the basic step is accepted; any other value is refused.
-  While a step is pending, the robot is `blocked` and other services wait: Webots holds a mutex that all of
-  them need.
+  While a step is pending, the robot is `blocked` and other services wait: Webots holds a mutex that all
+  services need.
 - After the response to a step, the controller sends one message for each enabled sensor that is due. A sensor
-  is due if (count * step) % period is 0. Subscribers that are connected at that moment get the message.
-- `count` is the number of steps. It increases before the step runs. `step` is the value of the last accepted
-  `time_step`. So if a client changes the value, `count * step` is not the elapsed time, and sensors with
-  longer periods are due at other times than before.
+  is due if (count * step) % period is 0. Subscribers that are connected when the message is sent get the
+  message.
+- `count` is the number of steps. It increases before a step runs. `step` is the value of the last accepted
+  `time_step`. So if a client changes the value of `time_step`, `count * step` is not the elapsed time, and
+  sensors with longer periods are due at other times than before.
 
 With the option `lost_wakeup`, a step may be requested while the main loop still handles the previous step.
 The new step then runs and gets a response, but its messages are lost. Without the option, the controller
@@ -226,7 +228,7 @@ class RosController:
         return not (self._publish_due or busy)
 
     def _stepped(self, done: bool) -> None:  # noqa: FBT001 - what Stepping calls back
-        """Respond to a step that has ended, or respond later if it was faster than its minimum real time."""
+        """Respond to a step that has ended, but not before its minimum real time has passed."""
         delay_s = self._delay_s() if done else 0.0
         if delay_s > 0.0:
             self.node.later(delay_s, lambda: self._finish(done))

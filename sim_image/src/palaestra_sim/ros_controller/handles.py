@@ -1,8 +1,8 @@
 """The handles by which clients of a supervisor refer to nodes and fields.
 
 A handle is a number that looks like a memory address, because Webots' handles are memory addresses. A handle
-is valid until the world is loaded again; after that, services refuse it. In Webots an old handle is a
-dangling pointer and may crash the controller, so clients must request new handles after each load.
+is valid until the world is loaded again; after that, services refuse the old handle. In Webots an old handle
+is a dangling pointer and may crash the controller, so clients must request new handles after each load.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _SPACING: Final = 0x90
 
 
 class NoSuchHandleError(SimError, LookupError):
-    """The handle is not one of the loaded world; Webots might crash at such a handle."""
+    """The loaded world has no node or field for the handle; Webots might crash at such a handle."""
 
 
 class Handles:
@@ -28,7 +28,7 @@ class Handles:
 
     Args:
         simulation: the simulation of that world.
-        load: the number of earlier loads; it makes the handles of different loads differ.
+        load: the number of earlier loads, so that different loads have different handles.
     """
 
     def __init__(self, simulation: Backend, load: int = 0) -> None:
@@ -53,7 +53,8 @@ class Handles:
         """Return the node of a handle.
 
         Raises:
-            NoSuchHandleError: the handle is 0, from another load, of a removed node, or not that of a node.
+            NoSuchHandleError: the handle is 0, or belongs to another load of a world, to a removed node, or
+                to a field.
         """
         held = self._held.get(handle)
         if not isinstance(held, SceneNode) or self._is_gone(held):
@@ -64,7 +65,8 @@ class Handles:
         """Return the field of a handle.
 
         Raises:
-            NoSuchHandleError: the handle is 0, from another load, of a removed node, or not that of a field.
+            NoSuchHandleError: the handle is 0, or belongs to another load of a world, to a field of a removed
+                node, or to a node.
         """
         held = self._held.get(handle)
         if not isinstance(held, NodeField) or self._is_gone(held.node):

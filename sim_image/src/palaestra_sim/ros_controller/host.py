@@ -1,7 +1,7 @@
 """The interface through which a controller and its services use the running simulator.
 
-The module of the simulator imports the controllers, because it starts and ends them. To avoid an import
-cycle, the controllers import only this Protocol.
+The module of the simulator imports the controllers, because the simulator starts and ends the controllers. To
+avoid an import cycle, the controllers import only this Protocol.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Battery, keyboard and joystick: the controller of every robot has these devices, although no node has them.
 
 In a pod nobody can press keys, so clients press them through services below `palaestra/`. Webots does not
-have these services. They do not depend on the backend, so they work with every simulator.
+have these services. These services do not depend on the backend, so they work with every simulator.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ class Input:
     """A device that is not a node of the world.
 
     Attributes:
-        name: the first part of its paths.
-        topics: its topics.
+        name: the first part of the paths of the device's topics and services.
+        topics: the topics of the device.
         enable: returns whether the device accepts a sampling period.
-        rows: its services besides `enable` and `get_sampling_period`.
-        own_rows: its services that Webots does not have; their paths begin with `palaestra/`.
+        rows: the services of the device besides `enable` and `get_sampling_period`.
+        own_rows: the services that Webots does not have; their paths begin with `palaestra/`.
     """
 
     name: str
@@ -41,7 +41,7 @@ class Input:
 
 
 def inputs(robot: Robot) -> tuple[Input, ...]:
-    """Return the pseudo devices of a robot."""
+    """Return the battery, the keyboard and the joystick of a robot."""
     battery = DeviceTopic(name="value", type_name="webots_ros/Float64Stamped", source=robot.battery)
     return Input(name="battery_sensor", topics=(battery,)), _keyboard(), _joystick()
 

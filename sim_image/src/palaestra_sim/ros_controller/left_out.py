@@ -1,4 +1,4 @@
-"""Report the nodes that a simulator leaves out to its sidecar; see `palaestra_protocol.control`."""
+"""Report to the sidecar which nodes a simulator leaves out; see `palaestra_protocol.control`."""
 
 from __future__ import annotations
 

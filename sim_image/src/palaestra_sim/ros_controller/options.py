@@ -7,14 +7,15 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FrontOptions:
-    """Options that imitate the timing of Webots' controller, which depends on the world and the machine.
+    """Options that imitate the timing of Webots' controller, which differs by world and machine.
 
     Attributes:
-        step_sleep_s: minimum real time of a `time_step`, to imitate a larger world.
+        step_sleep_s: minimum real time of a `time_step` in seconds, to imitate a larger world.
         lost_wakeup: whether the controller can lose the messages of a step, as Webots' controller can. The
             messages are lost if the step is requested before the messages of the previous step are sent, or
             within `publish_delay_s` after that.
-        publish_delay_s: delay from the end of a step to its messages; 0 means right after the response.
+        publish_delay_s: delay in seconds from the end of a step to the messages of this step; 0 means right
+            after the response.
     """
 
     step_sleep_s: float = 0.0

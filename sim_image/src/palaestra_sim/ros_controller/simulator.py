@@ -1,8 +1,9 @@
 """A running simulator: the simulation of a world, and the controllers of its robots.
 
 When a client loads another world, the controllers of the old world end and those of the new world start; the
-simulator continues. The module `program` has the command line, the event loop and the signals. It gives the
-simulator ROS nodes and a clock, and ends the process when the simulator calls its callback.
+simulator continues. The module `program` has the command line, the event loop and the signals. That module
+gives the simulator ROS nodes and a clock, and ends the process when the simulator calls the callback of
+`on_quit`.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ class RunningSimulator:
     """A simulator; its constructor loads and checks the world, and `start` starts the controllers.
 
     Args:
-        world_path: the world file; each reload reads it again.
+        world_path: the world file; each reload reads the file again.
         load: returns the simulation of a world file, which starts in the given mode.
         make_node: returns the ROS node for a name.
         options: the options of controllers.
@@ -42,7 +43,7 @@ class RunningSimulator:
     Attributes:
         simulation: the simulation of the loaded world.
         controllers: the controllers of robots whose controller is "ros", by ROS name.
-        quit_status: the exit status that a client set with `simulation_quit`; None before.
+        quit_status: the exit status that a client set with `simulation_quit`; None before that call.
 
     Raises:
         WorldError: the file is wrong, or contains a node that cannot be simulated.

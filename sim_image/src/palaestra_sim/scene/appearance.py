@@ -1,8 +1,9 @@
 """The visible shapes of a world and their poses, as data for viewers; see `palaestra_protocol.scene`.
 
-The data is computed only on request. A frame that moves by itself becomes one node, with everything that it
-carries. Each other frame with visible shapes becomes a node of its own, because a client may move it. A robot
-without visible shapes, such as an instance of a built-in PROTO, is shown by its collision shapes.
+The data is computed only on request. A frame that moves by itself becomes one node, together with all frames
+that it carries. Each other frame with visible shapes becomes a separate node, because a client may move that
+frame. A robot without visible shapes, such as an instance of a built-in PROTO, is shown by its collision
+shapes.
 """
 
 from __future__ import annotations
@@ -68,7 +69,7 @@ class MeshTable:
     _triangles: int = 0
 
     def index(self, key: object, read: Callable[[], Triangles], points: int, triangles: int) -> int | None:
-        """Return the index of a mesh; None if it exceeds a limit. `read` is called once for each `key`."""
+        """Return the index of a mesh; None if the mesh exceeds a limit. `read` runs once for each `key`."""
         if key in self._known:
             return self._known[key]
         within = self._points + points <= MOST_POINTS and self._triangles + triangles <= MOST_TRIANGLES
@@ -163,7 +164,7 @@ class Appearance:
         )
 
     def _refresh(self) -> None:
-        """Collect the nodes again if a visible shape changed; else find the nodes that a client has moved."""
+        """Collect the nodes again if a visible shape changed; otherwise find the nodes that clients moved."""
         if self._view.changes != self._changes:
             self._collect()
         elif self._view.moves != self._moves:
@@ -250,7 +251,7 @@ def _outline(node: SceneNode, place: Frame) -> Iterator[Drawn]:
 
 
 def _carrier(place: Frame) -> Frame:
-    """Return the innermost frame around `place` that moves by itself, or `place` if no frame moves."""
+    """Return the innermost frame around `place` that moves by itself, or `place` if no such frame exists."""
     return next((frame for frame in place.chain() if frame.moves), place)
 
 

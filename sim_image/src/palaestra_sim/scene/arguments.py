@@ -31,8 +31,8 @@ class ControllerArguments:
 def read_arguments(reading: NodeReader, node: SceneNode) -> ControllerArguments:
     """Return the arguments of a robot whose controller is "ros".
 
-    `--name` is required, because the topics of two robots without it would have the same names.
-    `--synchronize` is required, because without it no client controls the steps.
+    `--name` is required, because without this argument the topics of two robots would have the same names.
+    `--synchronize` is required, because without this argument no client controls the steps.
     """
     texts = node.texts("controllerArgs")
     names = [text.removeprefix("--name=") for text in texts if text.startswith("--name=")]

@@ -17,7 +17,7 @@ _SYSTEMS: Final = ("ENU", "NUE", "EUN")
 
 
 def read_axes(reading: NodeReader, node: SceneNode) -> Frame | None:
-    """Return the frame around a world whose y axis points up, None if z points up; record the axes.
+    """Return the frame around a world whose y axis points up, None if z points up; set `reading.system`.
 
     `node` is the WorldInfo of the world, or its first node.
     """

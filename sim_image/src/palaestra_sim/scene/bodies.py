@@ -18,9 +18,9 @@ class Build:
 
     Attributes:
         base: its wheels.
-        outline: the shapes with which it collides, in its own frame.
-        heights: z of the lower and upper end of the body, in its own frame.
-        links: the parts on its joints that forces move; empty in a physics without such joints.
+        outline: the shapes with which the robot collides, in the robot's frame.
+        heights: z of the lower and of the upper end of the body, in the robot's frame.
+        links: the parts on the robot's joints that forces move; empty if the physics has no such joints.
         matter: the masses of the parts that are not on a link.
     """
 
@@ -36,12 +36,12 @@ class Body(Protocol):
 
     Attributes:
         base: its wheels.
-        x, y: the position of its origin in the world, in meters, in the axes of the ground.
+        x, y: the position of the robot's origin in the world, in meters, in the axes of the ground.
         heading_rad: the heading, in (-pi, pi].
         c, s: cosine and sine of the heading.
         velocity: vx, vy in m/s and omega in rad/s, in world axes, over the last basic step.
         touched: one bit for each part that was touched since the bumpers were last read; the code that reads
-            the bumpers clears it.
+            the bumpers clears the bits.
     """
 
     base: MobileBase
@@ -62,7 +62,7 @@ class Body(Protocol):
         ...
 
     def halt(self) -> None:
-        """Stop all motion, including that of the motors."""
+        """Stop all motion, including the motion of the motors."""
         ...
 
     def push(self, vx: float, vy: float, omega: float) -> None:

@@ -8,7 +8,8 @@ from typing import Final, Protocol
 
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 
-# Left, top, right and bottom in pixels from the top left; right and bottom are exclusive.
+# A rectangle in an image: left, top, right and bottom in pixels from the top left corner of the image. The
+# pixels at right and bottom are not part of the rectangle.
 Corners = tuple[int, int, int, int]
 
 MOST_PIXELS: Final = 4096  # limit for a row and for a column
@@ -56,7 +57,7 @@ class CameraInterface(Protocol):
         """Return a float32 for each pixel: its distance along the axis of the lens, in meters.
 
         A distance below `nearest_m`, or beyond the far end of the lens, is infinite. Other distances are
-        multiples of `resolution_m`, if that is positive.
+        multiples of `resolution_m`, if `resolution_m` is positive.
         """
         ...
 

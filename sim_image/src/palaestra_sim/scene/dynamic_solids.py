@@ -21,14 +21,14 @@ class BodyState(NamedTuple):
 
 
 class DynamicFrame(Frame):
-    """The frame of a dynamic solid: it stays as it was set, until the physics moves it.
+    """The frame of a dynamic solid: it keeps the pose that was set, until the physics moves the solid.
 
     Attributes:
-        follow: returns the state to which the physics has moved it; None before a physics has a model.
+        follow: returns the state to which the physics has moved the solid; None before a physics has a model.
         changed: the frames that the physics has to read; a frame that a client changed adds itself.
         put: whether a client has set this frame since the physics last read it; the physics clears the flag.
         speed: the linear and angular velocity that a client set, in the axes of the ground; the physics uses
-            them and then sets None, which means no change.
+            both and then sets None, which means no change.
     """
 
     moves = True
@@ -107,9 +107,9 @@ class DynamicSolid:
     """One dynamic solid.
 
     Attributes:
-        node: its Solid.
-        place: its frame.
-        shapes: the shapes with which it and the Solids inside it collide.
+        node: the node of the solid.
+        place: the frame of the solid.
+        shapes: the shapes with which the solid and the Solids inside it collide.
         densities: the densities of the shapes, in kg/m3.
     """
 

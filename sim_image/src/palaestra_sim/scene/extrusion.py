@@ -22,10 +22,10 @@ _DEFAULTS: Final = {
     "orientation": (0.0, 0.0, 1.0, 0.0),
     "splineSubdivision": (4.0,),
 }
-_MOST: Final = 1000  # points of a spine or a cross-section; faces are cut in quadratic time
+_MOST: Final = 1000  # maximum number of points of a spine or a cross-section; faces are cut in quadratic time
 _STRAIGHT: Final = 1e-9
 _LEAST_SPINE: Final = 2
-_LEAST_SECTION: Final = 4  # a triangle, whose last point repeats the first
+_LEAST_SECTION: Final = 4  # minimum number of points of a cross-section; the last repeats the first
 _TURN: Final = 4  # numbers of a rotation
 _PAIR: Final = 2
 
@@ -83,7 +83,7 @@ def _placed(
 
 
 def _index(count: int, corners: int, *, begin_cap: bool, end_cap: bool) -> list[int]:
-    """Return the faces: the first cap, the sides, and the last cap. The last corner repeats the first."""
+    """Return the faces: first cap, sides, last cap; the last corner, which repeats the first, is left out."""
     index: list[int] = []
     if begin_cap:
         index += [*range(corners - 1), -1]
@@ -126,7 +126,7 @@ def _axes(spine: Sequence[Vector]) -> list[tuple[Vector, Vector]]:
 
 
 def _first_z(spine: Sequence[Vector], y: Vector) -> Vector:
-    """Return z at the start of an open spine: that of its first bend, or z turned with a straight spine."""
+    """Return z at the start of an open spine: z at its first bend; for a straight spine, z turned with it."""
     bends = (
         cross(minus(spine[k + 1], spine[k]), minus(spine[k - 1], spine[k])) for k in range(1, len(spine) - 1)
     )

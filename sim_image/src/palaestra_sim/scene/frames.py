@@ -1,7 +1,8 @@
 """The frames of a world's nodes, each relative to the frame of its parent node.
 
 A frame has the `translation` and `rotation` that clients read and write. Only the frames of a robot with a
-body, of a dynamic solid, and of a joint's end point move by themselves. Only clients move all other frames.
+body, of a dynamic solid, and of a joint's end point move by themselves. All other frames move only when a
+client sets them.
 
 Clients see poses in the axes of the world file, where z or y points up. Shapes and physics use the axes of
 the *ground*, where z points up.
@@ -82,12 +83,12 @@ class Frame:
 
     @property
     def world_position(self) -> Vector:
-        """Return the position of its origin in the world, in meters."""
+        """The position of the frame's origin in the world, in meters."""
         return self.translation if self.parent is None else self.world_pose.position
 
     @property
     def axes(self) -> Matrix | None:
-        """The rotation from the axes of the world file to those of the ground; None if they are the same."""
+        """The rotation from the file's axes to the axes of the ground; None if both are the same."""
         return None if self.parent is None else self.parent.axes
 
     def to_ground(self, vector: Vector) -> Vector:
@@ -106,7 +107,7 @@ class Frame:
 
     @property
     def height_m(self) -> float:
-        """The height of its origin in the world."""
+        """The height of the frame's origin in the world, in meters."""
         return self.ground_pose.position[2]
 
     def chain(self) -> Iterator[Frame]:

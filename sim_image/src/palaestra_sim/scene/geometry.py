@@ -1,6 +1,7 @@
 """Poses in space, for responses to supervisor calls and for the frames of shapes.
 
-Rotations are 3 x 3 matrices as nine floats, row after row. The planar motion of the stub does not need them.
+Rotations are 3 x 3 matrices as nine floats, row after row. The planar motion of the stub does not need
+rotation matrices.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ _NEVER: Final = (math.inf, -math.inf)
 
 
 def first_hit(shape: Shape, origin: Vector, direction: Vector) -> float:
-    """Return the meters from `origin` along a unit vector to the shape; infinite if the ray misses it."""
+    """Return the meters from `origin` along a unit vector to the shape; infinite if the ray misses."""
     if shape.mesh is not None:
         return nearest_triangle(shape.mesh, origin, direction)
     enter, leave = _span(shape, origin, direction)
@@ -28,7 +28,7 @@ def first_hit(shape: Shape, origin: Vector, direction: Vector) -> float:
 
 
 def _span(shape: Shape, origin: Vector, direction: Vector) -> tuple[float, float]:
-    """Return the distances at which a line enters and leaves a convex shape; enter > leave if it misses."""
+    """Return the distances at which a line enters and leaves a convex shape; if it misses, enter > leave."""
     half = shape.size[0] / 2.0, shape.size[1] / 2.0, shape.size[2] / 2.0
     match shape.kind:
         case "ball":
@@ -68,7 +68,7 @@ def _in_slab(origin: float, direction: float, half: float) -> tuple[float, float
 
 
 def _in_ball(origin: Sequence[float], direction: Sequence[float], radius: float) -> tuple[float, float]:
-    """Return the two distances at which a line enters and leaves a ball, or a circle of the plane."""
+    """Return the two distances at which a line enters and leaves a ball, or, in two dimensions, a circle."""
     square = sum(part * part for part in direction)
     half_linear = sum(part * at for part, at in zip(direction, origin, strict=True))
     constant = sum(at * at for at in origin) - radius * radius

@@ -50,7 +50,7 @@ class ImageBuffer:
                 self.pixels[start : start + _BYTES] = bytes(new)
 
     def copy(self, x: int, y: int, width: int, height: int) -> ImageBuffer:
-        """Return the part of the image inside a rectangle; it may be smaller, or have no pixels."""
+        """Return the part of the image inside a rectangle; the part may be smaller, or have no pixels."""
         left, top = max(0, x), max(0, y)
         right, bottom = min(self.width, x + width), min(self.height, y + height)
         rows = (
@@ -75,7 +75,7 @@ class ImageBuffer:
 
 
 def on_background(picture: ImageBuffer, background: bytes | bytearray | memoryview) -> ImageBuffer:
-    """Return an opaque image: `picture` on a background of the same size, mixed by its alpha."""
+    """Return an opaque image: `picture` on a background of the same size, mixed by the alpha of `picture`."""
     behind = ImageBuffer(width=picture.width, height=picture.height, pixels=bytearray(background))
     for y in range(picture.height):
         for x in range(picture.width):

@@ -45,7 +45,7 @@ def read_joint(reading: NodeReader, node: SceneNode, *, forces: bool) -> Joint |
 
 
 def read_door(reading: NodeReader, node: SceneNode, parent: Frame | None) -> Link | None:
-    """Return the link of a door, still without shapes; None if the end of the joint has no physics."""
+    """Return the link of a door, without shapes yet; None if the end of the joint has no physics."""
     for end in node.nodes("endPoint"):
         if end.type_name == "Solid" and end.nodes("physics"):
             if parent is not None and parent.scale != 1.0:

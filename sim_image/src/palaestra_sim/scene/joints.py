@@ -39,11 +39,11 @@ class Joint:
     Attributes:
         axis: unit vector.
         anchor: a point on the axis of a hinge, in meters.
-        slides: whether it is a slider.
+        slides: whether the joint is a slider.
         start: the position in the file, in rad or m.
-        motor: the motor that moves it; None if only a client or a physics with forces moves it.
+        motor: the motor that moves the joint; None if only a client or a physics with forces moves the joint.
         stops: the lowest and the highest position; if both are equal, the joint has no stops.
-        rubbing: its resistance to motion.
+        rubbing: the joint's resistance to motion.
         position: the position of a joint without a motor, in rad or m.
         speed: the speed of a joint without a motor, in rad/s or m/s.
         brake: the damping by the brake of a joint without a motor, in N m s/rad.
@@ -86,7 +86,7 @@ class Joint:
             self.motor.angle_rad, self.motor.speed_rad_s = position, speed
 
     def halt(self) -> None:
-        """Stop its motion."""
+        """Stop the motion of the joint."""
         self.follow(self.now, 0.0)
 
     def put(self, position: float) -> None:

@@ -30,16 +30,16 @@ _LAMPS: Final = frozenset(
     )
 )
 _MOUNTAINS: Final = "mountains"
-_FROM_MOUNTAINS: Final = (0.55, -0.6, -1.0)  # east, north, up
-_OF_MOUNTAINS, _AMBIENT_OF_MOUNTAINS = 2.7, 1.0  # intensities
+_FROM_MOUNTAINS: Final = (0.55, -0.6, -1.0)  # direction of the light of "mountains": east, north, up
+_OF_MOUNTAINS, _AMBIENT_OF_MOUNTAINS = 2.7, 1.0  # intensities of the direct and the ambient light
 _EVERYWHERE: Final = (1.0, 0.0, 0.0)  # an attenuation that does not depend on the distance
-_FAR_M: Final = 1000.0  # the length of a ray to such a light in Webots
+_FAR_M: Final = 1000.0  # the length of a ray to a light without location, in Webots
 _LEAST: Final = 1e-300  # replaces a divisor of 0; Webots limits that quotient to the end of the lookup table
 _WIDEST_RAD: Final = 0.785398  # the default of SpotLight.cutOffAngle
 _BEAM_RAD: Final = 1.570796
 
 Lit = Callable[[Vector], bool]
-"""Gets the way from a sensor to a light, in meters in the axes of the world; returns whether it is free."""
+"""Gets the way from a sensor to a light, in meters, in the world's axes; returns whether the way is free."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +47,7 @@ class Light:
     """A light of the world.
 
     Attributes:
-        node: its node.
+        node: the node of the light.
         axes: the axes of the world that point east, north and up, 0 to 2.
     """
 
@@ -69,7 +69,7 @@ class Light:
         return white * dot(shares, _vector(self.node, "color", (1.0, 1.0, 1.0))) / 3.0
 
     def _white(self, at: Vector, normal: Vector) -> tuple[float, float, Vector]:
-        """Return the ambient and the direct irradiance of a white light, and the way to it in meters."""
+        """Return the ambient and the direct irradiance of a white light, and the way to it, in meters."""
         node = self.node
         if node.type_name == _BACKGROUND:
             way = _far(_opposite(self._from_mountains()))
@@ -118,7 +118,7 @@ def lights_in(root: SceneNode) -> Iterator[SceneNode]:
 
 
 def unknown_light(root: SceneNode) -> str | None:
-    """Return a description of a node whose light is not simulated, such as "a CeilingLight"; else None."""
+    """Return a description of a node whose light is not simulated, such as "a CeilingLight", or None."""
     for node in root.descendants():
         if node.type_name == _BACKGROUND and (node.text("texture") or _MOUNTAINS) != _MOUNTAINS:
             return f"a {_BACKGROUND} with the texture {node.text('texture')}"
@@ -128,7 +128,7 @@ def unknown_light(root: SceneNode) -> str | None:
 
 
 def _cosine(one: Vector, other: Vector) -> float:
-    """Return the cosine of the angle between two directions; 0 beyond a right angle."""
+    """Return the cosine of the angle between two directions; 0 if the angle is above 90 degrees."""
     length = math.hypot(*one) * math.hypot(*other)
     return max(0.0, dot(one, other) / length) if length else 0.0
 

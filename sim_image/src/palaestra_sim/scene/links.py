@@ -1,6 +1,6 @@
 """Links: parts that forces move on joints, and parts whose force on the robot is measured.
 
-A link consists of all parts on the end of one joint, except the parts on further joints. It is mounted on
+A link consists of all parts on the end of one joint, except the parts on further joints. A link is mounted on
 another link, on a robot, on a dynamic solid, or on a fixed object.
 """
 
@@ -22,11 +22,11 @@ class Link:
     """One link.
 
     Attributes:
-        node: its Solid.
-        place: its frame; for a link on a joint, the frame of the joint's end.
-        joint: the joint that moves it; None if it is fixed and the force on it is measured.
-        shapes: the shapes with which it touches other objects.
-        matter: the masses of its Solids.
+        node: the Solid of the link.
+        place: the frame of the link; for a link on a joint, the frame of the joint's end.
+        joint: the joint that moves the link; None if the link is fixed and the force on it is measured.
+        shapes: the shapes with which the link touches other objects.
+        matter: the masses of the link's Solids.
         force: the force in N on the object that carries the link, in the link's axes; set by the physics.
     """
 
@@ -39,7 +39,7 @@ class Link:
 
     @property
     def start(self) -> Pose:
-        """Its pose in the parent's frame, at the joint's position in the world file."""
+        """The pose of the link in the parent's frame, at the joint's position in the world file."""
         return self.place.start if isinstance(self.place, JointFrame) else self.place.pose
 
 

@@ -1,6 +1,6 @@
 """The masses of Solids, for a physics with masses.
 
-A Solid without a Physics node has no mass of its own. Source: Webots reference, Physics.
+A Solid without a Physics node has no mass. Source: Webots reference, Physics.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _FILLED: Final = {
     "box": 1.0,
     "cylinder": math.pi / 4.0,
     "ball": math.pi / 6.0,
-}  # share of the box around the shape
+}  # volume of a shape, as a share of the box around the shape
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -30,10 +30,10 @@ class MassProperties:
     """The mass of one Solid.
 
     Attributes:
-        place: its frame.
-        shapes: its boundingObject.
-        mass_kg: 0 if it has no Physics node, or neither a mass nor a shape.
-        center: the center of mass in its frame, in meters; None for the center of the shapes.
+        place: the frame of the Solid.
+        shapes: the shapes of the Solid's boundingObject.
+        mass_kg: the mass; 0 if the Solid has no Physics node, or if it has neither a mass nor a shape.
+        center: the center of mass in the Solid's frame, in meters; None for the center of the shapes.
         inertia: xx, yy, zz, xy, xz, yz about the center of mass in kg m2; None for the shapes' inertia.
     """
 

@@ -19,7 +19,7 @@ _PARALLEL: Final = 1e-12
 _THIN_M: Final = 1e-4  # a mesh that is thinner than this counts as flat
 _SHEET_M: Final = 1e-3
 
-_FEW_TRIANGLES: Final = 8  # up to this number, a ray tries all triangles
+_FEW_TRIANGLES: Final = 8  # a part with up to this number of triangles is not divided further
 _SLACK_M: Final = 1e-9  # tolerance for a ray along the side of a box
 
 Triangle = tuple[int, int, int]
@@ -161,7 +161,10 @@ def nearest_triangle(mesh: Mesh, origin: Vector, direction: Vector, *, front: bo
 
 
 def _to_triangle(origin: Vector, direction: Vector, corners: Corners, least: float) -> float:
-    """Return the meters to a triangle, as in Möller and Trumbore (1997); `volume` < 0 from behind."""
+    """Return the meters to a triangle, as in Möller and Trumbore (1997).
+
+    `volume` is negative if the ray meets the triangle from behind.
+    """
     a, b, c = corners
     first, second, apart = minus(b, a), minus(c, a), minus(origin, a)
     across = cross(direction, second)

@@ -2,12 +2,12 @@
 
 `wheel_kinematics` relates wheel speeds to the robot's motion. In Webots torque and friction limit the
 acceleration of a robot. Here three limits replace torque and friction: 10 m/s2 along x, 6 m/s2 along y, and
-20 rad/s2 about z. These limits are those of the Robotino 3's own controller (Webots,
+20 rad/s2 about z. These limits come from the Robotino 3's own controller (Webots,
 projects/robots/festo/robotino3/controllers/robotino3/base.c). The same factor slows all three axes, as in
 `base_accelerate` of that controller. A motor's own `acceleration` is an additional limit. The three limits do
 not apply to a robot without physics, whose wheel accelerations Webots itself limits (`Motor.kinematic`).
 
-Every simulator uses this speed, so a robot responds to the same commands in the same way in all of them.
+Every simulator uses this module, so a robot responds to the same commands in the same way in all simulators.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ class MobileBase:
 
     Args:
         wheels: the motors of the wheels.
-        drive: the kinematics of these wheels; None if they do not move the robot.
+        drive: the kinematics of these wheels; None if the wheels do not move the robot.
 
     Attributes:
-        drive: the kinematics of the wheels, or None, as passed.
-        vx, vy, omega: the speed of the robot in m/s and rad/s, in its own axes.
+        drive: the argument `drive`.
+        vx, vy, omega: the speed of the robot in m/s and rad/s, in the robot's own axes.
     """
 
     __slots__ = ("_kinematic", "_step_s", "_wheels", "drive", "omega", "vx", "vy")
@@ -52,7 +52,7 @@ class MobileBase:
         return motor in self._wheels
 
     def halt(self) -> None:
-        """Stop all motion, including that of the motors."""
+        """Stop all motion, including the motion of the motors."""
         self.vx = self.vy = self.omega = 0.0
         for wheel in self._wheels:
             wheel.halt()

@@ -1,4 +1,4 @@
-"""The motion of a frame in the world, from the motion of its robot and of the joints that carry it.
+"""The motion of a frame in the world, from the motion of its robot and of the joints that carry the frame.
 
 Velocities are in the axes of the world file, over the last basic step. A velocity is computed from the speeds
 of the body and the motors, not from the change of a pose. So a robot that a client moves to another position

@@ -14,18 +14,18 @@ import math
 from dataclasses import dataclass, replace
 from typing import Final
 
-_REACHED: Final = 1e-6  # rad or m: a joint without physics stops this close to its target, as in Webots
+_REACHED: Final = 1e-6  # a joint without physics stops this close to its target, in rad or m, as in Webots
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotorSpec:
-    """A motor as the world describes it. Angles in rad, velocities in rad/s, torque in N m.
+    """A motor as the world describes it; angles are in rad, velocities in rad/s, torques in N m.
 
-    Units of a linear motor: m, m/s, N. An `acceleration_rad_s2` of -1 is unlimited. Equal `min_rad` and
-    `max_rad` mean that commands have no limits. The shaft never passes the `stops`; equal `stops` mean that
-    the joint has no stops. `start_rad` is the position in the world file. `gains` are P, I and D of its
-    controller. `multiplier` scales the positions, velocities and torques that a client sets. `forces` is True
-    if the physics has forces.
+    The units of a linear motor are m, m/s and N. An `acceleration_rad_s2` of -1 means no limit. Equal
+    `min_rad` and `max_rad` mean that commands have no limits. The shaft never passes the `stops`; equal
+    `stops` mean that the joint has no stops. `start_rad` is the position in the world file. `gains` are P, I
+    and D of the motor's controller. `multiplier` scales the positions, velocities and torques that a client
+    sets. `forces` is True if the physics has forces.
     """
 
     name: str
@@ -45,18 +45,18 @@ class MotorSpec:
 class Motor:
     """One motor: its commands, and the speed of its shaft.
 
-    The names are those of a rotational motor; the angles of a linear motor are lengths in meters.
+    The names are for a rotational motor; the angles of a linear motor are lengths in meters.
 
     Attributes:
         speed_rad_s: the speed of the shaft.
         angle_rad: the angle of the shaft, since the start or the last reset.
         asked_rad, asked_velocity_rad_s: the commands as a client reads them back, before the multiplier.
-        gains: P, I and D of its controller.
-        kinematic: whether its joint has no physics. Then, as in Webots, the available torque limits the
-            acceleration, and the motor keeps the commanded velocity up to the target.
+        gains: P, I and D of the motor's controller.
+        kinematic: whether the joint of the motor has no physics. Then, as in Webots, the available torque
+            limits the acceleration, and the motor keeps the commanded velocity up to the target.
         changed: whether a command came since the physics last read the motor; the physics clears this flag.
-        damping: the damping of the joint, in N m s/rad, set by its brake; 0 without a brake.
-        forceful: whether the physics moves it by forces.
+        damping: the damping of the joint, in N m s/rad, set by the joint's brake; 0 without a brake.
+        forceful: whether the physics moves the motor's joint by forces.
         effort_nm: the torque that a client set instead of a position; None without such a command.
         feedback_nm: the torque that the motor applied in the last basic step.
     """
@@ -91,12 +91,12 @@ class Motor:
 
     @property
     def name(self) -> str:
-        """Its name in the world file."""
+        """The name of the motor in the world file."""
         return self.spec.name
 
     @property
     def model(self) -> str:
-        """The node's `model`."""
+        """The field `model` of the motor's node."""
         return self.spec.model
 
     def join(self, start_rad: float, stops: tuple[float, float]) -> None:
@@ -119,7 +119,7 @@ class Motor:
         self.changed = True
 
     def put(self, angle_rad: float) -> None:
-        """Set the shaft to an angle within the stops, which becomes the target."""
+        """Set the shaft to an angle, limited by the stops; this angle becomes the target."""
         low, high = self.spec.stops
         self.angle_rad = angle_rad if low == high else max(low, min(high, angle_rad))
         self.target_rad = self.asked_rad = self.angle_rad
@@ -162,7 +162,7 @@ class Motor:
         self.changed = True
 
     def set_acceleration(self, acceleration_rad_s2: float) -> None:
-        """Limit the acceleration; -1 is unlimited. NaN and other negative values are ignored."""
+        """Limit the acceleration; -1 means no limit. NaN and other negative values are ignored."""
         if acceleration_rad_s2 >= 0.0 or acceleration_rad_s2 == -1.0:
             self.acceleration_rad_s2 = acceleration_rad_s2
             self.changed = True
@@ -183,7 +183,8 @@ class Motor:
     def set_effort(self, torque_nm: float) -> None:
         """Apply a torque, times the multiplier, until the next position command. NaN is ignored.
 
-        The torque is clamped to the available torque. It has an effect only if the motor is `forceful`.
+        The torque is clamped to the available torque. The command has an effect only if the motor is
+        `forceful`.
         """
         if math.isnan(torque_nm):
             return
@@ -198,7 +199,7 @@ class Motor:
             self.changed = True
 
     def demand(self, step_s: float) -> float:
-        """Return the speed in rad/s that the motor demands in the next step; call this once for each step."""
+        """Return the speed in rad/s that the motor demands in the next step; call it once for each step."""
         if self.kinematic:
             return self._kinematic_speed(step_s)
         if not self.available_torque_nm:
@@ -242,7 +243,7 @@ class Motor:
         return math.copysign(min(abs(gap) / step_s, self._rate), gap)
 
     def _at_limit(self) -> bool:
-        """Return whether a position limit ends the endless motion of a joint without physics."""
+        """Return whether a position limit stops a motor without a finite target; for a kinematic motor."""
         low, high, velocity = self.spec.min_rad, self.spec.max_rad, self.velocity_rad_s
         if low == high:
             return False

@@ -27,9 +27,9 @@ class Movie:
     """A movie that a client requests.
 
     Attributes:
-        path: the path of its file, absolute or relative to the working directory of the simulator.
+        path: the path of the movie's file, absolute or relative to the working directory of the simulator.
         size: width and height in pixels.
-        quality: from 1 to 100.
+        quality: the quality of the video, from 1 to 100.
         acceleration: simulated seconds per second of the movie.
         frames_s: frames in a second of the movie; set when the recording starts.
     """
@@ -42,7 +42,7 @@ class Movie:
 
 
 class VideoWriter(Protocol):
-    """The file of a movie, which appears at its path when it is finished; to abandon it, drop this object."""
+    """The file of a movie; without a call of `finish`, no file is left."""
 
     def add(self, pixels: bytes | memoryview) -> None:
         """Add a frame: blue, green, red and alpha of each pixel.
@@ -65,7 +65,8 @@ class Movies:
     """Records the movies of one world, one at a time.
 
     Args:
-        view: returns a camera of that size at the current Viewpoint; None if the simulator does not render.
+        view: returns a camera of the movie's size at the current Viewpoint; None if the simulator does not
+            render.
         film: returns a writer for a movie; None if the simulator does not render.
         basic_step_ms: the basic step of the simulation.
 

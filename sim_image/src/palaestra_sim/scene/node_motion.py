@@ -74,8 +74,9 @@ class NodeMotion:
         Args:
             node: the node on which the force acts.
             force: the force in N.
-            relative: whether `force` is in the axes of the node, and not in those of the world.
-            offset: the point at which it acts, in meters in the node's frame; None for the center of mass.
+            relative: whether `force` is in the axes of the node, not in the axes of the world.
+            offset: the point at which the force acts, in meters in the node's frame; None for the center of
+                mass.
 
         Raises:
             UnsimulatedError: this physics has no forces, or the node has no frame.

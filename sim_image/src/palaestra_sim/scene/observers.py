@@ -12,7 +12,7 @@ from palaestra_sim.scene.radar_targets import echoes_of
 
 
 class OutlineObservers:
-    """The devices that `show` gives new outlines."""
+    """The devices to which `show` passes new outlines."""
 
     def __init__(self, devices: Iterable[object]) -> None:
         every = tuple(devices)

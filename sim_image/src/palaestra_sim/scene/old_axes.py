@@ -1,9 +1,9 @@
-"""Nodes of files from before R2022a, whose axes Webots converts when it loads them.
+"""Nodes of files from before R2022a, whose axes Webots converts when it loads the files.
 
 In these files robots looked along -z, cylinders stood along y, and many devices looked along other axes.
 Webots rotates these nodes, and the instances of its own PROTOs, whose files have the current axes. This
-module also rotates a RangeFinder, so that it looks in the direction that its author intended. Source:
-WbNodeUtilities::fixBackwardCompatibility of Webots.
+module also rotates a RangeFinder, so that it looks in the direction that the author of the world intended.
+Source: WbNodeUtilities::fixBackwardCompatibility of Webots.
 """
 
 from __future__ import annotations
@@ -26,19 +26,19 @@ def of_old_axes(node: SceneNode) -> bool:
 
 
 def standing(node: SceneNode, frame: Pose) -> Pose:
-    """Return the frame of a shape or a Track that stands along z; in an old file, along y."""
+    """Return the frame of a shape or Track, which stands along z, or along y in an old file."""
     if not of_old_axes(node) or any(around.stand_in for around in node.ancestors()):
         return frame
     return frame.after(_STANDING)
 
 
 def looking(node: SceneNode, place: Frame) -> Frame:
-    """Return the frame of a device that looks along x with z up; in an old file, along -z with y up."""
+    """Return the frame of a device, which looks along x with z up, or in an old file along -z with y up."""
     return _in_axes(node, place, _LOOKING)
 
 
 def pointing(node: SceneNode, place: Frame) -> Frame:
-    """Return the frame of a device that points along x with z up; in an old file, along z with y up."""
+    """Return the frame of a device, which points along x with z up, or in an old file along z with y up."""
     return _in_axes(node, place, _POINTING)
 
 

@@ -21,7 +21,8 @@ class Outlines:
     """The shapes and the floors of a world.
 
     Attributes:
-        shapes: the shapes of each Solid, robot and device with a boundingObject, but not of their parts.
+        shapes: the shapes of each Solid, robot and device with a boundingObject, but not the shapes of their
+            parts.
         floors_m: returns the current heights of the floors.
     """
 
@@ -45,7 +46,7 @@ def outlines_of(nodes: Collection[SceneNode], floors_m: Callable[[], tuple[float
 
 
 def robot_around(node: SceneNode) -> frozenset[SceneNode]:
-    """Return the nodes of the robot that carries a device; without a robot, those of the device."""
+    """Return the nodes of the robot that carries a device; without a robot, the nodes of the device."""
     robot = next((it for it in node.ancestors() if it.type_name == "Robot"), node)
     return frozenset((robot, *robot.descendants()))
 
@@ -62,6 +63,6 @@ def free_path(shapes: Iterable[Shape], start: Vector, end: Vector) -> float:
 
 
 def _entry(shape: Shape, start: Vector, direction: Vector) -> float:
-    """Return the distance in meters at which a ray meets a shape; infinite if it misses."""
+    """Return the distance in meters at which a ray meets a shape; infinite if the ray misses the shape."""
     frame = shape.pose.inverse
     return first_hit(shape, frame.carry(start), frame.turned(direction))

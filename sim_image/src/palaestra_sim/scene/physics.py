@@ -31,9 +31,10 @@ class Figure(Protocol):
     """A robot, whether it moves or not.
 
     Attributes:
-        place: its frame.
-        body: its body in this physics; None if it cannot drive and is not a free-standing obstacle.
-        powered: whether its motors have energy to turn.
+        place: the frame of the robot.
+        body: the robot's body in this physics; None if the robot cannot drive and is not a free-standing
+            obstacle.
+        powered: whether the robot's motors have energy to turn.
     """
 
     place: Frame
@@ -42,7 +43,7 @@ class Figure(Protocol):
 
     @property
     def links(self) -> Sequence[Link]:
-        """The parts on its joints that forces move, outer parts first."""
+        """The parts on the robot's joints that forces move, outer parts first."""
         ...
 
 
@@ -87,7 +88,7 @@ class Physics(Protocol):
     """The motion of one loaded world.
 
     Attributes:
-        abilities: the contents that it simulates.
+        abilities: the contents that this physics simulates.
     """
 
     abilities: Abilities
@@ -118,7 +119,7 @@ class Physics(Protocol):
         ...
 
     def reset(self) -> None:
-        """Discard the past: the motion then depends only on the state and the commands."""
+        """Discard what earlier steps left: the motion then depends only on the state and the commands."""
         ...
 
     def look(self, figure: Figure, beams: Sequence[Beam]) -> Cast:
@@ -126,7 +127,7 @@ class Physics(Protocol):
         ...
 
     def see(self, figure: Figure, beams: Sequence[Beam]) -> Cast:
-        """Return such a function for beams that stop at visible objects, but not at the robot itself."""
+        """Return a function as `look` does, for beams that stop at visible shapes, but not at the robot."""
         ...
 
     def push(self, target: Figure | DynamicSolid, push: Push) -> None:

@@ -18,11 +18,11 @@ _ENDLESS: Final = 100.0  # replaces -1, which stands for infinite friction in We
 
 @dataclass(frozen=True, slots=True)
 class Floor:
-    """A level Plane of a boundingObject; in Webots it is infinite.
+    """A level Plane of a boundingObject; Webots treats the Plane as infinite.
 
     Attributes:
-        place: the frame of its Solid.
-        local: its pose in that frame.
+        place: the frame of the Solid that has the boundingObject.
+        local: the pose of the Plane in that frame.
     """
 
     place: Frame
@@ -30,7 +30,7 @@ class Floor:
 
     @property
     def height_m(self) -> float:
-        """Its current height, in the axes of the ground."""
+        """The current height of the Plane in meters, in the axes of the ground."""
         return self.place.ground_pose.after(self.local).position[2]
 
 
@@ -55,7 +55,7 @@ class PhysicsSettings:
         return tuple(floor.height_m for floor in self.floors)
 
     def heights_m(self) -> tuple[float, ...]:
-        """Return the current heights of the floors; without a floor in the file, that of a floor at 0."""
+        """Return the current heights of the floors; 0 if the file has no floor."""
         return self.floors_m() or (0.0,)
 
     def friction(self, one: str, other: str) -> float:

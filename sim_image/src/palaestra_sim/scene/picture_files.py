@@ -33,7 +33,7 @@ def save(
         alpha: whether a PNG file stores the alpha values.
 
     Raises:
-        UnsimulatedError: the name is not that of a PNG or JPEG file, or Pillow is missing.
+        UnsimulatedError: the path does not have the suffix of a PNG or JPEG file, or Pillow is missing.
     """
     if not all(size):
         return False

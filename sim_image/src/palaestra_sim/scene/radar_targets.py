@@ -1,8 +1,9 @@
 """The targets of radars: Solids with a `radarCrossSection`, and the shapes that hide them. Pure geometry.
 
-The size of a Solid is that of the box around its shapes, along the axes of the radar. A Solid without shapes
-is a point. Parts outside the field of view do not count. Floors and the radar's own robot hide no target.
-Source: WbObjectDetection.cpp of Webots, which cuts boxes at the edge of the field of view by their corners.
+The size of a Solid is the size of the box around its shapes, along the axes of the radar. A Solid without
+shapes is a point. Parts outside the field of view do not count. Floors and the radar's own robot hide no
+target.
+Source: WbObjectDetection.cpp of Webots; Webots cuts boxes at the edge of the field of view by their corners.
 """
 
 from __future__ import annotations
@@ -31,10 +32,10 @@ class RadarTarget:
     """A Solid that radars can see.
 
     Attributes:
-        place: its frame.
-        cross_section_m2: its `radarCrossSection`.
-        shapes: its own shapes and those of the Solids inside it.
-        nodes: itself and all nodes inside it.
+        place: the frame of the Solid.
+        cross_section_m2: the Solid's `radarCrossSection`.
+        shapes: the shapes of the Solid and of all Solids inside it.
+        nodes: the Solid and all nodes inside it.
     """
 
     place: Frame
@@ -43,9 +44,10 @@ class RadarTarget:
     nodes: frozenset[SceneNode]
 
     def seen_from(self, radar: Pose, field_of_view_rad: tuple[float, float]) -> Bounds | None:
-        """Return the box around its part in a field of view (horizontal, vertical); None if it is outside.
+        """Return the box around the target's part in a field of view; None if the target is outside.
 
-        `radar` is in the axes of the ground.
+        `radar` is the pose of the radar in the axes of the ground. `field_of_view_rad` has the horizontal and
+        the vertical angle.
         """
         frame = radar.inverse
         boxes = [_box(frame.after(shape.pose), shape) for shape in self.shapes]
@@ -61,7 +63,7 @@ class RadarTargets:
 
     Attributes:
         targets: the targets, in the order of the world file.
-        shapes: all shapes that may hide them.
+        shapes: all shapes that may hide the targets.
     """
 
     targets: tuple[RadarTarget, ...] = ()
@@ -78,7 +80,7 @@ class RadarTargets:
 
 
 def echoes_of(nodes: Collection[SceneNode], outlines: Outlines) -> RadarTargets:
-    """Return the current radar targets among these nodes, which have these outlines."""
+    """Return the current radar targets among `nodes`, whose outlines are in `outlines`."""
     shapes = outlines.shapes
     targets = []
     for node in nodes:
@@ -113,13 +115,13 @@ def _cut(box: Bounds, across_rad: float, up_rad: float) -> Bounds | None:
         return None
     left, right, top, bottom = (cut or 0.0 for cut in cuts)
     if across_rad > math.pi / 2.0:
-        return box  # Webots does not cut such wide fields of view
+        return box  # Webots does not cut boxes at such a wide field of view
     middle = (x, y + (right - left) / 2.0, z + (bottom - top) / 2.0)
     return Bounds(middle, (depth, max(0.0, width - left - right), max(0.0, height - top - bottom)))
 
 
 def _beyond(ahead: float, aside: float, size: float, half_rad: float) -> Iterator[float | None]:
-    """Yield the length of a box beyond each edge, the positive edge first; None if the box is outside."""
+    """Yield the length of a box beyond each edge of the view, the positive edge first; None if outside."""
     for side in (-aside, aside):
         inside = math.sin(half_rad) * ahead + math.cos(half_rad) * side
         yield None if inside < -size / 2.0 else max(0.0, size / 2.0 - inside)

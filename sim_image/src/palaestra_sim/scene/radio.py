@@ -14,7 +14,7 @@ class Radio:
     """Delivers packets from the emitters of each robot to the receivers of all other robots.
 
     Args:
-        robots: for each robot, its devices.
+        robots: the devices of each robot.
     """
 
     def __init__(self, robots: Iterable[Iterable[object]]) -> None:

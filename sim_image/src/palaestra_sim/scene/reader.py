@@ -27,7 +27,7 @@ from palaestra_sim.scene.shapes import Shape, bounding_shapes
 from palaestra_sim.scene.tree.scene_tree import SceneTree
 from palaestra_sim.scene.validation import ELSEWHERE, LeaveOut, NodeReader
 
-# Only visible to people and cameras, or read elsewhere (WorldInfo).
+# These nodes are only visible to people and cameras, or other code reads them (WorldInfo).
 DRAWN_ONLY: Final = frozenset(
     (
         "Background",
@@ -63,8 +63,8 @@ class SceneContents:
         random_seed: WorldInfo.randomSeed.
         solids: the obstacles.
         loose: the dynamic solids, which move when they are pushed.
-        heavy: Solids with physics that are fixed to another Solid, with their own shapes.
-        doors: links that swing on joints without a robot.
+        heavy: Solids with physics that are fixed to another Solid, each with its own shapes.
+        doors: links on joints that do not belong to a robot.
         robots: the robots, in the order of the world file.
         top: the frame around the whole world; None if z of the world points up.
         surroundings: the settings of the whole world.
@@ -87,14 +87,14 @@ class SceneContents:
 
 
 def read_scene(tree: SceneTree, physics: Physics, leave_out: LeaveOut | None = None) -> SceneContents:
-    """Return the contents of a world, and give its nodes their frames; `physics` makes its robots' bodies.
+    """Return the contents of a world, and set the frames of its nodes; `physics` makes the robots' bodies.
 
     Raises:
         WorldError: the world has objects that cannot be simulated; the error lists all of them.
     """
     reading = NodeReader(tree.refused, leave_out, physics.abilities.name)
     scene = SceneContents(physics=physics)
-    # WorldInfo is read first, because devices read it too, wherever it is in the file.
+    # WorldInfo is read first, wherever it is in the file, because devices read it too.
     for node in tree.root.nodes():
         if node.type_name == "WorldInfo":
             reading.world_info = node
@@ -117,7 +117,7 @@ def read_scene(tree: SceneTree, physics: Physics, leave_out: LeaveOut | None = N
 
 
 def read_added(tree: SceneTree, nodes: Iterable[SceneNode], to: SceneContents) -> SceneContents:
-    """Return the contents that nodes inside one parent add to a world, and give these nodes their frames.
+    """Return the contents that nodes inside one parent add to a world, and set the frames of these nodes.
 
     `to` has the contents of the world so far.
 
@@ -213,7 +213,7 @@ def _is_loose(node: SceneNode) -> bool:
 
 
 def _is_fixed(node: SceneNode) -> bool:
-    """Return whether a Solid is inside another Solid without a joint; Webots makes these one body.
+    """Return whether a Solid is in another Solid without a joint between them; Webots makes both one body.
 
     If the outer Solid has no physics, both are fixed to the world.
     """

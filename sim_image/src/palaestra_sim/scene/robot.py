@@ -36,16 +36,18 @@ class Robot:
 
     Attributes:
         name: Robot.name in the world file.
-        motors: its motors, by device name.
-        sensors: its sensors, by device name; each has a `value` after a step.
-        samplers: functions that set the values of all sensors, in this order.
-        gauss: returns the next number of the robot's noise, from mean and deviation.
-        place: its frame.
-        body: its body in the physics; None if it cannot drive and is not a free-standing obstacle.
+        motors: the motors, by device name.
+        sensors: the sensors, by device name; each sensor has a `value` after a step.
+        samplers: the functions that set the values of all sensors; they are called in this order.
+        gauss: returns the next number of the robot's noise; its arguments are the mean and the standard
+            deviation.
+        place: the frame of the robot.
+        body: the robot's body in the physics; None if the robot cannot drive and is not a free-standing
+            obstacle.
         time_s: the time of the world since its start or its last reset.
-        powered: whether its motors have energy to turn.
-        links: the parts on its joints that forces move.
-        battery: its battery; its value is -1 if the robot has no battery.
+        powered: whether the motors have energy to turn.
+        links: the parts on the robot's joints that forces move.
+        battery: the battery; its value is -1 if the robot has no battery.
     """
 
     def __init__(self, parts: RobotParts, random_seed: int, physics: Physics, view: View) -> None:
@@ -95,7 +97,7 @@ class Robot:
         return self._physics.look(self, beams)
 
     def see(self, beams: Sequence[Beam]) -> Cast:
-        """Return such a function for beams that stop at visible objects; see `Carrier`."""
+        """Return a function as `look` does, for beams that stop at visible shapes; see `Carrier`."""
         return self._physics.see(self, beams)
 
     def reflect(self, beams: Sequence[Beam]) -> Callable[[], Sequence[Glance]]:
@@ -111,7 +113,7 @@ class Robot:
         return self._physics.eye(place, lens)
 
     def device(self, name: str) -> object | None:
-        """Return one of its devices; see `Carrier`."""
+        """Return one of the robot's devices; see `Carrier`."""
         _, device = self.parts.devices.rows.get(name, (None, None))
         return device
 
@@ -137,7 +139,7 @@ class Robot:
             trail.begin(step_s)
 
     def turn(self, step_s: float) -> None:
-        """Turn for one basic step the motors that neither drive a wheel nor move by forces."""
+        """Turn for one basic step the motors that neither drive a wheel nor are moved by forces."""
         if self.powered:
             for motor in self._stray_motors:
                 motor.advance(step_s)

@@ -66,7 +66,7 @@ class RobotFrame(Frame):
 
     @property
     def height_m(self) -> float:
-        """The height of the robot's origin in the world."""
+        """The height of the robot's origin in the world, in meters."""
         return self._height_m
 
 

@@ -25,13 +25,13 @@ _CLEARANCE_M: Final = 0.01  # a joint's end that is nearer than this to the floo
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parts:
-    """The parts of one robot, in its own frame, with all joints as in the world file.
+    """The parts of one robot, in the robot's own frame, with all joints as in the world file.
 
     Attributes:
         nodes: each node with its frame, outer nodes first.
         shapes: all shapes that can collide with something.
         wheels: the wheels that drive the robot.
-        steering: the motors that steer its wheels.
+        steering: the motors that steer the robot's wheels.
         measured: links whose force on the robot a sensor measures; they have no shapes and masses yet.
     """
 

@@ -54,7 +54,8 @@ _JOINTS: Final = frozenset(("HingeJoint", "SliderJoint"))
 _LOOSE_JOINTS: Final = frozenset(("BallJoint", "Hinge2Joint"))
 
 _NAME_IT: Final = "give it a unique name of letters, digits and underscores, or leave it out (--leave-out)"
-# Robots drive over lower steps. Real worlds need this, because their robots start slightly inside the floor.
+# Robots drive over steps that are lower than this. Real worlds need this tolerance, because their robots
+# start slightly inside the floor.
 _STEP_M: Final = 0.005
 
 
@@ -63,10 +64,11 @@ class RobotParts:
     """A robot of the world file.
 
     Attributes:
-        body: its body in the physics; None if it cannot drive and is not a free-standing obstacle.
+        body: the robot's body in the physics; None if the robot cannot drive and is not a free-standing
+            obstacle.
         standing: the outline of a robot that cannot move and does not stand upright on the floor.
-        arguments: its controllerArgs; None if its controller is not "ros".
-        links: the parts on its joints that forces move.
+        arguments: the robot's controllerArgs; None if the robot's controller is not "ros".
+        links: the parts on the robot's joints that forces move.
     """
 
     node: SceneNode
@@ -80,7 +82,7 @@ class RobotParts:
 
 
 def read_robot(reading: NodeReader, node: SceneNode, parent: Frame | None, physics: Physics) -> RobotParts:
-    """Return the robot at `node`, and give it and its parts their frames."""
+    """Return the robot at `node`, after setting the frames of the robot and of its parts."""
     return _RobotReader(reading, node, parent, physics).read()
 
 
@@ -92,7 +94,8 @@ class _RobotReader:
         self._parent = parent
         self._by_ros = node.text("controller") == "ros"
         self._devices = Devices()
-        # The robot's pose does not affect its parts, so they are read in its own frame, with z up.
+        # The robot's pose does not affect its parts, so the parts are read in the robot's own frame, with z
+        # up.
         self._y_points_up = self._has_y_up()
         self._frame = Frame(None, (0.0, 0.0, 0.0), to_axis_angle(Y_UP if self._y_points_up else IDENTITY))
         self._outline: list[Shape] = []  # shapes of parts that are fixed to the robot
@@ -213,7 +216,7 @@ class _RobotReader:
         return RobotFrame(self._parent, translation, rotation, body)
 
     def _on(self, place: Frame, shape: Shape) -> Shape:
-        """Return a shape that was read in the robot's own frame, with the robot's final frame."""
+        """Return a shape that was read in the robot's own frame, attached to the robot's final frame."""
         return replace(shape, place=place) if shape.place is self._frame else shape
 
     def _settle(self, place: Frame) -> None:
@@ -308,7 +311,7 @@ class _RobotReader:
         self._read_frame(end, inner)
 
     def _read_loose_joint(self, node: SceneNode, place: Frame) -> None:
-        """Read a joint without motors, such as that of a caster, as a fixed joint, with all parts on it."""
+        """Read a joint without motors, such as a caster's joint, as a fixed joint, with all parts on it."""
         if node.nodes("device") or node.nodes("device2") or node.nodes("device3"):
             self._lacks(node, f"{self._reading.simulator} simulates no {node.type_name} with devices")
         for end in node.nodes("endPoint"):

@@ -69,7 +69,7 @@ class States:
 
 
 def require_joint(node: SceneNode, index: int) -> JointFrame:
-    """Return the end of the joint at `node`; `index` counts its axes from 1.
+    """Return the end of the joint at `node`; `index` is the number of the joint's axis, counted from 1.
 
     Raises:
         UnsimulatedError: the node is not a joint with that axis.

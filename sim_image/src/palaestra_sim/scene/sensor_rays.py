@@ -11,7 +11,7 @@ from palaestra_sim.scene.geometry import Pose, Vector, turn
 Ray = tuple[float, float, float, float]
 
 _LEVEL: Final = 1e-3  # a smaller slope counts as level
-_STEEPEST: Final = 1e-6  # a vertical ray moves less than this along the floor for each meter
+_STEEPEST: Final = 1e-6  # a vertical ray moves less than this along the floor for each meter of its length
 
 
 class Beam(NamedTuple):
@@ -19,8 +19,8 @@ class Beam(NamedTuple):
 
     Attributes:
         ray: the ray as seen from above, in the robot's frame.
-        height_m: the height of its origin, in the robot's frame.
-        slope: the height that it gains for each meter along the floor.
+        height_m: the height of the ray's origin, in the robot's frame.
+        slope: the height that the ray gains for each meter along the floor.
         reach_m: the distance beyond which the sensor's value is constant.
     """
 

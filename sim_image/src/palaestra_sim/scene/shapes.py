@@ -16,9 +16,9 @@ from palaestra_sim.scene.validation import NodeReader
 
 _ALONG_AN_AXIS: Final = frozenset(("Capsule", "Cylinder"))
 _FLAT: Final = 0.9999  # cosine of the largest slope of a floor, less than a degree
-_ALONG: Final = 1.0 - 0.5e-6  # z of a unit vector that is vertical to within a milliradian
-_LEAST_M: Final = 1e-3  # minimum side of the box around points
-_ACROSS: Final = 1e-3  # z of a unit vector that is level to within a milliradian
+_ALONG: Final = 1.0 - 0.5e-6  # minimum z of a unit vector that is vertical to within a milliradian
+_LEAST_M: Final = 1e-3  # minimum length of a side of the box around points
+_ACROSS: Final = 1e-3  # maximum z of a unit vector that is level to within a milliradian
 
 Kind = Literal["box", "cylinder", "ball", "capsule", "mesh"]
 
@@ -41,12 +41,12 @@ class Shape:
 
     @property
     def pose(self) -> Pose:
-        """The shape's frame, in the axes of the ground."""
+        """The pose of the shape in the world, in the axes of the ground."""
         return self.place.ground_pose.after(self.local)
 
     @property
     def upright(self) -> bool:
-        """Whether one of its axes is vertical, so that its outline is the same at every height.
+        """Whether one of the shape's axes is vertical, so that its outline is the same at every height.
 
         A ball, a mesh and a shape that `lies` count as upright too. So does every shape of a stand-in,
         because stand-ins are approximations: a tilted stand-in has the outline of an upright stand-in.
@@ -61,17 +61,17 @@ class Shape:
 
     @property
     def lies(self) -> bool:
-        """Whether it is round about a level axis."""
+        """Whether the shape is round about a level axis."""
         return self.kind in {"cylinder", "capsule"} and abs(self.pose.rotation[8]) < _ACROSS
 
     def heights(self) -> tuple[float, float]:
-        """Return z of its lower and its upper end."""
+        """Return z of the shape's lower end and of its upper end."""
         pose = self.pose
         z, half = pose.position[2], self.half_along(pose.rotation, 2)
         return z - half, z + half
 
     def half_along(self, rotation: Matrix, axis: int) -> float:
-        """Return half its length along an axis, 0 to 2, of a frame in which the shape has that rotation."""
+        """Return half the shape's length along an axis, 0 to 2, of a frame in which it has that rotation."""
         if self.kind == "ball":
             return self.size[2] / 2.0
         if self.kind == "capsule":

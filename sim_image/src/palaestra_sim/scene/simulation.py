@@ -49,8 +49,8 @@ class Simulation:
         tree: the nodes of the world.
         robots: the robots, in the order of the world file.
         time_ms: simulated time; a reset sets it to 0.
-        mode: the mode, which the program that paces the steps reads; `step` works in every mode.
-        quit_status: the exit status that `quit` requested; None before.
+        mode: the mode, for the program that paces the steps; `step` works in every mode.
+        quit_status: the exit status that `quit` requested; None before that request.
         motion: the motion of robots and dynamic solids, for a supervisor.
         movies: recordings of the Viewpoint's view.
         appearance: the visible shapes and poses, for viewers.
@@ -106,8 +106,8 @@ class Simulation:
 
         Args:
             world: the parsed world.
-            physics: the physics that moves its robots.
-            name: the name of its file, in errors.
+            physics: the physics that moves the robots.
+            name: the name of the world file, in errors.
             mode: the mode at the start.
             descriptions: the descriptions of the types that are not base types.
             leave_out: the nodes that may be left out, if they cannot be simulated.
@@ -179,7 +179,7 @@ class Simulation:
         """Request a reset of the world within the next basic step.
 
         The reset restores the time, the poses of all solids and robots, the motors, and the noise with the
-        current seed in customData. It does not restore other fields that a client has written.
+        current seed in customData. The reset does not restore other fields that a client has written.
         """
         self._reset_asked = True
 
@@ -274,12 +274,13 @@ class Simulation:
         """Save the Viewpoint's view as a PNG or JPEG file; return whether that was possible.
 
         Raises:
-            UnsimulatedError: the name is not that of a PNG or JPEG file, or this machine cannot render.
+            UnsimulatedError: the path does not have the suffix of a PNG or JPEG file, or this machine cannot
+                render.
         """
         return save_view(self.tree.root, self.scene.physics, path, quality)
 
     def contact_points(self, node: SceneNode, *, descendants: bool) -> list[tuple[Vector, int]]:
-        """Return a node's contact points: positions in meters, each with the number of the touching node."""
+        """Return a node's contact points: positions in meters, each with the number of a touching node."""
         asked = {node, *node.descendants()} if descendants else {node}
         return [
             (point if self.scene.top is None else self.scene.top.from_ground(point), touching.number)
@@ -307,7 +308,7 @@ class Simulation:
         self._arrange()
 
     def set_joint_position(self, node: SceneNode, position: float, index: int) -> None:
-        """Set the position of a joint, in rad or m; its motor holds it there.
+        """Set the position of a joint, in rad or m; the joint's motor holds this position.
 
         Raises:
             UnsimulatedError: the node is not a joint with an axis `index`, counted from 1.

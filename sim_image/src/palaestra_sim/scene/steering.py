@@ -2,8 +2,8 @@
 
 The plain tires of a fixed axle permit two motions: ahead, and a turn about a point on the axle. A steered
 tire must not slide sideways, which fixes the ratio of these two motions. If the angles of two steered tires
-contradict each other, the drive uses the motion in which both slide least. The speeds of the driven tires
-then give the speed of the robot by least squares, whichever axle is driven.
+contradict each other, the drive uses the motion in which both tires slide least. The speeds of the driven
+tires then give the speed of the robot by least squares, whichever axle is driven.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ class Steer:
     """The joint that steers a tire: its axis is vertical in the robot's frame.
 
     Args:
-        motor: the motor of the joint; the motor has the joint's angle.
-        start_rad: the joint's angle when the tire has its pose of the world file.
+        motor: the motor of the joint; the motor's angle is the angle of the joint.
+        start_rad: the joint's angle at which the tire has the same pose as in the world file.
         pivot: x and y of the axis, in meters.
         up: 1 if a positive angle turns to the left, -1 if it turns to the right.
     """
@@ -50,9 +50,9 @@ class Tire:
     """A plain tire on the floor.
 
     Attributes:
-        wheel: its position, axle and radius in the world file.
-        driven: whether a motor turns it.
-        steer: the joint that steers it; None on a fixed axle.
+        wheel: the tire's position, axle and radius in the world file.
+        driven: whether a motor turns the tire.
+        steer: the joint that steers the tire; None on a fixed axle.
     """
 
     wheel: Wheel
@@ -93,7 +93,7 @@ class SteeredDrive:
         self.changed()
 
     def changed(self) -> bool:
-        """Read the current angles; return whether they differ from those of the previous call."""
+        """Read the current angles; return whether they have changed since the previous call."""
         angles = tuple(0.0 if it is None else it.angle_rad for it in self._steers)
         if angles == self._angles:
             return False

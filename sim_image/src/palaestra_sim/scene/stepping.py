@@ -1,4 +1,4 @@
-"""The steps that robots request; the world moves when each robot for which it waits has requested a step.
+"""The steps that robots request; the world moves when each robot with `synchronization` requested a step.
 
 A robot whose `synchronization` is TRUE holds the world until it requests a step. Steps of different lengths
 are served in parts: the world advances by the shortest remaining time. While the simulation is paused, all
@@ -18,11 +18,11 @@ Done = Callable[[bool], None]
 
 
 class Simulated(Protocol):
-    """The interface of a simulation for its steps; another simulator can implement it too.
+    """The interface of a simulation for its steps; another simulator can implement it, too.
 
     Attributes:
-        mode: the simulation mode; nothing moves in PAUSE.
-        quit_status: None until a client has requested the end; after that nothing moves.
+        mode: the simulation mode; in PAUSE the world does not move.
+        quit_status: None until a client has requested the end; after that the world does not move.
     """
 
     mode: Mode
@@ -62,9 +62,9 @@ class Stepping:
         self.advance()
 
     def ask(self, robot: Robot, duration_ms: int, done: Done) -> None:
-        """Request a step; when the world has advanced by `duration_ms`, maybe at once, call `done(True)`.
+        """Request a step; when the world has advanced by `duration_ms`, maybe immediately, call `done(True)`.
 
-        If the simulator ends before that, `done(False)` is called.
+        If the simulator ends before the world has advanced, `done(False)` is called.
         """
         self._wishes[robot] = _Wish(duration_ms, done)
         self.advance()

@@ -1,8 +1,8 @@
 """Textures for infra-red sensors: the share of light that a shape returns at the point that a ray meets.
 
 The red of the texture's pixel is multiplied by the red of the base color. The coordinates of a point in the
-texture are those that Webots computes for its rays. Source: WbShape::pickColor, pickUVCoordinate of WbBox,
-WbCylinder, WbPlane and WbSphere, WbImageTexture::pickColor and wren's TextureTransform of Webots.
+texture are computed as Webots computes them for its rays. Source: WbShape::pickColor, pickUVCoordinate of
+WbBox, WbCylinder, WbPlane and WbSphere, WbImageTexture::pickColor and wren's TextureTransform of Webots.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Coordinates = tuple[float, float]
 # A function that maps a point of a shape to its coordinates in a texture. The box around the shape reaches
 # from -1 to 1 on each axis.
 Mapped = Callable[[Vector], Coordinates]
-_END: Final = 1.0 - 1e-7  # share of half a cylinder's height; a point beyond it is on an end
+_END: Final = 1.0 - 1e-7  # share of half a cylinder's height; a point beyond it is on the upper or lower face
 _UP: Final = 2  # index of the z axis
 _PIXEL: Final = 4  # blue, green, red, alpha
 _RED: Final = 2
@@ -31,7 +31,7 @@ _RED: Final = 2
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Image:
-    """The red of a texture: a byte for each pixel, row by row from the top left.
+    """The red channel of a texture: a byte for each pixel, row by row from the top left.
 
     Attributes:
         repeats: whether the texture repeats along u and along v; otherwise the pixels of its edge continue.
@@ -55,10 +55,10 @@ class Paint:
     """The look of a textured shape in infra-red light.
 
     Attributes:
-        red: the red of its base color times its opacity, 0 to 1.
-        roughness: its roughness if `rough` is None.
-        image, rough, hollow: the textures of its color, its roughness, and its occlusion.
-        mapped: maps a point to coordinates in its textures.
+        red: the red of the shape's base color times its opacity, 0 to 1.
+        roughness: the roughness of the shape if `rough` is None.
+        image, rough, hollow: the textures of the shape's color, roughness and occlusion.
+        mapped: maps a point of the shape to coordinates in the textures.
     """
 
     red: float
@@ -88,8 +88,8 @@ class Textures:
     """The textures of a world; each image is read at its first use.
 
     Args:
-        read: returns the bytes of an image, from the file that refers to it and its address there; None if
-            the world has no images.
+        read: returns the bytes of an image; its arguments are the file that refers to the image, and the
+            address in that file. `read` is None if the world has no images.
     """
 
     def __init__(self, read: ReadFile | None = None) -> None:
@@ -102,10 +102,10 @@ class Textures:
         """Return the paint of a shape; None without a texture that infra-red sensors see.
 
         Args:
-            look: its Appearance or PBRAppearance.
-            geometry: the type of its geometry.
-            opaque: 1 minus its transparency.
-            tiles: how often its texture repeats along u and v, from the lower left.
+            look: the Appearance or PBRAppearance of the shape.
+            geometry: the type of the shape's geometry.
+            opaque: 1 minus the transparency of the shape.
+            tiles: how often the texture repeats along u and v, from the lower left.
         """
         mapped = MAPPINGS.get(geometry)
         node = texture_of(look)
@@ -210,7 +210,7 @@ MAPPINGS: Final[Mapping[str, Mapped]] = {
 
 
 def _transform(node: SceneNode | None) -> Callable[[Coordinates], Coordinates]:
-    """Return the function of a TextureTransform: move, turn and scale about its center, with v down."""
+    """Return the function of a TextureTransform: move, turn and scale about `center`, with v down."""
     if node is None:
         return lambda place: place
     move_u, move_v = _pair(node, "translation", (0.0, 0.0))

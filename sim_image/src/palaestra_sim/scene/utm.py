@@ -1,7 +1,7 @@
 """Latitude and longitude on the ellipsoid WGS84, and meters on the grid of a UTM zone. Pure.
 
 Source: J. P. Snyder, Map Projections: A Working Manual (USGS Professional Paper 1395), pages 60 to 64. Webots
-has the same formulas, in WbGps.cpp. Within a zone they are exact to a millimeter.
+has the same formulas, in WbGps.cpp. Within a zone the formulas are exact to a millimeter.
 """
 
 from __future__ import annotations
@@ -10,11 +10,11 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-_RADIUS_M: Final = 6378137.0  # at the equator
+_RADIUS_M: Final = 6378137.0  # radius of the ellipsoid at the equator
 _FLATTENING: Final = 1.0 / 298.257223563
 _SCALE: Final = 0.9996
 _FALSE_EAST_M: Final = 500_000.0
-_FALSE_NORTH_M: Final = 10_000_000.0  # south of the equator
+_FALSE_NORTH_M: Final = 10_000_000.0  # the coordinate "north" of the equator, for points south of the equator
 _E2: Final = _FLATTENING * (2.0 - _FLATTENING)
 _E4: Final = _E2 * _E2
 _E6: Final = _E4 * _E2

@@ -58,7 +58,8 @@ class NodeReader:
         world_info: the WorldInfo of the world; None if it is missing.
         system: one letter for the direction of each axis, such as "ENU" for east, north and up.
         top: the frame around the whole world; None if z of the world points up.
-        floors: the frame, and the pose in it, of each level Plane that faces up.
+        floors: for each level Plane that faces up, the frame that contains the Plane, and the Plane's pose in
+            this frame.
     """
 
     def __init__(
@@ -82,7 +83,7 @@ class NodeReader:
             self._refused.append(node.origin.error(fact, remedy))
 
     def lacks(self, node: SceneNode, fact: str, remedy: str = ELSEWHERE) -> None:
-        """Record that `node` is not supported; if the user leaves out its type, mark it as left out."""
+        """Record that `node` is not supported; if the user leaves out its type, mark the node as left out."""
         if not self.leave_out.covers(node):
             self.refuse(node, fact, remedy)
             return
@@ -94,7 +95,7 @@ class NodeReader:
         """Raise an error if a node was refused.
 
         Raises:
-            WorldError: it lists all mistakes and all refused nodes.
+            WorldError: the error lists all mistakes and all refused nodes.
         """
         if error := refusal(self._refused):
             raise error
@@ -140,7 +141,7 @@ class NodeReader:
         return of_instance(node, (x, y, z, angle_rad))
 
     def scale(self, node: SceneNode) -> Vector:
-        """Return `scale`, which a Transform has, and before R2023a a Solid; 1 1 1 if it is absent."""
+        """Return `scale`, a field of Transform and, before R2023a, of Solid; 1 1 1 if it is absent."""
         if node.stand_in:  # the shapes of the stand-in already include its PROTO's scale
             return 1.0, 1.0, 1.0
         x, y, z = self.vector(node, "scale", (1.0, 1.0, 1.0))

@@ -1,8 +1,8 @@
 """Cast rays against visible shapes, for infra-red DistanceSensors and for lidars without rendering. Pure.
 
-A ray stops at the first surface that faces it. It passes through the robot that carries the sensor, and
-through shapes that contain its origin. The formula of the reflection is from reference/distancesensor.md of
-Webots, "Infra-Red Sensors".
+A ray stops at the first surface that faces it. The ray passes through the robot that carries the sensor, and
+through shapes that contain the ray's origin. The formula of the reflection is from
+reference/distancesensor.md of Webots, "Infra-Red Sensors".
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ class VisualRays:
         return [glance for origin, rays in self._bundles for glance in _bundle(targets, pose, origin, rays)]
 
     def _refresh(self) -> None:
-        """Collect the shapes again if a shape was changed, or if a client moved one."""
+        """Collect the shapes again if a shape was changed, or if a client moved a shape."""
         seen = (self._view.changes, self._view.moves)
         if seen == self._seen:
             return
@@ -141,10 +141,10 @@ def _bundle(
     near = []
     for target in targets:
         offset = minus(target.center, start)
-        beyond = dot(offset, offset) - target.radius_m**2  # negative: the origin is inside its ball
+        beyond = dot(offset, offset) - target.radius_m**2  # negative: the origin is inside the target's ball
         if beyond < 0.0 or math.hypot(*offset) - target.radius_m < farthest:
             near.append((target, *offset, target.radius_m, beyond, target.inward.carry(start)))
-    near.sort(key=itemgetter(5))  # the nearest first, because it hides most
+    near.sort(key=itemgetter(5))  # the nearest target first, because it hides the most rays
     level = [row for row in near if abs(row[3]) <= row[0].half_height_m]
     for direction, reach_m in rays:
         dx, dy, dz = towards = turn(pose.rotation, direction)
@@ -161,7 +161,7 @@ def _bundle(
 
 
 def _radius(thing: Drawn) -> float:
-    """Return the radius of the ball around the origin of its frame that contains a shape."""
+    """Return the radius of a ball that contains a shape; its center is the origin of the shape's frame."""
     if thing.mesh is None:
         return math.hypot(*thing.size) / 2.0
     return max(math.dist((0.0, 0.0, 0.0), point) for point in _scaled(thing.mesh, thing.size))

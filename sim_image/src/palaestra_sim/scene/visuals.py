@@ -1,9 +1,9 @@
 """Convert the nodes of a world to visible shapes, each with a color and the frame that carries it.
 
 This module reads no textures and no mesh files, so a shape has one color. A stand-in, the placeholder of a
-PROTO, has the shapes of its boundingObject in the color of its first appearance. Its floor does not use
-`wallAppearance`, and its walls do not use `floorAppearance`. A scale stretches a shape along the shape's own
-axes, so right angles stay right angles.
+PROTO, has the shapes of its boundingObject in the color of its first appearance. The floor of a stand-in does
+not use `wallAppearance`, and the walls do not use `floorAppearance`. A scale stretches a shape along the
+shape's own axes, so right angles stay right angles.
 """
 
 from __future__ import annotations
@@ -67,17 +67,19 @@ class Drawn:
     """One visible shape.
 
     Attributes:
-        kind: "ball" is an ellipsoid if its sizes differ.
+        kind: the kind of shape; a "ball" whose three sizes differ is an ellipsoid.
         size: x, y, z in meters; for round shapes 2 r, 2 r, height; for a mesh, its scale factors.
         color: the color of the whole shape.
-        local: its pose in the frame `place`; the lengths are meters of the world, with all scales applied.
-        place: the frame that carries it; None for the world.
+        local: the pose of the shape in the frame `place`; the lengths are meters of the world, with all
+            scales applied.
+        place: the frame that carries the shape; None for the world.
         node: the Shape, or the stand-in.
         mesh: the triangles of the kind "mesh".
         roughness: the roughness of a PBRAppearance, 0 to 1.
-        geometry: the type of its geometry, such as "Plane".
-        look: its appearance; None without one, or if the texture's position on the shape is unknown.
-        textured: whether its appearance has a texture.
+        geometry: the type of the shape's geometry, such as "Plane".
+        look: the shape's appearance; None without an appearance, or if the texture's position on the shape is
+            unknown.
+        textured: whether the appearance has a texture.
         tiles: how often the texture repeats along x and y.
     """
 
@@ -105,8 +107,8 @@ class View:
 
     Attributes:
         root: the root of the world.
-        textures: the images of its textures.
-        changes: how often a node was added or removed, or its look changed.
+        textures: the images of the world's textures.
+        changes: how often a node was added or removed, or the look of a node changed.
         moves: how often a client or a reset moved a node; motion by motors and by the physics does not count.
     """
 
@@ -152,7 +154,7 @@ class View:
 
 
 class _Frame(NamedTuple):
-    """A frame relative to `place`, and the factors by which it scales its contents along its axes."""
+    """A frame relative to `place`, and the factors by which the frame scales its contents along its axes."""
 
     place: Frame | None = None
     pose: Pose = Pose()
@@ -209,7 +211,7 @@ def _stand_in(node: SceneNode, frame: _Frame) -> Iterator[Drawn]:
 
 
 def _stand_in_look(node: SceneNode, but: str) -> _Look:
-    """Return the look of a stand-in's first appearance outside of `but`; else a look without color."""
+    """Return the look of a stand-in's first appearance outside the field `but`; if none, an empty look."""
     looks = (
         item
         for name, content in node.fields.items()
@@ -241,7 +243,7 @@ class _Look(NamedTuple):
 
 
 def _geometry(node: SceneNode, frame: _Frame, look: _Look, owner: SceneNode) -> Iterator[Drawn]:
-    """Yield the shape of a geometry, or nothing if its numbers are invalid or another file contains it."""
+    """Yield the shape of a geometry, or nothing if its numbers are invalid or it is in another file."""
     solid = _solid(node, frame.pose)
     if solid is None or not look.color or look.color[3] <= 0.0:
         return
@@ -273,7 +275,7 @@ class _Solid(NamedTuple):
 
 
 def _solid(node: SceneNode, pose: Pose) -> _Solid | None:
-    """Return the solid of a geometry in a frame; None if it has no solid."""
+    """Return the solid of a geometry in a frame; None if the geometry has no solid."""
     diameter = 2.0 * _number(node, "radius", 1.0)
     match node.type_name:
         case "Box":
@@ -314,7 +316,7 @@ def _of_shape(shape: SceneNode) -> _Look:
 
 
 def _look(look: SceneNode) -> _Look:
-    """Return the look of an Appearance, of a PBRAppearance, or of a PROTO for one."""
+    """Return the look of an Appearance, of a PBRAppearance, or of an instance of an appearance PROTO."""
     return _plain_look(look)._replace(node=look, textured=texture_of(look) is not None)
 
 

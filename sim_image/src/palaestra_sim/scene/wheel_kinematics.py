@@ -7,13 +7,15 @@ or by least squares. So wheels need no names, and pairs and rows of wheels need 
 
 - If the grips have different directions, the wheels determine the motion in all directions (omni, mecanum).
 - If all grips are parallel, only plain tires resist a motion across the grips. The tires slide least if the
-  robot turns about their middle, so this point has no speed across the grips (differential, skid-steer).
+  robot turns about the center of all tires. So the model gives this center no speed across the grips
+  (differential, skid-steer).
 
 Two plain tires with different axles would block each other. Some worlds contain such tires nevertheless, as
-models of omnidirectional wheels: a low friction along the axle replaces the rollers. So the tires slide here
-too.
+models of omnidirectional wheels: a low friction along the axle replaces the rollers. So tires slide in this
+model too.
 
-A skid-steer robot turns here as its geometry says. On a real floor its tires slip, and it turns more slowly.
+In this model, a skid-steer robot turns as fast as its geometry determines. On a real floor the tires slip,
+and the robot turns more slowly.
 """
 
 from __future__ import annotations
@@ -30,7 +32,7 @@ Rows = tuple[Twist, Twist, Twist]
 _PARALLEL: Final = 0.05  # sine of the largest angle, 3 degrees, between grips that count as parallel
 _LEAST_GAIN: Final = 0.05  # minimum speed along the grip, as a fraction of the wheel's rim speed
 _LEAST_VOLUME: Final = 1e-3  # normalized determinant: 1 for orthogonal equations, 0 for dependent equations
-_LEAST_ARM_M: Final = 1e-3  # if the longest arm is shorter than this, the wheels do not turn the robot
+_LEAST_ARM_M: Final = 1e-3  # wheels whose longest lever arm is shorter do not turn the robot
 _THREE: Final = 3
 _ROUNDED: Final = 1e-3  # tolerance in m and in rad, because files round the positions of wheels
 _K: Final = math.sqrt(0.75)
@@ -44,7 +46,7 @@ class Wheel:
     """A driven wheel on the floor, in the robot's frame.
 
     Attributes:
-        x_m, y_m: the position of its hub.
+        x_m, y_m: the position of the hub.
         axle: the axis about which a positive speed turns the wheel.
         radius_m: the distance from the hub to the floor.
         roller: the axis of the roller that touches the floor; None for a plain tire.
@@ -80,7 +82,7 @@ class Drive:
 
     Attributes:
         to_twist: one row per wheel: the vx, vy and omega of the robot's origin for 1 rad/s of this wheel.
-        to_speeds: one row per wheel: its speed in rad/s for a vx, a vy and an omega of 1.
+        to_speeds: one row per wheel: the wheel's speed in rad/s for a vx, a vy and an omega of 1.
         freedoms: 3 if the robot can move in any direction, 2 if it rolls ahead and turns.
     """
 
@@ -111,7 +113,7 @@ class Ring(Drive):
     """Three omnidirectional wheels around the middle, in closed form, which keeps zeros exact.
 
     Source: Webots, projects/robots/festo/robotino3/controllers/robotino3/base.c. In that file the first wheel
-    is at the rear. The rotation by `c`, `s` turns its frame into the robot's frame.
+    is at the rear. The rotation by `c`, `s` turns the frame of that file into the robot's frame.
     """
 
     radius_m: float
@@ -163,7 +165,7 @@ def _difference(one: Wheel, other: Wheel) -> float:
 
 
 def find_drive(wheels: Sequence[Wheel]) -> Drive | None:
-    """Return the drive of a robot with these wheels; None if they cannot steer it."""
+    """Return the drive of a robot with these wheels; None if the wheels cannot steer it."""
     if not wheels or not all(wheel.plausible for wheel in wheels):
         return None
     if ring := _ring(wheels):
@@ -193,7 +195,7 @@ def find_drive(wheels: Sequence[Wheel]) -> Drive | None:
 
 
 class _Hold(NamedTuple):
-    """The point and direction in which the floor holds a wheel, and the meters that it rolls for 1 rad."""
+    """The point and direction in which the floor holds a wheel, and the distance in m for 1 rad."""
 
     x: float
     y: float
@@ -235,7 +237,7 @@ def _two_directions(forward: Direction, arms: Sequence[float]) -> list[Twist]:
 
 
 def _any_direction(holds: Sequence[_Hold], arms: Sequence[float]) -> list[Twist]:
-    """Return the motion for 1 m/s of each hold; an empty list if they do not determine the motion.
+    """Return the motion for 1 m/s of each hold; an empty list if the holds do not determine it.
 
     The rotation is scaled by the longest arm, so that all three unknowns are speeds of similar size.
     """
@@ -261,7 +263,10 @@ def _middle(wheels: Sequence[Wheel]) -> Direction:
 
 
 def _pivot(wheels: Sequence[Wheel], forward: Direction, middle: Direction) -> Direction:
-    """Return the point without lateral speed: the middle of all wheels, moved level with the plain tires."""
+    """Return the point without lateral speed.
+
+    It is the middle of all wheels, moved along `forward` until it is level with the plain tires.
+    """
     plain = [wheel for wheel in wheels if wheel.roller is None]
     if not plain:
         return middle
@@ -271,7 +276,7 @@ def _pivot(wheels: Sequence[Wheel], forward: Direction, middle: Direction) -> Di
 
 
 def _at_origin(row: Twist, center: Direction, gain_m: float) -> Twist:
-    """Return the motion of the origin for 1 rad/s of a wheel, from that for 1 m/s of its hold at `center`."""
+    """Return the motion of the origin for 1 rad/s of a wheel; `row` is for 1 m/s of its hold at `center`."""
     vx, vy, omega = row
     return (vx + omega * center[1]) * gain_m, (vy - omega * center[0]) * gain_m, omega * gain_m
 

@@ -21,8 +21,9 @@ _VERTICAL: Final = 0.999  # cosine of the largest slope, 2.6 degrees, of an axis
 def read_rolling(
     reading: NodeReader, joint: Joint, place: Frame, shapes: Sequence[Shape], end: SceneNode
 ) -> Rolling | None:
-    """Return the end of a joint as a wheel; None if it is not round, or on a motor that does not steer it.
+    """Return the end of a joint as a wheel, or None if the end cannot be a wheel.
 
+    The end cannot be a wheel if it has no round shape, or if the motor of an outer joint does not steer it.
     `place` is the frame that contains the joint, and `shapes` are the shapes of the end.
     """
     round_ones = [shape for shape in shapes if shape.kind not in _FLAT]

@@ -28,10 +28,10 @@ class Rolling:
 
     Attributes:
         anchor: a point on the axle; for a track, the track's origin.
-        shape: the round end; for a track, its lowest shape.
+        shape: the round end; for a track, the lowest shape of the track.
         roller: the axis of the roller that touches the floor; None for a plain tire or a belt.
-        belt: whether it is a track.
-        steer: the joint that steers it; None on a fixed axle.
+        belt: whether the part is a track.
+        steer: the joint that steers the wheel; None on a fixed axle.
     """
 
     axle: Vector
@@ -43,12 +43,12 @@ class Rolling:
 
     @property
     def bottom(self) -> float:
-        """Z of its lower end."""
+        """Z of the lower end of the shape."""
         return self.shape.heights()[0] if self.belt else self.shape.pose.position[2] - self.radius
 
     @property
     def top(self) -> float:
-        """Z of its upper end."""
+        """Z of the upper end of the shape."""
         return self.bottom + 2.0 * self.radius
 
     @property
@@ -59,12 +59,12 @@ class Rolling:
 
     @property
     def turns_level(self) -> bool:
-        """Whether it turns about a level axle through its center."""
+        """Whether the end turns about a level axle through its center."""
         fits = abs(self.axle[2]) < _LEVEL and self.radius > 0.0
         return fits and (self.belt or self._turns_about_its_center())
 
     def wheel(self) -> Wheel:
-        """Return it as a wheel on the floor."""
+        """Return the hinge or track as a wheel on the floor."""
         x, y, _ = self.anchor if self.belt else self.shape.pose.position
         return Wheel(
             x_m=x,
@@ -89,7 +89,7 @@ class Driven(Rolling):
     motor: Motor
 
     def may_drive(self) -> bool:
-        """Return whether it turns without stops about a level axle through its center."""
+        """Return whether the end turns without stops about a level axle through its center."""
         stops = self.motor.spec.stops
         return stops[0] == stops[1] and self.turns_level
 

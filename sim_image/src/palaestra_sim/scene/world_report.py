@@ -21,7 +21,7 @@ from palaestra_sim.scene.tree.scene_tree import SceneTree
 from palaestra_sim.world.mjcf import is_mjcf
 
 _ROLLS_AND_TURNS: Final = 2
-_MOST_NAMES: Final = 8  # names of devices in one line
+_MOST_NAMES: Final = 8  # maximum number of device names in one line
 _OF_BODIES: Final = frozenset(("Accelerometer", "Gyro"))
 
 
@@ -55,7 +55,7 @@ def summary(simulation: Described, *, chosen: bool = False) -> Iterator[str]:
     """Yield lines about robots, stand-ins, and all nodes that were left out.
 
     By default, the world was read without any unsupported node, so that the report covers all other nodes. If
-    `chosen`, the world was read without the nodes that the user has chosen to leave out.
+    `chosen` is True, the world was read without the nodes that the user has chosen to leave out.
     """
     for robot in simulation.robots:
         yield f'robot "{robot.name}": {", ".join(_of_robot(robot))}'
@@ -103,7 +103,7 @@ def silent_devices(robots: Iterable[Robot]) -> str:
 
 
 def differences(simulation: Described) -> Iterator[str]:
-    """Yield the differences of this world's devices and obstacles from Webots."""
+    """Yield the differences from Webots for the devices and obstacles of this world."""
     robots = [robot.parts for robot in simulation.robots if robot.parts.arguments is not None]
     devices = [row for robot in robots for row in robot.devices.rows.values()]
     types = Counter(it.type for _, it in devices if isinstance(it, DistanceSensor))

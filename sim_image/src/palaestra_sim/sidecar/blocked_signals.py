@@ -9,6 +9,6 @@ TAKEN = ENDS | {signal.SIGCHLD}
 def hold_back() -> None:
     """Block the signals, so that they stay pending until a thread receives them.
 
-    Call this before any other thread starts, because new threads inherit the blocked signals.
+    Call this function before any other thread starts, because new threads inherit the blocked signals.
     """
     signal.pthread_sigmask(signal.SIG_BLOCK, TAKEN)

@@ -1,6 +1,7 @@
 """The command line of the sidecar.
 
-It checks the options and the world, opens the two ports, logs their addresses, and runs the simulators.
+The program checks the options and the world, opens the two ports, logs their addresses, and runs the
+simulators.
 """
 
 import argparse
@@ -40,7 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 @contextmanager
 def work_folder(given: argparse.Namespace) -> Iterator[None]:
-    """Set `given.work` to a temporary folder for the block, if a folder is needed and --work names none.
+    """Set `given.work` to a temporary folder for the block, if a folder is needed and --work is not given.
 
     The generated world of --suffix needs a folder, and so does the socket for viewers. The sidecar removes
     the folder itself, because its parent process may be killed.
@@ -145,7 +146,7 @@ def log_to_stdout() -> None:
 
 
 def _world(given: argparse.Namespace, slot: str) -> Path:
-    """Return the world to run: the given one, or, with --job or --suffix, its copy with other ROS names."""
+    """Return the world to run: the given world, or, with --job or --suffix, a copy with other ROS names."""
     if given.job is None and not given.suffix:
         return Path(given.world).absolute()
     if given.work is None:

@@ -11,7 +11,7 @@ from pathlib import Path
 from palaestra_sim.errors import SidecarError
 from palaestra_sim.sidecar.process import CommandLine
 
-WORLD = "{world}"  # in the arguments of a program, stands for the path of the world
+WORLD = "{world}"  # represents the path of the world in the arguments of a program
 _NOT_ROOT = "palaestra"
 _MESA_THREADS = "LP_NUM_THREADS"
 
@@ -98,7 +98,8 @@ def _for_mujoco(environment: Mapping[str, str]) -> dict[str, str]:
 def _for_webots(environment: Mapping[str, str]) -> dict[str, str]:
     """Return the environment variables for Webots.
 
-    Webots needs USER, which containers often lack. The other variable prevents files next to the world.
+    Webots needs USER, which containers often lack. With the other variable, Webots writes no files next to
+    the world.
     """
     return {
         "USER": environment.get("USER", _NOT_ROOT),

@@ -10,9 +10,9 @@ _MOST_BYTES = 2**16
 
 
 def read_left_out(file: Path) -> tuple[str, ...]:
-    """Return the lines of the file without empty ones; () if the file cannot be read."""
+    """Return the non-empty lines of the file; () if the file cannot be read."""
     try:
-        if not file.is_file():  # if it is a pipe, to open it would block
+        if not file.is_file():  # opening a pipe would block
             return ()
         with file.open("rb") as opened:
             text = opened.read(_MOST_BYTES).decode("utf-8", "replace")

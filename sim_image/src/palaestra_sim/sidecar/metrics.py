@@ -23,7 +23,7 @@ def registry(simulators: Sequence[SupervisedSimulator]) -> CollectorRegistry:
 
 
 class _Simulators(Collector):
-    """Creates the metrics of the simulators; each series exists from the first scrape, even if it is 0."""
+    """Creates the metrics of the simulators; each series exists from the first scrape, even at 0."""
 
     def __init__(self, simulators: Sequence[SupervisedSimulator]) -> None:
         self._simulators = dict(zip(SLOTS, simulators, strict=False))
@@ -36,7 +36,7 @@ class _Simulators(Collector):
     def _values(self) -> Mapping[Family, Values]:
         them = self._simulators.items()
         used = {slot: simulator.usage() for slot, simulator in them}
-        states = {slot: simulator.state for slot, simulator in them}  # one read, because a state may change
+        states = {slot: simulator.state for slot, simulator in them}  # read once, because states change
         return {
             metric_definitions.UP: {(slot,): state.pid is not None for slot, state in states.items()},
             metric_definitions.STATES: {

@@ -1,8 +1,8 @@
 """Write lines of the simulator and of the sidecar to standard output.
 
 Each line is one write, and is short enough that a write to a pipe is atomic. So the lines of several writers
-do not mix, although the writers use no lock. If a simulator prints faster than the container's log reads, the
-simulator has to wait, because the sidecar buffers only one line.
+do not mix, although the writers use no lock. If a simulator prints faster than the container runtime reads,
+the simulator has to wait, because the sidecar buffers only one line.
 """
 
 import logging
@@ -12,7 +12,7 @@ import select
 from palaestra_protocol.masking import masked
 
 STDOUT = 1
-MOST_LINE = select.PIPE_BUF  # 4096: the most that Linux writes to a pipe atomically
+MOST_LINE = select.PIPE_BUF  # 4096: the maximum number of bytes that Linux writes to a pipe atomically
 _CHUNK = 65536
 
 

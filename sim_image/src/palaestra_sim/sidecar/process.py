@@ -169,7 +169,8 @@ def _spawn(command: CommandLine, descriptors: Mapping[int, int]) -> int:
 
     Args:
         command: the command line of the simulator.
-        descriptors: for each descriptor of the reaper, the descriptor of this process that becomes it.
+        descriptors: maps each descriptor of the reaper to the descriptor of this process that the reaper
+            inherits as that number.
     """
     with _reapers_lock:
         pid = os.posix_spawn(
@@ -202,7 +203,7 @@ def _watch(reaper_pid: int, reports: int, reader: threading.Thread, passage: Pas
 
 
 def _end_orphans() -> None:
-    """Kill the descendants of a reaper that was itself killed; they have become children of this process."""
+    """Kill the descendants of a killed reaper; these descendants are now children of this process."""
     while orphans := _kill_orphans():
         for pid in orphans:
             with contextlib.suppress(ChildProcessError):  # the signal thread has reaped the orphan

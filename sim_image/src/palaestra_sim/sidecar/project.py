@@ -3,8 +3,8 @@
 Webots uses the parent of a world's folder as the project, and searches it for `controllers/<name>/`, PROTOs
 and plugins. If a controller is missing, Webots only prints a warning and starts `<generic>`. So the project
 of the generated world has links to all files and folders next to the source world, and next to the source
-world's folder. If the world names files above its project, the project has folders up to these files, with
-links in each folder.
+world's folder. If the source world names files above its project, the new project has folders up to these
+files, with links in each folder.
 
 A world from a ConfigMap has no project. The files next to its folder do not belong to the world, so they are
 not linked.
@@ -44,10 +44,10 @@ def lay_out(world: Path, project: Path, root: Path, *, linked: bool) -> Path:
     Args:
         world: the absolute path of the source world.
         project: the absolute path of the project to make.
-        root: the absolute path of the outermost source folder. For each folder from `root` to that of
+        root: the absolute path of the outermost source folder. For each folder from `root` to the folder of
             `world`, the project gets a folder.
-        linked: whether to link everything next to `world`, and next to each folder from it up to `root`, at
-            the same relative path. Links of an earlier start are renewed.
+        linked: whether to link every other entry of the world's folder, and of each folder above it up to and
+            including `root`, at the same relative path. Links of an earlier start are renewed.
 
     Raises:
         SidecarError: `project` is the project of `world` itself, or a folder cannot be read.

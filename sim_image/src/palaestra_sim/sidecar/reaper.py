@@ -10,12 +10,12 @@ standard input of the reaper is a pipe from the sidecar; its descriptor 3 is a p
          exit STATUS   the first process ended with this wait status, and all of its descendants have ended
 
 The reaper is a subreaper: if a descendant loses its parent, the descendant becomes a child of the reaper.
-That holds even after `setsid`, a double fork or a change of environment. A process group, a parent-death
-signal or a marker in the environment would lose such a process.
+The reaper gets this descendant even after `setsid`, a double fork or a change of environment. A process
+group, a parent-death signal or a marker in the environment would lose such a process.
 
-To end the simulator, the reaper kills its children until it has no more. When a killed process ends, the
-kernel first makes its children those of the reaper (exit_notify). Then the kernel sends SIGCHLD, at which the
-reaper searches for children again. So the reaper needs no timer.
+To end the simulator, the reaper kills its children until it has no more children. When a killed process ends,
+the kernel first makes the children of this process children of the reaper (exit_notify). Then the kernel
+sends SIGCHLD, at which the reaper searches for children again. So the reaper needs no timer.
 
 The sidecar starts this file directly, so it imports only the standard library.
 """
@@ -50,7 +50,7 @@ def adopt_orphans() -> None:
 
 
 def children(parents: set[int]) -> set[int]:
-    """Return the IDs of the processes whose parent is one of `parents`; this reads all of /proc once."""
+    """Read all of /proc once; return the IDs of the processes whose parent is one of `parents`."""
     found = set()
     for name in os.listdir("/proc"):
         if name.isdigit():

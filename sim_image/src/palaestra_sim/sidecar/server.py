@@ -2,7 +2,8 @@
 
 The control port is for the trainer in the same pod. It has no authentication, so it listens on loopback only.
 The module `simulator` decides whether the simulator's state allows a request. All clients that can reach the
-pod can use the health port, so its requests only read. Both ports have the routes for viewers (`viewing`).
+pod can use the health port, so this port has only requests that read. Both ports have the routes for viewers
+(`viewing`).
 """
 
 from collections.abc import Callable, Sequence

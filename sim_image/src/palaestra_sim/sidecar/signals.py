@@ -24,7 +24,7 @@ def take(shut_down: Callable[[], None]) -> None:
     """From now on, reap children and handle SIGTERM and SIGINT, in a separate thread.
 
     The thread calls `shut_down` at the first SIGTERM or SIGINT. From now on, orphaned descendants become
-    children of this process, even if it is not process 1.
+    children of this process, even if this process is not process 1.
     """
     adopt_orphans()
     threading.Thread(target=_take, args=(shut_down,), name="signals", daemon=True).start()

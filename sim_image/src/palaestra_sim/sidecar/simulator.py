@@ -2,7 +2,7 @@
 
 Requests, reports of the process, the deadline of a stop, and the shutdown of the container become messages in
 one queue. One thread handles the messages in order, so no lock is needed. Other threads may read `state`; it
-is an immutable value, which the owner replaces as a whole.
+is an immutable value, and the owner replaces the whole value.
 """
 
 import logging
@@ -58,7 +58,7 @@ class SupervisedSimulator:
     Args:
         command: the command line that starts the simulator.
         state: the state before the first start.
-        left_out: the file in which the simulator reports the nodes that it leaves out; None if it has no such
+        left_out: the file in which the simulator reports the nodes that it leaves out; None without such a
             file.
         viewing: see Attributes; None if the simulator has no socket for viewers.
         clock: returns seconds, from any origin.
@@ -200,7 +200,7 @@ class SupervisedSimulator:
         return self._after(message.ended or Ended(), state, expected=True)
 
     def _after(self, ended: Ended, state: SimulatorState, *, expected: bool) -> SimulatorState:
-        """Close the process that ended; return the state with its last exit."""
+        """Close the pipe to the reaper of the ended process; return the state with the last exit."""
         if self._process is not None:
             self._process.close()
         self._process = None

@@ -24,7 +24,7 @@ from palaestra_protocol.scene import MOST_SCENE_BYTES, MOST_STATE_BYTES
 _LENGTH: Final = struct.Struct(">I")
 _STATE_S: Final = 1.0 / 30.0
 _PICTURE_S: Final = 0.2
-_SCENE_S: Final = 1.0  # long, because a scene may be large and seldom changes within an episode
+_SCENE_S: Final = 1.0  # longer than _STATE_S, because a scene may be large and seldom changes
 _DEADLINE_S: Final = 2.0
 
 
@@ -77,7 +77,7 @@ class Viewing:
         return self._read(self._state)
 
     def camera(self) -> bytes:
-        """Return the newest picture of a camera as JSON, at most a fifth of a second old; null without one.
+        """Return the newest picture of a camera as JSON, at most 0.2 s old; null if no picture was sent.
 
         Raises:
             NothingToSee, SimulatorSilent
@@ -92,7 +92,7 @@ class Viewing:
     def _read(self, newest: _Newest) -> bytes:
         if self._reason:
             raise NothingToSee(self._reason)
-        with self._lock:  # other threads wait here, and then return the same response
+        with self._lock:  # other threads wait here for the lock, and then return the same response
             now = self._clock()
             if now >= newest.due:
                 newest.content = self._link.ask(newest.request, newest.most_bytes)
@@ -112,7 +112,7 @@ class _Newest:
 
 
 class _Link:
-    """A connection to the simulator's socket; the first request opens it, and so does one after a failure."""
+    """A connection to the simulator's socket; a request opens it if it is not open."""
 
     def __init__(self, path: Path) -> None:
         self._path = path

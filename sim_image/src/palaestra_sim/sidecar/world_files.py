@@ -21,7 +21,7 @@ _PROJECT = "project"
 
 
 def located(world: str) -> Path:
-    """Return the path of a world: the file `world`, or the shipped world of that name if it is missing."""
+    """Return the path of a world: the file `world`; if it is missing, the shipped world of that name."""
     path = Path(world)
     shipped = builtin_path(world) if path.name == world and not path.exists() else None
     return shipped or path
@@ -51,8 +51,9 @@ def named(
     """Generate this simulator's world from `world`, write it into the folder `work`, and return its path.
 
     With `as_project`, or if the world names files by relative paths, the result is a Webots project in
-    `work`, with links to the files around `world`. These are the files in all folders from that of `world` up
-    to `root`. If `root` is None, it is the nearest folder that holds all files that the world names.
+    `work`, with links to the files around `world`. These are the files in all folders from the folder of
+    `world` up to `root`. If `root` is None, the function uses the nearest folder that holds all files that
+    the world names.
 
     Raises:
         WorldError: the world is wrong.
@@ -67,7 +68,7 @@ def named(
 def renamed(
     world: Path, work: Path, ending: str, *, as_project: bool = False, root: Path | None = None
 ) -> Path:
-    """Write a copy of `world` with `ending` appended to its ROS names into `work`; return its path.
+    """Write into `work` a copy of `world` with `ending` appended to its ROS names; return its path.
 
     `as_project` and `root` have the same meaning as in `named`.
 
@@ -95,7 +96,7 @@ def root_of(world: Path, given: Path | None) -> Path:
 
 
 def root_of_model(world: Path, given: Path | None) -> Path | None:
-    """Return `root_of` for an MJCF model; None for any other world, which is loaded without a root.
+    """Return the result of `root_of` for an MJCF model; None for any other world, which needs no root.
 
     Raises:
         WorldError, SidecarError: see `named`.

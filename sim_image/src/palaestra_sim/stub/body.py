@@ -1,4 +1,4 @@
-"""The motion of a robot on the floor: each basic step, the speed of its base changes its pose.
+"""The motion of a robot on the floor: in each basic step, the speed of its base changes its pose.
 
 A robot consists of one or several upright cylinders. If a cylinder is inside an obstacle, the robot is pushed
 out along the surface normal; while its wheels turn, it slides along the surface. There is no mass, no bounce
@@ -17,8 +17,8 @@ from palaestra_sim.scene.shapes import Shape
 from palaestra_sim.stub.obstacles import Contact, Disc, FlatObstacle, Neighborhood
 from palaestra_sim.stub.outline import RoundPart
 
-_PASSES: Final = 4  # enough for a corner of two walls and another robot
-_RESTING_M: Final = 1e-9  # maximum depth of a robot that rests at a surface, because of rounding
+_PASSES: Final = 4  # maximum number of passes; enough for a corner of two walls and another robot
+_RESTING_M: Final = 1e-9  # because of rounding, a robot that rests at a surface may be this deep in it
 _STRIDE: Final = 0.3  # maximum motion between two checks for contacts, as a share of the smallest radius
 
 
@@ -111,7 +111,7 @@ class StubBody(Disc):
         return deepest
 
     def scan(self, frame: tuple[float, float, float, float], rays: Sequence[Ray], reach: list[float]) -> None:
-        """Shorten each `reach` to the distance at which its ray, of a robot at `frame`, meets this robot."""
+        """Shorten each `reach` to the distance at which its ray meets this robot; the rays are in `frame`."""
         for disc in self.discs:
             disc.scan(frame, rays, reach)
 

@@ -77,7 +77,7 @@ class Disc:
         return (dx / distance, dy / distance, reach - distance)
 
     def scan(self, frame: tuple[float, float, float, float], rays: Sequence[Ray], reach: list[float]) -> None:
-        """Shorten each `reach` to the distance at which its ray, of a robot at `frame`, meets the disc."""
+        """Shorten each `reach` to the distance at which its ray meets the disc; the rays are in `frame`."""
         x, y, c, s = frame
         dx = self.x - x
         dy = self.y - y
@@ -143,7 +143,7 @@ class Block:
         return (nx * self.c - ny * self.s, nx * self.s + ny * self.c, depth)
 
     def scan(self, frame: tuple[float, float, float, float], rays: Sequence[Ray], reach: list[float]) -> None:
-        """Shorten each `reach` to the distance at which its ray, of a robot at `frame`, meets the block."""
+        """Shorten each `reach` to the distance at which its ray meets the block; the rays are in `frame`."""
         x, y = self._local(frame[0], frame[1])
         c = frame[2] * self.c + frame[3] * self.s
         s = frame[3] * self.c - frame[2] * self.s
@@ -170,7 +170,7 @@ class Block:
         return dx * self.c + dy * self.s, dy * self.c - dx * self.s
 
     def _way_out(self, x: float, y: float, radius: float) -> Contact:
-        """Return the contact of a robot whose center is inside the block; it leaves by the nearest face."""
+        """Return the contact of a robot, whose center is inside the block, with the block's nearest face."""
         out_x = self.half_x - abs(x)
         out_y = self.half_y - abs(y)
         if out_x < out_y:
@@ -207,7 +207,7 @@ class Hull:
         return (sign * (x - nearest_x) / distance, sign * (y - nearest_y) / distance, push)
 
     def scan(self, frame: tuple[float, float, float, float], rays: Sequence[Ray], reach: list[float]) -> None:
-        """Shorten each `reach` to the distance at which its ray, of a robot at `frame`, meets the polygon."""
+        """Shorten each `reach` to the distance at which its ray meets the polygon; rays are in `frame`."""
         for i, ray in enumerate(rays):
             enter, leave = self.crossing(frame, ray)
             if max(enter, 0.0) <= leave:
@@ -294,7 +294,7 @@ class Neighborhood:
         self._squares: dict[int, tuple[FlatObstacle, ...]] = {}
 
     def near(self, x: float, y: float) -> tuple[FlatObstacle, ...]:
-        """Return all obstacles within reach of x, y, in their order; the result may have others nearby."""
+        """Return all obstacles within reach of x, y, in their order; the result may have other obstacles."""
         column = int(x * 8.0 + 4096.0)  # 8 = 1 / SIDE_M; the shift makes usual coordinates positive
         row = int(y * 8.0 + 4096.0)
         key = column * 65536 + row

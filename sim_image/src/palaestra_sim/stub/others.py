@@ -19,7 +19,7 @@ class OtherRobot:
     """A robot that rays of other robots can hit.
 
     Args:
-        body: the body of the robot; it has the current position and heading.
+        body: the body of the robot, which has the current position and heading.
         place: the frame of the robot; only its height is used.
         parts: the shapes of the robot's outline, each with the pose of the robot in the frame of the shape.
     """

@@ -74,7 +74,7 @@ class StubPhysics:
         parts = covering(build.outline)
         outline, rim = [part for part, _ in parts], [shape for _, shape in parts]
         body = StubBody(build.base, outline, rim, build.heights)
-        # The poses are now relative to the robot; later they are poses in the world.
+        # The robot is still at the origin of the world, so these poses are relative to the robot.
         self._parts[body] = [(shape, shape.pose.inverse) for shape in build.outline]
         return body
 
@@ -90,7 +90,7 @@ class StubPhysics:
         doors: Sequence[Link] = (),
     ) -> None:
         """Set the obstacles of each robot and of its rays."""
-        del loose, doors  # both are empty: `abilities` excludes them, so the checks of a world refuse them
+        del loose, doors  # both are empty, because `abilities` excludes such objects
         self._solids = tuple(solids)
         self._tall = [(shape, shape.heights()) for shape in solids]
         self._moving = [(it, it.body) for it in figures if isinstance(it.body, StubBody)]
@@ -116,7 +116,7 @@ class StubPhysics:
                 body.advance(step_s)
 
     def reset(self) -> None:
-        """Do nothing: the physics has no state besides that of the bodies."""
+        """Do nothing: the physics has no state besides the state of the bodies."""
 
     def look(self, figure: Figure, beams: Sequence[Beam]) -> Cast:
         """Return a function that computes the distance in meters that each beam of a robot travels now."""
@@ -134,7 +134,7 @@ class StubPhysics:
         return lambda: level.cast((body.x, body.y, body.c, body.s), place.height_m)
 
     def see(self, figure: Figure, beams: Sequence[Beam]) -> Cast:
-        """Return such a function for beams that meet visible shapes; they pass through the robot itself."""
+        """Return a function as `look` does, for beams that stop at visible shapes, but not at the robot."""
         sight = VisualRays(self._view, figure.place, beams)
         return lambda: [glance.distance_m for glance in sight.cast()]
 

@@ -45,7 +45,7 @@ class Fan:
         self._others = tuple(others)
 
     def cast(self, frame: tuple[float, float, float, float]) -> list[float]:
-        """Return the distance in meters that each ray travels; at most its reach.
+        """Return the distance in meters that each ray travels; at most the reach of the ray.
 
         `frame` is x, y, cosine and sine of the robot's heading. The next call changes the returned list.
         """
@@ -134,7 +134,7 @@ class SlopedBeams:
         self._floors = tuple(floors_m)
 
     def cast(self, frame: tuple[float, float, float, float], height_m: float) -> list[float]:
-        """Return the distance in meters that each beam travels; `height_m` is that of the robot's frame."""
+        """Return the distance in meters that each beam travels; `height_m` is the height of the robot."""
         for index, beam in enumerate(self._beams):
             self.distances[index] = self._first(beam, frame, height_m)
         return self.distances
@@ -177,7 +177,7 @@ class SlopedBeams:
 
 
 def _between(low_m: float, high_m: float, slope: float) -> tuple[float, float]:
-    """Return the distances along the floor between which a beam is between two heights.
+    """Return the distances along the floor at which a beam enters and leaves the space between two heights.
 
     The heights are relative to the origin of the beam.
     """

@@ -1,7 +1,7 @@
 """Worlds: read `.wbt`, `.proto` and MJCF files, and generate a world for each simulator, with its own names.
 
-Pure: bytes in, bytes out. No clock, no network, and no files except built-in files and the files that a world
-names.
+Pure: bytes in, bytes out. This package uses no clock and no network. It reads only built-in files and the
+files that a world names.
 
     parse(source)                              the tree of a `.wbt` world
     check(source)                              raises unless a world can be generated for every simulator

@@ -15,7 +15,7 @@ from palaestra_sim.world.tokens import Token, quoted, unquoted
 from palaestra_sim.world.tree import Node, Value, World
 
 _UP_TO_COMMENT = re.compile(rb"\A.*#[^\n]*\n?", re.DOTALL)  # up to the last comment, with its line end
-_LONGEST_GAP = 200  # bytes; a longer gap between two strings is not copied between new strings
+_LONGEST_GAP = 200  # maximum number of bytes of a gap between two strings that is copied between new strings
 _INDENT = re.compile(rb"\r?\n[ \t]*\Z")
 
 
@@ -27,7 +27,8 @@ def asks_for_clock(robot: Node) -> bool:
 def argument_edits(world: World, robot: Node, ros_name: str, *, clock: bool) -> tuple[Patch, ...]:
     """Return the edits that give a robot its `--name=` and `--synchronize`.
 
-    If `clock`, the first `--clock` stays, and the others are removed. The edits never add a `--clock`.
+    If `clock` is True, the first `--clock` stays, and every other `--clock` is removed. The edits never add a
+    `--clock`.
     """
     value = robot.fields.get("controllerArgs")
     if value is None:
@@ -77,7 +78,7 @@ def _rows(strings: list[Token], ros_name: str, *, clock: bool) -> list[tuple[byt
 
 
 def _options(text: str) -> list[str]:
-    """Return the options in a string; it is split only if each of its words begins with `--`."""
+    """Return the options in a string; a string is split only if each word begins with `--`."""
     words = text.split()
     several = len(words) > 1 and all(word.startswith("--") for word in words)
     return words if several else [text]
@@ -92,7 +93,7 @@ def _new_row(world: World, token: Token, row: tuple[bytes, ...], separator: byte
 
 
 def _new_list(value: Value, string: Token, ros_name: str, *, clock: bool) -> Patch:
-    """Replace a bare string by a list; an empty string means that there are no arguments."""
+    """Replace a bare string by a list; an empty string means no arguments."""
     strings = [string] if unquoted(string) else []
     texts = tuple(chain(*_rows(strings, ros_name, clock=clock)))
     text = b"[" + b" ".join(texts) + b"]"
@@ -114,6 +115,6 @@ def _new_field(world: World, robot: Node, ros_name: str) -> Patch:
 
 
 def _gap_before(world: World, token: Token) -> bytes:
-    """Return the bytes between a token and the previous one: blanks, commas, comments."""
+    """Return the bytes between a token and the previous token: blanks, commas, comments."""
     before = world.tokens[world.index(token.start) - 1]
     return world.source[before.end : token.start]

@@ -19,7 +19,7 @@ from palaestra_sim.world.tree import Node, Value, World
 
 _ADDRESS_FIELD = re.compile(r"(?:url|sound|texture)\Z", re.IGNORECASE)
 _ABSOLUTE = re.compile(r"[a-z][a-z0-9+.-]*://|/", re.IGNORECASE)
-_MOST_NAMED = 20  # robots that an error lists
+_MOST_NAMED = 20  # maximum number of robots that an error lists
 _ROS_REMAPPING = re.compile(r"__\w+:=")
 
 
@@ -56,13 +56,14 @@ def no_robot_speaks_ros(candidate: Candidate) -> Iterator[WorldError]:
 def robot_used_twice(candidate: Candidate) -> Iterator[WorldError]:
     """A `USE` repeats a robot with the same ROS name.
 
-    All DEFs with that name are compared, although a `USE` refers only to the last DEF before it. A world with
-    different DEF names is clearer anyway.
+    All DEFs with that name are compared, although a `USE` refers only to the last DEF before the `USE`. A
+    world with different DEF names is clearer anyway.
     """
     starts = [robot.span[0] for robot in candidate.robots]
     containers = {}
     for node in candidate.world.walk():
-        # A robot that begins inside a node is part of that node. The last such robot gives the name.
+        # A robot that begins inside a node is part of that node. If a node contains several robots, the error
+        # names the last one.
         last = bisect_left(starts, node.span[1]) - 1
         if node.def_name is not None and last >= 0 and starts[last] >= node.span[0]:
             containers[node.def_name] = candidate.robots[last]

@@ -33,7 +33,7 @@ class _Operation(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Expression:
-    """A parsed formula; `names` are the fields in it, with `.x` or `sum()` where the formula has these."""
+    """A parsed formula; `names` are the fields in it, with `.x` or `sum()` as in the formula."""
 
     text: str
     tree: _Tree

@@ -8,8 +8,9 @@ line.
 Files from before R2022b do not have such lines: Webots found PROTOs by their names in the folder `protos/` of
 the world's project, and in its subfolders. This module does the same for such files.
 
-A PROTO that cannot be used does not raise an error here, because the world may not need it: a stand-in may
-describe it, or its instances may be left out. Its error is in the result, for callers that need the PROTO.
+A PROTO that cannot be used does not raise an error here, because the world may not need the PROTO: a stand-in
+may describe it, or its instances may be left out. The error is in the result, for callers that need the
+PROTO.
 """
 
 import re

@@ -45,8 +45,8 @@ def generate(
 ) -> bytes:
     """Return the world of one simulator, generated from the world `source`.
 
-    `clock` is True if this simulator may publish `/clock` when its world requests it. It must be True for at
-    most one simulator of a ROS master. `name` and `relative_addresses` are as for `check`.
+    `clock` is True if this simulator may publish `/clock` when its world requests it. `clock` must be True
+    for at most one simulator of a ROS master. `name` and `relative_addresses` are as for `check`.
 
     Raises:
         WorldError: as for `check`.
@@ -78,7 +78,7 @@ def robots(source: bytes, name: str = "world") -> tuple[WorldRobot, ...]:
 
 
 def own_controllers(source: bytes, name: str = "world") -> tuple[tuple[str, str], ...]:
-    """Return (robot, controller) for each robot whose controller is a program of its own, in source order.
+    """Return (robot, controller) for each robot whose controller is a program of the world's project.
 
     Raises:
         WorldError: the bytes are not a world file.

@@ -31,8 +31,8 @@ def generate(
 ) -> bytes:
     """Return the world of one simulator, generated from the world `source`.
 
-    `clock` is True if this simulator may publish `/clock` when its world requests it. It must be True for at
-    most one simulator of a ROS master. `name` and `relative_addresses` are as for `check`.
+    `clock` is True if this simulator may publish `/clock` when its world requests it. `clock` must be True
+    for at most one simulator of a ROS master. `name` and `relative_addresses` are as for `check`.
 
     Raises:
         WorldError: as for `check`.

@@ -5,8 +5,8 @@
 
 The readable part is for people. It may be cut, and some characters may be replaced. The hash covers the
 original values, so two names with the same readable part still differ. A name is valid in ROS 1 (a letter
-first, then `[A-Za-z0-9_]`). It has at most 63 bytes, because the `ros` controller copies it into a buffer of
-64 bytes without a check.
+first, then `[A-Za-z0-9_]`). A name has at most 63 bytes, because the `ros` controller copies it into a buffer
+of 64 bytes without a check.
 """
 
 import hashlib
@@ -41,8 +41,8 @@ class RunIdentity:
 def name_prefix(identity: RunIdentity) -> str:
     """Return the readable part before the robot, such as `move_to_target_r0_collect_1a`.
 
-    All robots of a simulator share this prefix. It has at most 40 bytes; a long job name is cut first. The
-    prefix is not unique by itself.
+    All robots of a simulator share this prefix. The prefix has at most 40 bytes; a long job name is cut
+    first. The prefix is not unique by itself.
     """
     group = _legal(identity.group)[:_MAX_GROUP]
     place = _legal(f"_r{identity.replica}_{group}_{identity.index}{identity.slot}")

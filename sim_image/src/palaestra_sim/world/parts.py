@@ -39,10 +39,11 @@ class ShapePart:
 class Form:
     """A shape whose lengths are formulas.
 
-    The lengths of box, cylinder, sphere and plane are those of a ShapePart. A ring has (inner radius,
-    thickness, height), a wall (thickness, height). A wall follows the points of the field `path`, and returns
-    to the first point if `closed`. `at` is the center of the form, or the center of its lower side if
-    `on_base` and for every ring and wall. The object has the form only if `when` is not 0 and `unless` is 0.
+    A box, cylinder, sphere or plane has the same lengths as its ShapePart. The lengths of a ring are (inner
+    radius, thickness, height), and those of a wall (thickness, height). A wall follows the points of the
+    field `path`, and returns to the first point if `closed`. `at` is the center of the form, or, if
+    `on_base`, and for every ring and wall, the center of the lower side. The object has the form only if
+    `when` is not 0 and `unless` is 0.
     """
 
     kind: FormKind

@@ -1,8 +1,8 @@
 """Change a few spans of a world and leave every other byte unchanged.
 
 A patch has the bytes to insert, and the tokens that they must form. After the change, the result is split
-into tokens again. It must have the old tokens with exactly those changes. So this module finds an accidental
-change of nearby bytes before a simulator reads the world.
+into tokens again. The result must have the old tokens with exactly those changes. So this module finds an
+accidental change of nearby bytes before a simulator reads the world.
 """
 
 from collections.abc import Sequence

@@ -22,7 +22,7 @@ class ProjectFiles:
 
     Args:
         world_path: the path of the world.
-        source: its bytes.
+        source: the bytes of the world.
     """
 
     def __init__(self, world_path: Path, source: bytes) -> None:

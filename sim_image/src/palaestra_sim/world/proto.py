@@ -36,8 +36,8 @@ _LANGUAGE = re.compile(rb"\s*template\s+language\b")
 class ProtoField:
     """A field that a PROTO declares.
 
-    `type` is a type such as "SFVec3f"; `access` is the word before it, such as "hiddenField". `allowed` has
-    the values that the declaration permits; it is empty if all are permitted.
+    `type` is a type such as "SFVec3f"; `access` is the word before the type, such as "hiddenField". `allowed`
+    has the values that the declaration permits; it is empty if all values are permitted.
     """
 
     type: str
@@ -112,7 +112,7 @@ def _undeclared(proto: Proto) -> Iterator[WorldError]:
 
 
 class _ProtoReader(Reader):
-    """The grammar rules of a PROTO file, in addition to those for its nodes."""
+    """The grammar rules of a PROTO file, in addition to the rules for its nodes."""
 
     _access_needed = True
 

@@ -21,8 +21,8 @@ class WorldRobot:
     """A robot whose controller is "ros".
 
     `robot` is its Robot.name. `ros_name` is the value of its `--name=`, or None without this argument. A
-    `supervisor` may read and change the whole scene. If `synchronize`, the simulation waits until a client
-    steps the robot. `definition` is its DEF name.
+    `supervisor` may read and change the whole scene. If `synchronize` is True, the simulation waits until a
+    client steps the robot. `definition` is its DEF name.
     """
 
     robot: str
@@ -42,7 +42,7 @@ def robots(source: bytes, name: str = "world") -> tuple[WorldRobot, ...]:
 
 
 def own_controllers(source: bytes, name: str = "world") -> tuple[tuple[str, str], ...]:
-    """Return (robot, controller) for each robot whose controller is a program of its own, in source order.
+    """Return (robot, controller) for each robot whose controller is a program of the world's project.
 
     "ros" and "void" are programs of Webots, and "<none>", "<generic>" and "<extern>" are not programs.
 
@@ -65,8 +65,8 @@ def ros_robots(world: World) -> tuple[Node, ...]:
 def robot_name(node: Node) -> str:
     """Return the Robot.name of a robot's node.
 
-    The default of a Robot is "robot" in Webots. The default of a PROTO is not in the world, so for a PROTO
-    its type is returned instead.
+    The default of a Robot is "robot" in Webots. The default of a PROTO is not in the world, so for an
+    instance of a PROTO its type is returned instead.
     """
     default = "robot" if node.type_name == "Robot" else node.type_name
     return node.text("name") or default

@@ -1,4 +1,4 @@
-"""The folder around a world that holds all files that the world names."""
+"""The folder that holds a world and all files that the world names."""
 
 from pathlib import Path
 
@@ -14,10 +14,10 @@ def placed(world: Path) -> Path:
 
 
 def root_of(world: Path, source: bytes, given: Path | None = None) -> Path:
-    """Return `given`, or the nearest folder around a world that holds all files that the world names.
+    """Return `given`, or the nearest folder that holds a world and all files that the world names.
 
     The nearest folder is the Webots project of the world, or a folder above that project. `world` is a path
-    from `placed`.
+    that `placed` has returned.
 
     Raises:
         RootError: `given` is not above the world, or does not hold all files that the world names.

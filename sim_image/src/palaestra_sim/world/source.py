@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 from palaestra_sim.errors import WorldError
 
-_BYTE_ORDER_MARK = b"\xef\xbb\xbf"  # some editors put it at the start of a UTF-8 file
-# Webots accepts blanks after the hash; PROTOs of drones have them.
+_BYTE_ORDER_MARK = b"\xef\xbb\xbf"  # some editors put this mark at the start of a UTF-8 file
+# Webots accepts blanks after the hash; PROTOs of drones have such blanks.
 _RELEASE = re.compile(rb"#[ \t]*VRML_SIM R(?P<year>[0-9]{4})(?P<letter>[a-z]?)")
 _CONTINUED = bytes(range(0x80, 0xC0))  # continuation bytes of UTF-8, which do not begin a character
 _BLOCK = 4096  # bytes between two marks

@@ -42,7 +42,7 @@ _FIELDS_OF_FORM: dict[FormKind, tuple[str, ...]] = {
 }
 
 Values: TypeAlias = Mapping[str, Sequence[Item]]
-"""The items of an object's fields; a field that is missing or has items of a wrong type has its default."""
+"""The items of an object's fields; a missing field, or one with items of a wrong type, has its default."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -217,7 +217,7 @@ class _Entry:
         return tuple(self._formula(length, place) for length in written)
 
     def _path(self, written: object, place: str) -> tuple[str, bool]:
-        """Return the field with the points of a wall, and whether it is closed."""
+        """Return the field with the points of a wall, and whether the wall is closed."""
         path = str(written.get("path", "")) if isinstance(written, dict) else ""
         closed = written.get("closed", False) if isinstance(written, dict) else None
         declared = self._fields.get(path)

@@ -81,7 +81,7 @@ class Node:
 class World:
     """A parsed world file: its bytes, its first line, and its nodes in source order.
 
-    `externs` are the string tokens of its EXTERNPROTO lines; the last of `tokens` is of kind `end`.
+    `externs` are the string tokens of its EXTERNPROTO lines; the last token in `tokens` is of kind `end`.
     """
 
     source: bytes

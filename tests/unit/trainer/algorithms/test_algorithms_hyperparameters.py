@@ -140,7 +140,7 @@ def test_words_of_other_projects_are_refused_with_their_place_here():
         (
             "DQN",
             "optimize_memory_usage",
-            "is not a hyperparameter here; a run stores next observations, as with",
+            "is not a hyperparameter here; in a run, its value is always false",
         ),
         ("REINFORCE", "rollout_buffer_class", "REINFORCE has no such hyperparameter, unlike PPO, A2C, TRPO"),
         ("PPO", "log_std_init", "is an argument of the policy; write it in policy_kwargs.log_std_init"),
@@ -169,7 +169,7 @@ def test_layers_that_policy_and_value_shared_have_their_form_of_today():
     """Half of the examples on the web use the old form, so the message shows the present form."""
     old = {"policy_kwargs": {"net_arch": [{"pi": [8], "vf": [8]}]}}
 
-    with pytest.raises(ConfigurationError, match=r"before 1\.8, .* write \{pi: \[\.\.\.\], vf"):
+    with pytest.raises(ConfigurationError, match=r"removed in 1\.8; write \{pi: \[\.\.\.\], vf"):
         check(Algorithm(name="PPO", hyperparameters=old))
 
 

@@ -100,7 +100,7 @@ class TextReward(Hall):
         (Wide, ["shape (3,), not (2,)"]),
         (Listed, ["from reset an observation of Box", "got a list"]),
         (Double, ["dtype float64, not float32"]),
-        (Outside, ["1.5 at [1], not within -1.0 and 1.0"]),
+        (Outside, ["1.5 at [1], not between -1.0 and 1.0"]),
         (TextReward, ["reward", "str"]),
     ],
     ids=lambda it: getattr(it, "__name__", ""),
@@ -135,9 +135,13 @@ LATER = [
     ("no tuple", None, "got a NoneType, in step 3"),
     ("a number as end", (*RIGHT[:2], 0, False, {}), "got a int as terminated"),
     ("no info", (*RIGHT[:4], None), "got a NoneType as info"),
-    ("another shape", (np.zeros(3, np.float32), *RIGHT[1:]), "of another kind (shape (3,), not (2,))"),
-    ("another dtype", (np.zeros(2), *RIGHT[1:]), "of another kind (dtype float64, not float32)"),
-    ("a list", ([0.0, 0.0], *RIGHT[1:]), "of another kind (a list)"),
+    (
+        "another shape",
+        (np.zeros(3, np.float32), *RIGHT[1:]),
+        "that does not fit its space (shape (3,), not (2,))",
+    ),
+    ("another dtype", (np.zeros(2), *RIGHT[1:]), "that does not fit its space (dtype float64, not float32)"),
+    ("a list", ([0.0, 0.0], *RIGHT[1:]), "that does not fit its space (a list)"),
 ]
 
 

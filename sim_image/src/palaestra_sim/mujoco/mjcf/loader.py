@@ -76,7 +76,7 @@ def _robot(tree: ModelTree, equipment: Equipment, description: Description, leav
     )
     return Robot(
         parts, 0, MujocoPhysics(), View(tree.scene.root)
-    )  # this physics is never used: sensors read the model
+    )  # this physics is never used, because the sensors read the model
 
 
 def _compiled(world_path: Path) -> Any:
@@ -107,7 +107,7 @@ def _keyframe(model: Any, description: Description) -> int | None:
 
 
 def _basic_step_ms(model: Any, description: Description) -> int:
-    """Return the basic step in milliseconds: the one that the file sets, or one that fits the timestep.
+    """Return the basic step in milliseconds: the file's own, or a multiple of MuJoCo's timestep.
 
     The timestep is read from the compiled model, because an included file may set it.
     """

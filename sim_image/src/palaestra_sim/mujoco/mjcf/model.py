@@ -25,7 +25,8 @@ class Model:
 
     Args:
         model: MuJoCo's model.
-        keyframe: the number of the keyframe with which the world begins; None for the model's own positions.
+        keyframe: the number of the keyframe with which the world begins; None for the initial positions in
+            the model (`qpos0`).
 
     Attributes:
         model, data: the model and the data of MuJoCo.

@@ -1,9 +1,9 @@
 """Actuators as motors of Webots: translate a motor's commands to MuJoCo's `ctrl`.
 
 The control of an actuator sets a position, a velocity or a force, and its motor accepts the matching
-commands. If the control sets a velocity, the motor also accepts a target position, and turns to it as a motor
-of Webots does. Until a client commands a motor, the control keeps its initial value: 0, or the value in the
-keyframe.
+commands. If the control sets a velocity, the motor also accepts a target position, and turns to this position
+as a motor of Webots does. Until a client commands a motor, the control keeps its initial value: 0, or the
+value in the keyframe.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ class ActuatorMotor(Motor):
         self.forceful = True  # MuJoCo moves all bodies by forces
 
     def reset(self) -> None:
-        """Discard all commands; call this after the model was reset."""
+        """Discard all commands; call this method after the model was reset."""
         super().reset()
         self._commanded = False
         if self._actuator.length is not None:
@@ -79,7 +79,7 @@ class ActuatorMotor(Motor):
         self._aim: float | None = None  # current target of a position servo
 
     def put(self, angle_rad: float) -> None:
-        """Handle the event that a client has set the joint position; a commanded motor then holds it."""
+        """Handle the event that a client has set the joint position; a commanded motor holds it."""
         if self._commanded and self._actuator.control is not Control.FORCE:
             super().put(angle_rad)
         self._aim = None
@@ -157,7 +157,7 @@ class ActuatorMotor(Motor):
         return self.speed_rad_s
 
     def _next_aim(self, aim: float, step_s: float) -> float:
-        """Return the next target of a position servo; in a basic step it moves at the commanded velocity."""
+        """Return the next target of a position servo; the target moves at the commanded velocity."""
         reach = abs(self.velocity_rad_s) * step_s
         if math.isfinite(self.target_rad):
             return max(aim - reach, min(aim + reach, self.target_rad))
@@ -210,7 +210,7 @@ def kind_of(model: Any, index: int) -> str:
 def gear_of(model: Any, index: int) -> float:
     """Return the force at the joint for an actuator force of 1.
 
-    For an actuator on a site, it is the force in the direction of the actuator's gear.
+    For an actuator on a site, this is the force in the direction of the actuator's gear.
     """
     gear: list[float] = model.actuator_gear[index].tolist()
     if model.actuator_trntype[index] in _TURNED:

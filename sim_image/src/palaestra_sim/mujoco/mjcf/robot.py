@@ -32,7 +32,7 @@ class Equipment:
 
     Attributes:
         devices: all devices, by name.
-        joints: for each device on a joint, the number of the joint, by name of the device.
+        joints: the number of the joint, for each device on a joint, by the name of the device.
         motors: the actuators that are motors.
         actuators: the actuators that are not motors.
         samples: functions that set the values of the sensors.
@@ -229,7 +229,7 @@ class _Fitter:
 
 
 def _actuator_names(model: Any) -> list[str]:
-    """Return a name for each actuator: its own name, or that of its joint, or "actuator" and its number.
+    """Return a name for each actuator: its own name, the name of its joint, or "actuator" and its number.
 
     Several actuators of one joint may lack names; for example, a position servo and a velocity servo. Their
     names then end with their kinds, or with their numbers if the kinds are equal.
@@ -270,6 +270,6 @@ def _sensor_names(model: Any) -> list[str]:
 
 
 def _numbered(names: Sequence[str]) -> list[str]:
-    """Return `names`; to each name that occurs several times, its index is appended."""
+    """Return `names`; a name that occurs several times gets its index in the list as a suffix."""
     counts = Counter(names)
     return [f"{name}{index}" if counts[name] > 1 else name for index, name in enumerate(names)]

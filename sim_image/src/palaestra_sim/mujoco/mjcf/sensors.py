@@ -30,7 +30,7 @@ from palaestra_sim.scene.devices.touch_sensor import TOUCH_SENSOR, TouchSensor
 from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.lookup_table import LookupTable
 
-_NOWHERE: Final = Frame(None, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0))  # not used: MuJoCo computes the values
+_NOWHERE: Final = Frame(None, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0))  # never read
 _PLAIN: Final = Axes(table=None, on=(True, True, True), resolution=-1.0)
 _FORCE: Final = 1  # the value that `get_type` of a touch sensor returns
 _PIXELS: Final = (64, 64)  # Webots' default, for a camera without a resolution
@@ -54,7 +54,8 @@ class ModelSensor:
         number: the number of the sensor.
         name: the name of the device.
         numbers: a view of the sensor's current numbers in MuJoCo's data.
-        shaft: the joint that the sensor measures; if it does not measure a joint, a new unused one.
+        shaft: the joint that the sensor measures; a new joint, which is not used, if the sensor measures no
+            joint.
     """
 
     model: Model
@@ -70,7 +71,7 @@ def in_webots(model: Any, number: int) -> bool:
 
 
 def measured(sensor: ModelSensor) -> Measured:
-    """Return the device of a sensor: a device of Webots, or one that publishes the numbers unchanged."""
+    """Return the device of a sensor: a device of Webots, or a device that publishes the numbers unchanged."""
     make = _maker(sensor.model.model, sensor.number) or _numbers
     return make(sensor)
 
@@ -124,7 +125,7 @@ def _number(sensor: ModelSensor) -> Measured:
 
 
 def _distance(sensor: ModelSensor) -> Measured:
-    """Return a distance sensor; if its ray meets no surface, its value is its maximum range."""
+    """Return a distance sensor; its value is the maximum range if the ray meets no surface."""
     model = sensor.model.model
     reach_m = float(model.sensor_cutoff[sensor.number]) or float(model.vis.map.zfar * model.stat.extent)
     table = LookupTable([(0.0, 0.0, 0.0), (reach_m, reach_m, 0.0)])

@@ -67,7 +67,7 @@ class MjcfSimulation:
         self._states = BodyStates(model, tree.bodies)
         self._step_s = basic_step_ms / 1000.0
         self._steps = round(self._step_s / float(model.model.opt.timestep))
-        model.model.opt.timestep = self._step_s / self._steps  # exact, although a file may round 1/240 s
+        model.model.opt.timestep = self._step_s / self._steps  # exact; a file may have a rounded 1/240 s
         self._pending: list[Callable[[], None]] = []
         self._reset_asked = False
 
@@ -151,7 +151,7 @@ class MjcfSimulation:
     def contact_points(self, node: SceneNode, *, descendants: bool) -> list[tuple[Vector, int]]:
         """Return the contact points of a body: each has a position in meters and the number of a node.
 
-        With `descendants`, the contact points of all bodies inside it are included.
+        With `descendants`, the contact points of all bodies inside the body are included.
         """
         self._model.settle()
         asked = {node, *node.descendants()} if descendants else {node}
@@ -181,7 +181,8 @@ class MjcfSimulation:
         """Set the position of a hinge or slider in rad or m, cut to its range, and stop its motion.
 
         Raises:
-            UnsimulatedError: the node is not a hinge or slider, or `index` is not 1, the number of its axis.
+            UnsimulatedError: the node is not a hinge or slider, or `index` is not 1, the number of its only
+                axis.
         """
         joint = self._nodes.joints.get(node)
         model = self._model.model

@@ -2,7 +2,7 @@
 
 A body becomes a Solid, whose DEF is the name of the body. The body of the robot becomes a Robot; it has all
 devices that are not on a joint. The DEF of a joint is the name of the joint. If a body has the same name,
-`_joint` is appended.
+`_joint` is appended to the DEF of the joint.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def grow(
     Args:
         model: the model.
         description: the names that the file gives to robot and devices.
-        equipment: the devices; their nodes are added to it.
+        equipment: the devices; `grow` adds their nodes to this object.
         body: the number of the robot's body.
         basic_step_ms: the basic step in milliseconds.
     """
@@ -85,10 +85,10 @@ def _place(model: Model, tree: ModelTree) -> None:
 
 
 class _Builder:
-    """Builds the nodes; each node gets a unique number as its span, by which it is found in the tree later.
+    """Builds the nodes; each node gets a unique number as its span, by which the tree finds the node later.
 
     Attributes:
-        kinds: for each number, the kind and the number or name of the model's object.
+        kinds: for each span number, the kind of the model's object, and the object's number or name.
     """
 
     def __init__(self, model: Model, description: Description, equipment: Equipment, body: int) -> None:
@@ -120,9 +120,9 @@ class _Builder:
         return tuple(node for number in numbers for node in self._body(number))
 
     def _body(self, number: int) -> tuple[Node, ...]:
-        """Return the nodes of a body: its joints; the last joint has the body as its end point.
+        """Return the nodes of a body's joints; the node of the last joint has the body as its end point.
 
-        A body without joints is returned itself.
+        For a body without joints, return the node of the body.
         """
         name = self._model.model.body(number).name
         children = list(self._children(number))

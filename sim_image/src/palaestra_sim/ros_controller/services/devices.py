@@ -73,7 +73,8 @@ class Feed:
     def publish(self, elapsed_ms: int) -> None:
         """Send the value to the subscribers, once for each publisher that is due.
 
-        If the topic has no subscriber, the value is not read, because it takes time to render an image.
+        If the topic has no subscriber, the value is not read, because reading may take time: for example, a
+        camera renders an image.
         """
         source = self.source
         if source is None:
@@ -142,7 +143,7 @@ class Outlet:
         self._periods_ms: set[int] = set()
 
     def enable(self, period_ms: int, step_ms: int) -> bool:
-        """Start to publish with the period `period_ms`, or stop if it is 0.
+        """Start to publish with the period `period_ms`, or stop if the period is 0.
 
         Return whether the device accepts the period.
 

@@ -15,11 +15,11 @@ from palaestra_sim.scene.robot import Robot
 
 Fields = dict[str, Any]
 
-_MOST_TEXTS: Final = 100  # maximum number of queued texts from the robot's window
+_MOST_TEXTS: Final = 100  # maximum number of texts from the robot's window that wait to be read
 
 
 class RobotServices:
-    """The services of one robot, except `time_step` and those of its devices."""
+    """The services of one robot, except `time_step` and the services of devices."""
 
     def __init__(self, host: Host, simulation: Backend, robot: Robot) -> None:
         self._host = host

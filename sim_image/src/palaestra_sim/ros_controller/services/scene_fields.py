@@ -24,7 +24,7 @@ Fields = dict[str, Any]
 class _Codec(NamedTuple):
     """Converts the values of a field type to and from messages.
 
-    `absent` is the result of a read without a value; None if such a read fails.
+    `absent` is the result of a read of a field that has no such value; None if the read fails.
     """
 
     type: FieldType

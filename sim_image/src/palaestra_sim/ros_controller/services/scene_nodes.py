@@ -1,7 +1,7 @@
 """Services under `supervisor/node/`: read the type and the pose of a node, and change the node.
 
-If the simulator does not support a request, such as a force in the stub, the call fails with the reason. The
-call does not return success without an effect.
+If the simulator does not support a request, such as a force in the stub, the call fails with the reason. A
+call without an effect never returns success.
 """
 
 from __future__ import annotations
@@ -121,8 +121,8 @@ class NodeServices:
     def _get_pose(self, request: Any) -> Fields:
         """Return the pose of `from_node` relative to `node`.
 
-        The names suggest the opposite, but Webots' controller swaps the nodes in this way. If `from_node` is
-        0, Webots crashes; here the call fails.
+        The names of these two fields suggest the opposite, but Webots' controller swaps the nodes in this
+        way. If `from_node` is 0, Webots crashes; here the call fails.
         """
         node = _pose(self._node(request))
         other = _pose(self._handles.node(request.from_node))
@@ -236,7 +236,7 @@ class NodeServices:
         return {"success": 1}
 
     def _accept(self, request: Any) -> Fields:
-        """Accept a hint that affects only the speed of Webots' responses, or its rendering."""
+        """Accept a hint that affects only the speed of Webots' responses, or only Webots' rendering."""
         self._node(request)
         return {"success": 1}
 

@@ -20,7 +20,7 @@ class Altimeter:
     """An altimeter; `value` is in meters.
 
     Attributes:
-        reference: the offset from the height in the world.
+        reference: the number of meters that is added to the sensor's height in the world.
         accuracy: standard deviation of the noise, in meters.
     """
 

@@ -28,14 +28,14 @@ class Camera:
     """A camera.
 
     Attributes:
-        place: its frame.
-        lens: its lens, whose field of view a client may change.
-        spherical: whether the world asks for a spherical image, which is not rendered.
+        place: the frame of the camera.
+        lens: the lens, whose field of view a client may change.
+        spherical: whether the world requests a spherical image, which is not rendered.
         exposure: the exposure in the world, or the exposure that a client set.
-        focus: focal length, focal distance, and its highest and lowest value, in meters; None without a Focus
-            node.
+        focus: focal length, focal distance, and the highest and lowest focal distance, in meters; None
+            without a Focus node.
         zoom: minimum and maximum field of view in rad; None without a Zoom node.
-        recognition: its Recognition node; None without such a node.
+        recognition: the camera's Recognition node; None without such a node.
         eye: the camera interface; None if the simulator does not render.
     """
 

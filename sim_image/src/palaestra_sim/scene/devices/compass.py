@@ -20,7 +20,7 @@ from palaestra_sim.scene.geometry import Vector, transposed, turn
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class Compass:
-    """A compass of up to three axes; `value` is x, y, z of north in its own frame."""
+    """A compass of up to three axes; `value` is x, y, z of north in the compass's frame."""
 
     name: str
     model: str

@@ -1,7 +1,7 @@
 """Connector: detects whether another connector is near enough to connect.
 
-If so, `lock` fails, because joining is not simulated. Connectors fit if they face each other; the x axis of
-each points outward. Source: WbConnector.cpp of Webots.
+If another connector is near enough, `lock` fails, because joining is not simulated. Connectors fit if they
+face each other; the x axis of each points outward. Source: WbConnector.cpp of Webots.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ class Connector:
     Attributes:
         kind: "symmetric", "active" or "passive".
         reach_m: maximum distance to another connector.
-        tilt_rad: maximum angle between the axes.
-        turns: number of rotations about the axis in which it fits; 0 means any rotation.
+        tilt_rad: maximum angle between the axes of two connectors.
+        turns: number of rotations about the axis at which two connectors fit; 0 means any rotation.
         twist_rad: maximum deviation from one of these rotations.
         others: all connectors of the world.
         locked: the state that a client set.
@@ -56,7 +56,7 @@ class Connector:
         """Lock or unlock the connector.
 
         Raises:
-            UnsimulatedError: the lock would join it to another connector.
+            UnsimulatedError: the lock would join the connector to another connector.
         """
         if locked and self.value > 0:
             raise UnsimulatedError(

@@ -31,12 +31,12 @@ class Device(Protocol):
 
     @property
     def name(self) -> str:
-        """Its name in the world file."""
+        """The name of the device in the world file."""
         ...
 
     @property
     def model(self) -> str:
-        """The node's `model`."""
+        """The field `model` of the device's node."""
         ...
 
 
@@ -62,7 +62,7 @@ class Shaft:
 
     @property
     def type_number(self) -> int:
-        """The response of `get_type` of its devices: 0 for a hinge, 1 for a slider."""
+        """The response of `get_type` of the joint's devices: 0 for a hinge, 1 for a slider."""
         return int(self.joint is not None and self.joint.slides)
 
     @property
@@ -81,9 +81,9 @@ class DevicePart:
         reading: the reader of the world's nodes.
         lacks: records that a node of the robot cannot be simulated.
         node: the node of the device.
-        name: its name in the world file, else the default name of its type.
-        place: its frame, in the robot's frame; for a device on a joint, the frame of the joint.
-        shaft: the joint to which it belongs; None if it is not on a joint.
+        name: the name of the device in the world file; without one, the default name of its type.
+        place: the device's frame, in the robot's frame; for a device on a joint, the frame of the joint.
+        shaft: the joint on which the device is; None if the device is not on a joint.
         outline: the shapes with which the robot collides.
         measured: the links whose force on the robot is measured.
         forces: whether the physics has forces.
@@ -108,7 +108,7 @@ class DevicePart:
         return self.node.text(name) or default
 
     def inner(self, name: str) -> SceneNode | None:
-        """Return the node in a field; None if it is NULL."""
+        """Return the node in a field; None if the field is NULL."""
         return next(iter(self.node.nodes(name)), None)
 
     def world_numbers(self, name: str, default: tuple[float, ...]) -> tuple[float, ...]:
@@ -134,7 +134,7 @@ class DevicePart:
         self.lacks(self.node, fact)
 
     def take_outline(self) -> list[Shape]:
-        """Return the shapes of its boundingObject, after adding them to the robot's outline."""
+        """Return the shapes of the device's boundingObject, after adding them to the robot's outline."""
         shapes = list(bounding_shapes(self.reading, self.node, self.place))
         self.outline += shapes
         return shapes
@@ -150,7 +150,8 @@ class Carrier(Protocol):
     """The interface of the robot that carries a device.
 
     Attributes:
-        body: its body in the physics; None if it cannot drive and is not a free-standing obstacle.
+        body: the robot's body in the physics; None if the robot cannot drive and is not a free-standing
+            obstacle.
         time_s: the time of the world since its start or its last reset.
     """
 
@@ -166,7 +167,7 @@ class Carrier(Protocol):
         ...
 
     def see(self, beams: Sequence[Beam]) -> Callable[[], Sequence[float]]:
-        """Return such a function for beams that stop at visible objects, but not at the robot itself."""
+        """Return a function as `look` does, for beams that stop at visible shapes, but not at the robot."""
         ...
 
     def reflect(self, beams: Sequence[Beam]) -> Callable[[], Sequence[Glance]]:
@@ -208,13 +209,13 @@ class DeviceTopic:
     """A topic of one device.
 
     Attributes:
-        name: relative to the device's name.
-        type_name: the type of its messages.
+        name: the name of the topic, relative to the device's name.
+        type_name: the type of the messages.
         source: the source of the reading; None if the topic never has a reading.
         constants: the values of the other fields.
-        reading: the field of the value. "" means the last field, which must consist of numbers; this is the
+        reading: the field of the value. "" means the last field, which must consist of numbers; "" is the
             fastest choice.
-        many: whether `value` is a sequence, with a message for each of its items.
+        many: whether `value` is a sequence; each of its items is sent in a separate message.
         whole: whether the value is a mapping of all fields except the header.
         stamped: whether the messages begin with a header; without a header, `reading` must name the field.
     """
@@ -251,7 +252,7 @@ Enable = Callable[[int, int], bool]  # period and step in ms; returns whether th
 
 
 def whole_steps(period_ms: int, step_ms: int) -> bool:
-    """Accept a period that is a multiple of the controller's last step."""
+    """Return whether the period is a multiple of the duration of the controller's last step."""
     return period_ms % step_ms == 0
 
 
@@ -265,12 +266,12 @@ class DeviceType(Generic[DeviceT]):
     """A row of the table: one type of device.
 
     Attributes:
-        node: the type of its node.
+        node: the type of the device's node.
         name: the name of a device whose node has no name.
-        fields: the fields of the node, in the syntax of `field_types`, except `name` and, if the node is a
-            Solid, except the fields that every Solid has.
-        without_effect: the names of the fields that have an effect in Webots but in no simulator here,
-            separated by spaces.
+        fields: the fields of the node, in the syntax of `field_types`, without `name`, and, if the node is a
+            Solid, without the fields that every Solid has.
+        without_effect: the names, separated by spaces, of the fields that have an effect in Webots but in no
+            simulator of this package.
         solid: whether a node that is not on a joint is a Solid.
         role: one of `ROLES` for a device of a joint; "" for a device with its own frame on the robot.
         read: returns the device of a node.
@@ -284,7 +285,8 @@ class DeviceType(Generic[DeviceT]):
         enable: returns whether a period is accepted; 0, which stops publishing, is always accepted.
         silent: returns whether an attached device has no readings, so that all periods are refused.
         enabled: called with a device and its new sampling period in ms after a change; 0 means off.
-        sensor: the path of `enable` relative to the name of the device, "" for the name itself.
+        sensor: a prefix of the paths of `enable` and of the topics, after the name of the device; "" for no
+            prefix.
     """
 
     node: str
@@ -310,12 +312,12 @@ class DeviceType(Generic[DeviceT]):
 
     @property
     def on_joint(self) -> bool:
-        """Whether it is a device of a joint."""
+        """Whether the device is a device of a joint."""
         return bool(self.role)
 
     @property
     def body(self) -> bool:
-        """Whether its node is a Solid, with which other objects may collide."""
+        """Whether the device's node is a Solid, with which other objects may collide."""
         return self.solid and not self.on_joint
 
 
@@ -355,7 +357,7 @@ class Devices:
         return {name: it for name, (kind, it) in self.rows.items() if kind.sampler is not None}
 
     def trouble_with(self, name: str) -> str | None:
-        """Return the reason to refuse another device of that name; None to accept the device."""
+        """Return the reason to refuse another device of the name `name`; None to accept the device."""
         if name in self.rows:
             return f"a second device {name!r}"
         if not is_ros_name(name):

@@ -27,14 +27,14 @@ from palaestra_sim.scene.lookup_table import Row as TableRow
 from palaestra_sim.scene.sensor_rays import Beam, beam_along
 from palaestra_sim.scene.visual_rays import Glance
 
-_MOST_RAYS: Final = 10_000  # limit for the rays of a sensor, because each ray is cast at every step
+_MOST_RAYS: Final = 10_000  # maximum number of rays of a sensor, because each ray is cast at every step
 _BESIDE_M: Final = 1e-4  # distance of the additional rays from the ray of a sonar
 _BEAMS_OF_SONAR: Final = 5  # number of beams for each ray of a sonar
 _STEEPEST: Final = math.tan(math.pi / 8.0)  # slope of the steepest surface that returns a sonar's ray
 _TABLE: Final = ((0.0, 0.0, 0.0), (0.1, 1000.0, 0.0))  # the default of DistanceSensor.lookupTable
-_EMPTY: Final = ((0.0, 0.0, 0.0),)  # replaces a table without rows, with which the sensor measures 0
-# For 1 to 10 rays, the rings of the cone. Each ring has a number of rays, a rotation as a share of the
-# spacing between them, and an opening angle as a share of the aperture.
+_EMPTY: Final = ((0.0, 0.0, 0.0),)  # replaces a table without rows; the sensor then measures 0
+# For each number of rays from 1 to 10, the rings of the cone. Each ring has a number of rays, a rotation as a
+# share of the spacing between them, and an opening angle as a share of the aperture.
 _RINGS: Final = (
     ((1, 0.0, 0.0),),
     ((2, 0.5, 1.0),),
@@ -75,7 +75,7 @@ class DistanceSensor:
     A sonar has five beams for each ray: the ray itself, and two pairs of beams next to it.
 
     Attributes:
-        rows: the rows of its lookup table, as the world has them.
+        rows: the rows of the lookup table, as in the world.
         sensitivity: the effect of the color on an infra-red sensor; 0 for no effect.
         resolution: the resolution of the value; -1 for exact values.
     """
@@ -151,7 +151,7 @@ def _cone(count: int, aperture_rad: float) -> list[Vector]:
 
 
 def _many(count: int) -> list[tuple[float, float]]:
-    """Return angle around the axis and share of the aperture for rays on rings of 1, 4, 7 and more."""
+    """Return each ray's angle around the axis and share of the aperture; rings have 1, 4, 7, ... rays."""
     rings: list[int] = []
     left = count
     while left > 0:
@@ -249,10 +249,10 @@ def _measured(sensor: DistanceSensor, distances_m: Sequence[float]) -> float:
 
 
 def _returned(distances_m: Sequence[float]) -> Iterator[float]:
-    """Yield the distances of those rays of a sonar that meet a surface within 22.5 degrees of its normal.
+    """Yield the distances of a sonar's rays that meet a surface within 22.5 degrees of the normal.
 
-    At an edge, the two beams of a pair may have different lengths. The beam whose length is closer to that of
-    the ray decides.
+    At an edge, the two beams of a pair may have different lengths. Of these two beams, the beam whose length
+    is closer to the length of the ray decides.
     """
     for first in range(0, len(distances_m), _BEAMS_OF_SONAR):
         distance, left, right, below, above = distances_m[first : first + _BEAMS_OF_SONAR]
@@ -263,7 +263,7 @@ def _returned(distances_m: Sequence[float]) -> Iterator[float]:
 
 
 def _reflected(sensor: DistanceSensor, glances: Sequence[Glance]) -> float:
-    """Return the average distance, increased if less than the full light returns."""
+    """Return the average distance, increased if the surface does not return all light."""
     light = sum(it.reflection * weight for it, weight in zip(glances, sensor.weights, strict=True))
     distance_m = _measured(sensor, [it.distance_m for it in glances])
     return distance_m + (distance_m / light - distance_m) * sensor.sensitivity

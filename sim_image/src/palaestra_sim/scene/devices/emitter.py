@@ -20,9 +20,9 @@ class Emitter:
     """An emitter.
 
     Attributes:
-        range_m: the maximum distance of receivers; -1 is without limit.
-        channel: the channel of its packets; -1 means all receivers.
-        outbox: texts, each with the channel and the range at which it was sent.
+        range_m: the maximum distance of receivers in meters; -1 means without limit.
+        channel: the channel of the packets; -1 means all receivers.
+        outbox: the texts to send, each with the channel and the range at the time of `send`.
     """
 
     name: str

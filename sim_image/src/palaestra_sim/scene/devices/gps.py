@@ -1,8 +1,8 @@
 """GPS: the position of the sensor in meters or in degrees, and its speed.
 
-In the coordinate system "local", the position is that in the world plus WorldInfo.gpsReference. In the system
-"WGS84", the reference and the position are latitude and longitude in degrees and altitude in meters. Noise
-and resolution are in meters in both systems. Source: WbGps.cpp of Webots.
+In the coordinate system "local", the position is the position in the world plus WorldInfo.gpsReference. In
+the system "WGS84", the reference and the position are latitude and longitude in degrees and altitude in
+meters. Noise and resolution are in meters in both systems. Source: WbGps.cpp of Webots.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Gyro: the angular velocity of the sensor about its own axes, in rad/s.
 
-Webots measures the angular velocity of the nearest Solid with physics. Here the velocity includes that of
-every joint that carries the sensor. Source: WbGyro.cpp of Webots.
+Webots measures the angular velocity of the nearest Solid with physics. Here the velocity includes the
+velocity of every joint that carries the sensor. Source: WbGyro.cpp of Webots.
 """
 
 from __future__ import annotations

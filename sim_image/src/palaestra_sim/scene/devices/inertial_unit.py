@@ -23,7 +23,7 @@ from palaestra_sim.scene.geometry import (
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class InertialUnit:
-    """An inertial unit; `value` is x, y, z, w of its quaternion.
+    """An inertial unit; `value` is x, y, z, w of the quaternion of its rotation.
 
     Attributes:
         noise: standard deviation of the noise about each axis, as a fraction of pi.

@@ -4,9 +4,9 @@ Each layer is a row of the image, from the top down. In a row, the rays go from 
 cast at each step, but only while the lidar is enabled, because they cost time. The distance of an object
 nearer than `minRange` or beyond `maxRange` is infinite.
 
-At each step, a rotating lidar casts the rays over which its head has turned since the step before. Its first
-ray points ahead, and the following rays go to the right, through a full turn. The distance of a ray is 0
-until the head has passed this ray. Source: WbLidar.cpp and RosLidar.cpp of Webots.
+At each step, a rotating lidar casts the rays over which its head has turned since the step before. The first
+ray of a layer points ahead, and the following rays go to the right, through a full turn. The distance of a
+ray is 0 until the head has passed this ray. Source: WbLidar.cpp and RosLidar.cpp of Webots.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _FLOAT_BYTES: Final = 4
 _MOST_RAYS: Final = 1_000_000
 _ROUNDING: Final = 1e-6  # tolerance, so that a turn by exactly the angle of one ray includes that ray
 _POINT: Final = struct.Struct("<fffif")  # x, y, z, layer, time
-_FLOAT32, _INT32 = 7, 5  # sensor_msgs/PointField
+_FLOAT32, _INT32 = 7, 5  # the numbers of these types in sensor_msgs/PointField
 _POINT_FIELDS: Final = [
     {"name": name, "offset": offset, "datatype": datatype, "count": 1}
     for name, offset, datatype in (
@@ -52,11 +52,11 @@ class Lidar:
         frequency: the response of `get_frequency_info`.
         noise: standard deviation of a distance, as a fraction of the maximum range.
         resolution: the resolution of a distance; -1 for exact values.
-        rays: its rays.
-        period_ms: its sampling period; 0 while it is not enabled.
+        rays: the rays of the lidar.
+        period_ms: the sampling period; 0 while the lidar is not enabled.
         clouded: whether the point cloud is enabled.
         layers: the distances of the last step in meters, by layer.
-        timing: `scan_time` and `time_increment` of its scans.
+        timing: `scan_time` and `time_increment` of the laser scans.
     """
 
     name: str
@@ -210,7 +210,7 @@ def _rotating(lidar: Lidar, robot: Carrier) -> Sample:
 
 
 def _sweep(lidar: Lidar, robot: Carrier, before: float, turns: float) -> None:
-    """Cast the rays that the head passes from the angle `before` to the angle `turns`, both in turns."""
+    """Cast the rays that the head passes between the angles `before` and `turns`, given in full turns."""
     rays = lidar.rays
     first, end = (math.floor(it * rays.columns + _ROUNDING) for it in (before, turns))
     columns = [column % rays.columns for column in range(max(first, end - rays.columns), end)]

@@ -18,13 +18,13 @@ class LidarRays:
     """The rays of a lidar by layer and column.
 
     Attributes:
-        frame: the frame of the sensor in that of the robot; the sensor looks along x, with z up.
+        frame: the pose of the sensor in the robot's frame; the sensor looks along x, with z up.
         layers: the number of layers, from the top down.
         columns: the number of rays in each layer.
         wide_rad: the angle over which a fixed lidar spreads the rays of a layer.
         high_rad: the angle from the first layer to the last.
         tilt_rad: the angle by which the lidar is tilted upward.
-        reach_m: the length of its rays.
+        reach_m: the length of the rays.
         rotates: whether the rays are on a rotating head, and spread over a full turn.
     """
 
@@ -52,7 +52,7 @@ class LidarRays:
     def _direction(self, layer: int, column: int) -> Vector:
         up_rad = self.high_rad * (0.5 - layer / (self.layers - 1)) if self.layers > 1 else 0.0
         share = (column + 0.5) / self.columns
-        if self.rotates:  # the head tilts, so each of its rays points upward by the tilt
+        if self.rotates:  # the head tilts, so each ray of the head points upward by the tilt
             return _towards(-math.tau * share, up_rad + self.tilt_rad)
         x, y, z = _towards(self.wide_rad * (0.5 - share), up_rad)
         cosine, sine = math.cos(self.tilt_rad), math.sin(self.tilt_rad)

@@ -31,11 +31,11 @@ class LightSensor:
     """A light sensor; `value` is in the unit of its lookup table, or in W/m2 if `table` is None.
 
     Attributes:
-        place: its frame; it looks along x.
+        place: the frame of the sensor; the sensor looks along the x axis of this frame.
         axes: the axes of the world that point east, north and up.
-        filter: the shares of red, green and blue light that it measures.
+        filter: the shares of red, green and blue light that the sensor measures.
         occlusion: whether shapes hide lights.
-        period_ms: its sampling period; 0 while it is not enabled, so that it measures darkness.
+        period_ms: the sampling period; 0 while the sensor is not enabled, so that it measures darkness.
     """
 
     name: str

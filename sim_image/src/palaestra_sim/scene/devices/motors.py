@@ -13,7 +13,7 @@ from palaestra_sim.ros_interfaces import Handler, Row, UnsimulatedError
 from palaestra_sim.scene.devices.device_type import DevicePart, DeviceTopic, DeviceType
 from palaestra_sim.scene.motors import Motor, MotorSpec
 
-_ROTATIONAL: Final = 0  # the value that `get_type` returns
+_ROTATIONAL: Final = 0  # the value that `get_type` returns for a RotationalMotor
 _LINEAR: Final = 1
 _FIELDS: Final = """
     acceleration SFFloat -1; consumptionFactor SFFloat 10;

@@ -1,4 +1,4 @@
-"""Radar: distances and speeds of the Solids with a `radarCrossSection` in its field of view.
+"""Radar: distances and speeds of the Solids with a `radarCrossSection` in the radar's field of view.
 
 A speed is the change of position since the previous sample, so it is 0 in the first sample. With the default
 limits, Webots detects only targets that move away at 1 to 2 m/s. If both limits are 0, a target may have any
@@ -23,7 +23,7 @@ from palaestra_sim.scene.radar_targets import Bounds, RadarTarget, RadarTargets
 
 _LIGHT_M_S: Final = 299_792_458.0
 _MILLIWATT: Final = 0.001
-_NEAREST_M: Final = 0.001  # the power from a distance of 0 would be infinite
+_NEAREST_M: Final = 0.001  # minimum distance in the formula of the power, which would be infinite at 0
 _Gauss = Callable[[float, float], float]
 
 
@@ -36,7 +36,8 @@ class RadarLimits:
         field_of_view_rad: horizontal and vertical.
         radial_m_s: minimum and maximum speed at which a target moves away; None for any speed.
         absolute_m_s: minimum speed, in either direction.
-        cell: distance in m and speed in m/s below which two targets are merged; a speed of 0 is ignored.
+        cell: two targets are merged if their distances differ by less than the first number, in m, and their
+            speeds by less than the second number, in m/s. If the second number is 0, speeds are not compared.
         power_w: the weakest detectable signal.
         noise: standard deviations of distance, speed and azimuth.
     """
@@ -81,7 +82,7 @@ class Radar:
     """A radar.
 
     Attributes:
-        place: its frame; it looks along x.
+        place: the frame of the radar; the radar looks along the x axis of this frame.
         node: the node of the device.
         limits: the limits of its detection.
         gain_w_m2: the power reflected by 1 m2 at a distance of 1 m.
@@ -179,7 +180,7 @@ class Radar:
 
 
 def merged(echoes: Sequence[Echo], cell: tuple[float, float]) -> list[Echo]:
-    """Return the targets; those in one cell are merged into their mean, weighted by their powers."""
+    """Return the targets; the targets in one cell become their mean, weighted by their powers."""
     rest = list(echoes)
     at = 0
     while cell[0] > 0.0 and at < len(rest):

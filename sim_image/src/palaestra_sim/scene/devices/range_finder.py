@@ -24,11 +24,11 @@ class RangeFinder:
     """A depth camera.
 
     Attributes:
-        place: its frame.
-        lens: its lens; `lens.far_m` is the maximum range.
+        place: the frame of the device.
+        lens: the lens; `lens.far_m` is the maximum range.
         least_m: the minimum range.
         resolution_m: the resolution of a distance; -1 for exact values.
-        spherical: whether the world asks for a spherical image, which is not rendered.
+        spherical: whether the world requests a spherical image, which is not rendered.
         eye: the camera interface; None if the simulator does not render.
     """
 

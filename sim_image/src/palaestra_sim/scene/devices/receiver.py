@@ -1,4 +1,4 @@
-"""Receiver: the queue of the packets that emitters on its channel have sent while it was enabled."""
+"""Receiver: the queue of the packets that emitters sent on the receiver's channel while it was enabled."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ class Receiver:
     """A receiver.
 
     Attributes:
-        listening: whether it is enabled; otherwise it receives nothing.
-        channel: the channel on which it listens; -1 means all channels.
+        listening: whether the receiver is enabled; otherwise it receives nothing.
+        channel: the channel on which the receiver listens; -1 means all channels.
         queue: the packets that arrived, the oldest first.
     """
 

@@ -1,8 +1,8 @@
 """The objects that a camera recognizes: solids with `recognitionColors` that are at least partly visible.
 
-The position of an object is that of its solid, in the frame of the camera. Its position in the image is the
-middle of the rectangle around its visible part. The segmentation image shows each object in its first color,
-on black.
+The position of an object is the position of its solid, in the frame of the camera. The position of an object
+in the image is the middle of the rectangle around the object's visible part. The segmentation image shows
+each object in its first color, on black.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ class Recognition:
 
     Attributes:
         place, lens: the frame and the lens of the camera.
-        reach_m: objects are recognized within this distance.
+        reach_m: the maximum distance of a recognized object, in meters.
         most: maximum number of objects, the nearest first; -1 for all.
-        segments: whether it has `segmentation`.
+        segments: whether the field `segmentation` is TRUE.
         segmenting: whether the segmentation image is published.
         eye: the camera interface; None if the simulator does not render.
     """

@@ -15,7 +15,7 @@ from palaestra_sim.scene.lookup_table import Row as TableRow
 
 Gauss = Callable[[float, float], float]
 
-# The fields of a sensor with three axes, besides `name` and those of a Solid.
+# The fields of a sensor with three axes, besides `name` and the fields of a Solid.
 AXES_FIELDS = """lookupTable MFVec3f; xAxis SFBool TRUE; yAxis SFBool TRUE; zAxis SFBool TRUE;
     resolution SFFloat -1"""
 

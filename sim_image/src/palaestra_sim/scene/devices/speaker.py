@@ -1,4 +1,4 @@
-"""Speaker: its sounds and its speech, which nobody hears. A sound ends at once, unless it loops."""
+"""Speaker: it plays no sounds and no speech here. A sound ends immediately, unless it loops."""
 
 from __future__ import annotations
 

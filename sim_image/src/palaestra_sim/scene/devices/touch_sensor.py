@@ -1,4 +1,4 @@
-"""TouchSensor: a bumper, or a sensor of the force that it exerts on the robot.
+"""TouchSensor: a bumper, or a sensor of the force that the sensor exerts on the robot.
 
 A sensor of type `force` measures the pressure along its x axis. A sensor of type `force-3d` measures the
 force along each of its axes. Both types need a Physics node, and a physics with forces. Source:
@@ -30,13 +30,13 @@ class TouchSensor:
     """A touch sensor.
 
     Attributes:
-        outline: its shapes.
+        outline: the shapes of the sensor.
         type: the number of one of `_TYPES`.
         link: the link whose force is measured; None for a bumper.
         table: the lookup table of a force; None if the value is the force itself.
         resolution: the resolution of a force; -1 for exact values.
-        value: for a bumper, whether it was touched since the last sample; for other types, the force as one
-            number or three.
+        value: for a bumper, whether the bumper was touched since the last sample; for other types, the force
+            as one number or three.
     """
 
     name: str

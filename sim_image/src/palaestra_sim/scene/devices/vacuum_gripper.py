@@ -18,9 +18,9 @@ class VacuumGripper:
     """A gripper.
 
     Attributes:
-        on: whether it is switched on.
-        touches: whether an object could touch it, so that the gripper would hold the object.
-        value: whether it holds an object.
+        on: whether the gripper is switched on.
+        touches: whether an object could touch the gripper, which would then hold the object.
+        value: whether the gripper holds an object.
     """
 
     name: str

@@ -1,6 +1,6 @@
 """Create the scene nodes of a world from the nodes that its files contain.
 
-Each `USE` of a node becomes a node of its own, as in Webots. An instance of a PROTO becomes the node in the
+Each `USE` of a node becomes a separate node, as in Webots. An instance of a PROTO becomes the node in the
 PROTO's body, with the field values of the instance. This node has the DEF name of the instance, and errors
 refer to the instance's position in the file.
 """

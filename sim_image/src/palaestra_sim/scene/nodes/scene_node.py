@@ -23,7 +23,7 @@ class FieldContent:
     """The values of a field: numbers, booleans, strings, nodes, None for NULL.
 
     Attributes:
-        items: in order; each number of a vector is one item.
+        items: the values, in order; each number of a vector is one item.
         bracketed: whether the file has the values in brackets.
     """
 
@@ -48,20 +48,20 @@ class SceneNode:
 
     Attributes:
         number: the response of `get_id`; 0 is the root.
-        origin: the position at which it was written; None for the root.
+        origin: the position of the node in its file; None for the root.
         type_name: the type of the node, such as "Solid".
-        proto_name: the PROTO of which it is an instance; "" if it is not an instance.
-        def_name: its DEF name; "" without one.
-        parent: the node that contains it; None for the root.
+        proto_name: the PROTO of which the node is an instance; "" if it is not an instance.
+        def_name: the DEF name of the node; "" if it has no DEF name.
+        parent: the node that contains this node; None for the root.
         fields: the fields that the file or a client has set, by name.
         twins: this node and all nodes that are the same node in the file by `DEF` and `USE`; a write changes
-            all of them.
-        place: its frame; None for a node without a frame, such as an appearance.
-        outline: whether it, or a twin, is part of a boundingObject.
-        shipped: whether it is an instance of a Webots PROTO whose built-in file has the current axes.
-        stand_in: whether it is a simple solid that replaces a PROTO.
-        unusable: the reason why its PROTO cannot be expanded; "" without a reason.
-        left_out: whether it is not simulated, because the user left it out.
+            all twins.
+        place: the frame of the node; None for a node without a frame, such as an appearance.
+        outline: whether the node, or one of its twins, is part of a boundingObject.
+        shipped: whether the node is an instance of a Webots PROTO whose built-in file has the current axes.
+        stand_in: whether the node is a simple solid that replaces a PROTO.
+        unusable: the reason why the node's PROTO cannot be expanded; "" if it can be expanded.
+        left_out: whether the node is not simulated, because the user left it out.
     """
 
     def __init__(self, number: int, type_name: str, origin: Origin | None, parent: SceneNode | None) -> None:
@@ -105,18 +105,18 @@ class SceneNode:
         return tuple(item for item in self._items(name) if isinstance(item, SceneNode))
 
     def inside(self) -> Iterator[SceneNode]:
-        """Yield the nodes in its fields, in the order of the fields."""
+        """Yield the nodes in the fields of this node, in the order of the fields."""
         for content in self.fields.values():
             yield from (item for item in content.items if isinstance(item, SceneNode))
 
     def descendants(self) -> Iterator[SceneNode]:
-        """Yield all nodes inside it at any depth, parents before children."""
+        """Yield all nodes inside this node at any depth, parents before children."""
         for node in self.inside():
             yield node
             yield from node.descendants()
 
     def ancestors(self) -> Iterator[SceneNode]:
-        """Yield its outer nodes, from the parent to the root."""
+        """Yield the nodes that contain this node, from the parent to the root."""
         node = self.parent
         while node is not None:
             yield node

@@ -45,7 +45,7 @@ class Scope:
         """Return the node itself, or the node to which its `USE` refers.
 
         Raises:
-            WorldError: no node with that DEF name precedes it.
+            WorldError: no node with that DEF name precedes the `USE`.
         """
         if node.uses is None:
             return node
@@ -56,7 +56,7 @@ class Scope:
         return named[before - 1]
 
     def value(self, value: Value) -> tuple[Value, Scope] | None:
-        """Return a value with the scope in which it is written; None for an `IS` without such a field."""
+        """Return a value with the scope in which it is written; None for an `IS` of an unknown field."""
         if len(value.items) == 1 and isinstance(bound := value.items[0], Is):
             found = self.bindings.get(bound.name)
             return None if found is None else found[1].value(found[0])

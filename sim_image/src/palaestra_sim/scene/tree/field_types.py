@@ -1,8 +1,8 @@
 """Node types as a supervisor sees them: their fields, and the type of each field.
 
-Fields and defaults are those of resources/nodes/*.wrl, R2023b. This module lists only the types in the stub's
-worlds; `devices` lists the types of devices. A field that is not listed exists if the world file sets it, and
-its type is derived from its value.
+The fields and defaults come from resources/nodes/*.wrl of Webots R2023b. This module lists only the types in
+the stub's worlds; `devices` lists the types of devices. A field that is not listed exists if the world file
+sets it, and its type is derived from its value.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ _TYPES: Final = {name: type_ for type_, name in _NAMES.items()}
 
 
 class FieldKind(NamedTuple):
-    """The declaration of a field: its type, whether it has several values, and the default as in a world."""
+    """The declaration of a field: its type, whether it has several values, and its default as in a world."""
 
     type: FieldType
     multiple: bool

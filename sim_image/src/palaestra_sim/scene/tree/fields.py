@@ -1,10 +1,10 @@
 """Fields of nodes: typed values that a supervisor reads and writes.
 
 A read returns the written value at once, but the simulation applies the value at the beginning of the next
-basic step. A write of `translation` or `rotation` moves an object, and `customData` reaches the robot. A
-write that only changes the look of an object is accepted too, because Webots does not simulate its effect
-either. `write_rules` refuses a write without the effect that it has in Webots: the client would read the
-value back although nothing had changed.
+basic step. A write of `translation` or `rotation` moves an object, and a write of `customData` reaches the
+robot. A write that only changes the look of an object is accepted too, because Webots does not simulate the
+effect of the look either. `write_rules` refuses a write that would not have the effect that it has in Webots.
+Otherwise the client would read the value back although nothing had changed.
 
 As in Webots, a value that is invalid for the field is ignored without an error.
 """
@@ -42,9 +42,9 @@ class NodeField:
     """One field of one node.
 
     Attributes:
-        node: its node.
-        name: its name in the world file.
-        kind: its declaration.
+        node: the node that has the field.
+        name: the name of the field in the world file.
+        kind: the declaration of the field.
     """
 
     def __init__(self, node: SceneNode, name: str, kind: FieldKind, changes: Changes) -> None:
@@ -61,7 +61,7 @@ class NodeField:
         return len(self._current()) if self.kind.multiple else -1
 
     def get(self, type_: FieldType, index: int = 0) -> Any:
-        """Return the value at `index`, which is ignored for a field with exactly one value.
+        """Return the value at `index`; for a field with exactly one value, `index` is ignored.
 
         The value is a bool, int, float, str, a tuple of floats, or for `NODE` a SceneNode or None.
 
@@ -96,7 +96,7 @@ class NodeField:
         self._changes.before_next_step(self._take_effect)
 
     def room(self, index: int) -> int | None:
-        """Return the position of a node inserted at `index`, -1 for the end; None if that is impossible."""
+        """Return the position for a node inserted at `index` (-1: the end); None if that is impossible."""
         size = len(self._current())
         if self.kind.type is not FieldType.NODE:
             return None
@@ -105,7 +105,7 @@ class NodeField:
         return (index if index >= 0 else size + 1 + index) if -size - 1 <= index <= size else None
 
     def insert(self, type_: FieldType, index: int, value: Any) -> bool:
-        """Insert a value before `index`, -1 for the end; return False if that is impossible.
+        """Insert a value before `index`, or at the end for -1; return False if that is impossible.
 
         Raises:
             UnsimulatedError: the inserted value would have no effect.
@@ -119,7 +119,7 @@ class NodeField:
         return True
 
     def remove(self, index: int) -> bool:
-        """Remove the value at `index`; return False if it does not exist, or if it cannot be removed.
+        """Remove the value at `index`; return False if the value does not exist, or cannot be removed.
 
         Raises:
             UnsimulatedError: the removal would have no effect.
@@ -136,7 +136,7 @@ class NodeField:
         require_effect(self.node, self.name)
 
     def _current(self) -> list[Any]:
-        """Return the values of the pending writes; without pending writes, those of the simulation."""
+        """Return the values of the pending writes; without pending writes, the values of the simulation."""
         if self.kind.type is FieldType.NODE:
             return _initial(self.node, self.name, self.kind)
         if self._writes == 0:
@@ -161,11 +161,11 @@ class NodeField:
 
 
 def quaternion_to_axis_angle(x: float, y: float, z: float, w: float) -> AxisAngle:
-    """Return the axis and angle that the Webots controller computes from a quaternion, including its bug.
+    """Return the axis and angle that Webots' controller computes from a quaternion, including a bug.
 
-    Its RosMathUtils set an angle below 1e-4 to 0, but still compute the axis as xyz / |xyz|. For the exact
-    identity this axis is NaN, so a client cannot write back a zero rotation that it has read. If |w| > 1, the
-    angle is NaN.
+    The controller's RosMathUtils set an angle below 1e-4 to 0, but still compute the axis as xyz / |xyz|. For
+    the exact identity this axis is NaN, so a client cannot write back a zero rotation that it has read. If
+    |w| > 1, the angle is NaN.
     """
     angle_rad = 2.0 * math.acos(w) if -1.0 <= w <= 1.0 else math.nan
     if angle_rad < 1e-4:  # noqa: PLR2004 - Source: RosMathUtils

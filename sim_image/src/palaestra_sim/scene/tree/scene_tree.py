@@ -22,12 +22,12 @@ class SceneTree:
 
     Args:
         world: the parsed world.
-        name: the name of its file, in errors.
+        name: the name of the world file, in errors.
         descriptions: the descriptions of the types that are not base types.
 
     Attributes:
         source: the bytes of the world.
-        nodes: by number.
+        nodes: all nodes, by number.
         root: a Group that has the nodes of the file as its children.
         refused: mistakes in the file because of which a node is missing, such as `USE` of an unknown name.
         ignored: fields that a PROTO does not have, each with its position in the file.
@@ -44,7 +44,7 @@ class SceneTree:
         _mark_outlines(self.nodes.values())
 
     def grow(self, text: str, parent: SceneNode) -> list[SceneNode]:
-        """Return the nodes that `text` describes; `parent` is their parent, but does not contain them yet.
+        """Return the nodes that `text` describes; `parent` is their parent, but does not hold them yet.
 
         Raises:
             WorldError: the text is wrong; the error lists all mistakes.
@@ -81,7 +81,7 @@ class SceneTree:
                 self.nodes.pop(gone.number, None)
 
     def field_of(self, node: SceneNode, name: str, changes: Changes) -> NodeField | None:
-        """Return a node's field; None if this node type does not have it."""
+        """Return a node's field; None if this node type has no such field."""
         found = self._fields.get((node.number, name))
         kind = kinds_of(node).get(name) if found is None else None
         if kind is not None:

@@ -1,7 +1,7 @@
 """Refuse writes of fields that have an effect in Webots but not here.
 
-Without these checks, a client that randomizes a world would read its values back, but train in a world that
-never changes.
+Without these checks, a client that randomizes a world would read back the values that it wrote, but train in
+a world that never changes.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _ACTING: Final = DEVICES.keys() | frozenset(
 # Fields that only people read. A running controller has already read the `name` of each device.
 _FOR_PEOPLE: Final = frozenset(("description", "info", "model", "name", "recognitionColors", "title"))
 _ELSEWHERE: Final = "write it into the world file, or use driver webots"
-_HOLDING: Final = frozenset(("Group", "Pose", "Transform"))  # only the nodes inside these have an effect
+_HOLDING: Final = frozenset(("Group", "Pose", "Transform"))  # only their children have an effect
 _PLACING: Final = frozenset(("translation", "rotation"))
 _SIZES: Final = {
     "Box": ("size",),

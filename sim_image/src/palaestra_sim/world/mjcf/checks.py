@@ -39,7 +39,7 @@ def no_actuator(found: Description) -> Iterator[WorldError]:
 
 
 def repeated(found: Description) -> Iterator[WorldError]:
-    """Two texts or numbers have the same name, so MuJoCo refuses the model."""
+    """Two elements `text` or `numeric` have the same name, so MuJoCo refuses the model."""
     for tag in ("text", "numeric"):
         seen = set()
         for name, element in custom(found.root, tag):
@@ -49,7 +49,7 @@ def repeated(found: Description) -> Iterator[WorldError]:
 
 
 def without_data(found: Description) -> Iterator[WorldError]:
-    """A text or number has no data, or no name."""
+    """An element `text` or `numeric` has no data, or no name."""
     for tag in ("text", "numeric"):
         for element in found.root.named("custom", tag):
             if not element.attributes.get("name") or not element.attributes.get("data", "").strip():
@@ -91,7 +91,7 @@ def unfit_step(found: Description) -> Iterator[WorldError]:
 
 
 def unknown_devices(found: Description) -> Iterator[WorldError]:
-    """The name of a text that renames a device has a wrong form, or the text has no new name."""
+    """An element `text` that renames a device has a name of a wrong form, or no new name."""
     for key, name in found.devices.items():
         kind, slash, old = key.partition("/")
         if kind not in DEVICE_KINDS or not slash or not old or not name:

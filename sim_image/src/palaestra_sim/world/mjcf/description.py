@@ -43,10 +43,10 @@ class Description:
     """An MJCF world as text.
 
     Attributes:
-        source: its bytes.
-        root: its elements.
-        texts: the elements `text` of `custom` by name; if several have the same name, the first.
-        numbers: the elements `numeric` of `custom`, in the same way.
+        source: the bytes of the file.
+        root: the root of the elements.
+        texts: the elements `text` of `custom` by name; if several have the same name, only the first.
+        numbers: the elements `numeric` of `custom` by name; if several have the same name, only the first.
     """
 
     source: Source
@@ -58,7 +58,7 @@ class Description:
 
     @property
     def robot(self) -> str:
-        """The name of the robot: from `custom`, else that of the model, else "robot"."""
+        """The name of the robot: from `custom`, else the name of the model, else "robot"."""
         return self._text(ROBOT) or self.root.attributes.get("model") or "robot"
 
     @property
@@ -68,12 +68,12 @@ class Description:
 
     @property
     def keyframe(self) -> str:
-        """The name of the keyframe at which the world begins; "" for the model's own positions."""
+        """The name of the keyframe at which the world begins; "" for the model's initial positions."""
         return self._text(KEYFRAME)
 
     @property
     def devices(self) -> Mapping[str, str]:
-        """The names of devices that differ from those in the model, by kind and name: "sensor/x"."""
+        """The new names of devices, by the kind and the name in the model, such as "sensor/x"."""
         return {name.removeprefix(DEVICE): self._text(name) for name in self.texts if name.startswith(DEVICE)}
 
     @property
@@ -89,7 +89,7 @@ class Description:
         return None if element is None else _number(element.attributes.get("data", ""))
 
     def error(self, section: str, name: str, fact: str, remedy: str) -> WorldError:
-        """Return an error at the element of that name in a section such as "sensor", else at the root."""
+        """Return an error at the element `name` in a section such as "sensor"; without it, at the root."""
         if section not in self._places:
             elements = (it for section_ in self.root.named(section) for it in section_.walk())
             named = ((it.attributes.get("name", ""), it.start) for it in elements)

@@ -23,10 +23,10 @@ class Element:
     """One element.
 
     Attributes:
-        tag: its name.
-        attributes: the unescaped values of its attributes, by name.
-        start: the byte at which its start tag begins.
-        children: the elements in it, in the order of the file.
+        tag: the name of the element.
+        attributes: the unescaped values of the attributes, by name.
+        start: the byte at which the start tag begins.
+        children: the elements directly inside it, in the order of the file.
     """
 
     tag: str
@@ -73,7 +73,7 @@ def value_span(source: Source, element: Element, attribute: str) -> tuple[int, i
     return found.span(1)
 
 
-_DEEPEST: Final = 200  # bodies of robots are nested 20 deep
+_DEEPEST: Final = 200  # maximum depth of elements; the bodies of robots are nested about 20 deep
 
 
 class _Reader:

@@ -23,7 +23,7 @@ _PARTS: Final = frozenset(("include", "model"))
 
 
 def named_files(root: Element) -> Iterator[tuple[Element, str]]:
-    """Yield the names of files with their elements."""
+    """Yield the name of each file, with the element that names the file."""
     for element in root.walk():
         for attribute, value in element.attributes.items():
             if attribute in _FILES:
@@ -31,7 +31,7 @@ def named_files(root: Element) -> Iterator[tuple[Element, str]]:
 
 
 def named_folders(root: Element) -> Iterator[tuple[Element, str]]:
-    """Yield the names of folders in which MuJoCo looks for files, with their elements."""
+    """Yield each name of a folder in which MuJoCo looks for files, with the element that has this name."""
     for element in root.walk():
         for attribute, value in element.attributes.items():
             if element.tag == "compiler" and attribute in _FOLDERS:
@@ -39,17 +39,17 @@ def named_folders(root: Element) -> Iterator[tuple[Element, str]]:
 
 
 def parts(root: Element) -> tuple[tuple[Element, str], ...]:
-    """Return the names of the files from which MuJoCo reads more elements, with their elements."""
+    """Return the name of each file from which MuJoCo reads more elements, with the element that names it."""
     return tuple(row for row in named_files(root) if row[0].tag in _PARTS)
 
 
 def assets(root: Element) -> Iterator[tuple[Element, str]]:
-    """Yield the names of the files without elements, such as meshes, with their elements."""
+    """Yield the name of each file without elements, such as a mesh, with the element that names the file."""
     return (row for row in named_files(root) if row[0].tag not in _PARTS)
 
 
 def absolutes(source: Source, root: Element) -> Iterator[WorldError]:
-    """Yield an error for each name in a file that is not relative to the folder of the world."""
+    """Yield an error for each file name that is not relative to the folder of the world."""
     for element, path in (*named_folders(root), *named_files(root)):
         if not is_relative(path):
             fact = f"{path!r} is not relative to the folder of the world"

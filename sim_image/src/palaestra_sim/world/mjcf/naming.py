@@ -27,7 +27,7 @@ def generate(
     name: str = "world",
     relative_addresses: bool = False,
 ) -> bytes:
-    """Return the world of one simulator; the parameters are those of `world.generate`.
+    """Return the world of one simulator; the parameters are the same as for `world.generate`.
 
     Raises:
         WorldError: as for `check`.
@@ -56,7 +56,7 @@ def rename(source: bytes, suffix: str, *, name: str = "world", relative_addresse
 
 
 def robots(source: bytes, name: str = "world") -> tuple[WorldRobot, ...]:
-    """Return the robot of a world; there is exactly one, and it is a supervisor.
+    """Return the robot of a world; a world has exactly one robot, which is a supervisor.
 
     Raises:
         WorldError: the bytes are not an MJCF world.

@@ -1,7 +1,7 @@
 """Count how often each file of a model is part of the model.
 
-If a model attaches itself, MuJoCo attaches it without end. Even a few files, of which each attaches the next
-file twice, make more bodies than fit into memory.
+If a model attaches itself, MuJoCo attaches the model without end. Even a few files, of which each attaches
+the next file twice, make more bodies than fit into memory.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import Final
 
 from palaestra_sim.world.mjcf.elements import Element
 
-_MOST: Final = 1_000_000  # elements of a model with all its copies
+_MOST: Final = 1_000_000  # maximum number of elements of a model, including all copies
 
 
 class PartFiles:

@@ -1,9 +1,9 @@
-"""The files of a model on disk, and its project: the folder that holds them all.
+"""The files of a model on disk, and its project: the folder that holds all these files.
 
-Models of a package share meshes, so a model may name files in folders above its own. The project is the
-nearest folder that holds all files that the model names, unless the user names a folder. The project is never
-the whole file system, and no link may lead out of the project: an untrusted model must not read files of the
-pod.
+Models of a package share meshes, so a model may name files in folders above its own folder. The project is
+the nearest folder that holds all files that the model names, unless the user names a folder. The project is
+never the whole file system, and no link may lead out of the project: an untrusted model must not read files
+of the pod.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class Project:
 
     Args:
         world: path of the world.
-        description: the description of its main file.
+        description: the description of the model's main file.
         root: the folder that the user names; None for the nearest folder that holds all files.
 
     Attributes:
@@ -126,7 +126,7 @@ class Project:
         return max(1, len(self._folder.parents))
 
     def _is_outside(self, named: _Named, root: Path | None) -> bool:
-        """Return whether a file is outside `root`; if that is None, only a path to the top is outside."""
+        """Return whether a file is outside `root`; if `root` is None, only a path to the top is outside."""
         if root is None:
             return climb(named.path) >= self._top
         return not self._real(named).is_relative_to(root.resolve())
