@@ -218,7 +218,7 @@ def test_a_world_without_a_floor_is_refused(running):
         Robotino, builtin("arena").replace(b"DEF FLOOR Solid", b"DEF GROUND Solid"), "robotino"
     )
 
-    with pytest.raises(WorldMisfit, match="the world has no floor; give a Solid"):
+    with pytest.raises(WorldMisfit, match="the world has no floor; write DEF FLOOR"):
         scene.layout()
 
 

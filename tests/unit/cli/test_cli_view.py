@@ -46,7 +46,7 @@ def test_a_folder_without_a_run_is_refused(tmp_path, capsys):
     The command must not look for a job of this name in a cluster.
     """
     assert main(["view", str(tmp_path)]) == 2
-    assert "is not a run directory, which has training.yaml" in capsys.readouterr().err
+    assert "has no training.yaml, so it is not a run directory" in capsys.readouterr().err
 
 
 def test_a_name_that_is_no_folder_is_looked_up_in_the_cluster_and_that_is_said(tmp_path, capsys):

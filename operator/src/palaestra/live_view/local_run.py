@@ -75,4 +75,4 @@ def _replica_in(folder: Path) -> Path:
     if replicas:
         names = ", ".join(str(replica) for replica in replicas)
         raise NoRun(f"{folder}: has several replicas; name one of their folders: {names}")
-    raise NoRun(f"{folder}: is not a run directory, which has {FILE}; give runs/JOB/REPLICA")
+    raise NoRun(f"{folder}: has no {FILE}, so it is not a run directory; give runs/JOB/REPLICA")

@@ -38,7 +38,7 @@ class ProjectFiles:
                 the project.
         """
         if not is_relative(address) or "\0" in address:
-            raise OSError(errno.EINVAL, "is not a path from the folder of the world", address)
+            raise OSError(errno.EINVAL, "is not a path relative to the file that names it", address)
         namer_path = Path(namer.name) if namer.kind == "PROTO" else self._world
         return read_bounded(self._inside(Path(posixpath.normpath(namer_path.parent / address))))
 

@@ -142,7 +142,7 @@ def test_a_dependency_that_the_image_lacks_comes_without_what_the_image_has(proj
     [
         ("gymnasium>=99", "corridor: needs gymnasium>=99, and the image has 1."),
         ("companion", "companion: needs torch>=99, and the image has 2.6"),
-        ("stable-baselines3[tests]", "corridor: needs pytest-cov, and the image has no version"),
+        ("stable-baselines3[tests]", "corridor: needs pytest-cov, which the image does not have"),
     ],
     ids=["direct", "indirect", "extra"],
 )

@@ -177,11 +177,15 @@ def _check_requirements(staged: Path) -> None:
     there = [*new, *distributions()]
     for distribution in new:
         for requirement in _unmet(_requirements(distribution), there):
-            found = _found(requirement, there)
+            name, found = distribution.name, _found(requirement, there)
+            wanted = f"{name}: needs {requirement.name}{requirement.specifier}"
+            if found is None:
+                raise ConfigurationError(
+                    f"{wanted}, which the image does not have; add {requirement.name} to your dependencies"
+                )
             raise ConfigurationError(
-                f"{distribution.name}: needs {requirement.name}{requirement.specifier}, and the image has "
-                f"{found.version if found else 'no version'}; choose a version that fits the image, "
-                "or add the package to your dependencies"
+                f"{wanted}, and the image has {found.version}; use a version of {name} that accepts "
+                f"{found.version}, or relax the requirement if it is your own"
             )
 
 

@@ -113,7 +113,8 @@ class ImageReading(_Arrays):
             )
         if (step, data_bytes) != (width * pixel_bytes, height * width * pixel_bytes):
             raise ValueError(
-                f"an image of {width} x {height} pixels with {step} bytes a row and {data_bytes} in all"
+                f"an image of {width} x {height} pixels with {step} bytes a row and {data_bytes} in all, not "
+                f"{width * pixel_bytes} and {height * width * pixel_bytes}"
             )
         data_at = at + _IMAGE.size
         return _Layout(

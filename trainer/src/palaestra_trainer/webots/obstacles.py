@@ -80,8 +80,8 @@ class ObstacleReader:
         if not any(known.name == FLOOR for known in self._things):
             raise WorldMisfit(
                 self._services.node_name,
-                "the world has no floor; give a Solid with a Box as its boundingObject the DEF name FLOOR,"
-                " or use a RectangleArena",
+                "the world has no floor; write DEF FLOOR before the Solid that is the floor and give it a Box"
+                " as its boundingObject, or use a RectangleArena",
             )
         return [
             Thing(known.name, self._place(known), self._heading(known), known.shapes)
