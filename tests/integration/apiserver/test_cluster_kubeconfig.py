@@ -112,7 +112,7 @@ def test_requests_act_for_the_user_that_the_kubeconfig_names(secure, tmp_path):
         ({"as-groups": ["students"]}, "as is missing"),
         ({"as-uid": "7"}, "as is missing"),
         ({"as": "a", "as-groups": "students"}, "as-groups: 'students' is not a list"),
-        ({"as": "a", "as-user-extra": {"k": "v"}}, "as-user-extra: .* is not usable"),
+        ({"as": "a", "as-user-extra": {"k": "v"}}, "as-user-extra: .* is not a mapping of lists"),
         ({"as": "a\nAuthorization: x"}, "as: .* is not one line of text"),
         ({"as": "a", "as-uid": 7}, "as-uid: 7 is not one line of text"),
         ({"token": "a", "username": "b"}, "both token and username"),

@@ -77,7 +77,7 @@ def test_a_run_ends_with_a_summary_and_is_reported_when_it_is_typed_again(desk):
     for line in ("success rate      50%", "steps             7", "faults            2"):
         assert line in out
         assert line in report
-    assert "finished already" in report
+    assert "has already finished" in report
 
 
 def test_a_finished_run_is_prolonged_by_more_steps_and_began_with_the_policy_of_another(desk):
@@ -134,7 +134,7 @@ def test_fresh_begins_anew_and_keeps_the_old_run(desk):
     code, out = desk.run("--fresh")
 
     assert code == 0
-    assert "finished already" not in out
+    assert "already finished" not in out
     assert (desk.run_directory.parent / "0.old-1" / "summary.json").exists()
 
 

@@ -103,7 +103,7 @@ def test_a_complete_run_has_a_result_and_is_not_repeated(job, tmp_path):
     assert (run.progress.phase, run.progress.step, run.progress.success_rate) == ("ended", 7, 0.5)
     again = palaestra.run(job(END), runs=tmp_path)
     assert again.result(PATIENCE_S) == result
-    assert "finished already" in again.log.read_text()
+    assert "has already finished" in again.log.read_text()
 
 
 def test_the_log_of_a_run_has_a_limit(job, tmp_path):

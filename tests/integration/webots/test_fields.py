@@ -62,7 +62,7 @@ def test_one_of_several_values_is_chosen_by_its_index(arena):
             "TARGET",
             "rotation",
             (0.0, 0.0, 0.0, 1.0),
-            "TARGET.rotation: holds x, y, z of an axis and an angle",
+            "TARGET.rotation: .* does not fit; give x, y, z of an axis and an angle",
         ),
         ("ROBOTINO", "customData", 3, "ROBOTINO.customData: 3 does not fit; give text"),
         ("BODY", "radius", True, "BODY.radius: True does not fit; give a finite number"),
