@@ -56,9 +56,10 @@ class WorkQueue(Generic[Item]):
         self._lane = lane
         self._clock = clock
         self._changed = threading.Condition()
-        # Ready names by lane; the lane of the next turn is first.
+        # The ready keys of each lane. The first lane has the next turn.
         self._ready: dict[Hashable, deque[Item]] = {}
-        # The names that wait for a worker, including names that a worker has now and that were added again.
+        # For each key that waits for a worker, the time since when it waits. A key that is added again while
+        # a worker has it waits too.
         self._since: dict[Item, float] = {}
         self._working: set[Item] = set()
         self._later: list[tuple[float, int, Item]] = []

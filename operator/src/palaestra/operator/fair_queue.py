@@ -24,7 +24,7 @@ class FairQueue:
 
     def __init__(self) -> None:
         self._changed = threading.Condition()
-        # Waiting jobs by namespace; the namespace of the next turn is first.
+        # The waiting jobs of each namespace. The first namespace has the next turn.
         self._lines: dict[str, dict[Key, None]] = {}
         self._turns: dict[Key, Turn] = {}
         self._closed = False

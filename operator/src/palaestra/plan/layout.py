@@ -221,7 +221,7 @@ class LocalLayout:
     job_directory: str
     ports: Ports = Ports()
     ros_master: Sequence[str] = OWN_ROS_MASTER
-    # An address, because a minimal chroot has no /etc/hosts that defines localhost.
+    # This is an address and not a name, because a minimal chroot has no /etc/hosts that defines localhost.
     ros_hostname: str = "127.0.0.1"
     health_host: str = "127.0.0.1"
     # This limit is short, because a person waits, and the start includes no image pull and no mount.
