@@ -42,7 +42,8 @@ OURS = frozenset(
 )  # fmt: skip
 ARENA_ENVIRONMENTS = frozenset({"MoveToTargetEnv-v0"})
 _ANY_ACTIONS = (spaces.Box, spaces.Discrete, spaces.MultiDiscrete, spaces.MultiBinary)
-_LOG_INTERVAL = {True: 10, False: 1}  # True: episodes of an off-policy algorithm; False: rollouts
+# True: number of episodes, for an off-policy algorithm; False: number of rollouts.
+_LOG_INTERVAL = {True: 10, False: 1}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

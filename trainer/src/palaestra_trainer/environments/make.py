@@ -39,7 +39,8 @@ def make_environment(wanted: Environment, robot: RobotAbc, scene: Scene) -> gymn
     arguments = _checked(wanted, {"robot": robot, "scene": scene})
     require(robot, getattr(_creator(wanted.id, _spec(wanted.id)), "needs", ()), wanted.id)
     try:
-        # `held` replaces gymnasium's checker, because warnings would not end the run.
+        # `held` replaces gymnasium's checker, because that checker mostly warns, and a warning would not end
+        # the run.
         env = gymnasium.make(wanted.id, disable_env_checker=True, **arguments)
     except TrainerError:
         raise
