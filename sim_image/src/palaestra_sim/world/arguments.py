@@ -14,7 +14,8 @@ from palaestra_sim.world.robots import CLOCK, NAME, SYNCHRONIZE
 from palaestra_sim.world.tokens import Token, quoted, unquoted
 from palaestra_sim.world.tree import Node, Value, World
 
-_UP_TO_COMMENT = re.compile(rb"\A.*#[^\n]*\n?", re.DOTALL)  # up to the last comment, with its line end
+# Matches all bytes up to the end of the line of the last comment.
+_UP_TO_COMMENT = re.compile(rb"\A.*#[^\n]*\n?", re.DOTALL)
 _LONGEST_GAP = 200  # maximum number of bytes of a gap between two strings that is copied between new strings
 _INDENT = re.compile(rb"\r?\n[ \t]*\Z")
 
