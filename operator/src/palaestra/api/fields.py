@@ -227,7 +227,7 @@ def _free(value: dict[str, Any]) -> dict[str, Any]:
 
 
 # The schema is a map to values of any type, not an object with unknown fields. If an API server compares two
-# objects with unknown fields, it ignores a renamed key. So users could change a frozen field.
+# objects with unknown fields, it does not notice a renamed key. Then users could change a frozen field.
 FreeObject = Annotated[
     dict[str, Any],
     Field(max_length=64),

@@ -94,7 +94,7 @@ def node_lost(situation: ReplicaContext) -> Finding | None:
         return None
     why = explain(Reason.NODE_LOST, pod=pod.name, node=pod.node, seconds=LOST_AFTER_S)
     wait = Wait(key=("gone", pod.uid), seconds=pod.grace_s + LOST_AFTER_S)
-    # The node's last report says that the pod runs, so the phase is set here.
+    # The node is lost, but its last report says that the pod runs. So the phase is set here.
     return replace(after(situation, wait, why), phase=Phase.PENDING)
 
 

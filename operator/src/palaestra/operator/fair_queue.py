@@ -82,7 +82,7 @@ class FairQueue:
         self._turns[turn.key] = turn
         del line[turn.key]
         if line:
-            self._lines[namespace] = line  # behind all other namespaces
+            self._lines[namespace] = line  # the namespace is now behind all other namespaces
         return turn
 
     def _leave(self, key: Key) -> None:

@@ -19,7 +19,8 @@ FIRST_S = 1.0  # seconds within which a new trainer is polled for the first time
 class PollStatus(Enum):
     """The result of the last request to a trainer."""
 
-    # The request ended soon, with or without a response: a refused connection delays no other request.
+    # The request ended soon, with or without a response. For example, a refused connection ends at once, and
+    # does not delay other requests.
     PROMPT = "prompt"
     NEW = "new"  # no request was sent yet
     SLOW = "slow"
@@ -67,7 +68,7 @@ class _Turns:
         namespace, entries = self.waiting.popitem(last=False)
         entry = entries.popleft()
         if entries:
-            self.waiting[namespace] = entries  # behind all other namespaces
+            self.waiting[namespace] = entries  # the namespace is now behind all others
         return entry
 
 

@@ -20,7 +20,8 @@ from palaestra.operator.bounded_cache import Answers, BoundedCache, RateLimitedL
 from palaestra.plan.job import QUEUE_LABEL
 
 RECHECK_S = 10.0  # seconds between two reads of a foreign Job
-JOB_UID_LABEL = "kueue.x-k8s.io/job-uid"  # on Workloads; from Kueue's pkg/controller/constants/constants.go
+# Label of a Workload. Source: Kueue's pkg/controller/constants/constants.go.
+JOB_UID_LABEL = "kueue.x-k8s.io/job-uid"
 
 Denied = Mapping[int | None, ApiError]  # errors by replica; the key None is for objects of the whole job
 Lacking = tuple[str, str]  # uid of a Job or pod, and the field selector of the events to read
@@ -213,7 +214,8 @@ class KueueWorkloads(RateLimitedLookup[str, str]):
     def _words(self, namespace: str, uid: str) -> str:
         try:
             return why_not_admitted(self._api.list(WORKLOADS, namespace, labels=f"{JOB_UID_LABEL}={uid}"))
-        # The role does not allow Workloads, or this Kueue does not serve this version.
+        # The operator has no permission to list Workloads, or this release of Kueue does not serve this API
+        # version.
         except (Forbidden, NotFound):
             return ""
 

@@ -17,7 +17,7 @@ from palaestra.plan.yaml_text import literal
 Container = dict[str, Any]
 
 SIDECAR = "palaestra-sidecar"
-PERIOD_S = 10  # seconds between two probes; one execution of the ROS master's probe lasts as long
+PERIOD_S = 10  # seconds between two probes; one execution of the ROS master's probe has the same time limit
 BUILT_IN = "palaestra-train"  # the trainer's program in a job without a custom command
 SECURITY = {
     "allowPrivilegeEscalation": False,
