@@ -39,7 +39,7 @@ class ViewLabel:
 class Supervisor:
     """Changes the simulation through the supervisor's controller.
 
-    Every method raises SimulatorDead, SimulatorHung or WrongData. Changes of fields take effect in the next
+    Every method may raise SimulatorDead, SimulatorHung or WrongData. Changes of fields take effect in the next
     step.
 
     Args:
