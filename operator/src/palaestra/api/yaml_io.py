@@ -21,7 +21,7 @@ _TEXT = "tag:yaml.org,2002:str"
 
 _TAGS = {_BOOL, _FLOAT, _INT, _NULL, _TEXT, "tag:yaml.org,2002:map", "tag:yaml.org,2002:seq"}
 
-_MOST_NODES = 50_000  # nodes of an alias count again at each use
+_MOST_NODES = 50_000  # the nodes of an alias count again each time the alias is used
 _LARGEST_FILE = 1_500_000  # characters; an API server has the same limit for a request
 
 

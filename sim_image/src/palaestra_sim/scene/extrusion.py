@@ -28,7 +28,7 @@ _MOST: Final = 1000
 _STRAIGHT: Final = 1e-9
 _LEAST_SPINE: Final = 2
 _LEAST_SECTION: Final = 4  # minimum number of points of a cross-section; the last repeats the first
-_TURN: Final = 4  # numbers of a rotation
+_TURN: Final = 4  # a rotation has this many numbers
 _PAIR: Final = 2
 
 

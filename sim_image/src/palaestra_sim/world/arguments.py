@@ -16,7 +16,7 @@ from palaestra_sim.world.tree import Node, Value, World
 
 # Matches all bytes up to the end of the line of the last comment.
 _UP_TO_COMMENT = re.compile(rb"\A.*#[^\n]*\n?", re.DOTALL)
-_LONGEST_GAP = 200  # maximum number of bytes of a gap between two strings that is copied between new strings
+_LONGEST_GAP = 200  # the text between two strings is copied only if it has at most this many bytes
 _INDENT = re.compile(rb"\r?\n[ \t]*\Z")
 
 

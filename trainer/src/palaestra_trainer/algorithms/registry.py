@@ -214,7 +214,7 @@ def entry_of(name: str) -> RegisteredAlgorithm:
         raise ConfigurationError(f"algorithm.name: {name} cannot be used: {why}")
     if imports.names_class(name):
         entry = _entry(imports.class_named(name, "algorithm.name", BaseAlgorithm))
-        with_valid_rows(entry.original)  # raises an error if invalid rows would reach the losses
+        with_valid_rows(entry.original)  # raises an error if the algorithm would learn from invalid rows
         return entry
     raise ConfigurationError(
         f"algorithm.name: {name} is not an algorithm; {nearest(name, dict(ALGORITHMS))} "

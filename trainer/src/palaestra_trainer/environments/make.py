@@ -26,7 +26,7 @@ from palaestra_trainer.job.user_code.kwargs import AcceptedArguments
 from palaestra_trainer.robots.base import RobotAbc, Scene
 from palaestra_trainer.robots.capabilities import require
 
-_OF_MAKE = ("max_episode_steps",)  # an argument of gymnasium.make itself
+_OF_MAKE = ("max_episode_steps",)  # this argument belongs to gymnasium.make, not to the environment
 
 
 def make_environment(wanted: Environment, robot: RobotAbc, scene: Scene) -> gymnasium.Env[Any, Any]:
