@@ -100,7 +100,7 @@ def _with_remedies(source: RunSource, target: Path, deadline: float) -> Iterator
         raise TookTooLong(
             f"{source.directory} in pod {source.pod}: was not copied in time; allow more time with --timeout"
         ) from error
-    except (ApiError, ClientError):  # a later clause would catch those of these errors that are OSErrors
+    except (ApiError, ClientError):  # some of these errors are OSErrors, which a later clause replaces
         raise
     except CommandFailed as error:
         raise NotFetched(

@@ -52,7 +52,7 @@ RESET_PLACES = "Scene.reset() leaves the robot at rest at the start, with fresh 
 RESET_DECIDES = "the same seed, start and commands give the same readings"
 
 PERIODS = 3  # number of periods of each movement; in this time, the acceleration becomes unimportant
-STILL_M = 0.002  # largest motion that may be measured for a standing robot, because odometry has steps
+STILL_M = 0.002  # tolerance for the measured motion of a standing robot, because odometry has steps
 RESET_M = 0.01  # tolerance, because a robot in a simulator settles on its wheels
 SHARE = 0.5  # share of the robot's greatest speeds with which steering is checked
 
