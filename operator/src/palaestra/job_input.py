@@ -43,7 +43,7 @@ def changed(job: Given, changes: Mapping[str, Any]) -> TrainingJob:
         OSError: the file cannot be read.
         TooLarge: the file is too large for a job.
     """
-    data = Pruned(data_of(job)).data()  # a copy
+    data = Pruned(data_of(job)).data()  # a copy of the job's data
     if not isinstance(data, dict):
         return validate(data, name_of(job))
     problems = [problem for path, value in changes.items() if (problem := _put(data, path, value))]

@@ -16,9 +16,9 @@ _COUNT = "write the count of a group of spec.simulators with role Collect"
 _STEPS = "write trainer.steps"
 _NORMALIZE = "write trainer.algorithm.normalize"
 
-# The keys of this table are names of three kinds. A key of RL-Baselines3-Zoo's files is one kind. The second
-# is an argument that a run itself passes to a class of Stable-Baselines3. The third is an argument of
-# `learn`, of a callback or of another library, which a field of a job replaces. The values are the remedies.
+# Some keys of this table are keys of RL-Baselines3-Zoo's files. Others are arguments that a run itself passes
+# to a class of Stable-Baselines3. The remaining keys are arguments of `learn`, of a callback or of another
+# library; fields of a job replace these arguments. The values are the remedies.
 ELSEWHERE: Mapping[str, str] = MappingProxyType(
     {
         "_init_setup_model": "a run sets up its model itself; leave it out",
@@ -57,7 +57,7 @@ ELSEWHERE: Mapping[str, str] = MappingProxyType(
         "verbose": "the log of a run contains all figures; leave it out",
     }
 )
-# The names in this table that occur only in files of RL-Baselines3-Zoo.
+# The keys of `ELSEWHERE` that occur only in files of RL-Baselines3-Zoo.
 OF_ZOO = frozenset(
     {
         "callback", "env_kwargs", "env_wrapper", "frame_stack", "monitor_kwargs", "n_envs", "n_timesteps",

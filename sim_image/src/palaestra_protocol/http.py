@@ -24,7 +24,8 @@ from palaestra_protocol.connection_limits import MOST_CONNECTIONS, ConnectionSlo
 from palaestra_protocol.numbers import MOST_PORT
 from palaestra_protocol.tcp_server import TcpServer
 
-MOST_REQUEST_BYTES = 2**17  # above the limit of http.server for a path, 64 KiB, so the server can reply 414
+# Larger than http.server's limit of 64 KiB for a path, so that the server can respond with 414.
+MOST_REQUEST_BYTES = 2**17
 MOST_BODY_BYTES = 4096
 DEADLINE_S = 5.0
 

@@ -140,7 +140,7 @@ def _hidden(folder: str, others: list[str]) -> list[tuple[str, str, str]]:
         if not (mine and mine.origin):  # a folder without `__init__.py` does not shadow a module
             continue
         # Some modules of the standard library, such as msvcrt, exist only on other systems. The library tries
-        # to import them to recognize the system. So a user's module with such a name also shadows a module.
+        # to import them to recognize the system. So a user's module with such a name counts as shadowing too.
         if name in sys.stdlib_module_names if other is None else not _same(mine.origin, other.origin):
             found.append((name, mine.origin, folder))
     return found

@@ -29,8 +29,8 @@ import traceback
 from typing import ClassVar, Literal
 
 FaultKind = Literal["dead", "hung", "wrong_data"]
-# A mistake of a job's author is not in the lines of these libraries. They only call the author's code, or the
-# author's code calls them.
+# A mistake of a job's author is never in a line of these libraries. Such a line only calls the author's code,
+# or the author's code calls the library.
 _LIBRARIES = {
     "gymnasium",
     "importlib",

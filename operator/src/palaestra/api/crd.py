@@ -43,7 +43,7 @@ _COLUMNS = (
 _SELECTABLE = (
     ".status.phase",
     ".spec.scheduling.queueName",
-)  # fields for `--field-selector`, which needs Kubernetes 1.32 or newer
+)  # `--field-selector` can select jobs by these fields since Kubernetes 1.32
 
 
 def crd() -> dict[str, Any]:
@@ -86,7 +86,7 @@ def schema() -> Schema:
     freeze(fields["spec"])
     for heading in ("apiVersion", "kind"):  # the API server itself checks the values of these fields
         fields[heading] = {"type": "string", "maxLength": 63}
-    # A schema may restrict only the name fields of metadata.
+    # The schema of a CRD may restrict only the fields `name` and `generateName` of `metadata`.
     name = fields["metadata"]["properties"]["name"]
     fields["metadata"] = {"type": "object", "properties": {"name": name}}
     # Generations begin at 1, so 0 means "not read yet". Without this default, kstatus would report a new job

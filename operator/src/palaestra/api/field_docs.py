@@ -15,8 +15,8 @@ from palaestra.api.model import Rule
 from palaestra.api.model_walk import fields_of, model_at
 from palaestra.api.structural import Schema
 
-# The names of the fields from the TrainingJob to one field. The name of a list ends in `[]` if the name of a
-# field of its items follows.
+# The path of a field: the names of the fields from the TrainingJob down to this field. The name of a list
+# ends in `[]` if a field of the list's items follows.
 FieldPath = tuple[str, ...]
 Quote = Callable[[str], str]
 

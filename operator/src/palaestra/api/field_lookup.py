@@ -12,7 +12,8 @@ from palaestra.errors import PalaestraError
 
 _MOST_NEAR = 3
 _LONGEST_QUOTE = 120
-_KIND_NAMES = {"trainingjob", "trainingjobs", "tj"}  # in `kubectl explain`, the kind precedes the field
+# A path for `kubectl explain` begins with one of these names.
+_KIND_NAMES = {"trainingjob", "trainingjobs", "tj"}
 _INDEX = re.compile(r"\[[^\]]*\]")
 
 

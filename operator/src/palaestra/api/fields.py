@@ -91,7 +91,7 @@ PATTERNS: dict[str, tuple[str, str]] = {
     ROBOT: ("a robot", f"use {', '.join(ROBOTS)} or module:Class"),
 }
 
-# The pods' names, including the hash, must be DNS labels of at most 63 characters.
+# The name of a pod is the name of its job and a suffix, and must be a DNS label of at most 63 characters.
 JobName = Annotated[str, Field(min_length=1, max_length=48, pattern=LABEL)]
 GroupName = Annotated[str, Field(min_length=1, max_length=20, pattern=LABEL)]
 # The name of a job becomes part of the names of Services and ROS nodes, which must begin with a letter. The
@@ -128,7 +128,8 @@ def _without_unknown_items(items: Any, read: ValidatorFunctionWrapHandler) -> An
 
 
 # A newer release may write items of a kind that this release does not know. This validator drops such items.
-# Use the validator only for lists of a status that are only displayed, or that each reconcile builds again.
+# A list in a status may have this validator only if programs only display the list, or if each reconcile
+# builds the list again.
 KNOWN_ITEMS = WrapValidator(_without_unknown_items)
 
 
@@ -156,7 +157,7 @@ def _uniquely_named(items: tuple[N, ...]) -> tuple[N, ...]:
     return items
 
 
-# With these keywords of the schema, the API server itself refuses equal names.
+# These keywords of the schema make the API server refuse a list in which two items have the same name.
 NamedList = Annotated[
     Listed[N],
     AfterValidator(_uniquely_named),
@@ -226,7 +227,7 @@ def _free(value: dict[str, Any]) -> dict[str, Any]:
 
 
 # The schema is a map to values of any type, not an object with unknown fields. If an API server compares two
-# objects with unknown fields, it ignores a renamed key. So users could change a frozen field.
+# objects with unknown fields, it does not notice a renamed key. Then users could change a frozen field.
 FreeObject = Annotated[
     dict[str, Any],
     Field(max_length=64),

@@ -28,11 +28,12 @@ from palaestra_protocol.pod.enums import Role
 
 API_VERSION: Final = "palaestra.dev/v1alpha1"
 KIND: Final = "TrainingJob"
-START_TIMEOUT_S = 21_600  # Six hours: a job survives a registry outage of a night, but not of a weekend.
+# Six hours: a job survives a short outage of the image registry, but not an outage of a weekend.
+START_TIMEOUT_S = 21_600
 
 FRUITLESS_PODS = 6  # Equal to Kubernetes' default backoffLimit.
 
-MOST_SIMULATORS = 32  # The limit for one pod, in which simulator k uses ports 7100+k and 7200+k.
+MOST_SIMULATORS = 32  # The limit for one pod. Simulator k of a pod uses the ports 7100+k and 7200+k.
 
 MOST_INLINE = 900_000  # Characters of all inline worlds together; the plan also limits their bytes.
 

@@ -19,7 +19,7 @@ from palaestra.api.validation_messages import quoted, sentence
 from palaestra.api.yaml_io import NotYaml, read, write
 from palaestra.errors import SpecErrors
 
-_NOT_EXACT = 2.0**53  # from here on, a float may be the nearest float of several whole numbers
+_NOT_EXACT = 2.0**53  # from this number on, several whole numbers may have the same nearest float
 _KEY = "[key]"  # last item of pydantic's path if the key of a mapping is wrong
 
 _HEADING = (("apiVersion", API_VERSION), ("kind", KIND))
@@ -141,7 +141,7 @@ def _remove(pruned: Pruned, paths: list[Path], removed: list[Path]) -> bool:
     before = len(removed)
     for path in paths:
         if any(path[: len(other)] == other != path for other in removed):
-            continue  # its parent was removed
+            continue  # a field that contains this field was removed
         gone = path
         while gone and not pruned.take(gone, _STAND_INS.get(gone)):
             gone = gone[:-1]

@@ -42,7 +42,7 @@ NO_PASSWORD_IN_WORDS = Rule(
     cel=f"!self.options.exists(word, word.matches(r'{PASSWORD}'))",
     message=_ELSEWHERE,
 )
-NO_PASSWORD_IN_OPTIONS = Rule(  # about a free object, which an API server cannot check
+NO_PASSWORD_IN_OPTIONS = Rule(  # `options` may have any content, so an API server cannot check it
     field="options",
     holds=lambda owner: not has_password(owner.options),
     reads=("options",),

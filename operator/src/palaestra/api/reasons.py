@@ -2,7 +2,8 @@
 
 from enum import StrEnum
 
-LONGEST_MESSAGE = 1024  # Characters of every message: the API server's limit for the message of an event.
+# Limit of every message, in characters. The API server has this limit for the message of an event.
+LONGEST_MESSAGE = 1024
 
 
 class Reason(StrEnum):

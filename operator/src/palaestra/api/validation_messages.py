@@ -17,7 +17,7 @@ from palaestra_protocol.foreign_words import ELSEWHERE, FROM_ZOO, NO_ALGORITHM, 
 
 _LONGEST_QUOTE = 60
 _SIMILAR = 0.6
-# Least similarity between a name in Python's style and the name of a field for which it is suggested: for
+# A message suggests a field for a name in Python's style if their similarity is at least this. For
 # every_steps the message suggests everySteps, but for n_steps it does not suggest steps.
 _MISSPELLED = 0.92
 # Sections in which people write hyperparameters of RL Zoo.

@@ -21,8 +21,8 @@ _TEXT = "tag:yaml.org,2002:str"
 
 _TAGS = {_BOOL, _FLOAT, _INT, _NULL, _TEXT, "tag:yaml.org,2002:map", "tag:yaml.org,2002:seq"}
 
-_MOST_NODES = 50_000  # each use of an alias counts
-_LARGEST_FILE = 1_500_000  # characters, the limit of an API server
+_MOST_NODES = 50_000  # the nodes of an alias count again each time the alias is used
+_LARGEST_FILE = 1_500_000  # characters; an API server has the same limit for a request
 
 
 class NotYaml(ValueError):

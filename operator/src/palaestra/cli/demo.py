@@ -32,7 +32,8 @@ exit codes:
   1    failed; the last lines of the log give the reason
 """
 JOB = "demo.yaml"
-# A step of the robot is 192 ms of simulated time; the stub would compute this step in less than 1 ms.
+# The stub computes a step of the robot, which is 192 ms of simulated time, in less than 1 ms. With this
+# fault, a step takes about as long as in real time.
 ABOUT_REAL_TIME = {"name": "PALAESTRA_STUB_FAULTS", "value": "slow:latency_ms=190"}
 
 

@@ -26,7 +26,7 @@ OBJECT = re.compile(r"[a-z0-9]([-a-z0-9.]{0,251}[a-z0-9])?")
 ALLOWED = re.compile(rf"({DOMAIN})?{NAME}|{DOMAIN}")
 NODE_LABEL = re.compile(rf"({DOMAIN})?{NAME}=({NAME})?")
 
-# Settings that an installation may allow to jobs. Each row has the end of the option's name, the field of
+# Settings of jobs that an installation may allow. Each row has the end of the option's name, the field of
 # `Allowed`, the type of the option's value, and the meaning.
 ALLOWANCES = (
     ("pod-label", "pod_labels", "KEY", "label that jobs may set on their pods"),

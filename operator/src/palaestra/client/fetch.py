@@ -39,7 +39,9 @@ PARTS = (
     "attempts.jsonl",
     "tensorboard",
 )
-TIMES = 4  # a volume may be larger than its request: provisioners round up, and some do not limit a volume
+# Limit of the files, as a multiple of the requested size. A volume may be larger than its request, because
+# provisioners round up, and some provisioners do not limit a volume.
+TIMES = 4
 OF_EXISTING_BYTES = 2**34
 # A replica in these phases gets a new pod if it has no pod.
 GOES_ON = frozenset({Phase.PENDING, Phase.RUNNING})
@@ -98,7 +100,7 @@ def _with_remedies(source: RunSource, target: Path, deadline: float) -> Iterator
         raise TookTooLong(
             f"{source.directory} in pod {source.pod}: was not copied in time; allow more time with --timeout"
         ) from error
-    except (ApiError, ClientError):  # some of these errors are OSErrors too
+    except (ApiError, ClientError):  # some of these errors are OSErrors, which a later clause replaces
         raise
     except CommandFailed as error:
         raise NotFetched(

@@ -16,7 +16,8 @@ from palaestra.api.text import one_line
 MOST_FILES = 10_000
 MOST_PARTS = 16
 MOST_NAME_BYTES = 255
-# The limit of bytes between the contents of two files: headers, and blocks that are read ahead.
+# Limit in bytes of the data between the contents of two files. This data is headers, and blocks that are read
+# ahead.
 MOST_HEAD_BYTES = 2**16
 
 
@@ -53,7 +54,7 @@ def unpack(chunks: Iterator[bytes], into: Path, wanted: Collection[str], most_by
         raise
     except (tarfile.TarError, ValueError, UnicodeError) as error:  # tarfile raises all three
         raise WrongArchive(f"the archive from the pod is damaged ({one_line(str(error), 200)})") from error
-    for _ in chunks:  # The exit code of the command is at the end of the stream.
+    for _ in chunks:  # Read the stream to its end, where the command's exit code is.
         pass
 
 

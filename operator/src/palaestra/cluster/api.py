@@ -21,7 +21,7 @@ Objects = list[Object]
 PAGE = 500
 MANAGER = "palaestra-operator"
 MERGE_PATCH = "application/merge-patch+json"
-APPLY_PATCH = "application/apply-patch+yaml"  # JSON is YAML
+APPLY_PATCH = "application/apply-patch+yaml"  # the body is JSON, which is also valid YAML
 LISTS_FROM_THE_START = 3
 TABLE = "application/json;as=Table;v=v1;g=meta.k8s.io"
 METADATA = "application/json;as={kind};g=meta.k8s.io;v=v1"

@@ -203,7 +203,7 @@ def _of_provider(merger: KubeConfigMerger, context: str, provider: Mapping[str, 
     if (name := provider.get("name")) != OIDC:
         raise NotConfigured(f"{PROVIDER}: {name!r} is no longer supported; use a plugin under `exec`")
     configuration = Configuration()
-    base: Any = None  # None selects each file's own folder
+    base: Any = None  # with None, relative paths in a file start at the folder of that file
     loader = KubeConfigLoader(
         merger.config, active_context=context, config_base_path=base, config_persister=merger.save_changes
     )

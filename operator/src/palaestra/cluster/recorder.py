@@ -104,7 +104,8 @@ class Recorder:
     def _event(self, obj: Object, kind: str, reason: str, message: str) -> dict[str, Any]:
         metadata = obj["metadata"]
         name, uid = str(metadata["name"]), str(metadata.get("uid", ""))
-        namespace = str(metadata.get("namespace") or "default")  # the namespace of events about nodes
+        # Events about nodes are in the namespace `default`.
+        namespace = str(metadata.get("namespace") or "default")
         text = message if len(message) <= LONGEST_MESSAGE else message[: LONGEST_MESSAGE - 1] + "…"
         digest = hashlib.sha256(f"{uid}\0{kind}\0{reason}\0{text}".encode()).hexdigest()[:16]
         now = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")

@@ -171,7 +171,7 @@ class Reflector:
                 self._changed(before)
             if different:
                 self._changed(kept)
-        except Exception:  # an error from one object must not hide the others
+        except Exception:  # an error about one object must not stop the work on other objects
             log.exception("object not cached", resource=self._resource.plural, key=key_of(obj))
 
     def _drop(self, key: Key) -> None:
@@ -180,5 +180,5 @@ class Reflector:
             return
         try:
             self._changed(known)
-        except Exception:  # an error from one object must not hide the others
+        except Exception:  # an error about one object must not stop the work on other objects
             log.exception("deletion not reported", resource=self._resource.plural, key=key)

@@ -84,7 +84,8 @@ DEPLOYMENTS = Resource(api_version="apps/v1", kind="Deployment", plural="deploym
 STORAGE_CLASSES = Resource(
     api_version="storage.k8s.io/v1", kind="StorageClass", plural="storageclasses", namespaced=False
 )
-# The kinds for access reviews: the response to a creation contains whether an account has a permission.
+# Objects of these kinds are access reviews: the response to the creation of a review states whether an
+# account has a permission.
 OWN_RIGHTS = Resource(
     api_version="authorization.k8s.io/v1",
     kind="SelfSubjectAccessReview",

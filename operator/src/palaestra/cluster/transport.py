@@ -192,7 +192,7 @@ class Transport:
         response = self._send(call, Timeout(connect=min(self.limits.connect_s, left_s), read=left_s))
         try:
             return self._answer(response, call, deadline)
-        except BaseException:  # also Ctrl-C: the next request would read the remaining bytes of this response
+        except BaseException:  # after Ctrl-C too, the next request would read the rest of this response
             response.close()
             raise
         finally:

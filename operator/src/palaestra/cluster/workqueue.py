@@ -56,9 +56,10 @@ class WorkQueue(Generic[Item]):
         self._lane = lane
         self._clock = clock
         self._changed = threading.Condition()
-        # Ready names by lane; the lane of the next turn is first.
+        # The ready keys of each lane. The first lane has the next turn.
         self._ready: dict[Hashable, deque[Item]] = {}
-        # The names that wait for a worker, including names that a worker has now and that were added again.
+        # For each key that waits for a worker, the time at which the wait began. A key that is added again
+        # while a worker has it waits too.
         self._since: dict[Item, float] = {}
         self._working: set[Item] = set()
         self._later: list[tuple[float, int, Item]] = []
@@ -155,7 +156,7 @@ class WorkQueue(Generic[Item]):
         line = self._ready.pop(lane)
         key = line.popleft()
         if line:
-            self._ready[lane] = line  # behind all other lanes
+            self._ready[lane] = line  # the lane is now behind all other lanes
         self._waited(now - self._since.pop(key))
         self._working.add(key)
         return key

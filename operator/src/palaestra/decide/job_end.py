@@ -21,7 +21,8 @@ from palaestra.observe.models import JobEnd, JobView, PodView
 from palaestra_protocol.pod.status import ExitCode
 
 LAST_WORD_S = 30  # longest wait in seconds for the end of a pod, after the end of its Job
-_EXIT_CODE = re.compile(r"exit code (\d{1,3})\b")  # matches the Job's message, for a pod that was deleted
+# Finds the exit code in the Job's message if the pod was deleted.
+_EXIT_CODE = re.compile(r"exit code (\d{1,3})\b")
 
 
 def ended_by_others(situation: ReplicaContext) -> Finding | None:

@@ -33,8 +33,9 @@ from palaestra.decide.explanation import Explanation
 from palaestra.decide.replica_context import ReplicaVerdict
 from palaestra.observe.models import Observed
 
-LONGEST_NODES = 256  # characters of the names of all nodes together
-LONGEST_LEFT_OUT = 230  # characters of one line: a group's name, and 200 characters from a simulator
+LONGEST_NODES = 256  # maximum number of characters of all node names together
+# Characters of one line: the name of a group, and at most 200 characters from a simulator.
+LONGEST_LEFT_OUT = 230
 _CONDITION_OF = {
     Phase.RUNNING: ConditionType.RUNNING,
     Phase.SUSPENDED: ConditionType.SUSPENDED,

@@ -94,7 +94,7 @@ def worlds_to_check(job: TrainingJob, observed: Observed, layout: ClusterLayout)
         return ()
     try:
         return given_worlds(job, _worlds(job, observed))
-    except PlanError:  # the plan fails in the same way, whatever the results of the checks
+    except PlanError:  # the plan will fail with the same error, so the results of the checks do not matter
         return ()
 
 

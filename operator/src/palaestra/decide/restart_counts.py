@@ -29,7 +29,8 @@ from palaestra.observe.json_access import MOST_COUNT
 from palaestra.observe.models import JobView, PodView, ReplicaObserved
 from palaestra_protocol.pod.status import ExitCode
 
-# A pod can report any number, so its report may exceed the observed attempts by at most this number.
+# A pod can report any number of attempts, so a report is ignored if it exceeds the number of observed
+# attempts by more than this limit.
 MOST_UNSEEN = 100
 
 # The Job controller creates the pod first and records the time of the resumption later. Both times are whole

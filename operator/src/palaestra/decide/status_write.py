@@ -24,7 +24,7 @@ from palaestra.observe.json_access import part, text
 PROGRESS_EVERY_S = 30
 _WITH_OTHERS = frozenset({"activeSeconds", "activeSince"})  # written together with other changes, never alone
 _OF_JOB = frozenset({"lastCheckpointTime", "leftOut", "nodes", "step", "successRate"})
-_FIRST = frozenset(  # fields that stay in the status after their first value
+_FIRST = frozenset(  # fields that are never removed from the status after their first value
     {"step", "target", "successRate", "successInterval", "lastCheckpoint"}
 )
 _OF_REPLICA = frozenset(
@@ -106,7 +106,8 @@ def _rest(replica: Any) -> Any:
     kept = {name: value for name, value in _without_amounts(replica).items() if name not in _OF_REPLICA}
     kept |= dict.fromkeys(_FIRST & replica.keys())  # a first value is written at once, a changed value later
     restarts = kept.get("restarts")
-    if isinstance(restarts, Mapping):  # simulators may restart often, so their restarts count as progress
+    # Simulators may restart often, so this count is written only together with the progress.
+    if isinstance(restarts, Mapping):
         kept["restarts"] = {name: value for name, value in restarts.items() if name != "simulator"}
     return kept
 

@@ -47,7 +47,8 @@ def mark(seen: ReplicaObserved, current: PodReference | None, *, suspend: bool) 
         return None
     named = job.suspension is not None and job.suspension.pod == current.uid
     lived = seen.pod is not None and lives(seen.pod)
-    # If the Job is suspended again before the next pod is created, the existing mark stays correct.
+    # If the Job is suspended again before the next pod is created, its annotation about the pod is still
+    # correct.
     if suspend:
         return None if named and not lived else Suspended(pod=current.uid, lived=lived)
     late = job.suspend_set is True and not named

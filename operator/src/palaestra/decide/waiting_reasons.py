@@ -28,7 +28,7 @@ from palaestra.plan.job import GIVEN_UP
 from palaestra.plan.replica import INSTALL_SIDECAR, ROS_MASTER, SIMULATOR_PREFIX, TRAINER
 from palaestra_protocol.pod.status import SimulatorStatus
 
-LOST_AFTER_S = 30  # seconds after the end of a deleted pod's grace period
+LOST_AFTER_S = 30  # seconds from the end of a deleted pod's grace period until its node counts as lost
 CRASHES = 3  # crashes of one sidecar after which the status reports a crash loop
 PULLING = frozenset(
     {"ErrImagePull", "ImagePullBackOff", "InvalidImageName", "ErrImageNeverPull", "ImageInspectError",
@@ -94,7 +94,7 @@ def node_lost(situation: ReplicaContext) -> Finding | None:
         return None
     why = explain(Reason.NODE_LOST, pod=pod.name, node=pod.node, seconds=LOST_AFTER_S)
     wait = Wait(key=("gone", pod.uid), seconds=pod.grace_s + LOST_AFTER_S)
-    # The node's last report says that the pod runs, so the phase is set here.
+    # The node is lost, but its last report says that the pod runs. So the phase is set here.
     return replace(after(situation, wait, why), phase=Phase.PENDING)
 
 

@@ -34,8 +34,8 @@ CHECKS: tuple[tuple[str, Check], ...] = (
     ("operator's rights", operator_rights),
     ("metrics", metrics),
 )
-# For each check, the checks to skip if it fails: these would fail too, or their results would mislead. For
-# example, RBAC also grants permissions in a namespace that does not exist.
+# For each check, the checks to skip if it fails. A skipped check would fail too, or its result would mislead.
+# For example, RBAC also grants permissions in a namespace that does not exist.
 POINTLESS: Mapping[Check, frozenset[Check]] = {
     answers: frozenset(check for _, check in CHECKS),
     namespace: frozenset({own_rights, sidecars, operator_rights}),

@@ -16,7 +16,7 @@ from palaestra.objects import Object
 from palaestra.plan.containers import SECURITY
 from palaestra.plan.pod import UNPRIVILEGED
 
-# The values are small, and all limits are set, so that a quota cannot require a missing limit.
+# All limits are set, because a quota may refuse a pod that lacks a limit. The values are small.
 RESOURCES = {
     "requests": {"cpu": "10m", "memory": "32Mi"},
     "limits": {"cpu": "10m", "memory": "96Mi"},

@@ -12,7 +12,7 @@ from contextlib import suppress
 from io import RawIOBase
 from typing import Any
 
-FIRST = 4 << 20  # bytes; a trainer itself writes about this much in some hours
+FIRST = 4 << 20  # bytes; the log of a trainer has about this size after some hours
 LAST = 4 << 20
 _NOTE = re.compile(rb"--- ([0-9]+) bytes were left out here; [^\n]*\n")
 _LONGEST_NOTE = 200

@@ -30,7 +30,8 @@ from palaestra.local.run import RunOptions, run
 from palaestra_protocol.pod.status import ExitCode
 from palaestra_sim.errors import SimError
 
-# Polling, because the kernel reports a parent's end only through a pidfd, which some systems lack.
+# This process polls, because the kernel reports the end of a parent only through a pidfd, which some systems
+# lack.
 PARENT_CHECK_S = 0.5
 
 

@@ -23,7 +23,8 @@ import sys
 import time
 
 MARKER = "PALAESTRA_LOCAL_CONTAINER"  # environment variable with the value <pod uid>/<container>/
-QUIET_ROUNDS = 3  # last rounds, which find no process; one round misses a process that is in an exec
+# Consecutive rounds without a process that end the search; one round may miss a process during its exec.
+QUIET_ROUNDS = 3
 ROUND_S = 0.02
 DEADLINE_S = 20.0  # a process that survives SIGKILL for this long hangs in the kernel
 

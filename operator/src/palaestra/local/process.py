@@ -145,7 +145,7 @@ def end_descriptor(pid: int) -> int:
 
     def tell() -> None:
         with contextlib.suppress(BrokenPipeError):  # the reading end is closed
-            # Closing is not enough, because a forked process may have a copy of the descriptor.
+            # To close the pipe is not enough, because a forked process may have a copy of the descriptor.
             os.write(writer, b"\n")
         os.close(writer)
 

@@ -38,8 +38,8 @@ async def show_progress(
     wait_s = first_s
     while True:
         await asyncio.sleep(wait_s)
-        # The request is in a thread, because the trainer may take seconds to respond, and the event loop must
-        # serve the pod meanwhile.
+        # The request runs in a thread, because the trainer may take seconds to respond. Meanwhile the event
+        # loop must serve the pod.
         progress = await asyncio.to_thread(reader.progress)
         if progress.target:
             show(progress_line(progress))

@@ -17,7 +17,8 @@ LACKS = "palaestra.dev/lacks"  # annotation of a cached copy: the value of `Lack
 LONGEST_TEXT = 256  # characters; a longer inline world is replaced by its digest
 MOST_CHARACTERS = 32_768  # limit of a cached copy without its status; a usual job has 4,000 characters
 
-# These fields may be large: lists and maps of texts. After the objects exist, no decision needs these fields.
+# These fields may be large, because they contain lists and maps of texts. Once the job's objects exist, no
+# decision needs these fields.
 _LARGE_OF_SPEC = frozenset({"imagePullSecrets", "rosMaster"})
 _LARGE_OF_TRAINER = frozenset({"algorithm", "command", "env", "environment", "resources"})
 _LARGE_OF_GROUP = frozenset({"command", "driver", "env", "image", "options", "resources", "world"})

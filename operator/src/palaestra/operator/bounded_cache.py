@@ -20,11 +20,12 @@ from typing import Generic, TypeVar
 from palaestra.objects import Key
 
 REMEMBERED = 4000  # limit of objects of all jobs together; one message is stored for each object
-PATIENCE_S = 5.0  # seconds after an object was found incomplete until the first request about the object
+PATIENCE_S = 5.0  # seconds from the first look at an incomplete object to the first request about the object
 # The pause between the first two requests about an object; each later pause is twice the previous one.
 RECHECK_S = 15.0
 LONGEST_PAUSE_S = 300.0
-# Requests a second for all objects together. The bucket holds one token, so at most 5 go out in any second.
+# Requests a second for all objects together. The bucket holds one token, so at most 5 requests are sent in
+# any second.
 RATE = 4.0
 
 Item = TypeVar("Item", bound=Hashable)
@@ -153,7 +154,7 @@ class _Turns:
     def __init__(self, now: float) -> None:
         self._lock = threading.Lock()
         self._tokens, self._filled = 1.0, now
-        self._end = now  # the first future time that no waiting object has
+        self._end = now  # the first future time that is not assigned to a waiting object
 
     def wait_s(self, now: float, *, queued: bool) -> float:
         """Return the seconds until the request may be sent; 0: now.

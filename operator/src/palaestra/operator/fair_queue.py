@@ -24,7 +24,7 @@ class FairQueue:
 
     def __init__(self) -> None:
         self._changed = threading.Condition()
-        # Waiting jobs by namespace; the namespace of the next turn is first.
+        # The waiting jobs of each namespace. The first namespace has the next turn.
         self._lines: dict[str, dict[Key, None]] = {}
         self._turns: dict[Key, Turn] = {}
         self._closed = False
@@ -82,7 +82,7 @@ class FairQueue:
         self._turns[turn.key] = turn
         del line[turn.key]
         if line:
-            self._lines[namespace] = line  # behind all other namespaces
+            self._lines[namespace] = line  # the namespace is now behind all other namespaces
         return turn
 
     def _leave(self, key: Key) -> None:

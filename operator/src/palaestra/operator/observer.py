@@ -204,7 +204,8 @@ class JobObserver:
         except Forbidden:
             if source.kind is not ReferenceKind.SECRET:
                 raise
-            # The operator may not read Secrets in this namespace: treat the Secret as one without the label.
+            # The operator has no permission to read Secrets in this namespace, so treat the Secret as one
+            # without the label.
             return {}
 
     def _has_kueue(self) -> bool:

@@ -19,7 +19,8 @@ FIRST_S = 1.0  # seconds within which a new trainer is polled for the first time
 class PollStatus(Enum):
     """The result of the last request to a trainer."""
 
-    # The request ended soon, with or without a response: a refused connection delays no other request.
+    # The request ended soon, with or without a response. For example, a refused connection ends at once, and
+    # does not delay other requests.
     PROMPT = "prompt"
     NEW = "new"  # no request was sent yet
     SLOW = "slow"
@@ -29,7 +30,7 @@ PLACES = {
     PollStatus.PROMPT: 40,
     PollStatus.NEW: 16,
     PollStatus.SLOW: 8,
-}  # 64 responses of 64 KiB: 4 MiB at most
+}  # at most 64 responses at a time, each at most 64 KiB: together 4 MiB
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,7 +68,7 @@ class _Turns:
         namespace, entries = self.waiting.popitem(last=False)
         entry = entries.popleft()
         if entries:
-            self.waiting[namespace] = entries  # behind all other namespaces
+            self.waiting[namespace] = entries  # the namespace is now behind all others
         return entry
 
 
@@ -122,7 +123,8 @@ class PollSchedule:
             return False
         first = entry.standing is PollStatus.NEW
         entry.standing = PollStatus.PROMPT if now_s - entry.asked_s < self._prompt_s else PollStatus.SLOW
-        # The first wait varies more, which spreads targets that were found at the same time.
+        # The first wait varies more, so that trainers that were found at the same time get requests at
+        # different times.
         least = 0.2 if first else 0.8
         self._at(entry, now_s + self._period_s * (least + (1.0 - least) * self._spread()))
         return True

@@ -20,16 +20,18 @@ from palaestra.operator.bounded_cache import Answers, BoundedCache, RateLimitedL
 from palaestra.plan.job import QUEUE_LABEL
 
 RECHECK_S = 10.0  # seconds between two reads of a foreign Job
-JOB_UID_LABEL = "kueue.x-k8s.io/job-uid"  # on Workloads; from Kueue's pkg/controller/constants/constants.go
+# Label of a Workload. Source: Kueue's pkg/controller/constants/constants.go.
+JOB_UID_LABEL = "kueue.x-k8s.io/job-uid"
 
-Denied = Mapping[int | None, ApiError]  # errors by replica; None: an object of the whole job
+Denied = Mapping[int | None, ApiError]  # errors by replica; the key None is for objects of the whole job
 Lacking = tuple[str, str]  # uid of a Job or pod, and the field selector of the events to read
 Change = tuple[str, int]  # uid and generation of a Job
 
-# The message has this word if a webhook does not respond. The response is then an internal error.
+# If a webhook does not respond, the API server responds with an internal error, and its message has this
+# word.
 _BY_A_WEBHOOK = "webhook"
-# The message has these words if a budget forbids an eviction. The response is then 429, as if the API server
-# were busy.
+# If a disruption budget forbids an eviction, the API server responds with 429, as if it were busy. The
+# message of this response has these words.
 _BY_A_BUDGET = "disruption budget"
 
 
@@ -212,7 +214,8 @@ class KueueWorkloads(RateLimitedLookup[str, str]):
     def _words(self, namespace: str, uid: str) -> str:
         try:
             return why_not_admitted(self._api.list(WORKLOADS, namespace, labels=f"{JOB_UID_LABEL}={uid}"))
-        # The role does not allow Workloads, or this Kueue does not serve this version.
+        # The operator has no permission to list Workloads, or this release of Kueue does not serve this API
+        # version.
         except (Forbidden, NotFound):
             return ""
 

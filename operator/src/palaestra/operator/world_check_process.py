@@ -18,9 +18,10 @@ import structlog
 from palaestra.plan import GivenWorld, WorldVerdict
 
 SECONDS = 20  # seconds of processor time for one world; the costliest known world of 900 kB takes 2 s
-# Address space; the costliest known world of 900 kB needs 135 MiB. The container has memory for two checks.
+# Limit of the address space of a check; the costliest known world of 900 kB needs 135 MiB. The container has
+# memory for two checks.
 MEBIBYTES = 144
-DEADLINE_S = 300.0  # seconds for all worlds of a job; only a busy node, not a costly world, exceeds it
+DEADLINE_S = 300.0  # seconds for all worlds of a job; the checks take longer only on a busy node
 _CRASHES: Final = frozenset(  # exit code 1: an exception, whose traceback is in the operator's log
     (1, -signal.SIGABRT, -signal.SIGBUS, -signal.SIGFPE, -signal.SIGILL, -signal.SIGSEGV)
 )

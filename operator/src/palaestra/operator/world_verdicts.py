@@ -16,9 +16,9 @@ from palaestra_sim.errors import WorldError
 from palaestra_sim.world import check
 
 MOST_BYTES_HERE = 16_384  # a worker itself checks worlds up to this total size, in less than 0.1 s
-AT_ONCE = 2  # checks of all namespaces together
+AT_ONCE = 2  # checks that run at the same time, for all namespaces together
 REMEMBERED = 4000  # results in memory; the result of an invalid world has a message of at most 4 kB
-HANDED_S = 10.0  # seconds that a job has at its turn to pass its worlds; then the turn ends
+HANDED_S = 10.0  # seconds; if a job does not pass its worlds within this time of its turn, the turn ends
 PAUSE_S = 5.0  # pause in seconds after a check without a result: the node is busy or out of memory
 
 Apart = Callable[[Sequence[GivenWorld]], Mapping[str, WorldVerdict]]
@@ -37,7 +37,8 @@ class WorldChecker:
         self._wake = wake
         self._turns = FairQueue()
         self._lock = threading.Lock()
-        self._known: OrderedDict[str, WorldVerdict] = OrderedDict()  # by digest; the last used is at the end
+        # By digest; the result that was used last is at the end.
+        self._known: OrderedDict[str, WorldVerdict] = OrderedDict()
         self._stopped = threading.Event()
         self._threads = [
             threading.Thread(target=self._run, name=f"check {number}", daemon=True)

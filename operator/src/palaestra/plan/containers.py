@@ -17,16 +17,16 @@ from palaestra.plan.yaml_text import literal
 Container = dict[str, Any]
 
 SIDECAR = "palaestra-sidecar"
-PERIOD_S = 10  # seconds between two probes; one try of the ROS master's probe waits as long
+PERIOD_S = 10  # seconds between two probes; one execution of the ROS master's probe has the same time limit
 BUILT_IN = "palaestra-train"  # the trainer's program in a job without a custom command
 SECURITY = {
     "allowPrivilegeEscalation": False,
     "capabilities": {"drop": ["ALL"]},
     "readOnlyRootFilesystem": True,
 }
-# The shortest period of a probe is a second, but the ROS master starts in a quarter of a second. So the
-# command of one try waits for the port itself. A TCP probe of the kubelet cannot reach the port, which is on
-# loopback.
+# The shortest period of a probe is a second, but the ROS master starts in a quarter of a second. So each
+# execution of the probe's command polls the port until it is open. A TCP probe of the kubelet cannot reach
+# the port, which is on loopback.
 MASTER_ANSWERS = "until (exec 3<>/dev/tcp/{host}/{port}) 2>/dev/null; do sleep 0.05; done"
 
 

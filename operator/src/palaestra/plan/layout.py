@@ -12,7 +12,7 @@ from palaestra.plan.resources import NO_DEFAULTS, Defaults
 
 ROS_MASTER_PORT = 11311  # the port that ROS 1 tools expect
 STATUS_PORT = 9090
-CONTROL_PORTS = range(7100, 7200)  # by the simulator's number in its pod; a pod has at most 32 simulators
+CONTROL_PORTS = range(7100, 7200)  # one port for each simulator of a pod; a pod has at most 32 simulators
 HEALTH_PORTS = range(7200, 7300)
 # SIGTERM ends process 1 of a container only if the process has a handler, and rosmaster has no handler. So
 # bash is process 1. Otherwise a deleted pod would exist for its whole grace period.
@@ -221,7 +221,7 @@ class LocalLayout:
     job_directory: str
     ports: Ports = Ports()
     ros_master: Sequence[str] = OWN_ROS_MASTER
-    # An address, because a minimal chroot has no /etc/hosts that defines localhost.
+    # This is an address and not a name, because a minimal chroot has no /etc/hosts that defines localhost.
     ros_hostname: str = "127.0.0.1"
     health_host: str = "127.0.0.1"
     # This limit is short, because a person waits, and the start includes no image pull and no mount.

@@ -10,7 +10,8 @@ from palaestra.plan.replica import TRAINER, Replica
 from palaestra.plan.resources import twice
 
 UNPRIVILEGED: Mapping[str, Any] = {"runAsNonRoot": True, "seccompProfile": {"type": "RuntimeDefault"}}
-# Seconds for the last checkpoint and the shutdown of the simulators. A spot node gives no longer notice.
+# Seconds for the last checkpoint and the shutdown of the simulators. A spot node may stop before this time is
+# over.
 GRACE_S = 60
 SCRATCH_SIZE = "1Gi"
 MEMORY_SIZE = "128Mi"

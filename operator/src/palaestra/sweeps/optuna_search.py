@@ -80,8 +80,8 @@ class OptunaSearch:
         waits = self._study.get_trials(states=(TrialState.WAITING,))
         enqueued = {old.user_attrs.get(NUMBER) for old in waits}
         for running in self._study.get_trials(states=(TrialState.RUNNING,)):
-            # If the process is killed between the two writes, both trials exist, and the next start ends the
-            # old one.
+            # If the process is killed between the next two writes to the study, the old and the new trial
+            # exist. The next start then ends the old trial.
             if running.user_attrs.get(NUMBER) not in {None, *enqueued}:
                 self._study.enqueue_trial(_values(running), user_attrs=running.user_attrs)
             self._study.tell(running.number, state=TrialState.FAIL)

@@ -64,7 +64,7 @@ def carry_out(
             active[trial.number] = trial
             report(f"{trial.name}: {_shown(trial)}")
             place.begin(trial)
-        if not active and place.has_room():  # while the backend has no room, a pruned trial has not ended yet
+        if not active and place.has_room():  # if the backend has no room, a pruned trial still runs
             return
         place.wait()
         for trial in tuple(active.values()):

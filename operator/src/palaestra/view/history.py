@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from palaestra.api import Status
 from palaestra.api.status import ReplicaStatus
 
-MOST = 40  # The number of values of a figure that fit into one line.
+MOST = 40  # A line shows at most this many values of one figure.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

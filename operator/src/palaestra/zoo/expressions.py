@@ -16,7 +16,7 @@ SHORT: Mapping[str, frozenset[str]] = {
     ),
     "torch.optim": frozenset({"Adam", "AdamW", "NAdam", "RAdam", "RMSprop", "SGD"}),
 }
-# Zoo's own modules import these modules with shorter names.
+# Zoo's own modules import these modules under shorter names.
 _ROOTS: Mapping[str, str] = {
     "gym": "gymnasium",
     "nn": "torch.nn",

@@ -21,7 +21,7 @@ _OFF_POLICY = frozenset({"DQN", "SAC", "TD3", "DDPG", "QRDQN", "TQC", "CrossQ"})
 _LINEAR = re.compile(r"lin_\d+(\.\d*)?(e-?\d+)?")
 _HINDSIGHT = "HerReplayBuffer"
 _GOALS = ("n_sampled_goal", "goal_selection_strategy")
-# Options of replay buffers whose values are fixed in a run; the table has these values.
+# A run fixes these options of replay buffers. The table has the fixed values.
 _BUFFER_OPTIONS: Mapping[str, object] = {
     "copy_info_dict": False,
     "handle_timeout_termination": True,
@@ -98,7 +98,7 @@ def _normalize(draft: Draft, value: Any) -> None:
     for name, option in _options(draft, "normalize", {} if value is True else value):
         if name in _NORMALIZE:
             chosen[_NORMALIZE[name]] = option
-        elif name != "gamma" or "gamma" not in draft.entry:  # if the entry has gamma, Zoo uses that value
+        elif name != "gamma" or "gamma" not in draft.entry:  # in Zoo, the entry's gamma overrides this gamma
             draft.note(f"normalize.{name}", "left out; algorithm.normalize has no such field")
     if not chosen["observations"]:
         chosen.pop("clipObservations", None)

@@ -10,6 +10,7 @@ OPTIONS = (
     (socket.IPPROTO_TCP, socket.TCP_CONGESTION, b"reno"),
 )
 
-# Size of the first read. The messages of a step are shorter. Python caches memory blocks of up to 512 bytes,
-# so all connections reuse the same block in turn. The next read returns the rest of a longer message.
+# Size of the first read in bytes. The messages of a step are shorter than this. Python caches memory blocks
+# of up to 512 bytes, so all connections reuse the same block in turn. The next read returns the rest of a
+# longer message.
 FIRST_BYTES = 448

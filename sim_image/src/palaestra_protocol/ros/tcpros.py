@@ -11,7 +11,8 @@ from collections.abc import Iterable, Iterator, Mapping
 
 LENGTH = struct.Struct("<I")
 
-# Much longer than any message of the interface. A larger length in a frame means that the stream is corrupt.
+# This limit is much larger than any message of the interface. A larger length in a frame means that the
+# stream is corrupt.
 MAX_FRAME_BYTES = 64 * 1024 * 1024
 
 

@@ -212,7 +212,7 @@ class _Elements:
     def read(self, data: bytes, at: int) -> tuple[Any, int]:
         count = self._length
         if count is None:
-            at, _, count = _counted(data, at, LENGTH.size)  # every element has at least one length
+            at, _, count = _counted(data, at, LENGTH.size)  # every element contains at least one length field
         items = []
         read = self._element.read
         for _ in range(count):

@@ -28,7 +28,7 @@ from palaestra_protocol.xmlrpc.documents import (
 )
 
 MOST_REQUEST_BYTES = 8 << 20  # a robot's description is a parameter, and may have a few MB
-MOST_CONNECTIONS = 256  # each has a thread; a simulator keeps one connection for each robot
+MOST_CONNECTIONS = 256  # each connection has a thread; a simulator keeps one connection for each robot
 REQUEST_S = 10.0  # time limit for reading a request after its first byte, and for sending the response
 IDLE_S = 60.0  # time limit of the wait for the next request
 _MULTICALL = "system.multicall"

@@ -27,7 +27,7 @@ from palaestra_sim.ros_controller.simulator import Load, RunningSimulator
 from palaestra_sim.ros_interfaces import Fields, Handler
 
 _ENABLES = ("/enable", "/recognition_enable")
-_HASH = re.compile(r"_[0-9a-f]{6}$")  # end of generated ROS names, which differs from job to job
+_HASH = re.compile(r"_[0-9a-f]{6}$")  # the end of a generated ROS name; this end differs from job to job
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

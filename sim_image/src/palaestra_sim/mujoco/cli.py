@@ -12,8 +12,8 @@ from palaestra_sim.scene.mode import Mode
 from palaestra_sim.scene.physics import Physics
 from palaestra_sim.scene.validation import LeaveOut
 
-# The functions import MuJoCo, because an import at the top of this module would fail without MuJoCo. So
-# `--help` always works, and the program can report a missing MuJoCo as an error with a remedy.
+# The functions of this module import MuJoCo, because an import at the top of this module would fail without
+# MuJoCo. So `--help` always works, and the program can report a missing MuJoCo as an error with a remedy.
 
 
 def _physics() -> Physics:

@@ -20,7 +20,7 @@ from palaestra_sim.scene.joints import Joint
 from palaestra_sim.scene.links import Link, frames_between, link_around
 from palaestra_sim.scene.motors import Motor
 
-# MuJoCo's defaults are too soft: a weight that a motor holds creeps, and a strong motor moves a joint a
+# MuJoCo's defaults are too soft: a weight that a motor holds sinks slowly, and a strong motor moves a joint a
 # centimeter beyond its stop.
 _STIFF: Final = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 _TOUCH: Final = Touch(ROBOTS, STANDING | LOOSE | ROBOTS)

@@ -224,8 +224,8 @@ def _begin_spec(spec: Any, surroundings: PhysicsSettings) -> list[Any]:
     spec.compiler.degree = False
     spec.compiler.balanceinertia = True  # Webots accepts any inertia matrix
     spec.compiler.boundmass, spec.compiler.boundinertia = _LEAST_KG, _LEAST_KG_M2
-    # The faster integrator ignores the coupling of x and y. A robot would then be slower in diagonal
-    # directions than along the axes.
+    # MuJoCo's faster integrator ignores the coupling of x and y. With that integrator, a robot would be
+    # slower in diagonal directions than along the axes.
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICIT
     spec.option.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
     return [

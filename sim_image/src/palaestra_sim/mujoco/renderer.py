@@ -37,7 +37,7 @@ class Renderer:
 
     def __init__(self, view: View) -> None:
         self._view = view
-        self._seen = (-1, -1)  # the view's counts of changes and moves that the model includes
+        self._seen = (-1, -1)  # the view's counts of changes and of moves when the model was last updated
         self._visible: VisualModel = build((), (0.0, 0.0, 0.0), SUN)
         self._carried: list[tuple[Frame, slice, Any, Any]] = []
 

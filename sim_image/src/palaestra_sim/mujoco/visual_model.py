@@ -73,7 +73,7 @@ def build(things: Sequence[Drawn], sky: Vector, sun: Vector) -> VisualModel:
     for thing in things:
         _add(spec, thing, meshes)
     _hang_sky(spec)
-    spec.stat.extent = 1.0  # the ends of the frustum are multiples of the extent
+    spec.stat.extent = 1.0  # MuJoCo multiplies the distances to the ends of the frustum by the extent
     model = spec.compile()
     model.stat.extent = 1.0
     model.geom_rgba[-1] = (*sky, 1.0)

@@ -25,7 +25,7 @@ _File = int | socket.socket
 # processor between two polls. If each step contains one longer wait, the loop never polls. That is intended:
 # in this case most polls would find nothing, and would take processor time from other simulators.
 _QUICK_S = 200e-6
-_STREAK = 10  # a step of a trainer causes fewer waits
+_STREAK = 10  # more waits than a step of a trainer causes
 _LOOKS = 30
 
 _EVENTS = 32  # maximum number of ready files in one poll; the next poll returns the others

@@ -54,7 +54,7 @@ class RosNode:
         self._topics: dict[str, PublishedTopic] = {}
         self._links: set[RosLink] = set()
         self._lingering = Lingering(loop)
-        self._subscribers: dict[Connection, list[Any]] = {}  # entries of getBusInfo
+        self._subscribers: dict[Connection, list[Any]] = {}  # the entries that getBusInfo returns
         self._connected = 0
         self._waiting: deque[tuple[ServiceEnd, bytes]] = deque()
         host = host_name(os.environ)

@@ -250,7 +250,7 @@ class RosController:
         delay_s = self._options.step_sleep_s
         if self.simulation.mode is Mode.REAL_TIME:
             now_s = self._host_clock()
-            # After a long pause of the client, the simulation may catch up only one basic step.
+            # After a long pause of the client, the simulation may catch up by only one basic step.
             owed_s = now_s - self._basic_ms / 1000.0
             self._paced_until_s = max(self._paced_until_s, owed_s) + self._asked_ms / 1000.0
             delay_s = max(delay_s, self._paced_until_s - now_s)

@@ -12,7 +12,7 @@ from palaestra_sim.scene.nodes.scene_node import SceneNode
 # pixels at right and bottom are not part of the rectangle.
 Corners = tuple[int, int, int, int]
 
-MOST_PIXELS: Final = 4096  # limit for a row and for a column
+MOST_PIXELS: Final = 4096  # limit of the pixels in a row and in a column
 _WIDEST_RAD: Final = 3.1  # widest field of view of a flat image
 
 

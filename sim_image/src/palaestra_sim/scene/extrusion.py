@@ -22,11 +22,13 @@ _DEFAULTS: Final = {
     "orientation": (0.0, 0.0, 1.0, 0.0),
     "splineSubdivision": (4.0,),
 }
-_MOST: Final = 1000  # maximum number of points of a spine or a cross-section; faces are cut in quadratic time
+# Maximum number of points of a spine or a cross-section; the time to divide faces into triangles is
+# quadratic.
+_MOST: Final = 1000
 _STRAIGHT: Final = 1e-9
 _LEAST_SPINE: Final = 2
 _LEAST_SECTION: Final = 4  # minimum number of points of a cross-section; the last repeats the first
-_TURN: Final = 4  # numbers of a rotation
+_TURN: Final = 4  # a rotation has this many numbers
 _PAIR: Final = 2
 
 

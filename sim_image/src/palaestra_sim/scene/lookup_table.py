@@ -27,8 +27,8 @@ class LookupTable:
         self.rows = tuple(rows) or ((0.0, 0.0, 0.0), (1e9, 1e9, 0.0))
         self._noisy = any(row[2] for row in self.rows)
         self._distances = [row[0] for row in self.rows]
-        # Interval i lies before row i; the first and the last interval are flat. In each, (value, noise) =
-        # base + slope * distance.
+        # Interval i lies before row i; the first and the last interval are flat. In each interval, (value,
+        # noise) = base + slope * distance.
         first, last = self.rows[0], self.rows[-1]
         self._bases = [(first[1], first[2])]
         self._slopes = [(0.0, 0.0)]

@@ -14,7 +14,7 @@ from palaestra_sim.scene.frames import Y_UP, Frame
 from palaestra_sim.scene.geometry import AxisAngle, Matrix, Pose, to_axis_angle, transposed, turned
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 
-# The columns of each matrix are the current axes, in the axes of the file.
+# The columns of each matrix are the axes of current Webots versions, in the axes of the file.
 _LOOKING: Final[Matrix] = (0.0, -1.0, 0.0, 0.0, 0.0, 1.0, -1.0, 0.0, 0.0)
 _POINTING: Final[Matrix] = (0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0)
 _STANDING: Final = Pose(rotation=transposed(Y_UP))

@@ -27,7 +27,8 @@ from palaestra_sim.scene.shapes import Shape, bounding_shapes
 from palaestra_sim.scene.tree.scene_tree import SceneTree
 from palaestra_sim.scene.validation import ELSEWHERE, LeaveOut, NodeReader
 
-# These nodes are only visible to people and cameras, or other code reads them (WorldInfo).
+# The physics ignores these nodes. Most of them only affect what people and cameras see; other code reads
+# WorldInfo.
 DRAWN_ONLY: Final = frozenset(
     (
         "Background",

@@ -20,7 +20,7 @@ from palaestra_sim.scene.shapes import Shape
 from palaestra_sim.scene.validation import NodeReader
 from palaestra_sim.scene.wheels import Driven
 
-_CLEARANCE_M: Final = 0.01  # a joint's end that is nearer than this to the floor rolls on the floor
+_CLEARANCE_M: Final = 0.01  # the end of a joint rolls on the floor if it is nearer than this to the floor
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

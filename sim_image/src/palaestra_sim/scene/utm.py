@@ -14,7 +14,8 @@ _RADIUS_M: Final = 6378137.0  # radius of the ellipsoid at the equator
 _FLATTENING: Final = 1.0 / 298.257223563
 _SCALE: Final = 0.9996
 _FALSE_EAST_M: Final = 500_000.0
-_FALSE_NORTH_M: Final = 10_000_000.0  # the coordinate "north" of the equator, for points south of the equator
+# The northing of the equator in southern zones, so that all northings are positive.
+_FALSE_NORTH_M: Final = 10_000_000.0
 _E2: Final = _FLATTENING * (2.0 - _FLATTENING)
 _E4: Final = _E2 * _E2
 _E6: Final = _E4 * _E2

@@ -20,8 +20,8 @@ from palaestra_sim.world import own_controllers, placed
 # If a folder has one of these subfolders, it is a project. Source: Webots' guide, "The Standard File
 # Hierarchy of a Project".
 FOLDERS = ("controllers", "libraries", "plugins", "protos")
-# The folders of the operating system below /. They are not linked: for a world in /worlds, the project is /,
-# and the world does not need them. Source: Filesystem Hierarchy Standard 3.0
+# The folders of the operating system below /. They are not linked. For a world in /worlds, the project is /,
+# but the world does not need the folders of the system. Source: Filesystem Hierarchy Standard 3.0
 _OF_THE_SYSTEM = frozenset(
     {
         *("bin", "boot", "dev", "etc", "lib", "lib32", "lib64", "libx32", "lost+found"),

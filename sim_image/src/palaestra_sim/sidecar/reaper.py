@@ -163,7 +163,7 @@ def _yield_to_the_trainer() -> None:
     A trainer sends requests to its simulators, one after another. With the default policy, the kernel
     interrupts the trainer at nearly each request, to run the simulator that gets the request.
     """
-    with contextlib.suppress(OSError):  # optional, because sandboxes may refuse it
+    with contextlib.suppress(OSError):  # this call is optional, because a sandbox may refuse it
         os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
 
 

@@ -14,8 +14,9 @@ from palaestra_sim.world.robots import CLOCK, NAME, SYNCHRONIZE
 from palaestra_sim.world.tokens import Token, quoted, unquoted
 from palaestra_sim.world.tree import Node, Value, World
 
-_UP_TO_COMMENT = re.compile(rb"\A.*#[^\n]*\n?", re.DOTALL)  # up to the last comment, with its line end
-_LONGEST_GAP = 200  # maximum number of bytes of a gap between two strings that is copied between new strings
+# Matches all bytes up to the end of the line of the last comment.
+_UP_TO_COMMENT = re.compile(rb"\A.*#[^\n]*\n?", re.DOTALL)
+_LONGEST_GAP = 200  # the text between two strings is copied only if it has at most this many bytes
 _INDENT = re.compile(rb"\r?\n[ \t]*\Z")
 
 

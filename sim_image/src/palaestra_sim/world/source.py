@@ -14,7 +14,7 @@ _BYTE_ORDER_MARK = b"\xef\xbb\xbf"  # some editors put this mark at the start of
 # Webots accepts blanks after the hash; PROTOs of drones have such blanks.
 _RELEASE = re.compile(rb"#[ \t]*VRML_SIM R(?P<year>[0-9]{4})(?P<letter>[a-z]?)")
 _CONTINUED = bytes(range(0x80, 0xC0))  # continuation bytes of UTF-8, which do not begin a character
-_BLOCK = 4096  # bytes between two marks
+_BLOCK = 4096  # bytes between two marks; a mark stores the line and column of its byte
 _HEADER = re.compile(rb"#[ \t]*VRML_SIM [VR]?[0-9][^\s]*(?: utf8)?(?=[ \t]*\r?(?:\n|\Z))")
 
 

@@ -26,7 +26,7 @@ _TOKEN = re.compile(
     """,
     re.VERBOSE | re.DOTALL,
 )
-# Possessive quantifiers, because otherwise a long number before a letter would take quadratic time.
+# The quantifiers are possessive, because otherwise a long number before a letter would take quadratic time.
 _NUMBER = re.compile(rb"[+-]?(?:[0-9]++(?:\.[0-9]*+)?|\.[0-9]++)(?:[eE][+-]?[0-9]++)?")
 GLANCE = 40  # maximum length of a text of the file in an error message
 _ESCAPE = re.compile(r'\\(["\\])')

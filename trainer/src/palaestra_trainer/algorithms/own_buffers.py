@@ -44,14 +44,15 @@ VALID_ROLLOUTS: Mapping[type[Any], type[Any]] = {
     DictRolloutBuffer: ValidDictRolloutBuffer,
     RolloutBuffer: ValidRolloutBuffer,
 }
-# An author's class may extend a class on the left; its subclass for valid rows is on the right.
+# The buffer class of a job's author may extend a class on the left. The class on the right is the subclass of
+# that class for valid rows.
 _VALID: Mapping[type[Any], type[Any]] = {
     DictReplayBuffer: ValidDictReplayBuffer,
     ReplayBuffer: ValidReplayBuffer,
     **VALID_ROLLOUTS,
 }
-# These classes also sample the rows that follow a sampled row. In a single column, the next row may belong to
-# another member.
+# These classes also sample the rows that follow a sampled row. If the members share one column, the next row
+# may belong to another member.
 _NEIGHBOURS = (HerReplayBuffer, NStepReplayBuffer)
 _STATE_METHODS = ("state_dict", "load_state_dict")
 
@@ -195,7 +196,8 @@ def _can_be_written(value: Any) -> bool:
     """Return whether a checkpoint can write a value and read an equal value."""
     if isinstance(value, np.ndarray):
         return not value.dtype.hasobject
-    if isinstance(value, torch.Tensor | float):  # no comparison, because NaN is not equal to itself
+    # These values are not compared, because NaN is not equal to itself.
+    if isinstance(value, torch.Tensor | float):
         return True
     try:
         return bool(json.loads(json.dumps(value)) == value)

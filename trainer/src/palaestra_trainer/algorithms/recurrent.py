@@ -26,7 +26,7 @@ class _Sequences(ValidRolloutBuffer):
         rows = np.flatnonzero(self.swap_and_flatten(self.valid))
         first_of_member = np.zeros((self.buffer_size, self.n_envs))
         first_of_member[0] = 1.0
-        draw: Any = self._get_samples  # its second argument differs from that of RolloutBuffer
+        draw: Any = self._get_samples  # Any, because the second argument differs from that of RolloutBuffer
         turned = np.roll(rows, -np.random.randint(len(rows)))
         for batch in batches(turned, batch_size or len(rows)):
             yield draw(batch, self.swap_and_flatten(first_of_member))

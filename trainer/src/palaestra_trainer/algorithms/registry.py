@@ -42,7 +42,8 @@ OURS = frozenset(
 )  # fmt: skip
 ARENA_ENVIRONMENTS = frozenset({"MoveToTargetEnv-v0"})
 _ANY_ACTIONS = (spaces.Box, spaces.Discrete, spaces.MultiDiscrete, spaces.MultiBinary)
-_LOG_INTERVAL = {True: 10, False: 1}  # True: episodes of an off-policy algorithm; False: rollouts
+# True: number of episodes, for an off-policy algorithm; False: number of rollouts.
+_LOG_INTERVAL = {True: 10, False: 1}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -213,7 +214,7 @@ def entry_of(name: str) -> RegisteredAlgorithm:
         raise ConfigurationError(f"algorithm.name: {name} cannot be used: {why}")
     if imports.names_class(name):
         entry = _entry(imports.class_named(name, "algorithm.name", BaseAlgorithm))
-        with_valid_rows(entry.original)  # raises an error if invalid rows would reach the losses
+        with_valid_rows(entry.original)  # raises an error if the algorithm would learn from invalid rows
         return entry
     raise ConfigurationError(
         f"algorithm.name: {name} is not an algorithm; {nearest(name, dict(ALGORITHMS))} "

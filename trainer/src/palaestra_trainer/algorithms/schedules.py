@@ -27,7 +27,7 @@ from palaestra_trainer.errors import ConfigurationError, fact_of
 from palaestra_trainer.job.user_code import imports
 
 LINEAR = re.compile(r"lin_(\d+(?:\.\d*)?(?:e-?\d+)?)")
-_TRIED = (1.0, 0.5, 0.0)  # remaining shares of the steps, with which a function is tried
+_TRIED = (1.0, 0.5, 0.0)  # the remaining shares of the steps with which the check calls a function
 
 
 def schedule_of(value: Any) -> Callable[[float], float] | None:

@@ -39,8 +39,8 @@ from palaestra_trainer.algorithms.recurrent import (
 from palaestra_trainer.algorithms.reinforce import REINFORCE
 from palaestra_trainer.errors import ConfigurationError
 
-# Each rollout buffer on the left is replaced by the class on its right. Other buffer classes are refused,
-# because they may store more than these classes do.
+# Each rollout buffer on the left is replaced by the class on its right. An algorithm that creates a buffer of
+# another class is refused, because the replacement would not store what that class adds.
 _MASKED: Mapping[type[RolloutBuffer], type[Any]] = {
     **own_buffers.VALID_ROLLOUTS,
     RecurrentRolloutBuffer: ValidRecurrentRolloutBuffer,

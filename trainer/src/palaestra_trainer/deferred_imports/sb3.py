@@ -19,7 +19,7 @@ from importlib.util import spec_from_file_location
 from types import MappingProxyType, ModuleType
 from typing import Any
 
-# Each tuple holds a library, and the submodules of it that Stable-Baselines3 imports by name.
+# Each tuple holds a library and those of its submodules that Stable-Baselines3 imports by name.
 _MATPLOTLIB = ("matplotlib", "matplotlib.figure")
 _PANDAS = ("pandas",)
 _PROGRESS_BAR = ("tqdm.rich",)

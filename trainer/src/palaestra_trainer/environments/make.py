@@ -26,7 +26,7 @@ from palaestra_trainer.job.user_code.kwargs import AcceptedArguments
 from palaestra_trainer.robots.base import RobotAbc, Scene
 from palaestra_trainer.robots.capabilities import require
 
-_OF_MAKE = ("max_episode_steps",)  # an argument of gymnasium.make itself
+_OF_MAKE = ("max_episode_steps",)  # this argument belongs to gymnasium.make, not to the environment
 
 
 def make_environment(wanted: Environment, robot: RobotAbc, scene: Scene) -> gymnasium.Env[Any, Any]:
@@ -39,7 +39,8 @@ def make_environment(wanted: Environment, robot: RobotAbc, scene: Scene) -> gymn
     arguments = _checked(wanted, {"robot": robot, "scene": scene})
     require(robot, getattr(_creator(wanted.id, _spec(wanted.id)), "needs", ()), wanted.id)
     try:
-        # `held` replaces gymnasium's checker, because warnings would not end the run.
+        # `held` replaces gymnasium's checker, because that checker mostly warns, and a warning would not end
+        # the run.
         env = gymnasium.make(wanted.id, disable_env_checker=True, **arguments)
     except TrainerError:
         raise

@@ -26,7 +26,8 @@ from palaestra_trainer.robots.capabilities import Localization, Scanner, Steerin
 from palaestra_trainer.robots.geometry import Point, Pose
 
 REACHED_M = 0.15
-BUMPED_M = 0.05  # an object nearer to the robot's outline counts as touched; a scanner may not detect it
+# An object that is nearer to the robot's outline counts as touched, because a scanner may not detect it.
+BUMPED_M = 0.05
 SECTORS = 24
 SEEN_M = 0.8  # a sector counts as empty if its nearest object is farther than this
 TARGET_M = 2.0  # the unit of the distance to the target

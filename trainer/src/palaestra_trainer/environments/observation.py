@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from palaestra_trainer.robots.base import SENSOR_RANGE_M, SENSORS
 from palaestra_trainer.robots.geometry import SPEED_M_S, TURN_RAD_S, Point, Pose, Twist
 
-UNIT_M = 2.0  # the unit of positions in an observation: half of the arena
+UNIT_M = 2.0  # the unit of positions in an observation: half of the length of a side of the arena
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,8 +83,8 @@ def velocity(before: Pose, after: Pose, elapsed_s: float) -> Twist:
 
 
 def _sensors(seen: StepState) -> Sequence[float]:
-    # The numbers are nearness, which is 0 in the usual case that no object is in range; a distance would be
-    # 1. A policy learned as much from nearness in 10,000 steps as from distances in 40,000 steps.
+    # The numbers are nearness. In the usual case no object is in range; then nearness is 0, and a distance
+    # would be 1. A policy learned as much from nearness in 10,000 steps as from distances in 40,000 steps.
     least, most = SENSOR_RANGE_M
     nearness = (most - seen.distances_m) / (most - least)
     return [*nearness.tolist(), float(seen.bumped)]

@@ -27,7 +27,7 @@ import numpy as np
 from palaestra_trainer.episodes.wilson import CONFIDENCE
 
 ALPHA = 1.0 - CONFIDENCE
-_HALVINGS = 40  # how often a search interval is halved for a bound, to 1e-12 of its length
+_HALVINGS = 40  # the search for a bound halves its interval this many times, to 1e-12 of its first length
 
 
 class Difference(NamedTuple):

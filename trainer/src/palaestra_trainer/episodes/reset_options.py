@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-EVALUATING = 1.0  # an evaluation plays the task as at the end of training
+EVALUATING = 1.0  # training progress in an evaluation, which plays the task as at the end of training
 
 
 def reset_options(training_progress: float, episode: int) -> dict[str, Any]:

@@ -126,7 +126,8 @@ class PolicyModule(nn.Module):
         if self.state_shape is None:
             return ()
         hidden, cell = inputs[len(self.spaces) :]
-        # The flags are always 0, because an episode begins with a state of zeros.
+        # The flags of new episodes are always 0, because the caller passes a state of zeros for a new
+        # episode.
         return (hidden, cell), torch.zeros_like(hidden[0, :, 0])
 
     def _channels_first(self, name: str, part: torch.Tensor) -> torch.Tensor:

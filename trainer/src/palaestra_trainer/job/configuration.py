@@ -32,7 +32,7 @@ from palaestra_trainer.job.run_directory import RunDirectory
 
 log = structlog.get_logger(__name__)
 
-_UNKNOWN = "extra_forbidden"  # pydantic's type of this error
+_UNKNOWN = "extra_forbidden"  # pydantic's type of the error for an unknown field
 
 CONFIG_VARIABLE = "PALAESTRA_CONFIG"
 CONFIRM_EPISODES = 100  # with 100 episodes, a success rate of 95 % is known to within 4 %

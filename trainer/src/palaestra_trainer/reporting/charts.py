@@ -12,7 +12,7 @@ from palaestra_trainer.reporting.run_data import Points
 WIDTH, HEIGHT = 360.0, 210.0
 LEFT, RIGHT, TOP, BOTTOM = 46.0, 8.0, 10.0, 26.0
 SIZES = ((1e6, 1e6, "M"), (1e4, 1e3, "k"))  # smallest number for a unit, the unit, and its letter
-COLORS = 8  # number of colors for series in the style
+COLORS = 8  # number of colors that the style sheet has for series
 MOST_POINTS = 240  # most points of one curve; a screen cannot show more
 
 

@@ -45,7 +45,7 @@ def element(name: str, /, *children: str, **attributes: str | float | None) -> M
 
 def json_script(content: Any) -> Markup:
     """Return a script element with JSON data for the page; the data cannot end the element."""
-    text = json.dumps(content, separators=(",", ":"), allow_nan=False)  # ASCII only
+    text = json.dumps(content, separators=(",", ":"), allow_nan=False)  # the text contains only ASCII
     for character in "<>&":
         text = text.replace(character, f"\\u{ord(character):04x}")
     return Markup(f'<script type="application/json">{text}</script>')

@@ -10,7 +10,8 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterator
 
-_HEADER, _CHECKSUM = 12, 4  # length and its checksum; checksum of the content; checksums are not compared
+# Bytes of the header (a length and its checksum), and of the checksum of the content.
+_HEADER, _CHECKSUM = 12, 4
 _VARINT, _FIXED64, _BYTES, _FIXED32 = 0, 1, 2, 5
 _STEP, _SUMMARY, _SESSION = 2, 5, 7  # fields of Event
 _VALUE = 1  # field of Summary

@@ -16,7 +16,8 @@ from palaestra_trainer.reporting.run_data import Replay
 GIF_PX = 360  # pixels of the longer side
 MOST_PICTURES = 60
 MOST_BYTES = 200_000
-LONGEST_MS, SHORTEST_MS = 150, 20  # time of a picture; browsers show a shorter picture for too long
+# Limits of the time for which a picture is shown. Browsers show a picture with a shorter time for longer.
+LONGEST_MS, SHORTEST_MS = 150, 20
 LAST_MS = 1500
 _COLORS = 32
 _SMOOTH = 2  # pictures are drawn larger by this factor and then reduced, to smooth edges

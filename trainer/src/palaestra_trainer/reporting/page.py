@@ -28,7 +28,7 @@ POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inli
 NAME = 120  # most characters of a run's name
 # Each pair limits the comparison of runs: points of a curve, and characters of a cell.
 COMPARISONS = ((120, 120), (20, 40), (4, 12))
-# A page uses the first of these entries with which its size is within the limit.
+# A page uses the first of these entries that keeps the page within its size limit.
 DETAILS: tuple[Detail | None, ...] = (
     Detail(curves=24, points=240, replays=3, faults=300, rows=100, text=60_000),
     Detail(curves=24, points=120, replays=3, faults=60, rows=40, text=8_000),
@@ -136,7 +136,7 @@ def _comparison(runs: Sequence[RunData], points: int) -> Markup:
     def label(run: RunData) -> str:
         return cut(run.name, 40)
 
-    banded = len(runs) <= COLORS  # more bands would hide each other
+    banded = len(runs) <= COLORS  # the bands of more runs would hide each other
     rates = drawn(lambda run, index: success_series(run.evaluations, label(run), index, points, line=banded))
     returns = drawn(lambda run, index: return_series(run.evaluations, label(run), index, points))
     charts = [

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntEnum
 
-SPEED_M_S = 0.5  # Source: ~max_linear_vel as launched by robotino_node
+SPEED_M_S = 0.5  # Source: ~max_linear_vel in the launch file of robotino_node
 TURN_RAD_S = 1.0  # Source: default of ~max_angular_vel in robotino_node
 
 Twist = tuple[float, float, float]

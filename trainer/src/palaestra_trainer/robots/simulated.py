@@ -70,7 +70,7 @@ class SimulatedRobot(RobotAbc):
         self.definition = type(self).definition if definition is None else definition
         self.period_ms = type(self).period_ms if period_ms is None else period_ms
         self._observer = webots.observer
-        self._in_use: set[str] = set()  # optional devices
+        self._in_use: set[str] = set()  # the optional devices that are in use
         others = map(webots.name_of, robots)
         together = dict.fromkeys((name, webots.robot_name, *others))
         self.simulation = Stepper(tuple(together), webots.supervisor, webots.observer, self.period_ms)
@@ -97,7 +97,7 @@ class SimulatedRobot(RobotAbc):
             WorldMisfit: the world lacks the robot's node, or the robot lacks a device of its class.
             SimulatorDead, SimulatorHung, WrongData
         """
-        self.close()  # connections to the previous simulator process
+        self.close()  # closes the connections to the previous simulator process
         self._observer.forget_handles()
         self.simulation.connect()
 

@@ -83,11 +83,11 @@ class Master:
         try:
             answer = client.call(uri, _NODE_TIMEOUT_S, "getMasterUri", self._caller)
         except TimeoutError:
-            return True  # a node that hangs still runs
+            return True  # the node runs, but does not respond
         except (OSError, UnreadableDocument):
             return False
         except xmlrpc.client.Fault:
-            return True  # a node that does not have this method
+            return True  # the node runs, but does not have this method
         # Nodes may write the host of the same master in different ways, so only the port is compared.
         return _port(answer[-1] if isinstance(answer, list) and answer else None) in {None, _port(self.uri)}
 

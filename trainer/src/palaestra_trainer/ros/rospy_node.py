@@ -25,7 +25,8 @@ def ensure_node(name: str = "palaestra_trainer") -> str:
     with _lock:
         if not rospy.core.is_initialized():
             Master(f"/{name}").ping()
-            # The program keeps its own signals, clock and log; rospy provides only name and registration.
+            # The program uses its own signal handlers, clock and log. rospy only registers the node with its
+            # name.
             rospy.init_node(
                 f"{name}_{os.getpid()}", disable_signals=True, disable_rostime=True, disable_rosout=True
             )

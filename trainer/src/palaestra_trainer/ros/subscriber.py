@@ -123,8 +123,8 @@ class RosSubscriber:
         self._drop()
         if self._registered:
             self._registered = False
-            # If the master is gone, so is the registration. A master that sends invalid responses cannot
-            # unregister the subscriber.
+            # If the master does not run, the registration does not exist. A master that sends invalid
+            # responses cannot unregister the subscriber.
             with contextlib.suppress(MasterLost, UnreadableAnswer):
                 Master(ensure_node()).unregister_subscriber(self.name, node_uri())
 

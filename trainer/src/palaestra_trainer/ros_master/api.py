@@ -265,7 +265,8 @@ def _removed(node: str, name: str, *, removed: bool) -> RpcResponse:
     return RpcResponse(OK, f"{node} was not registered for {name} at this address", 0)
 
 
-# By the name in XML-RPC: the Python method, and the value in the response if the arguments are wrong.
+# For each method name in XML-RPC: the Python method, and the value in the response if the arguments are
+# wrong.
 _CALLS: dict[str, tuple[str, Any]] = {
     "getUri": ("_get_uri", ""),
     "getPid": ("_get_pid", -1),

@@ -52,7 +52,7 @@ def _end_with_owner() -> None:
     """End this process when its standard input closes; the kernel closes it when the parent is killed."""
     while os.read(sys.stdin.fileno(), 1024):
         pass
-    os._exit(0)  # without waiting for the threads of connections
+    os._exit(0)  # end at once, and do not wait for the threads of connections
 
 
 def _options(arguments: Sequence[str] | None) -> argparse.Namespace:

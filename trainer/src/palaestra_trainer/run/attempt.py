@@ -180,7 +180,7 @@ class Attempt:
     def _trained(self, stack: ExitStack) -> End:
         try:
             self._directory.path.mkdir(parents=True, exist_ok=True)
-            with self._watchdog():  # the stop has its own deadline
+            with self._watchdog():  # the watchdog does not watch the stop, which has its own deadline
                 learned = self._train(*self._prepare(stack))
         except ENDING as error:  # the outermost handler of the process, because every end needs an exit code
             return _logged(error)
@@ -204,7 +204,9 @@ class Attempt:
         found = self._newest()
         before = RunDirectory(found.path.parent.parent) if found else None
         self._algorithm = algorithms.begin_with(configuration, self._directory, before)
-        self._take_over(found)  # before the server starts: Prometheus would count a later jump as new events
+        # This call precedes the start of the server, because Prometheus would count a later jump as new
+        # events.
+        self._take_over(found)
         known = constants(configuration)
         stack.enter_context(status_server(configuration.status_address, progress, known))
         self._begin(found)
@@ -325,7 +327,7 @@ class Attempt:
         text = dump(self._configuration)
         replace_file(self._directory.configuration, lambda path: _write_text(path, text))
         self._directory.end.unlink(missing_ok=True)
-        self._directory.summary.unlink(missing_ok=True)  # for a finished run that now has more steps
+        self._directory.summary.unlink(missing_ok=True)  # exists if a finished run gets more steps
         algorithms.keep(self._algorithm, self._directory)
         pod = self._around.environment.get("PALAESTRA_POD_UID", "")
         self._progress.attempt = attempt = self._directory.begin_attempt(pod, reason, versions())

@@ -94,7 +94,8 @@ def _damages(directory: RunDirectory) -> Iterator[tuple[Path, str]]:
                 check(path)
         except _Damaged as damage:
             yield path, str(damage)
-        except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:  # e.g. a number of 5,000 digits
+        except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
+            # For example, a number of 5,000 digits raises ValueError.
             yield path, f"cannot be read ({error})"
 
 

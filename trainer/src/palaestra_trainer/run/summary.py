@@ -68,7 +68,7 @@ def finished(directory: RunDirectory, configuration: Configuration) -> dict[str,
         return None
     if content["target"] < configuration.steps:
         return None
-    return {name: value for name, value in content.items() if name != "event"}  # structlog's key
+    return {name: value for name, value in content.items() if name != "event"}  # structlog adds this key
 
 
 def last_word_of(summary: dict[str, Any]) -> Termination:

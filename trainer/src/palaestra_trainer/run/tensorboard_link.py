@@ -33,7 +33,8 @@ def link_curves(directory: RunDirectory, configuration: Configuration) -> None:
     if not uid or (run.parent.name, run.name) != (uid, str(configuration.replica)):
         return
     job = f"{configuration.job}-{uid[:8]}"
-    target = f"../../{uid}/{run.name}/{directory.tensorboard.name}"  # TensorBoard mounts the claim elsewhere
+    # Relative, because TensorBoard mounts the claim at another path.
+    target = f"../../{uid}/{run.name}/{directory.tensorboard.name}"
     try:
         with ExitStack() as stack:
             volume = os.open(run.parent.parent, os.O_RDONLY | os.O_DIRECTORY)

@@ -98,8 +98,8 @@ class TrainingCallback(BaseCallback):
             self._before_update.put_back(self.model)
         started = time.monotonic()
         with run.progress.spending(Cause.CHECKPOINTING):
-            # A resume plays the steps after the boundary again, so their counts are dropped. Faults and time
-            # still count.
+            # A resumed run plays the steps after the boundary again, so the counts of these steps are
+            # dropped. The counts of faults and times are saved.
             counters = run.progress.counted(kept=step).to_json() | state.rollout["counters"]
             manifest = checkpoint.describe(run.configuration, step, counters)
             if self._saver.save(self.model, state, manifest):

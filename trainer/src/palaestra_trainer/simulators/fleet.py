@@ -20,7 +20,8 @@ from palaestra_trainer.simulators.stats import SimulatorStats
 from palaestra_trainer.simulators.threads import in_background
 from palaestra_trainer.waiting.check import Check, go_on
 
-# If the start takes longer, the missing simulators are logged, and again each time the duration doubles.
+# If the start takes longer, the missing simulators are logged. They are logged again each time the duration
+# has doubled.
 LONG_S = 5.0
 
 log = structlog.get_logger(__name__)

@@ -42,7 +42,7 @@ class NotebookSimulator:
         open_facades.take(webots)
 
     def release(self) -> None:
-        """Close the robot's connections and offer the facade again; further calls have no effect."""
+        """Close the robot's connections and make the facade available again; further calls have no effect."""
         self.robot.close()
         open_facades.give_back(self.webots)
 

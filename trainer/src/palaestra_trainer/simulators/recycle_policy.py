@@ -7,7 +7,9 @@ from collections.abc import Callable
 
 from palaestra_trainer.job.configuration import Recycle
 
-ASK_MEMORY_EVERY_S = 1.0  # the sidecar must sum the memory of all processes of the simulator
+# Seconds between two requests for the memory: for each request, the sidecar sums the memory of all processes
+# of the simulator.
+ASK_MEMORY_EVERY_S = 1.0
 
 _MINUTE_S = 60.0
 _MIB = 2**20

@@ -74,7 +74,8 @@ class Restarter:
         self.watcher: Watcher = watcher or NullWatcher()
         self.group = group or Group()
         self.tried = self.lost = self.stepped = False
-        self._refusal = ""  # the last process's mistake, if its fault shows a wrong configuration
+        # The mistake in the configuration that the fault of the last process shows; empty: no mistake.
+        self._refusal = ""
         self._budget = RestartBudget(member.name, limit or RestartLimit(), clock)
         self._clock = clock
         self._recycled, self._log_next = 0, -math.inf

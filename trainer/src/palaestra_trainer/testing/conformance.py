@@ -51,8 +51,8 @@ MOTORS_ARE_NAMED = "motors has a name and greatest a positive number for each mo
 RESET_PLACES = "Scene.reset() leaves the robot at rest at the start, with fresh readings"
 RESET_DECIDES = "the same seed, start and commands give the same readings"
 
-PERIODS = 3  # periods of each movement, long enough to make the acceleration unimportant
-STILL_M = 0.002  # largest apparent motion of a standing robot, because odometry has steps
+PERIODS = 3  # number of periods of each movement; in this time, the acceleration becomes unimportant
+STILL_M = 0.002  # tolerance for the measured motion of a standing robot, because odometry has steps
 RESET_M = 0.01  # tolerance, because a robot in a simulator settles on its wheels
 SHARE = 0.5  # share of the robot's greatest speeds with which steering is checked
 

@@ -22,7 +22,7 @@ from palaestra_trainer.testing.rays import nearest
 
 RAYS = 360
 SCANNER_M = -0.03  # position of the scanner, relative to the robot's center and along its heading
-NOISE_M = 0.015  # deviation, 0.0043 of the greatest distance. Source: RobotisLds01 of Webots
+NOISE_M = 0.015  # standard deviation: 0.0043 of the greatest distance. Source: RobotisLds01 of Webots
 ROWS = (np.arange(RAYS) + 0.5) * (2.0 * math.pi / RAYS) - math.pi
 TOP_M = 0.3
 

@@ -32,7 +32,7 @@ SENSORS_M = np.array(
         (0.03, -0.01),
     ]
 )
-NOISE_M = 0.001  # mean deviation over the range. Source: E-puckDistanceSensor of Webots
+NOISE_M = 0.001  # standard deviation, averaged over the range. Source: E-puckDistanceSensor of Webots
 TOP_M = 0.1
 
 PEN = FloorLayout(

@@ -34,7 +34,8 @@ from palaestra_trainer.testing.fake_scene import (
 BASIC_STEP_S = 0.032
 BASIC_STEPS = 6  # number of basic steps in one control period
 ACCELERATIONS = (10.0, 6.0, 20.0)  # m/s2, m/s2, rad/s2. Source: Webots, robotino3/base.c
-NOISE = 0.005  # deviation as a share of the reading. Source: GP2Y0A41 in Webots' model of the Robotino 3
+# Standard deviation as a share of the reading. Source: GP2Y0A41 in Webots' model of the Robotino 3.
+NOISE = 0.005
 
 
 class FakeRobotino(Crashing, RobotinoAbc):

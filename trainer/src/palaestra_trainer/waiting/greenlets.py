@@ -20,9 +20,9 @@ from greenlet import getcurrent, greenlet
 from palaestra_trainer.waiting import shutdown_deadline
 from palaestra_trainer.waiting.wait_time import count_wait
 
-# After this time the first greenlet waits alone, with its own deadline, so a fault is attributed to its
-# simulator. The time is longer than a step, because the time of waiting alone counts as this greenlet's turn.
-# The time is short compared with the deadline, which begins only then.
+# After this time the first greenlet waits alone and with its own deadline, so a fault is attributed to the
+# right simulator. The time is longer than a step, because the wait alone counts as a turn of this greenlet.
+# It is short compared with the deadline, which begins only when the greenlet waits alone.
 _SOON_MS = 500
 
 

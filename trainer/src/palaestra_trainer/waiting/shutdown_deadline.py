@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 import time
 
-# The checkpoint needs half of the default grace period, and a pending call may last twice its deadline. So
-# this time is left for further waits.
+# Seconds for further waits. The rest of the default grace period is for the checkpoint, which needs half of
+# the period, and for a pending call, which may last twice its deadline.
 LEFT_S = 10.0
 
 

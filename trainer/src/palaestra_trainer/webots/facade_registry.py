@@ -20,7 +20,8 @@ class FacadeRegistry(Generic[Facade]):
 
     def __init__(self) -> None:
         self._numbers = itertools.count()
-        self._open: WeakValueDictionary[tuple[int, int], Facade] = WeakValueDictionary()  # by pid, number
+        # Keys: process id and number.
+        self._open: WeakValueDictionary[tuple[int, int], Facade] = WeakValueDictionary()
         self._taken: WeakSet[Facade] = WeakSet()
 
     def offer(self, facade: Facade) -> None:

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 Message = bytes | memoryview
 
-_HEAD_AT: Final = 12  # the offset after sequence number and stamp, which change
+_HEAD_AT: Final = 12  # offset after the sequence number and the stamp, which change in each message
 _LENGTH: Final = struct.Struct("<I")
 _SIZE: Final = struct.Struct("<II")  # height, width
 _IMAGE: Final = struct.Struct("<BII")  # is_bigendian, step, bytes of data

@@ -33,7 +33,7 @@ class Mode(enum.IntEnum):
 class Observer:
     """Queries to the supervisor's controller, which do not affect the simulation.
 
-    Every method raises SimulatorDead, SimulatorHung or WrongData.
+    Every method may raise SimulatorDead, SimulatorHung or WrongData.
 
     Args:
         node_name: the ROS name of the supervisor.

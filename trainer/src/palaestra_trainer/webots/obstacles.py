@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 from palaestra_trainer.errors import WorldMisfit
 from palaestra_trainer.webots.services import Services
 
-FLOOR = "FLOOR"  # DEF name
+FLOOR = "FLOOR"  # the DEF name of the floor in a world
 _FLOOR_FIELDS = {
     "RectangleArena": "floorSize",
     "Floor": "size",

@@ -64,7 +64,7 @@ class OutputDevice:
 class LED(OutputDevice):
     """An LED.
 
-    Every method raises SimulatorDead, SimulatorHung or WrongData.
+    Every method may raise SimulatorDead, SimulatorHung or WrongData.
     """
 
     __slots__ = ()
@@ -82,7 +82,7 @@ class LED(OutputDevice):
 class Brake(OutputDevice):
     """The brake of a joint.
 
-    Every method raises SimulatorDead, SimulatorHung or WrongData.
+    Every method may raise SimulatorDead, SimulatorHung or WrongData.
     """
 
     __slots__ = ()
@@ -101,7 +101,7 @@ class Brake(OutputDevice):
 class Pen(OutputDevice):
     """A pen that draws on the floor.
 
-    Every method raises SimulatorDead, SimulatorHung or WrongData.
+    Every method may raise SimulatorDead, SimulatorHung or WrongData.
     """
 
     __slots__ = ()
@@ -118,7 +118,7 @@ class Pen(OutputDevice):
 class Connector(OutputDevice):
     """A connector, which locks to another connector that is near enough.
 
-    Every method raises SimulatorDead, SimulatorHung or WrongData.
+    Every method may raise SimulatorDead, SimulatorHung or WrongData.
     """
 
     __slots__ = ()
@@ -140,7 +140,7 @@ class Connector(OutputDevice):
 class Emitter(OutputDevice):
     """An emitter of texts to receivers on the same channel.
 
-    Every method raises SimulatorDead, SimulatorHung or WrongData.
+    Every method may raise SimulatorDead, SimulatorHung or WrongData.
     """
 
     __slots__ = ()
@@ -186,7 +186,7 @@ class Emitter(OutputDevice):
 class Speaker(OutputDevice):
     """A loudspeaker.
 
-    Every method raises SimulatorDead, SimulatorHung or WrongData.
+    Every method may raise SimulatorDead, SimulatorHung or WrongData.
     """
 
     __slots__ = ()

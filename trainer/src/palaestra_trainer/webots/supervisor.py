@@ -39,8 +39,8 @@ class ViewLabel:
 class Supervisor:
     """Changes the simulation through the supervisor's controller.
 
-    Every method raises SimulatorDead, SimulatorHung or WrongData. Changes of fields take effect in the next
-    step.
+    Every method may raise SimulatorDead, SimulatorHung or WrongData. Changes of fields take effect in the
+    next step.
 
     Args:
         node_name: the ROS name of the supervisor.

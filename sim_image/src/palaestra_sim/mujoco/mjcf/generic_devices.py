@@ -14,7 +14,7 @@ from palaestra_sim.mujoco.library import mujoco
 from palaestra_sim.ros_interfaces import Fields, Row
 from palaestra_sim.scene.devices.device_type import DevicePart, DeviceTopic, DeviceType
 
-FOLDER: Final = "mujoco/"  # prefix of the names of such devices
+FOLDER: Final = "mujoco/"  # prefix of the names of these generic devices
 _BODY: Final = int(mujoco.mjtTrn.mjTRN_BODY)
 _MUSCLE: Final = int(mujoco.mjtGain.mjGAIN_MUSCLE)
 

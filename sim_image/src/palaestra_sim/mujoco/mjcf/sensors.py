@@ -30,7 +30,7 @@ from palaestra_sim.scene.devices.touch_sensor import TOUCH_SENSOR, TouchSensor
 from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.lookup_table import LookupTable
 
-_NOWHERE: Final = Frame(None, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0))  # never read
+_NOWHERE: Final = Frame(None, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0))  # this frame is never read
 _PLAIN: Final = Axes(table=None, on=(True, True, True), resolution=-1.0)
 _FORCE: Final = 1  # the value that `get_type` of a touch sensor returns
 _PIXELS: Final = (64, 64)  # Webots' default, for a camera without a resolution

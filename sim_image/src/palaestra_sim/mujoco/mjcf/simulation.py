@@ -54,7 +54,7 @@ class MjcfSimulation:
         self.time_ms = 0
         self.mode = mode
         self.quit_status: int | None = None
-        self.forces = False  # the nodes have no masses and frictions; the model has its own
+        self.forces = False  # the scene's nodes contain no masses or friction; MuJoCo's model contains both
         self.unread_textures = 0  # textures affect only infra-red sensors, which MJCF does not have
         self.left_out: tuple[WorldError, ...] = tuple(equipment.left_out)
         self.basic_step_ms = basic_step_ms
@@ -67,7 +67,8 @@ class MjcfSimulation:
         self._states = BodyStates(model, tree.bodies)
         self._step_s = basic_step_ms / 1000.0
         self._steps = round(self._step_s / float(model.model.opt.timestep))
-        model.model.opt.timestep = self._step_s / self._steps  # exact; a file may have a rounded 1/240 s
+        # Makes the timestep exact, because a file may round 1/240 s.
+        model.model.opt.timestep = self._step_s / self._steps
         self._pending: list[Callable[[], None]] = []
         self._reset_asked = False
 

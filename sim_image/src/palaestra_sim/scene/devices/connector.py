@@ -16,7 +16,7 @@ from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.geometry import Pose, Vector
 from palaestra_sim.scene.old_axes import pointing
 
-_PASSIVE: Final = -1  # the presence of a passive connector, which has no sensor
+_PASSIVE: Final = -1  # value of `presence` for a passive connector, which cannot detect other connectors
 _MATCHING: Final = {"symmetric": "symmetric", "active": "passive", "passive": "active"}
 
 

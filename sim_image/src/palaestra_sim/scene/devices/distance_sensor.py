@@ -34,7 +34,7 @@ _STEEPEST: Final = math.tan(math.pi / 8.0)  # slope of the steepest surface that
 _TABLE: Final = ((0.0, 0.0, 0.0), (0.1, 1000.0, 0.0))  # the default of DistanceSensor.lookupTable
 _EMPTY: Final = ((0.0, 0.0, 0.0),)  # replaces a table without rows; the sensor then measures 0
 # For each number of rays from 1 to 10, the rings of the cone. Each ring has a number of rays, a rotation as a
-# share of the spacing between them, and an opening angle as a share of the aperture.
+# share of the spacing between its rays, and an opening angle as a share of the aperture.
 _RINGS: Final = (
     ((1, 0.0, 0.0),),
     ((2, 0.5, 1.0),),
@@ -100,7 +100,7 @@ def _read(part: DevicePart) -> DistanceSensor:
     rows = tuple(table_rows(part, _TABLE, "distances"))
     table = lookup_table(*(rows or _EMPTY))
     aperture_rad = part.number("aperture", 1.5708)
-    # Webots also gives a laser one ray, and prints a warning.
+    # As in Webots, a laser always has one ray. Webots prints a warning if the world sets another number.
     rays = 1 if type_name == "laser" else int(part.number("numberOfRays", 1.0))
     if rays > _MOST_RAYS:
         part.refuse(f"a distance sensor with {rays} rays", f"use 1 to {_MOST_RAYS}")

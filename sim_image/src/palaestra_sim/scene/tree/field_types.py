@@ -147,7 +147,8 @@ _WITHOUT_EFFECT: Final = {
 }
 
 
-_AS_SIMULATED: Final = {"bounce": [0.0]}  # values of these fields with the same effect here as in Webots
+# For each field, the values that have the same effect here as in Webots.
+_AS_SIMULATED: Final = {"bounce": [0.0]}
 
 
 def without_effect(node: SceneNode) -> list[str]:

@@ -24,7 +24,7 @@ _MOST: Final[Mapping[str, int]] = {
     "mesh": 40_000,
     "size": 1_000_000,
 }
-# The attributes whose numbers are multiplied.
+# For each element, the attributes whose numbers are multiplied to get its size.
 _SIZES: Final[Mapping[str, tuple[str, ...]]] = {
     "replicate": ("count",),
     "composite": ("count",),
@@ -56,6 +56,6 @@ def _size(element: Element) -> float:
     """Return the product of an element's size numbers; 1 without such numbers."""
     texts = [element.attributes.get(name, "") for name in _SIZES.get(element.tag, ())]
     numbers = [float(word) for text in texts for word in text.split() if word.isdigit()]
-    if element.tag == "mesh":  # a built-in mesh has up to as many points as the square of its resolution
+    if element.tag == "mesh":  # a built-in mesh has at most as many points as the square of its resolution
         return max(numbers, default=1.0) ** 2
     return math.prod(numbers)

@@ -54,7 +54,7 @@ def object_named(name: str, subject: str) -> Any:
     """
     module, _, attribute = name.partition(":")
     found = module_named(module, subject)
-    with _reported(subject, "correct the name"):  # a module may import its parts on access
+    with _reported(subject, "correct the name"):  # access to an attribute may import a part of the module
         return getattr(found, attribute)
 
 

@@ -66,7 +66,7 @@ def _read(path: Path, device: torch.device, most: int) -> tuple[Any, dict[str, A
         return torch.load(content, map_location=device, weights_only=True), known
     except ConfigurationError:
         raise
-    except pickle.UnpicklingError as error:  # PyTorch's message recommends to unpickle, so it is not shown
+    except pickle.UnpicklingError as error:  # omit PyTorch's message, which recommends to unpickle the file
         raise _refused(
             path,
             f"{POLICY} has objects other than tensors, which are never unpickled; name another model.zip",
