@@ -77,7 +77,7 @@ def test_the_operator_makes_no_pod_itself(made):
 
 
 def test_nothing_needs_what_a_plain_cluster_lacks(made):
-    """Only the Prometheus Operator defines these kinds, so a cluster without it would refuse the file."""
+    """Only the Prometheus Operator defines monitors and rules, so a plain cluster would refuse the file."""
     assert [kind for kind, _ in made if kind.endswith(("Monitor", "PrometheusRule"))] == []
 
 

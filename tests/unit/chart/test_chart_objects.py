@@ -110,7 +110,10 @@ def test_the_trial_is_one_hook(made, mode):
 
 
 def test_the_account_of_the_trial_can_be_left_out(made):
-    """The account keeps its permissions while the release is installed, which some platforms forbid."""
+    """The ServiceAccount of `helm test` exists as long as the release, not only during the test.
+
+    Some platforms forbid an account that may always create TrainingJobs.
+    """
     everything, without = made("default"), objects({"test": {"enabled": False}})
 
     left_out = [each for each in everything if each not in without]
@@ -169,7 +172,7 @@ def test_the_operator_understands_its_options(one, mode):
 def test_what_pods_may_carry_and_where_they_run_reaches_the_operator(one):
     """The chart passes these values as options of the operator's command line.
 
-    By default no extra field is allowed and no node selector is required.
+    By default jobs may set none of the restricted fields, and no node selector is required.
     """
     closed, default = options(one("closed", "Deployment")), options(one("default", "Deployment"))
 

@@ -1,4 +1,4 @@
-"""The permissions that roles grant and that an audit log shows in use, so that both can be compared."""
+"""The permissions that roles grant, and the permissions that an audit log shows in use."""
 
 import json
 
@@ -108,7 +108,7 @@ def test_a_refused_request_is_no_right():
 
 
 def test_people_discovery_the_past_and_half_a_line_are_left_out():
-    """Only complete requests of service accounts for objects, since the given time, use a permission."""
+    """A use is a complete request of a service account for an object, logged after the given time."""
     discovery = json.loads(entry("get"))
     del discovery["objectRef"]
     lines = [entry("list", user="admin"), json.dumps(discovery), entry("list"), '{"verb": "li']

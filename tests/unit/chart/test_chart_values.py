@@ -100,7 +100,7 @@ def test_a_wrong_value_is_refused_with_its_place(path, value, below):
     ],
 )
 def test_values_that_do_not_go_together_are_refused(values, told):
-    """A misspelled value, or a value that lacks another one, would have no effect without an error."""
+    """Without an error, a misspelled value, or a value that needs another value, would have no effect."""
     assert told in refusal(values)
 
 
@@ -148,7 +148,7 @@ dependencies:
 
 @pytest.mark.parametrize("enabled", [True, False])
 def test_a_parent_chart_switches_the_chart_on_and_off(tmp_path, enabled):
-    """Helm's `condition` sets `enabled` among the values of this chart, and the schema once refused it."""
+    """Helm's `condition` sets the value `enabled` of this chart, and the schema once refused this value."""
     (tmp_path / "charts").mkdir()
     (tmp_path / "charts" / "palaestra").symlink_to(CHART)
     (tmp_path / "Chart.yaml").write_text(PARENT)

@@ -71,7 +71,7 @@ def test_the_arena_has_one_robot_that_is_its_own_supervisor() -> None:
 
 
 def test_worlds_with_a_separate_supervisor_work_too() -> None:
-    """Only the supervisor of the two robots has the option `--clock`."""
+    """Of the two robots, only the supervisor has the option `--clock`."""
     supervisor, robotino = robots(builtin("two_robots"))
 
     assert (supervisor.robot, supervisor.supervisor) == ("supervisor", True)

@@ -15,7 +15,7 @@ def defined(name: str) -> Node:
 
 
 def test_the_court_has_one_robot_that_is_its_own_supervisor() -> None:
-    """The robot is an instance of a PROTO of Webots, whose description the stub has."""
+    """The robot is an instance of a PROTO of Webots, and the stub has a description of this PROTO."""
     assert defined("BURGER").type_name == "TurtleBot3Burger"
     assert robots(builtin("court")) == (
         WorldRobot(robot="burger", ros_name="burger", supervisor=True, synchronize=True, definition="BURGER"),

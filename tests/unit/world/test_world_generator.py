@@ -241,7 +241,7 @@ def test_a_byte_order_mark_is_accepted_and_kept(identity: RunIdentity) -> None:
 
 
 def test_robots_are_described_as_the_world_has_them(world: Make) -> None:
-    """The function describes a world before or after generation.
+    """`robots` also reads worlds that were not generated, so it returns whatever names the file has.
 
     The last `--name=` counts, as in the controller.
     """

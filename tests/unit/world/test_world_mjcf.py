@@ -139,7 +139,7 @@ def test_a_path_that_leads_above_the_world_is_fine():
     [("0.00831", "0.008 or 0.009"), ("0.0123", "0.012 or 0.013"), ("1e-09", "1e-05 or 1.0101e-05")],
 )
 def test_a_timestep_that_makes_no_short_step_is_refused_with_those_that_do(timestep, near):
-    """A basic step is a whole number of milliseconds, at most 100, and a limited number of MuJoCo's steps."""
+    """A basic step takes whole milliseconds, at most 100, and has a limited number of MuJoCo's steps."""
     with pytest.raises(WorldError, match=f"fits the timestep of {timestep} s; write {near}"):
         check(with_custom(b"", f'<option timestep="{timestep}"/>'.encode()))
 

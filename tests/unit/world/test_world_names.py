@@ -73,7 +73,7 @@ def test_the_same_job_created_again_has_other_names(identity: RunIdentity) -> No
 
 
 def test_the_border_between_two_parts_of_the_hash_cannot_be_shifted() -> None:
-    """Without a safe separator, the end of one part could pass for the beginning of the next."""
+    """Without a safe separator, the end of one part could be read as the beginning of the next part."""
     one = RunIdentity(job="j", namespace='a", "b', uid="c", replica=0, group="g", index=0)
     other = RunIdentity(job="j", namespace="a", uid='b", "c', replica=0, group="g", index=0)
 
