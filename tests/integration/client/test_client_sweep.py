@@ -94,7 +94,7 @@ def test_a_job_that_is_not_of_the_sweep_is_not_touched(file, client, place, tmp_
     before = place.get(TRAINING_JOBS, "s-0")
     search = InTurn(trials(load(file(matrix={"seed": [1]}))), {})
 
-    with pytest.raises(NotOfThisSweep, match="outside of this sweep; give the sweep another name"):
+    with pytest.raises(NotOfThisSweep, match="this sweep; give the sweep another name"):
         carry_out(search, ClusterBackend(client, "s", None, print), tmp_path, Objective.SUCCESS_RATE, print)
 
     assert place.get(TRAINING_JOBS, "s-0") == before
