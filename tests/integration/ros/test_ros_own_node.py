@@ -163,9 +163,11 @@ def test_rosnode_kill_ends_our_process_as_sigterm_does(listening, code, printed)
         text=True,
     ) as program:
         with xmlrpc.client.ServerProxy(program.stdout.readline().strip()) as node:
+            other = node.shutdown("/master", "[/gone] Reason: new node registered with same name")
             responses = [node.shutdown("/rosnode", "user request")[::2] for _ in range(2)]
         ended, _ = program.communicate(timeout=60)
 
+    assert other[0] == 0  # this node has the port of a node that was killed
     assert responses == [[1, 0], [1, 0]]
     assert program.returncode == code
     assert ended.splitlines()[1:] == printed  # the first line is from the log

@@ -140,6 +140,7 @@ def test_a_node_that_rosnode_kill_ends_is_reported_as_shut_down(master, stub):
     with xmlrpc.client.ServerProxy(master) as ask_master:
         _, _, address = ask_master.lookupNode("/test", "/process_test")
     with xmlrpc.client.ServerProxy(address) as node:
+        node.shutdown("/master", "[/gone] Reason: new node registered with same name")  # has no effect
         node.shutdown("/rosnode", "user request")
 
     line = process.stderr.readline()

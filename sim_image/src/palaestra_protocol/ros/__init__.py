@@ -11,4 +11,5 @@ All modules except `sockets` are pure.
 - `codec`: encodes and decodes any message, with `fixed` or `variable`
 - `rostypes`: the types of the interface, each with its md5 sum and its codecs
 - `sockets`: the socket options of both ends of a connection
+- `shutdown`: the reason of a shutdown, which names the node that the master wants to end
 """

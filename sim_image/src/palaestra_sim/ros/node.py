@@ -17,6 +17,7 @@ from contextlib import AbstractContextManager
 from typing import Any, Final
 
 from palaestra_protocol.ros.rostypes import ServiceType, message_type, service_type
+from palaestra_protocol.ros.shutdown import means_another_node
 from palaestra_protocol.ros.tcpros import encode_header, frame
 from palaestra_protocol.xmlrpc.server import bind_address, host_name
 from palaestra_sim.ros.links import Connection, Endpoint, HeaderRefused, Lingering, RosLink
@@ -192,6 +193,8 @@ class RosNode:
         self._ended = callback
 
     def _asked_to_end(self, reason: str) -> None:
+        if means_another_node(reason, f"/{self.name}"):
+            return
         self._loop.post(lambda: self._ended(reason))
 
     def _accept(self) -> None:

@@ -18,6 +18,7 @@ from typing import Any
 
 import structlog
 
+from palaestra_protocol.ros.shutdown import means_another_node
 from palaestra_protocol.xmlrpc.responses import FAILED, OK
 from palaestra_protocol.xmlrpc.server import Method, RpcServer, bind_address, host_name
 from palaestra_trainer.errors import ConfigurationError
@@ -80,7 +81,7 @@ def _made(name: str) -> _Node:
     master.ping()
     host = host_name(os.environ)
     try:
-        server = RpcServer((bind_address(host), 0), _answers(master.uri).get)
+        server = RpcServer((bind_address(host), 0), _answers(master.uri, in_full).get)
     except OSError as error:
         fact = f"{host}: a ROS node cannot listen on this address: {error.strerror}"
         raise ConfigurationError(f"{fact}; set ROS_HOSTNAME, for example to localhost") from error
@@ -88,7 +89,7 @@ def _made(name: str) -> _Node:
     return _Node(name=in_full, uri=f"http://{host}:{server.port}/", pid=os.getpid())
 
 
-def _answers(master_uri: str) -> dict[str, Method]:
+def _answers(master_uri: str, name: str) -> dict[str, Method]:
     """Return the methods of the Slave API; the source is http://wiki.ros.org/ROS/Slave_API."""
     return {
         "getPid": _constant(os.getpid),
@@ -100,7 +101,7 @@ def _answers(master_uri: str) -> dict[str, Method]:
         "publisherUpdate": _constant(lambda: 0),
         "paramUpdate": _constant(lambda: 0),
         "requestTopic": lambda _: [FAILED, "this node publishes no topic", 0],
-        "shutdown": _Shutdown(),
+        "shutdown": _Shutdown(name),
     }
 
 
@@ -110,13 +111,16 @@ def _constant(value: Callable[[], Any]) -> Method:
 
 
 class _Shutdown:
-    """The method `shutdown`; its first call ends this process as SIGTERM does."""
+    """The method `shutdown`; its first call for the node `name` ends this process as SIGTERM does."""
 
-    def __init__(self) -> None:
+    def __init__(self, name: str) -> None:
+        self._name = name
         self._first = threading.Lock()
 
     def __call__(self, parameters: tuple[Any, ...]) -> list[Any]:
         """Return the response, and send the signal a moment later."""
+        if any(means_another_node(parameter, self._name) for parameter in parameters[1:]):
+            return [FAILED, f"this node is {self._name}", 0]
         if self._first.acquire(blocking=False):  # a second signal would end a training without its checkpoint
             log.warning("the ROS node was asked to end", asked=parameters)
             timer = threading.Timer(_RESPONDING_S, os.kill, (os.getpid(), signal.SIGTERM))
