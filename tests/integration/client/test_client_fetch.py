@@ -7,11 +7,13 @@ import io
 import json
 import tarfile
 from functools import partial
+from pathlib import Path
 from urllib.parse import urlsplit
 
 import pytest
 
 from palaestra import Client
+from palaestra.cli import main
 from palaestra.client import NotFetched, TookTooLong
 from palaestra.cluster import Unreachable
 from palaestra.plan import ClusterLayout, Images, identified, plan
@@ -25,6 +27,8 @@ FAILURE = (
         {"status": "Failure", "details": {"causes": [{"reason": "ExitCode", "message": "1"}]}}
     ).encode()
 )
+FINISHED = Path(__file__).parents[2] / "fixtures/0.1.0/finished"
+KEPT = ("attempts.jsonl", "hyperparameters.json", "summary.json", "training.yaml")
 FILES = {"model.zip": b"weights" * 10_000, "tensorboard/events": b"curves"}
 RUN_POD = "job-0-x7k2p"
 WAITING = {"reason": "ErrImagePull", "message": "no such image"}
@@ -290,3 +294,15 @@ def test_a_pod_that_does_not_start_is_deleted_and_the_error_has_the_reason(scene
 
     [made] = scene.asked("POST", "/pods")
     assert len(scene.asked("DELETE", made.body["metadata"]["name"])) == 1
+
+
+def test_the_command_writes_the_report_of_a_run_whose_trainer_was_killed(scene, tmp_path, capsys):
+    """Such a trainer writes neither `end.json` nor a report, but the person who fetches wants one."""
+    scene.execution = command(*tar({name: (FINISHED / name).read_bytes() for name in KEPT}), SUCCESS)
+    kubeconfig = f"--kubeconfig={tmp_path / 'kubeconfig'}"
+
+    assert main(["fetch", "job", kubeconfig, f"--dir={scene.into}"]) == 0
+
+    report = scene.into / "job/0/report.html"
+    assert "<html" in report.read_text()
+    assert str(report) in capsys.readouterr().out
