@@ -210,7 +210,8 @@ def test_logs_of_a_container_that_is_not_there_lists_those_that_are(server, caps
     assert main(["logs", "trial", "-c", "nope", f"--kubeconfig={kubeconfig}"]) == 1
 
     there = "trainer, ros-master, sim-collect-0, sim-evaluate-0"
-    assert capsys.readouterr().err == f"pod trial-0-x7k2p: has no container nope; it has {there}\n"
+    said = capsys.readouterr().err
+    assert said == f"pod trial-0-x7k2p: has no container nope; its containers are {there}\n"
 
 
 @pytest.mark.parametrize(

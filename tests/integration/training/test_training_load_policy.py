@@ -97,9 +97,7 @@ def test_byte_code_is_read_by_the_python_that_wrote_it(stored_by_value):
 
 def test_a_network_of_another_python_is_refused_with_the_remedy(stored_by_value):
     """No module defines the network's class, so the user needs that version of Python or an export."""
-    fact = (
-        r"model\.zip: policy_kwargs has byte code of Python 3\.99, and this .*; use Python 3\.99, or export"
-    )
+    fact = r"model\.zip: policy_kwargs has byte code of Python 3\.99, but this is .*; use Python 3\.99, or"
 
     with pytest.raises(ConfigurationError, match=fact):
         load_policy(stored_by_value("3.99"))
