@@ -46,14 +46,10 @@ class NumberReading:
                 read as a number.
             struct.error: the message ends within its header.
         """
-        if len(message) != self._layout.size:
-            self._fit(message)
-        numbers = self._layout.unpack(message)
-        if numbers[0] != self._frame_id_bytes:
-            raise ValueError(f"a frame_id of {numbers[0]} bytes instead of {self._frame_id_bytes}")
-        if not math.isfinite(numbers[-1]):
-            raise ValueError(f"{numbers[-1]} from {self._device}")
-        return numbers[-1]
+        reading = self._numbers(message)[-1]
+        if not math.isfinite(reading):
+            raise ValueError(f"{reading} from {self._device}")
+        return reading
 
     def _numbers(self, message: bytes | memoryview) -> tuple[Any, ...]:
         """Return the length of the frame_id, and the numbers after the header."""
@@ -61,7 +57,7 @@ class NumberReading:
             self._fit(message)
         numbers = self._layout.unpack(message)
         if numbers[0] != self._frame_id_bytes:
-            raise ValueError(f"a frame_id of {numbers[0]} bytes, not {self._frame_id_bytes}")
+            raise ValueError(f"a frame_id of {numbers[0]} bytes instead of {self._frame_id_bytes}")
         return numbers
 
     def _fit(self, message: bytes | memoryview) -> None:

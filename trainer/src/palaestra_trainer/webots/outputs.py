@@ -42,15 +42,10 @@ class OutputDevice:
         self._services.close()
 
     def _command(self, name: str, type_name: str, **request: Any) -> None:
-        """Call a service of the device that only confirms.
-
-        Raises:
-            WrongData: the simulator refuses the command.
-            SimulatorDead, SimulatorHung: as `RosService`.
-        """
-        if not self._services.get(f"{self._path}/{name}", type_name)(**request).success:
-            given = ", ".join(f"{field} {value!r}" for field, value in request.items())
-            raise WrongData(self.robot, f"{self.device} refuses {name} with {given}")
+        """Call a service of the device that only confirms; see `Services.confirm`."""
+        given = ", ".join(f"{field} {value!r}" for field, value in request.items())
+        refused = f"{self.device} refuses {name} with {given}"
+        self._services.confirm(f"{self._path}/{name}", type_name, refused, **request)
 
     def _refuse_ignored(self, what: str, wanted: float, actual: float) -> None:
         """Raise WrongData if the simulator confirmed a value but ignored it, as Webots does."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from palaestra_trainer.errors import WrongData
 from palaestra_trainer.ros import RosService
 
 
@@ -29,6 +30,22 @@ class Services:
     def ask(self, path: str, type_name: str) -> Any:
         """Call a service without arguments, and return the `value` of its response."""
         return self.get(path, type_name)(ask=True).value
+
+    def confirm(self, path: str, type_name: str, refused: str, **request: Any) -> None:
+        """Call a service whose response only confirms the request.
+
+        Args:
+            path: the path of the service, relative to the node.
+            type_name: the name of its type, without the package.
+            refused: the fact for the error if the simulator does not confirm.
+            request: the fields of the request.
+
+        Raises:
+            WrongData: the simulator does not confirm.
+            SimulatorDead, SimulatorHung: as `RosService`.
+        """
+        if not self.get(path, type_name)(**request).success:
+            raise WrongData(self.node_name, refused)
 
     def close(self) -> None:
         """Close all connections."""

@@ -6,7 +6,7 @@ import contextlib
 from dataclasses import dataclass
 from pathlib import Path
 
-from palaestra_trainer.errors import SimulatorDead, WrongData
+from palaestra_trainer.errors import SimulatorDead
 from palaestra_trainer.ros import call_together
 from palaestra_trainer.webots.fields import Value, encoded, kind_of, turn_about_z
 from palaestra_trainer.webots.observer import Mode, Observer, Vector
@@ -63,8 +63,8 @@ class Supervisor:
             WrongData: also if the simulator refuses the mode.
         """
         self.paused = False
-        if not self._services.get("supervisor/simulation_set_mode", "set_int")(value=int(mode)).success:
-            raise WrongData(self.node_name, f"refuses mode {int(mode)}; use Webots R2021a or later")
+        refused = f"refuses mode {int(mode)}; use Webots R2021a or later"
+        self._services.confirm("supervisor/simulation_set_mode", "set_int", refused, value=int(mode))
         self.paused = mode == Mode.PAUSE
 
     def reset(self) -> None:
@@ -281,13 +281,9 @@ class Supervisor:
         self._services.close()
 
     def _confirm(self, path: str, type_name: str, subject: object, **request: object) -> None:
-        """Call a service that only confirms; `subject` is the object of the call, for the message.
-
-        Raises:
-            WrongData: the simulator does not confirm.
-        """
-        if not self._services.get(f"supervisor/{path}", type_name)(**request).success:
-            raise WrongData(self.node_name, f"refuses {path.rpartition('/')[2]} for {subject}")
+        """Call a service that only confirms; `subject` is the object of the call, for the message."""
+        refused = f"refuses {path.rpartition('/')[2]} for {subject}"
+        self._services.confirm(f"supervisor/{path}", type_name, refused, **request)
 
 
 def _xyz(vector: Vector) -> dict[str, float]:
