@@ -37,6 +37,7 @@ class OutlineObservers:
         outlines = outlines_of(nodes, floors_m)
         for sensor in self._shaded:
             sensor.show(outlines)
-        echoes = echoes_of(nodes, outlines)
-        for radar in self._radars:
-            radar.show(echoes, now_ms)
+        if self._radars:
+            echoes = echoes_of(nodes, outlines)
+            for radar in self._radars:
+                radar.show(echoes, now_ms)
