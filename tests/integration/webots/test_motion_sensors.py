@@ -5,7 +5,6 @@ import math
 import pytest
 
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.robots.simulated import SimulatedRobot
 from palaestra_trainer.webots import (
     GPS,
     Accelerometer,
@@ -14,13 +13,12 @@ from palaestra_trainer.webots import (
     Gyro,
     InertialUnit,
     LightSensor,
-    Webots,
 )
+from tests.integration.webots.own_world import OwnRobot, running
 from tests.values.frames import axis_angle, frame
 from tests.values.standing import GRAVITY, MOUNT, POSES, REFERENCE, ROWS
-from tests.values.worlds import PHYSICS, STEP_MS, Setting, robot
+from tests.values.worlds import PHYSICS, Setting, robot
 
-DEADLINE_S = 60.0
 FACADES = {
     "accelerometer": Accelerometer,
     "altimeter": Altimeter,
@@ -33,12 +31,10 @@ FACADES = {
 MEASURED = {row.name: row for row in ROWS if row.name in FACADES}
 
 
-class Measuring(SimulatedRobot):
+class Measuring(OwnRobot):
     """A robot with one sensor of each facade; one axis of another compass is switched off in the world."""
 
     definition = "R"
-    period_ms = STEP_MS
-    target = None
 
     def equip(self):
         """Add the sensors."""
@@ -55,17 +51,9 @@ def measured(request, master, tmp_path_factory):
     rows = [*MEASURED.values(), next(row for row in ROWS if row.name == "compass axes")]
     sensors = " ".join(row.node.format(place=f'name "{row.name}" {MOUNT.fields}') for row in rows)
     info = "gravity {} gpsReference {} {} {}".format(GRAVITY, *REFERENCE)
-    world = tmp_path_factory.mktemp("world") / "sensors.wbt"
-    world.write_text(setting.text(robot(sensors, POSES[0].fields), info))
-    webots = Webots("r", world, driver=request.param, start_deadline_s=DEADLINE_S)
-    measuring = Measuring(webots)
-    try:
-        with webots:
-            measuring.advance()
-            yield setting, measuring, POSES[0] @ MOUNT
-    finally:
-        measuring.close()
-        webots.close()
+    text = setting.text(robot(sensors, POSES[0].fields), info)
+    with running(text, tmp_path_factory.mktemp("world"), request.param, Measuring) as (_, measuring):
+        yield setting, measuring, POSES[0] @ MOUNT
 
 
 @pytest.mark.parametrize("name", FACADES)

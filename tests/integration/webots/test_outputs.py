@@ -3,23 +3,20 @@
 import pytest
 
 from palaestra_trainer.errors import ConfigurationError, WorldMisfit, WrongData
-from palaestra_trainer.robots.simulated import SimulatedRobot
-from palaestra_trainer.webots import LED, Brake, Connector, Emitter, Pen, Speaker, Webots
-from tests.values.worlds import PHYSICS, STEP_MS, Setting, robot
+from palaestra_trainer.webots import LED, Brake, Connector, Emitter, Pen, Speaker
+from tests.integration.webots.own_world import OwnRobot, running
+from tests.values.worlds import PHYSICS, Setting, robot
 
-DEADLINE_S = 60.0
 DEVICES = """LED { name "led" } Pen { name "pen" } Connector { name "connector" } Speaker { name "speaker" }
   Emitter { name "emitter" channel 3 range 2 maxRange 5 bufferSize 100 }
   HingeJoint { jointParameters HingeJointParameters { axis 0 1 0 } device Brake { name "brake" }
     endPoint Solid { } }"""
 
 
-class Commanded(SimulatedRobot):
+class Commanded(OwnRobot):
     """A robot with one device of each facade."""
 
     definition = "R"
-    period_ms = STEP_MS
-    target = None
 
     def equip(self):
         """Add the devices."""
@@ -32,17 +29,9 @@ class Commanded(SimulatedRobot):
 def devices(request, master, tmp_path_factory):
     """Yield the devices of a robot in a running simulator."""
     del master
-    world = tmp_path_factory.mktemp("world") / "devices.wbt"
-    world.write_text(Setting(request.param).text(robot(DEVICES)))
-    webots = Webots("r", world, driver=request.param, start_deadline_s=DEADLINE_S)
-    commanded = Commanded(webots)
-    try:
-        with webots:
-            commanded.advance()
-            yield commanded.devices
-    finally:
-        commanded.close()
-        webots.close()
+    text = Setting(request.param).text(robot(DEVICES))
+    with running(text, tmp_path_factory.mktemp("world"), request.param, Commanded) as (_, commanded):
+        yield commanded.devices
 
 
 def test_a_led_has_the_value_that_was_set(devices):
@@ -111,13 +100,6 @@ def test_a_negative_damping_is_refused(devices):
 def test_a_device_that_the_world_lacks_is_an_error_when_the_robot_connects(master, tmp_path):
     """Otherwise the first command would look like a simulator that does not respond."""
     del master
-    world = tmp_path / "bare.wbt"
-    world.write_text(Setting("stub").text(robot("")))
-    webots = Webots("r", world, start_deadline_s=DEADLINE_S)
-    commanded = Commanded(webots)
-    try:
-        with pytest.raises(WorldMisfit, match="led"):
-            webots.start()
-    finally:
-        commanded.close()
-        webots.close()
+    text = Setting("stub").text(robot(""))
+    with pytest.raises(WorldMisfit, match="led"), running(text, tmp_path, "stub", Commanded):
+        pass

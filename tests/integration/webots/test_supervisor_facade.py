@@ -4,12 +4,11 @@ import pytest
 from PIL import Image
 
 from palaestra_trainer.errors import WrongData
-from palaestra_trainer.robots.simulated import SimulatedRobot
-from palaestra_trainer.webots import ViewLabel, Webots
+from palaestra_trainer.webots import ViewLabel
+from tests.integration.webots.own_world import running
 from tests.values.frames import frame, quaternion
 from tests.values.worlds import PHYSICS, STEP_MS, Setting, robot
 
-DEADLINE_S = 60.0
 MASS_KG = 2.0
 FORCE_N = (3.0, -1.0, 0.5)
 BOX = frame((1.0, 2.0, 0.5), (0.0, 0.0, 1.0), 0.6)
@@ -19,14 +18,6 @@ WORLD = f"""DEF WALL Solid {{ {WALL.fields} name "wall" boundingObject Box {{ si
 DEF BOX Solid {{ {BOX.fields} name "box" boundingObject Box {{ size 0.4 0.4 0.4 }} PHYSICS }}
 """
 PHYSICS_NODE = f"physics Physics {{ density -1 mass {MASS_KG} }}"
-
-
-class Onlooker(SimulatedRobot):
-    """A supervisor without devices."""
-
-    definition = ""
-    period_ms = STEP_MS
-    target = None
 
 
 @pytest.fixture(scope="module", params=PHYSICS)
@@ -40,18 +31,9 @@ def world(simulator, master, tmp_path_factory):
     """Yield a facade and a robot in a running simulator; only MuJoCo simulates the mass of the box."""
     del master
     text = WORLD.replace("PHYSICS", PHYSICS_NODE if simulator == "mujoco" else "")
-    path = tmp_path_factory.mktemp("world") / "box.wbt"
-    path.write_text(Setting(simulator).text(text + robot(""), "gravity 0"))
-    webots = Webots("r", path, driver=simulator, start_deadline_s=DEADLINE_S)
-    onlooker = Onlooker(webots)
-    try:
-        with webots:
-            onlooker.connect()
-            onlooker.advance()
-            yield webots, onlooker
-    finally:
-        onlooker.close()
-        webots.close()
+    text = Setting(simulator).text(text + robot(""), "gravity 0")
+    with running(text, tmp_path_factory.mktemp("world"), simulator) as started:
+        yield started
 
 
 def test_the_full_pose_of_a_node_is_that_of_the_world_file(world):
@@ -160,27 +142,17 @@ def test_a_label_is_accepted(world):
     webots.supervisor.set_label(ViewLabel(text=""))
 
 
-def test_a_box_on_a_table_touches_it_at_its_corners(simulator, master, tmp_path):
+def test_a_box_on_a_table_touches_it_at_its_corners(master, tmp_path):
     """The contact points of MuJoCo are those of its physics; the stub has contacts of robots only."""
     del master
-    if simulator == "stub":
-        pytest.skip("in the stub, no object rests on another")
     resting = frame((0.0, 0.0, 0.1)).fields
     table = 'Solid { translation 0 0 -0.05 name "table" boundingObject Box { size 1 1 0.1 } }'
     box = f"DEF BOX Solid {{ {resting} boundingObject Box {{ size 0.4 0.4 0.2 }} {PHYSICS_NODE} }}"
-    path = tmp_path / "resting.wbt"
-    path.write_text(Setting(simulator).text(table + box + robot("")))
-    webots = Webots("r", path, driver=simulator, start_deadline_s=DEADLINE_S)
-    onlooker = Onlooker(webots)
-    try:
-        with webots:
-            onlooker.connect()
-            for _ in range(20):
-                onlooker.advance()
-            points = webots.observer.contact_points("BOX")
-    finally:
-        onlooker.close()
-        webots.close()
+    text = Setting("mujoco").text(table + box + robot(""))
+    with running(text, tmp_path, "mujoco") as (webots, onlooker):
+        for _ in range(20):
+            onlooker.advance()
+        points = webots.observer.contact_points("BOX")
 
     assert len(points) == 4
     for x, y, z in points:
