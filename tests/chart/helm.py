@@ -1,6 +1,7 @@
 """The chart as Helm renders it; Helm is built by tests/cluster/programs.sh."""
 
 import subprocess
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -53,3 +54,14 @@ def rendered(values: Object | None = None, *options: str) -> str:
 def objects(values: Object | None = None) -> list[Object]:
     """Return all objects of the chart with these values."""
     return [each for each in yaml.safe_load_all(rendered(values)) if each]
+
+
+def pods(objects: Iterable[Object]) -> dict[str, Object]:
+    """Return the spec of every pod, by the name of the object that creates it."""
+    return {
+        each["metadata"]["name"]: each["spec"]["template"]["spec"]
+        if each["kind"] == "Deployment"
+        else each["spec"]
+        for each in objects
+        if each["kind"] in {"Deployment", "Pod"}
+    }

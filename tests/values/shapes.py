@@ -34,6 +34,14 @@ ELL = f"IndexedFaceSet {{ coord Coordinate {{ point [ {_POINTS} ] }} coordIndex 
 # out.
 _SECTION = ", ".join(f"{-x:g} {-y:g}" for x, y in [*reversed(_OUTLINE), _OUTLINE[-1]])
 EXTRUSION = f"Extrusion {{ crossSection [ {_SECTION} ] spine [ 0 0 -0.5, 0 0 0.5 ] }}"
+# Rays toward the L: the start of each ray, and a point on the ray.
+_TOWARD_ELL: Points = (
+    ((3.0, 0.2, 0.1), (0.0, 0.2, 0.1)),
+    ((3.0, 1.2, 0.1), (0.0, 1.2, 0.1)),
+    ((1.2, 1.2, 2.0), (1.2, 1.2, 0.0)),
+    ((1.4, 1.6, 0.2), (1.0, 0.2, 0.0)),
+    ((0.2, 1.0, 2.0), (0.3, 1.2, 0.0)),
+)
 SHEET = """IndexedFaceSet { coord Coordinate { point [ 0 -1 -1, 0 1 -1, 0 1 1, 0 -1 1 ] }
   coordIndex [ 0 1 2 3 -1 ] }"""
 _SHEET = [[(0, -1, -1), (0, 1, -1), (0, 1, 1)], [(0, -1, -1), (0, 1, 1), (0, -1, 1)]]  # the sheet faces +x
@@ -152,27 +160,14 @@ SHAPES = (
         "IndexedFaceSet",
         ELL,
         partial(rays.triangles, corners=_TRIANGLES),
-        (
-            ((3.0, 0.2, 0.1), (0.0, 0.2, 0.1)),
-            ((3.0, 1.2, 0.1), (0.0, 1.2, 0.1)),
-            ((1.2, 1.2, 2.0), (1.2, 1.2, 0.0)),
-            ((1.4, 1.6, 0.2), (1.0, 0.2, 0.0)),
-            ((0.2, 1.0, 2.0), (0.3, 1.2, 0.0)),
-            ((3.0, 2.5, 0.0), (1.0, 2.2, 0.0)),
-        ),
+        (*_TOWARD_ELL, ((3.0, 2.5, 0.0), (1.0, 2.2, 0.0))),
         volume_m3=2.0 * 0.5 + 1.5 * 0.5,
     ),
     Shape(
         "IndexedFaceSet",
         EXTRUSION,
         partial(rays.triangles, corners=_TRIANGLES),
-        (
-            ((3.0, 0.2, 0.1), (0.0, 0.2, 0.1)),
-            ((3.0, 1.2, 0.1), (0.0, 1.2, 0.1)),
-            ((1.2, 1.2, 2.0), (1.2, 1.2, 0.0)),
-            ((1.4, 1.6, 0.2), (1.0, 0.2, 0.0)),
-            ((0.2, 1.0, 2.0), (0.3, 1.2, 0.0)),
-        ),
+        _TOWARD_ELL,
         volume_m3=2.0 * 0.5 + 1.5 * 0.5,
         name="Extrusion",
     ),

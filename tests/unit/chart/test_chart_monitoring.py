@@ -7,19 +7,8 @@ import pytest
 import yaml
 
 from palaestra_trainer.run.tensorboard_link import FOLDER
-from tests.chart.helm import CHART, objects
+from tests.chart.helm import CHART, objects, pods
 from tests.chart.modes import MODES, merged
-
-
-def pods(objects):
-    """Return the spec of every pod, by the name of the object that creates it."""
-    return {
-        each["metadata"]["name"]: each["spec"]["template"]["spec"]
-        if each["kind"] == "Deployment"
-        else each["spec"]
-        for each in objects
-        if each["kind"] in {"Deployment", "Pod"}
-    }
 
 
 def test_what_has_no_login_is_reached_by_nobody(one):

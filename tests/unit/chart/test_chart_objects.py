@@ -15,7 +15,7 @@ from palaestra.cli import operator
 from palaestra.cli.operator import ALLOWANCES
 from palaestra.operator.options import NAME
 from palaestra.plan import Images
-from tests.chart.helm import CHART, NAMESPACE, HelmRefused, helm, objects
+from tests.chart.helm import CHART, NAMESPACE, HelmRefused, helm, objects, pods
 from tests.chart.installation import SECRETS_ROLE
 from tests.chart.modes import DIGEST, MODES, merged
 from tests.chart.rights import held
@@ -23,17 +23,6 @@ from tests.chart.rights import held
 CLUSTER_WIDE = {"ClusterRole", "ClusterRoleBinding", "CustomResourceDefinition"}
 REGISTRY = "registry.example.com:5000/robots/"
 every_mode = pytest.mark.parametrize("mode", MODES)
-
-
-def pods(objects):
-    """Return the spec of every pod, by the name of the object that creates it."""
-    return {
-        each["metadata"]["name"]: each["spec"]["template"]["spec"]
-        if each["kind"] == "Deployment"
-        else each["spec"]
-        for each in objects
-        if each["kind"] in {"Deployment", "Pod"}
-    }
 
 
 def options(deployment):

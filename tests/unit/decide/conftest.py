@@ -167,6 +167,12 @@ class Scene:
         self.objects["pods"].append(pod)
         return pod
 
+    def restarts(self) -> tuple[int, int, int, int]:
+        """Return the attempt of replica 0, and its restarts by trainer, disruption and suspension."""
+        replica = self.replica()
+        counts = replica.restarts
+        return replica.attempt, counts.trainer, counts.disruption, counts.suspension
+
     def running_pod(self, index: int = 0) -> dict[str, Any]:
         """Create the next pod of a replica, with every container running."""
         pod = self.new_pod(index)

@@ -1,26 +1,19 @@
 """The counts of attempts and restarts are exact even if the operator missed changes, and never decrease."""
 
 
-def restarts(scene):
-    """Return the attempt, and the restarts by trainer, disruption and suspension."""
-    replica = scene.replica()
-    counts = replica.restarts
-    return replica.attempt, counts.trainer, counts.disruption, counts.suspension
-
-
 def test_a_failure_is_a_restart_once_another_pod_is_there(training, last_word):
     """No pod follows the last failure, so a failure alone is not a restart."""
     scene, pod = training()
     scene.end(pod, 70, last_word())
     scene.count_failures(1)
     scene.settle(5)
-    before = restarts(scene)
+    before = scene.restarts()
 
     scene.pass_(5)
     scene.running_pod()
     scene.settle(5)
 
-    assert (before, restarts(scene)) == ((1, 0, 0, 0), (2, 1, 0, 0))
+    assert (before, scene.restarts()) == ((1, 0, 0, 0), (2, 1, 0, 0))
 
 
 def test_a_pod_that_was_taken_is_a_disruption(training):
@@ -32,7 +25,7 @@ def test_a_pod_that_was_taken_is_a_disruption(training):
 
     scene.settle()
 
-    assert restarts(scene) == (2, 0, 1, 0)
+    assert scene.restarts() == (2, 0, 1, 0)
 
 
 def test_a_pod_that_somebody_deleted_is_a_disruption_too(training):
@@ -44,7 +37,7 @@ def test_a_pod_that_somebody_deleted_is_a_disruption_too(training):
 
     scene.settle()
 
-    assert restarts(scene) == (2, 0, 1, 0)
+    assert scene.restarts() == (2, 0, 1, 0)
 
 
 def test_a_failed_pod_that_somebody_tidied_away_is_still_a_failure(training):
@@ -57,7 +50,7 @@ def test_a_failed_pod_that_somebody_tidied_away_is_still_a_failure(training):
 
     scene.settle()
 
-    assert restarts(scene) == (2, 1, 0, 0)
+    assert scene.restarts() == (2, 1, 0, 0)
 
 
 def test_a_job_that_is_seen_late_is_not_needed(training, last_word):
@@ -67,12 +60,12 @@ def test_a_job_that_is_seen_late_is_not_needed(training, last_word):
     scene.pass_(15)
     scene.running_pod()
     scene.settle()
-    assert restarts(scene) == (2, 1, 0, 0)
+    assert scene.restarts() == (2, 1, 0, 0)
 
     scene.count_failures(1)
     scene.settle()
 
-    assert restarts(scene) == (2, 1, 0, 0)
+    assert scene.restarts() == (2, 1, 0, 0)
 
 
 def test_a_pod_that_is_seen_late_is_not_needed_either(training):
@@ -80,7 +73,7 @@ def test_a_pod_that_is_seen_late_is_not_needed_either(training):
     scene, pod = training()
     scene.count_failures(1)
     scene.settle()
-    assert restarts(scene) == (1, 0, 0, 0)
+    assert scene.restarts() == (1, 0, 0, 0)
 
     scene.end(pod, 70)
     scene.settle()
@@ -88,7 +81,7 @@ def test_a_pod_that_is_seen_late_is_not_needed_either(training):
     scene.running_pod()
     scene.settle()
 
-    assert restarts(scene) == (2, 1, 0, 0)
+    assert scene.restarts() == (2, 1, 0, 0)
 
 
 def test_what_happened_while_nobody_looked_is_counted(training, last_word):
@@ -104,7 +97,7 @@ def test_what_happened_while_nobody_looked_is_counted(training, last_word):
 
     scene.settle()
 
-    assert restarts(scene) == (5, 1, 3, 0)
+    assert scene.restarts() == (5, 1, 3, 0)
 
 
 def test_a_record_that_cannot_be_true_is_not_believed(training):

@@ -10,13 +10,6 @@ from hypothesis import strategies as st
 from palaestra.decide import Stop
 
 
-def restarts(scene):
-    """Return the attempt, and the restarts by trainer, disruption and suspension."""
-    replica = scene.replica()
-    counts = replica.restarts
-    return replica.attempt, counts.trainer, counts.disruption, counts.suspension
-
-
 def tell_suspension(scene, status):
     """Set the condition with which the Job controller reports a suspension or its end."""
     turned = {"type": "Suspended", "status": status, "lastTransitionTime": scene.stamp()}
@@ -34,7 +27,7 @@ def test_a_resumption_may_be_dated_after_the_pod_that_it_made(training):
 
     scene.settle()
 
-    assert restarts(scene) == (2, 0, 0, 1)
+    assert scene.restarts() == (2, 0, 0, 1)
 
 
 def test_a_suspension_by_a_queue_that_the_status_showed_is_counted_however_late_its_end_is_dated(training):
@@ -52,7 +45,7 @@ def test_a_suspension_by_a_queue_that_the_status_showed_is_counted_however_late_
 
     scene.settle()
 
-    assert restarts(scene) == (2, 0, 0, 1)
+    assert scene.restarts() == (2, 0, 0, 1)
 
 
 def test_a_pod_that_was_taken_before_a_queue_suspended_the_job_is_a_disruption(training):
@@ -70,7 +63,7 @@ def test_a_pod_that_was_taken_before_a_queue_suspended_the_job_is_a_disruption(t
 
     scene.settle()
 
-    assert restarts(scene) == (2, 0, 1, 0)
+    assert scene.restarts() == (2, 0, 1, 0)
 
 
 def test_a_pod_may_be_seen_before_its_job_tells_of_the_resumption(training):
@@ -85,7 +78,7 @@ def test_a_pod_may_be_seen_before_its_job_tells_of_the_resumption(training):
     scene.pass_(15)
     scene.running_pod()
     scene.settle(1)
-    assert restarts(scene) == (2, 0, 0, 1)
+    assert scene.restarts() == (2, 0, 0, 1)
 
     scene.objects["pods"].clear()
     tell_suspension(scene, "False")
@@ -93,7 +86,7 @@ def test_a_pod_may_be_seen_before_its_job_tells_of_the_resumption(training):
     scene.running_pod()
     scene.settle()
 
-    assert restarts(scene) == (3, 0, 1, 1)
+    assert scene.restarts() == (3, 0, 1, 1)
 
 
 def test_a_pod_that_was_replaced_before_the_suspension_is_a_disruption(training):
@@ -107,7 +100,7 @@ def test_a_pod_that_was_replaced_before_the_suspension_is_a_disruption(training)
 
     scene.settle()
 
-    assert restarts(scene) == (2, 0, 1, 0)
+    assert scene.restarts() == (2, 0, 1, 0)
 
 
 def pause(scene, pod, *, resumes=True):
@@ -138,7 +131,7 @@ def test_a_suspension_within_the_second_of_its_pod_is_counted(training):
 
     scene.settle()
 
-    assert restarts(scene) == (2, 0, 0, 1)
+    assert scene.restarts() == (2, 0, 0, 1)
 
 
 def test_a_pod_that_is_seen_after_the_suspension_that_ended_it_is_counted_as_such(accepted):
@@ -154,7 +147,7 @@ def test_a_pod_that_is_seen_after_the_suspension_that_ended_it_is_counted_as_suc
 
     scene.settle()
 
-    assert restarts(scene) == (2, 0, 0, 1)
+    assert scene.restarts() == (2, 0, 0, 1)
 
 
 @pytest.mark.parametrize("how", ["taken", "deleted", "gone", "interrupted"])
@@ -180,7 +173,7 @@ def test_a_pod_that_had_ended_before_the_suspension_is_a_disruption(how, trainin
 
     scene.settle()
 
-    assert restarts(scene) == (2, 0, 1, 0)
+    assert scene.restarts() == (2, 0, 1, 0)
 
 
 def test_a_failure_before_the_suspension_stays_a_failure(training, last_word):
@@ -193,7 +186,7 @@ def test_a_failure_before_the_suspension_stays_a_failure(training, last_word):
 
     scene.settle()
 
-    assert restarts(scene) == (2, 1, 0, 0)
+    assert scene.restarts() == (2, 1, 0, 0)
 
 
 def test_a_job_that_is_suspended_twice_before_the_next_pod_has_one_suspension(training):
@@ -207,7 +200,7 @@ def test_a_job_that_is_suspended_twice_before_the_next_pod_has_one_suspension(tr
 
     scene.settle()
 
-    assert restarts(scene) == (2, 0, 0, 1)
+    assert scene.restarts() == (2, 0, 0, 1)
 
 
 def test_a_mark_is_counted_once(training):
@@ -222,7 +215,7 @@ def test_a_mark_is_counted_once(training):
 
     scene.settle()
 
-    assert restarts(scene) == (3, 0, 1, 1)
+    assert scene.restarts() == (3, 0, 1, 1)
 
 
 def test_a_suspension_by_somebody_else_after_one_of_ours_goes_by_its_times(training):
@@ -238,7 +231,7 @@ def test_a_suspension_by_somebody_else_after_one_of_ours_goes_by_its_times(train
 
     scene.settle()
 
-    assert restarts(scene) == (3, 0, 0, 2)
+    assert scene.restarts() == (3, 0, 0, 2)
 
 
 ENDS = ("failure", "taken", "deleted", "suspended")
@@ -269,7 +262,7 @@ def test_the_counts_are_those_of_what_happened(accepted, lives):
     decision = scene.settle(1)
 
     assert not [each for each in decision.actions if isinstance(each, Stop)]
-    counts = restarts(scene)
+    counts = scene.restarts()
     assert counts == (len(lives) + 1, truth["failure"], truth["taken"] + truth["deleted"], truth["suspended"])
 
 
@@ -294,7 +287,7 @@ def test_suspensions_are_counted_however_fast_they_follow(accepted, lives):
             failures += _end(scene, pod, end, failures)
             scene.pass_(10)  # the Job controller also waits before it creates the next pod
         truth["paused" if end == "late" else end] += 1
-        counts = restarts(scene)
+        counts = scene.restarts()
         assert counts[0] == 1 + sum(counts[1:])
         assert all(old <= new for old, new in zip(before, counts, strict=True))
         before = counts
@@ -302,7 +295,7 @@ def test_suspensions_are_counted_however_fast_they_follow(accepted, lives):
 
     scene.settle()
 
-    assert restarts(scene) == (len(lives) + 1, truth["failure"], truth["taken"], truth["paused"])
+    assert scene.restarts() == (len(lives) + 1, truth["failure"], truth["taken"], truth["paused"])
 
 
 def _end(scene, pod, end, failures):
