@@ -166,7 +166,7 @@ ROWS: dict[Reason, ReasonText] = {
         "set `spec.suspend: false`; if another field manager suspended the Job, resume it there",
         warning=False,
     ),
-    Reason.RESUMED: ReasonText("{what}", "the replica is no longer suspended", "nothing", warning=False),
+    Reason.RESUMED: ReasonText("{what}", "the suspension of the replica has ended", "nothing", warning=False),
     Reason.STARTING: ReasonText(
         "{what}",
         "the objects exist and no trainer has responded yet",

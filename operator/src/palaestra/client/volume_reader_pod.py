@@ -2,7 +2,8 @@
 
 This module is pure. The pod is built from the template of the replica's Job in the cluster. So the reader pod
 has the same security context, scheduling, pull secrets and trainer image as the run's pods. The pod mounts
-the volume read-only, has no service account token, and ends by itself even if nobody deletes it.
+the volume read-only and has no service account token. Kubernetes ends the pod at its deadline, also without a
+deletion.
 """
 
 import copy
