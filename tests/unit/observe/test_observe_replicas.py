@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 import pytest
 
 from palaestra.api.status import PodReference, ReplicaStatus
-from palaestra.observe import JobEnd, Objects, Polled, last_hindrance, observe, trimmed
+from palaestra.observe import JobEnd, Objects, Polled, last_blocking_event, observe, trimmed
 from palaestra_protocol.pod.status import TrainerStatus
 
 NOW = datetime(2026, 1, 31, 12, 0, tzinfo=UTC)
@@ -250,4 +250,4 @@ def test_the_event_about_the_probe_is_read_and_not_one_about_another_container()
         {**other, "lastTimestamp": "2026-01-31T12:00:09Z"},
     ]
 
-    assert last_hindrance(events, "u")["message"] == probe["message"]
+    assert last_blocking_event(events, "u")["message"] == probe["message"]

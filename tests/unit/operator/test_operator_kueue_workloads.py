@@ -106,13 +106,13 @@ def test_jobs_in_queues_take_no_place_and_no_turn_from_pods_that_are_refused(ser
 
     The operator must still read the events about problems of other pods.
     """
-    admissions, hindrances = (kind(server, lambda: server.now) for kind in (KueueWorkloads, PodEvents))
+    admissions, pod_events = (kind(server, lambda: server.now) for kind in (KueueWorkloads, PodEvents))
     for number in range(REMEMBERED):
         admissions.of(("robots", f"job-{number}"), UID, [job(f"u{number}")], [])
     server.now += PATIENCE_S
     beyond = admissions.of(KEY, UID, [job("beyond")], [])
 
-    refused = hindrances.of(KEY, UID, [job(suspend=False)], [])
+    refused = pod_events.of(KEY, UID, [job(suspend=False)], [])
 
     assert beyond.unasked == {"beyond"}
     assert (refused.unasked, refused.again_s) == (frozenset(), PATIENCE_S)

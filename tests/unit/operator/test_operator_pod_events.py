@@ -68,9 +68,9 @@ def events(answers):
 
 def test_a_new_job_is_given_some_seconds(server):
     """Almost every Job gets a pod at once, so the operator waits before it requests events."""
-    hindrances = PodEvents(server, lambda: server.now)
+    pod_events = PodEvents(server, lambda: server.now)
 
-    found = hindrances.of(KEY, UID, [job()], [])
+    found = pod_events.of(KEY, UID, [job()], [])
 
     assert (events(found), server.asked) == ([], 0)
     assert found.again_s == PATIENCE_S
@@ -78,35 +78,35 @@ def test_a_new_job_is_given_some_seconds(server):
 
 def test_after_that_its_events_are_read_now_and_then(server):
     """While its pods change, a job is reconciled many times a second. Not every reconcile may read events."""
-    hindrances = PodEvents(server, lambda: server.now)
-    hindrances.of(KEY, UID, [job()], [])
+    pod_events = PodEvents(server, lambda: server.now)
+    pod_events.of(KEY, UID, [job()], [])
     server.now += PATIENCE_S
 
-    first, second = hindrances.of(KEY, UID, [job()], []), hindrances.of(KEY, UID, [job()], [])
+    first, second = pod_events.of(KEY, UID, [job()], []), pod_events.of(KEY, UID, [job()], [])
     assert first == second
     assert (events(first), first.again_s, server.asked) == ([LAST], RECHECK_S, 1)
 
 
 def test_the_pauses_grow_to_five_minutes(server):
     """A quota may be used up for a whole night, which needs no frequent requests."""
-    hindrances = PodEvents(server, lambda: server.now)
-    hindrances.of(KEY, UID, [job()], [])
+    pod_events = PodEvents(server, lambda: server.now)
+    pod_events.of(KEY, UID, [job()], [])
     server.now += PATIENCE_S
 
     pauses = []
     for _ in range(7):
-        pauses.append(hindrances.of(KEY, UID, [job()], []).again_s)
+        pauses.append(pod_events.of(KEY, UID, [job()], []).again_s)
         server.now += pauses[-1]
 
     assert pauses == [15, 30, 60, 120, 240, 300, 300]
     assert server.asked == 7
 
 
-def look_at(hindrances, number):
+def look_at(pod_events, number):
     """Return the known events of a Job without a pod; each number is another TrainingJob."""
     name, uid = f"job-{number}", f"u{number}"
     raw = job(metadata={"name": name, "namespace": "robots", "uid": uid})
-    return hindrances.of(("robots", name), f"job-{uid}", [raw], [])
+    return pod_events.of(("robots", name), f"job-{uid}", [raw], [])
 
 
 def test_at_most_five_events_lists_a_second_are_asked_for_and_everybody_has_a_turn(server):
@@ -114,8 +114,8 @@ def test_at_most_five_events_lists_a_second_are_asked_for_and_everybody_has_a_tu
 
     A reconcile before its turn sends no request.
     """
-    hindrances = PodEvents(server, lambda: server.now)
-    due = {number: look_at(hindrances, number).again_s for number in range(1500)}
+    pod_events = PodEvents(server, lambda: server.now)
+    due = {number: look_at(pod_events, number).again_s for number in range(1500)}
     looks = 0
 
     begun = server.now
@@ -123,25 +123,25 @@ def test_at_most_five_events_lists_a_second_are_asked_for_and_everybody_has_a_tu
     while server.asked < 1500:
         number = min(due, key=due.__getitem__)
         server.now = due[number]
-        due[number] = server.now + look_at(hindrances, number).again_s
+        due[number] = server.now + look_at(pod_events, number).again_s
         looks += 1
 
     busiest = max(sum(at <= each < at + 1 for each in server.times) for at in server.times)
     assert busiest <= 5
-    assert {bool(events(look_at(hindrances, number))) for number in range(1500)} == {True}
+    assert {bool(events(look_at(pod_events, number))) for number in range(1500)} == {True}
     assert server.now - begun < 900
     assert looks < 5 * 1500
 
 
 def test_jobs_beyond_the_bound_are_not_asked_about_and_listed_as_such(server):
     """Jobs that are already in the cache keep their entry, so each of them gets its events."""
-    hindrances = PodEvents(server, lambda: server.now)
+    pod_events = PodEvents(server, lambda: server.now)
     for number in range(REMEMBERED):
-        look_at(hindrances, number)
+        look_at(pod_events, number)
     server.now += PATIENCE_S
 
-    beyond = look_at(hindrances, REMEMBERED)
-    within = look_at(hindrances, 0)
+    beyond = look_at(pod_events, REMEMBERED)
+    within = look_at(pod_events, 0)
 
     assert (events(beyond), {uid for uid, _ in beyond.unasked}) == ([], {f"u{REMEMBERED}"})
     assert beyond.again_s == LONGEST_PAUSE_S
@@ -150,11 +150,11 @@ def test_jobs_beyond_the_bound_are_not_asked_about_and_listed_as_such(server):
 
 def test_a_job_whose_last_pod_has_failed_lacks_one(server):
     """The API server may refuse the second pod although it accepted the first."""
-    hindrances = PodEvents(server, lambda: server.now)
-    hindrances.of(KEY, UID, [job()], [pod("Failed")])
+    pod_events = PodEvents(server, lambda: server.now)
+    pod_events.of(KEY, UID, [job()], [pod("Failed")])
     server.now += PATIENCE_S
 
-    assert events(hindrances.of(KEY, UID, [job()], [pod("Failed")])) == [LAST]
+    assert events(pod_events.of(KEY, UID, [job()], [pod("Failed")])) == [LAST]
 
 
 @pytest.mark.parametrize(
@@ -169,11 +169,11 @@ def test_a_job_whose_last_pod_has_failed_lacks_one(server):
 )
 def test_nobody_is_asked_where_no_pod_is_lacking(jobs, pods, server):
     """If every Job has its pod, the operator must not request events."""
-    hindrances = PodEvents(server, lambda: server.now)
-    hindrances.of(KEY, UID, jobs, pods)
+    pod_events = PodEvents(server, lambda: server.now)
+    pod_events.of(KEY, UID, jobs, pods)
     server.now += PATIENCE_S
 
-    assert hindrances.of(KEY, UID, jobs, pods) == Answers(facts={})
+    assert pod_events.of(KEY, UID, jobs, pods) == Answers(facts={})
     assert server.asked == 0
 
 
@@ -189,12 +189,12 @@ def waiting_pod(**status):
 def test_a_pod_that_waits_for_its_volumes_has_its_warnings_read(server):
     """Most volumes are mounted at once, so the operator waits some seconds before it requests events."""
     server.about = "type=Warning"
-    hindrances = PodEvents(server, lambda: server.now)
-    hindrances.of(KEY, UID, [], [waiting_pod()])
+    pod_events = PodEvents(server, lambda: server.now)
+    pod_events.of(KEY, UID, [], [waiting_pod()])
     assert server.asked == 0
     server.now += PATIENCE_S
 
-    found = hindrances.of(KEY, UID, [], [waiting_pod()])
+    found = pod_events.of(KEY, UID, [], [waiting_pod()])
     assert (events(found), found.again_s) == ([LAST], RECHECK_S)
 
 
@@ -210,22 +210,22 @@ def test_a_pod_that_waits_for_its_volumes_has_its_warnings_read(server):
 )
 def test_nobody_is_asked_about_a_pod_that_waits_for_something_else(pod, server):
     """The status of this pod already has the reason."""
-    hindrances = PodEvents(server, lambda: server.now)
-    hindrances.of(KEY, UID, [], [pod])
+    pod_events = PodEvents(server, lambda: server.now)
+    pod_events.of(KEY, UID, [], [pod])
     server.now += PATIENCE_S
 
-    assert hindrances.of(KEY, UID, [], [pod]) == Answers(facts={})
+    assert pod_events.of(KEY, UID, [], [pod]) == Answers(facts={})
     assert server.asked == 0
 
 
 def test_a_job_that_is_made_again_is_asked_about_anew(server):
     """The events of the earlier job do not apply, even if a restored backup has its old uid."""
-    hindrances = PodEvents(server, lambda: server.now)
-    hindrances.of(KEY, UID, [job()], [])
+    pod_events = PodEvents(server, lambda: server.now)
+    pod_events.of(KEY, UID, [job()], [])
     server.now += PATIENCE_S
-    assert events(hindrances.of(KEY, UID, [job()], [])) == [LAST]
+    assert events(pod_events.of(KEY, UID, [job()], [])) == [LAST]
 
-    assert hindrances.of(KEY, "another", [job()], []) == Answers(facts={}, again_s=PATIENCE_S)
+    assert pod_events.of(KEY, "another", [job()], []) == Answers(facts={}, again_s=PATIENCE_S)
 
 
 def test_a_stranger_is_looked_at_again_until_it_is_gone(server):
@@ -263,8 +263,8 @@ def ended(code, uid="p", created="2026-01-31T12:00:00Z", **status):
 
 def asked_about(jobs, pods):
     """Return the uid and the selector of each request for events."""
-    hindrances = PodEvents(Server(), lambda: 0.0)
-    return {*hindrances.of(KEY, UID, jobs, pods).facts, *hindrances.known(KEY, UID)}
+    pod_events = PodEvents(Server(), lambda: 0.0)
+    return {*pod_events.of(KEY, UID, jobs, pods).facts, *pod_events.known(KEY, UID)}
 
 
 @pytest.mark.parametrize("code", [75, 137, 143])

@@ -238,7 +238,7 @@ def _await(api: Api, pod: Object, deadline: float) -> None:
                 return
             if phase in {"Succeeded", "Failed"}:
                 break
-            why = hindrance(change) or why
+            why = blocking_reason(change) or why
     except TookTooLong:
         raise TookTooLong(
             f"pod {name}: did not start in time ({why or 'no reason reported'}); "
@@ -249,7 +249,7 @@ def _await(api: Api, pod: Object, deadline: float) -> None:
     )
 
 
-def hindrance(pod: Object) -> str:
+def blocking_reason(pod: Object) -> str:
     """Return the cluster's reason for which a pod does not run; empty if the pod's status has no reason."""
     status = pod["status"]
     waiting = [

@@ -30,7 +30,7 @@ from palaestra.observe.models import (
     ReplicaObserved,
     Suspended,
 )
-from palaestra.observe.observe import last_hindrance, observe
+from palaestra.observe.observe import last_blocking_event, observe
 from palaestra.observe.pods import was_signalled
 from palaestra.observe.references import references
 
@@ -54,7 +54,7 @@ __all__ = [
     "ReplicaObserved",
     "Suspended",
     "lacking",
-    "last_hindrance",
+    "last_blocking_event",
     "observe",
     "references",
     "trimmed",

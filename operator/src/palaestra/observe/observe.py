@@ -161,7 +161,7 @@ def _probe(newest: PodView, objects: Objects) -> str:
     return failed[1] if failed is not None else ""
 
 
-def last_hindrance(events: Iterable[Raw], uid: str) -> dict[str, Any] | None:
+def last_blocking_event(events: Iterable[Raw], uid: str) -> dict[str, Any] | None:
     """Return the last event that explains an incomplete object, with only the fields that `observe` reads."""
     found = (raw for raw in events if _is_read(raw))
     last = max(found, key=_when, default=None)

@@ -94,7 +94,7 @@ class JobObserver:
         self._denials = denials
         self._polled = polled
         self._checking = checking
-        self._hindrances = PodEvents(api)
+        self._pod_events = PodEvents(api)
         self._admissions = KueueWorkloads(api)
         self._switchers = SuspendManagers(api)
         self._kueue = (-KUEUE_S, False)
@@ -108,7 +108,7 @@ class JobObserver:
         key, uid = (job.metadata.namespace, job.metadata.name), job.metadata.uid or ""
         jobs, pods = self._caches.children(JOBS, key), self._caches.children(PODS, key)
         strangers = self._strangers.among(key, uid, {job["metadata"]["name"] for job in jobs})
-        hindrances = self._hindrances.of(key, uid, jobs, pods)
+        pod_events = self._pod_events.of(key, uid, jobs, pods)
         admissions = self._admissions.of(key, uid, jobs, pods)
         objects = Objects(
             jobs=[*jobs, *strangers],
@@ -116,9 +116,9 @@ class JobObserver:
             claims=self._caches.children(CLAIMS, key),
             config_maps=self._caches.children(CONFIG_MAPS, key),
             policies=self._caches.children(NETWORK_POLICIES, key),
-            events=list(hindrances.facts.values()),
+            events=list(pod_events.facts.values()),
             unadmitted=admissions.facts,
-            unasked=admissions.unasked | {key for key, _ in hindrances.unasked},
+            unasked=admissions.unasked | {key for key, _ in pod_events.unasked},
             polled=self._polled(),
             denied=self._denials.known(key, uid),
             switchers=self._switchers.of(key, uid, job, jobs),
@@ -128,7 +128,7 @@ class JobObserver:
         met_s = RECHECK_S if strangers else None
         return Seen(
             observed=observed,
-            again_s=earliest(hindrances.again_s, admissions.again_s, asked_s, met_s, lost_s),
+            again_s=earliest(pod_events.again_s, admissions.again_s, asked_s, met_s, lost_s),
         )
 
     def ask_for(self, job: TrainingJob, seen: Seen) -> Seen:
@@ -158,7 +158,7 @@ class JobObserver:
 
     def forget(self, key: Key) -> None:
         """Drop all facts about a deleted TrainingJob."""
-        parts = (self._strangers, self._denials, self._hindrances, self._admissions, self._switchers)
+        parts = (self._strangers, self._denials, self._pod_events, self._admissions, self._switchers)
         for part in (*parts, self._checking):
             part.forget(key)
 

@@ -13,7 +13,7 @@ from palaestra.cluster import Api, ApiError, Forbidden, NotFound, ServerError, T
 from palaestra.cluster.resources import EVENTS, JOBS, WORKLOADS
 from palaestra.decide.suspend import overruled
 from palaestra.objects import Key, Object
-from palaestra.observe import Raw, last_hindrance, trimmed, was_signalled, why_not_admitted
+from palaestra.observe import Raw, last_blocking_event, trimmed, was_signalled, why_not_admitted
 from palaestra.observe.jobs import job_view, suspends
 from palaestra.observe.json_access import MOST_TEXT, count, holds, owners
 from palaestra.operator.bounded_cache import Answers, BoundedCache, RateLimitedLookup
@@ -133,7 +133,7 @@ class PodEvents(RateLimitedLookup[Lacking, Object]):
     def _event(self, namespace: str, lacking: Lacking) -> Object | None:
         uid, about = lacking
         found = self._api.list(EVENTS, namespace, fields=f"involvedObject.uid={uid},{about}")
-        return last_hindrance(found, uid)
+        return last_blocking_event(found, uid)
 
 
 def podless(jobs: Sequence[Object], pods: Sequence[Object]) -> Iterator[Object]:
