@@ -1,6 +1,7 @@
 """A simulator that a script starts may print without limit, and ends with the script."""
 
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -11,6 +12,8 @@ import pytest
 from palaestra_trainer.errors import ConfigurationError, SimulatorDead, SimulatorHung
 from palaestra_trainer.webots import Webots
 from palaestra_trainer.webots.launching.subprocesses import drain, end_child, first_line, start_child
+from tests.local_run import below
+from tests.waiting import eventually
 
 PATIENCE_S = 60.0
 CHATTERBOX = """
@@ -66,7 +69,8 @@ def test_a_killed_script_leaves_no_simulator(master):
     assert not simulator.exists()
 
 
-def test_a_killed_script_leaves_no_folder_of_a_world_with_other_names(master, tmp_path):
+@pytest.mark.parametrize("killed", ["script", "sidecar"])
+def test_nothing_killed_leaves_the_folder_of_a_world_with_other_names(master, tmp_path, killed):
     """A second simulator of a world runs a copy of the world file, and such copies would fill the disk."""
     del master
     code = (
@@ -87,13 +91,14 @@ def test_a_killed_script_leaves_no_folder_of_a_world_with_other_names(master, tm
     assert tmp_path in world.parents
     assert world.exists()
 
+    sidecar = next(
+        pid for pid, words in below(owner.pid) if any("palaestra-sidecar" in word for word in words)
+    )
+    os.kill(owner.pid if killed == "script" else sidecar, signal.SIGKILL)
+
+    assert eventually(lambda: list(tmp_path.glob("palaestra-world-*")) == [], PATIENCE_S)
     owner.kill()
     owner.communicate()
-
-    give_up = time.monotonic() + PATIENCE_S
-    while world.parent.exists() and time.monotonic() < give_up:
-        time.sleep(0.02)
-    assert not world.parent.exists()
 
 
 def test_the_error_inside_a_context_is_raised_and_not_that_the_simulator_is_gone(own_arena):

@@ -5,7 +5,6 @@ is renamed at the end. docs/decisions/0011 explains why a command in a container
 """
 
 import secrets
-import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -24,6 +23,7 @@ from palaestra.cluster.resources import JOBS, PODS
 from palaestra.objects import Object
 from palaestra.plan.replica import TRAINER
 from palaestra.plan.resources import in_bytes
+from palaestra_protocol.temporary_folder import temporary_folder
 
 PARTS = (
     "training.yaml",
@@ -123,8 +123,8 @@ def _copy(api: Api, source: RunSource, target: Path, deadline: float, most_bytes
     chunks = api.execute(
         source.namespace, source.pod, source.container, command, within_s=deadline - time.monotonic()
     )
-    with tempfile.TemporaryDirectory(prefix=".fetch-", dir=target.parent) as beside:
-        partial = Path(beside) / "run"
+    with temporary_folder(".fetch-", target.parent) as beside:
+        partial = beside.path / "run"
         partial.mkdir()
         unpack(chunks, partial, PARTS, most_bytes)
         if not any(partial.iterdir()):

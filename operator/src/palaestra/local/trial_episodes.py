@@ -7,7 +7,6 @@ starts this simulator in the same way as `palaestra-eval`.
 
 from __future__ import annotations
 
-import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,6 +19,7 @@ from palaestra.local.run_directory import job_directory, uid_of
 from palaestra.local.trainer_program import run_program
 from palaestra.plan import Images, LocalLayout, identified, plan
 from palaestra_protocol.pod.enums import Role
+from palaestra_protocol.temporary_folder import temporary_folder
 
 PROGRAM = "palaestra-try"
 # Without these variables, the program starts its own ROS master.
@@ -45,8 +45,8 @@ def try_here(job: TrainingJob, options: TryOptions) -> int:
         WorldError: a world of the job is invalid.
     """
     _refuse_own_program(job)
-    with tempfile.TemporaryDirectory(prefix="palaestra-try-") as folder:
-        runs = Path(folder)
+    with temporary_folder("palaestra-try-") as folder:
+        runs = folder.path
         preflight.check(preflight.PreflightRequest(job=job, runs=runs))
         directory = job_directory(runs, job.metadata.name)
         env = _prepare(identified(job, uid_of(directory)), directory, options)

@@ -10,7 +10,6 @@ import logging
 import os
 import signal
 import sys
-import tempfile
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -18,8 +17,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from palaestra_protocol.control import LEFT_OUT_FILE, VIEW_SOCKET, SidecarState, SimulatorState
+from palaestra_protocol.temporary_folder import temporary_folder
 from palaestra_sim.errors import SidecarError, SimError
-from palaestra_sim.sidecar import metrics, project, signals, world_files
+from palaestra_sim.sidecar import metrics, process, project, signals, world_files
 from palaestra_sim.sidecar.drivers import SHOWN, Driver, Launch, command
 from palaestra_sim.sidecar.options import EXIT_WRONG, parse
 from palaestra_sim.sidecar.output import LineHandler
@@ -43,15 +43,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def work_folder(given: argparse.Namespace) -> Iterator[None]:
     """Set `given.work` to a temporary folder for the block, if a folder is needed and --work is not given.
 
-    The generated world of --suffix needs a folder, and so does the socket for viewers. The sidecar removes
+    The generated world of --suffix needs a folder, and so does the socket for viewers. The sidecar makes
     the folder itself, because its parent process may be killed.
     """
     needed = given.suffix or Driver(given.driver) in SHOWN
     if not needed or given.job is not None or given.work is not None:
         yield
         return
-    with tempfile.TemporaryDirectory(prefix="palaestra-world-") as folder:
-        given.work = Path(folder)
+    with temporary_folder("palaestra-world-") as folder:
+        process.spare(folder.keeper)
+        given.work = folder.path
         yield
 
 

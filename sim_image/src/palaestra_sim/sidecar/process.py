@@ -1,9 +1,9 @@
 """Start a simulator's process under a reaper, a small program that ends all descendants of the simulator.
 
-No other module of the sidecar starts processes. The sidecar and a reaper exchange messages through two pipes.
-Threads wait for these messages, so no method of this module blocks. The sidecar may be process 1 of its
-container, and process 1 inherits all orphans. So `reap` collects the exit status of every child that has
-ended: of reapers and of orphans.
+No other module starts simulators. The sidecar and a reaper exchange messages through two pipes. Threads wait
+for these messages, so no method of this module blocks. The sidecar may be process 1 of its container, and
+process 1 inherits all orphans. So `reap` collects the exit status of every child that has ended: of reapers
+and of orphans.
 """
 
 import contextlib
@@ -24,8 +24,8 @@ _REAPER = Path(reaper.__file__)
 _OWN_TIME, _ENDED_TIME = slice(11, 13), slice(13, 15)  # Source: proc_pid_stat(5)
 _LAST_OUTPUT_S = 0.2  # time limit for reading the rest of the output after the simulator has ended
 
-_reapers: set[int] = set()  # running reapers; every other child of the sidecar is an orphan
-_reapers_lock = threading.Lock()  # held while a reaper is started and added to the set
+_helpers: set[int] = set()  # running reapers, and the folder's keeper; every other child is an orphan
+_helpers_lock = threading.Lock()  # held while a reaper is started and added to the set
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -144,6 +144,12 @@ class SimulatorProcess:
             os.write(self._commands, command)
 
 
+def spare(pid: int) -> None:
+    """From now on, do not treat this child of the sidecar as an orphan of a simulator."""
+    with _helpers_lock:
+        _helpers.add(pid)
+
+
 def reap() -> None:
     """Collect the exit status of every child that has ended, so that no child stays a zombie."""
     with contextlib.suppress(ChildProcessError):
@@ -172,7 +178,7 @@ def _spawn(command: CommandLine, descriptors: Mapping[int, int]) -> int:
         descriptors: maps each descriptor of the reaper to the descriptor of this process that the reaper
             inherits as that number.
     """
-    with _reapers_lock:
+    with _helpers_lock:
         pid = os.posix_spawn(
             sys.executable,
             [sys.executable, "-I", "-S", str(_REAPER), *command.arguments],
@@ -181,7 +187,7 @@ def _spawn(command: CommandLine, descriptors: Mapping[int, int]) -> int:
             setsid=True,
             setsigmask=(),
         )
-        _reapers.add(pid)
+        _helpers.add(pid)
         return pid
 
 
@@ -194,8 +200,8 @@ def _watch(reaper_pid: int, reports: int, reader: threading.Thread, passage: Pas
             said[word] = int(number)
             if word == "started":
                 report(Started(pid=said[word]))
-    with _reapers_lock:
-        _reapers.discard(reaper_pid)
+    with _helpers_lock:
+        _helpers.discard(reaper_pid)
     if "exit" not in said:
         _end_orphans()
     reader.join(_LAST_OUTPUT_S)
@@ -212,8 +218,8 @@ def _end_orphans() -> None:
 
 
 def _kill_orphans() -> set[int]:
-    with _reapers_lock:
-        return reaper.kill_children(frozenset(_reapers))
+    with _helpers_lock:
+        return reaper.kill_children(frozenset(_helpers))
 
 
 def _ended(said: Mapping[str, int], last_line: str) -> Ended:

@@ -1,0 +1,90 @@
+"""A temporary folder that is removed when the process that made it ends, also after SIGKILL.
+
+A second process, the keeper, removes the folder of a process that was killed. The standard input of the
+keeper is a pipe from the folder's owner. The kernel closes this pipe when the owner ends, in whatever way.
+
+The owner starts this file as the keeper, so the file imports only the standard library.
+"""
+
+import contextlib
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+_GIVE_UP_S = 60.0  # time limit for processes of the owner that still write files into the folder
+_PAUSE_S = 0.05
+_BLOCKED = (signal.SIGHUP, signal.SIGINT, signal.SIGTERM)
+
+
+@dataclass(frozen=True, slots=True)
+class TemporaryFolder:
+    """An empty folder that only this user can read, and the process ID of its keeper."""
+
+    path: Path
+    keeper: int
+
+
+@contextlib.contextmanager
+def temporary_folder(prefix: str, parent: Path | None = None) -> Iterator[TemporaryFolder]:
+    """Make a folder for the block; the folder is removed with all files in it.
+
+    Args:
+        prefix: the beginning of the folder's name.
+        parent: the folder in which to make it; by default the system's folder for temporary files (TMPDIR).
+
+    Raises:
+        OSError: the folder cannot be made or removed, or the system cannot start another process.
+    """
+    with (
+        _keeper() as (keeper, pipe),
+        tempfile.TemporaryDirectory(prefix=prefix, dir=parent) as name,
+    ):
+        os.write(pipe, os.fsencode(Path(name).absolute()))
+        yield TemporaryFolder(path=Path(name), keeper=keeper)
+
+
+@contextlib.contextmanager
+def _keeper() -> Iterator[tuple[int, int]]:
+    """Start a keeper, and yield its process ID and the pipe to it; the keeper ends after the block."""
+    theirs, ours = os.pipe()
+    # The keeper inherits the blocked signals, so from its start only SIGKILL can end it.
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, _BLOCKED)
+    try:
+        keeper = subprocess.Popen(
+            [sys.executable, "-I", "-S", __file__],
+            stdin=theirs,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+    except OSError:
+        os.close(ours)
+        raise
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        os.close(theirs)
+    try:
+        yield keeper.pid, ours
+    finally:
+        os.close(ours)
+        keeper.wait()
+
+
+def _keep() -> None:
+    """Read the path of the folder from standard input; at its end, remove the folder if it still exists."""
+    folder = os.fsdecode(sys.stdin.buffer.read())
+    give_up = time.monotonic() + _GIVE_UP_S
+    while os.path.lexists(folder) and time.monotonic() < give_up:
+        shutil.rmtree(folder, ignore_errors=True)
+        time.sleep(_PAUSE_S)
+
+
+if __name__ == "__main__":
+    _keep()
