@@ -23,5 +23,6 @@
 
 This package imports no other package of Palaestra. These modules use sockets, threads, processes or the
 interpreter's state: `connection_limits`, `http`, `imports`, `linux`, `shadowing`, `signals`, `tcp_server`,
-`temporary_folder`, `ros.sockets`, and the server and client of `xmlrpc`. All other modules are pure: they compute values from values.
+`temporary_folder`, `ros.sockets`, and the server and client of `xmlrpc`. All other modules are pure: they
+compute values from values.
 """
