@@ -1,10 +1,11 @@
 """The supervisor's facade changes a world, and the observer's facade reads it, in each simulator."""
 
+import av
 import pytest
 from PIL import Image
 
 from palaestra_trainer.errors import WrongData
-from palaestra_trainer.webots import ViewLabel
+from palaestra_trainer.webots import MovieSettings, ViewLabel
 from tests.integration.webots.own_world import running
 from tests.values.frames import frame, quaternion
 from tests.values.worlds import PHYSICS, STEP_MS, Setting, robot
@@ -157,3 +158,30 @@ def test_a_box_on_a_table_touches_it_at_its_corners(master, tmp_path):
     assert len(points) == 4
     for x, y, z in points:
         assert (abs(x), abs(y), z) == pytest.approx((0.2, 0.2, 0.0), abs=0.01)
+
+
+def test_a_movie_has_a_frame_for_each_40_ms_of_simulated_time(world, simulator, tmp_path):
+    """The stub, which renders nothing, refuses to record, and leaves no file."""
+    webots, onlooker = world
+    path, settings = tmp_path / "movie.mp4", MovieSettings(size=(64, 48))
+    if simulator == "stub":
+        with pytest.raises(WrongData):
+            webots.supervisor.start_movie(path, settings)
+        assert not path.exists()
+        return
+
+    webots.supervisor.start_movie(path, settings)
+    for _ in range(50):
+        onlooker.advance()
+    recording = webots.supervisor.movie_is_ready()
+    webots.supervisor.stop_movie()
+
+    assert (recording, webots.supervisor.movie_is_ready(), webots.supervisor.movie_failed()) == (
+        False,
+        True,
+        False,
+    )
+    with av.open(str(path)) as file:
+        frames = [frame.to_ndarray(format="rgb24").shape for frame in file.decode(video=0)]
+    assert set(frames) == {(48, 64, 3)}
+    assert len(frames) == pytest.approx(50 * STEP_MS / 40, abs=5)

@@ -107,16 +107,16 @@ class RosSubscriber:
         except (ValueError, struct.error) as error:
             raise WrongData(self.simulator, f"{self.name} sent {error}") from error
 
-    def newest(self, default: Any) -> Any:
-        """Return the value of the last message that has arrived; `default` without a new message.
+    def arrived(self) -> list[Any]:
+        """Return the values of all messages that have arrived and were not read, the oldest first.
 
         Raises:
             SimulatorDead, WrongData: as `next`.
         """
-        value = default
+        values = []
         while self._wire is not None and self._wire.waiting_bytes():
-            value = self.next()
-        return value
+            values.append(self.next())
+        return values
 
     def close(self) -> None:
         """Close the connection and unregister the subscriber."""

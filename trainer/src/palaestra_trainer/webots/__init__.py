@@ -6,7 +6,15 @@ blocks forever while the simulation is paused. A reset does not restore the whol
 
 from palaestra_trainer.ros import ensure_node
 from palaestra_trainer.webots.attached import Attached
-from palaestra_trainer.webots.cameras import Camera, Lidar, LidarPoints, RangeFinder
+from palaestra_trainer.webots.cameras import (
+    Camera,
+    Lidar,
+    LidarPoints,
+    RangeFinder,
+    RecognizedObject,
+    RecognizedObjects,
+)
+from palaestra_trainer.webots.detectors import Packet, Radar, RadarTarget, Receiver
 from palaestra_trainer.webots.device_check import require_node
 from palaestra_trainer.webots.devices import (
     DistanceSensor,
@@ -16,13 +24,17 @@ from palaestra_trainer.webots.devices import (
     TouchSensor,
     set_velocities,
 )
+from palaestra_trainer.webots.display import Display
 from palaestra_trainer.webots.facade import Launcher, Webots
+from palaestra_trainer.webots.inputs import Joystick, JoystickState, Keyboard
 from palaestra_trainer.webots.joint_motor import Command, JointMotor, set_commands
 from palaestra_trainer.webots.motion_sensors import (
     GPS,
     Accelerometer,
     Altimeter,
     Compass,
+    Force3DSensor,
+    ForceSensor,
     Gyro,
     InertialUnit,
     LightSensor,
@@ -32,7 +44,7 @@ from palaestra_trainer.webots.observer import Mode, Observer
 from palaestra_trainer.webots.obstacles import FLOOR, Thing
 from palaestra_trainer.webots.outputs import LED, Brake, Connector, Emitter, OutputDevice, Pen, Speaker
 from palaestra_trainer.webots.simulation import Actuator, Stepper
-from palaestra_trainer.webots.supervisor import Supervisor, ViewLabel
+from palaestra_trainer.webots.supervisor import MovieSettings, Supervisor, ViewLabel
 
 __all__ = [
     "FLOOR",
@@ -47,24 +59,37 @@ __all__ = [
     "Command",
     "Compass",
     "Connector",
+    "Display",
     "DistanceSensor",
     "Emitter",
+    "Force3DSensor",
+    "ForceSensor",
     "Gyro",
     "InertialUnit",
     "JointMotor",
+    "Joystick",
+    "JoystickState",
+    "Keyboard",
     "Launcher",
     "Lidar",
     "LidarPoints",
     "LightSensor",
     "Mode",
     "Motor",
+    "MovieSettings",
     "MujocoActuator",
     "MujocoSensor",
     "Observer",
     "OutputDevice",
+    "Packet",
     "Pen",
     "PositionSensor",
+    "Radar",
+    "RadarTarget",
     "RangeFinder",
+    "Receiver",
+    "RecognizedObject",
+    "RecognizedObjects",
     "Sensor",
     "Speaker",
     "Stepper",

@@ -5,11 +5,12 @@ An array is valid until the next step, which writes the next array into the same
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from palaestra_protocol.ros.rostypes import message_type
 from palaestra_trainer.errors import NoReading, WorldMisfit, WrongData
 from palaestra_trainer.ros import RosService
 from palaestra_trainer.webots.devices import Sensor, topic_name
@@ -51,6 +52,58 @@ class Camera(_Rendered):
             NoReading: before the first step.
         """
         return self._array()[..., 2::-1]
+
+
+class RecognizedObject(NamedTuple):
+    """An object that a camera recognizes.
+
+    Attributes:
+        position: x, y, z in meters in the axes of the camera.
+        orientation: rotation in the axes of the camera as a quaternion: x, y, z, w.
+        position_on_image: x and y of its middle in the image, in pixels from the upper left corner.
+        size_on_image: width and height in the image, in pixels.
+        colors: its `recognitionColors`: red, green, blue of each color, 0 to 1.
+        model: its `model`.
+    """
+
+    position: tuple[float, float, float]
+    orientation: tuple[float, float, float, float]
+    position_on_image: tuple[float, float]
+    size_on_image: tuple[float, float]
+    colors: tuple[tuple[float, float, float], ...]
+    model: str
+
+
+class RecognizedObjects(_Rendered):
+    """The objects that a camera with a Recognition node recognizes; `value` is a tuple, the nearest first.
+
+    A robot may have a `Camera` of the same device in addition.
+    """
+
+    __slots__ = ()
+
+    def __init__(self, robot: str, device: str) -> None:
+        super().__init__(robot, device, "webots_ros/RecognitionObjects", _objects, "recognition_objects")
+        self._enable = RosService(f"/{robot}/{topic_name(device)}/recognition_enable", "webots_ros/set_int")
+
+
+def _objects(message: bytes | memoryview) -> tuple[RecognizedObject, ...]:
+    decoded = message_type("webots_ros/RecognitionObjects").codec.decode(message)
+    return tuple(
+        RecognizedObject(
+            position=_xyz(it.position),
+            orientation=(it.orientation.x, it.orientation.y, it.orientation.z, it.orientation.w),
+            position_on_image=(it.position_on_image.x, it.position_on_image.y),
+            size_on_image=(it.size_on_image.x, it.size_on_image.y),
+            colors=tuple(_xyz(color) for color in it.colors),
+            model=it.model,
+        )
+        for it in decoded.objects
+    )
+
+
+def _xyz(vector: Any) -> tuple[float, float, float]:
+    return vector.x, vector.y, vector.z
 
 
 class RangeFinder(_Rendered):

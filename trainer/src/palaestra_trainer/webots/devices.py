@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from typing import Any
+from typing import Any, ClassVar
 
 from palaestra_trainer.errors import SimulatorHung, WrongData
 from palaestra_trainer.ros import RosService, RosSubscriber, call_together
@@ -35,9 +35,11 @@ class Sensor:
         robot: see above.
         device: see above.
         late: whether the next message to arrive may belong to the previous step.
+        listed: whether the robot's list of devices has the sensor; keyboard and joystick are not in it.
     """
 
     __slots__ = ("_enable", "_value", "_values", "device", "late", "robot")
+    listed: ClassVar[bool] = True
 
     def __init__(
         self,
@@ -98,10 +100,10 @@ class Sensor:
         Raises:
             SimulatorDead, WrongData: as `RosSubscriber`.
         """
-        value = self._values.newest(None)
-        self.late = value is None
-        if value is not None:
-            self._value = value
+        values = self._values.arrived()
+        self.late = not values
+        if values:
+            self._value = values[-1]
         return not self.late
 
     def disable(self) -> None:

@@ -1,4 +1,4 @@
-"""Sensors that measure the position, the motion and the environment of a robot, as tuples of numbers."""
+"""Sensors that measure position, motion, forces and the environment of a robot, as numbers."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ AXES: Final = "xyz"
 _IMU: Final = "37d"  # sensor_msgs/Imu: orientation, turning rate and acceleration, each with a covariance
 _FIELD: Final = "12d"  # sensor_msgs/MagneticField: x, y, z, and a covariance
 _ILLUMINANCE: Final = "2d"  # sensor_msgs/Illuminance: the reading, and a variance
+_WRENCH: Final = "6d"  # geometry_msgs/WrenchStamped: force and torque
 _ORIENTATION, _RATE, _ACCELERATION = 0, 13, 25  # positions of the first numbers in sensor_msgs/Imu
 
 
@@ -129,3 +130,28 @@ class LightSensor(Sensor):
     def __init__(self, robot: str, device: str) -> None:
         reading = PickedReading(device, _ILLUMINANCE, (0,))
         super().__init__(robot, device, "sensor_msgs/Illuminance", lambda message: reading(message)[0])
+
+
+class ForceSensor(Sensor):
+    """A TouchSensor of type `force`; `value` is the output of its lookup table for the pressure along x.
+
+    With an empty table, `value` is the pressure in N.
+    """
+
+    __slots__ = ()
+
+    def __init__(self, robot: str, device: str) -> None:
+        super().__init__(robot, device, "webots_ros/Float64Stamped", NumberReading(device, FLOAT64))
+
+
+class Force3DSensor(Sensor):
+    """A TouchSensor of type `force-3d`; `value` is the output of its lookup table for x, y and z.
+
+    With an empty table, `value` is the force in N along the axes of the sensor.
+    """
+
+    __slots__ = ()
+
+    def __init__(self, robot: str, device: str) -> None:
+        reading = PickedReading(device, _WRENCH, (0, 1, 2))
+        super().__init__(robot, device, "geometry_msgs/WrenchStamped", reading, "values")

@@ -95,7 +95,7 @@ class Stepper:
             return
         if self._connected:
             try:
-                require_devices(sensor.robot, [sensor.device])
+                require_devices(sensor.robot, [sensor.device] if sensor.listed else [])
                 sensor.enable(self.period_ms)
             except SimulatorFault:
                 sensor.close()
@@ -196,7 +196,8 @@ class Stepper:
 
     def _require_all(self) -> None:
         wanted: dict[str, list[str]] = {}
-        parts: tuple[Sensor | Actuator, ...] = (*self._sensors, *self._motors)
+        listed = [sensor for sensor in self._sensors if sensor.listed]
+        parts: tuple[Sensor | Actuator, ...] = (*listed, *self._motors)
         for part in parts:
             wanted.setdefault(part.robot, []).append(part.device)
         for robot, devices in wanted.items():

@@ -36,6 +36,23 @@ class ViewLabel:
     font: str = "Arial"
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MovieSettings:
+    """Settings of a recording.
+
+    Attributes:
+        size: width and height in pixels.
+        quality: 1 to 100.
+        acceleration: how many times faster than simulated time the movie plays.
+        caption: whether the movie shows that acceleration.
+    """
+
+    size: tuple[int, int] = (640, 480)
+    quality: int = 90
+    acceleration: int = 1
+    caption: bool = False
+
+
 class Supervisor:
     """Changes the simulation through the supervisor's controller.
 
@@ -258,6 +275,45 @@ class Supervisor:
             WrongData: also if the simulator does not render, as the stub, or cannot write the file.
         """
         self._confirm("export_image", "save_image", path, filename=str(path), quality=quality)
+
+    def start_movie(self, path: str | Path, settings: MovieSettings | None = None) -> None:
+        """Record the view of the world from the next step on, as a video file on the simulator's machine.
+
+        Args:
+            path: the file; an absolute path.
+            settings: size, quality and speed; None: the defaults of `MovieSettings`.
+
+        Raises:
+            WrongData: also if the simulator does not render, as the stub.
+        """
+        wanted = settings or MovieSettings()
+        width, height = wanted.size
+        self._confirm(
+            "movie_start_recording",
+            "supervisor_movie_start_recording",
+            path,
+            filename=str(path),
+            width=width,
+            height=height,
+            codec=0,
+            quality=wanted.quality,
+            acceleration=wanted.acceleration,
+            caption=wanted.caption,
+        )
+
+    def stop_movie(self) -> None:
+        """End the recording; the file is complete when `movie_is_ready` returns True."""
+        self._services.ask("supervisor/movie_stop_recording", "get_bool")
+
+    def movie_is_ready(self) -> bool:
+        """Return whether no movie is being recorded or written."""
+        service = self._services.get("supervisor/movie_is_ready", "node_get_status")
+        return bool(service(ask=True).status)
+
+    def movie_failed(self) -> bool:
+        """Return whether the last recording failed."""
+        service = self._services.get("supervisor/movie_failed", "node_get_status")
+        return bool(service(ask=True).status)
 
     def set_label(self, label: ViewLabel) -> None:
         """Show a text over the view of the world; a label of the same number is replaced."""

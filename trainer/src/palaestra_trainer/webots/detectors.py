@@ -1,0 +1,183 @@
+"""Sensors that detect any number of things: the packets of a radio, and the targets of a radar."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from palaestra_protocol.ros.rostypes import message_type
+from palaestra_trainer.errors import SimulatorHung, WrongData
+from palaestra_trainer.ros import RosSubscriber
+from palaestra_trainer.webots.devices import Sensor, topic_name
+from palaestra_trainer.webots.message_decoding import NumberReading, PickedReading
+from palaestra_trainer.webots.services import Services
+
+_COUNT = "b"  # webots_ros/Int8Stamped
+_TARGET = "dddd"  # webots_ros/RadarTarget
+
+
+class RadarTarget(NamedTuple):
+    """One target of a radar.
+
+    Attributes:
+        distance_m: its distance.
+        received_power_dbm: the power of its echo.
+        speed_m_s: the speed at which it moves away; negative if it comes closer.
+        azimuth_rad: its direction in the horizontal plane of the radar; positive to the right.
+    """
+
+    distance_m: float
+    received_power_dbm: float
+    speed_m_s: float
+    azimuth_rad: float
+
+
+class Radar(Sensor):
+    """A radar; `value` is a tuple of `RadarTarget`, empty if there is no target in range."""
+
+    __slots__ = ("_targets",)
+
+    def __init__(self, robot: str, device: str) -> None:
+        count = NumberReading(device, _COUNT)
+        super().__init__(robot, device, "webots_ros/Int8Stamped", count, "number_of_targets")
+        path = f"/{robot}/{topic_name(device)}/targets"
+        reading = PickedReading(device, _TARGET, range(len(_TARGET)))
+        self._targets = RosSubscriber(path, "webots_ros/RadarTarget", reading)
+
+    def enable(self, period_ms: int) -> None:
+        """Make the radar publish every `period_ms` of simulated time, and subscribe to its topics.
+
+        Raises:
+            WrongData, SimulatorDead, SimulatorHung: as `Sensor.enable`.
+        """
+        super().enable(period_ms)
+        self._targets.connect()
+
+    def read(self) -> bool:
+        """Read the targets of the next measurement; without one in time, keep the old ones and return False.
+
+        Raises:
+            SimulatorDead, WrongData: as `RosSubscriber`.
+        """
+        try:
+            self._value = self._read_targets(self._values.next())
+        except SimulatorHung:
+            self.late = True
+            return False
+        return True
+
+    def read_arrived(self) -> bool:
+        """Read the last measurement that has already arrived; return False without such a measurement.
+
+        Raises:
+            SimulatorDead, SimulatorHung, WrongData: as `RosSubscriber`.
+        """
+        counts = self._values.arrived()
+        for count in counts:
+            self._value = self._read_targets(count)
+        self.late = not counts
+        return not self.late
+
+    def close(self) -> None:
+        """Close the connections."""
+        super().close()
+        self._targets.close()
+
+    def _read_targets(self, count: int) -> tuple[RadarTarget, ...]:
+        """Read as many messages of targets as one measurement has."""
+        return tuple(RadarTarget(*self._targets.next()) for _ in range(count))
+
+
+class Packet(NamedTuple):
+    """A received text.
+
+    Attributes:
+        text: the text that an emitter has sent.
+        signal_strength: 1 / square of the emitter's distance in meters, at the time of the emission.
+        direction: the direction to the emitter at that time: x, y, z of a unit vector in the receiver's axes.
+    """
+
+    text: str
+    signal_strength: float
+    direction: tuple[float, float, float]
+
+
+class Receiver(Sensor):
+    """A receiver of texts that emitters send on the same channel.
+
+    `value` is the text of the oldest packet in the queue, "" if the queue is empty. The simulator publishes
+    this text once in each step, so at most one packet can be taken from the queue in each step.
+
+    Properties and methods may raise SimulatorDead, SimulatorHung or WrongData.
+    """
+
+    __slots__ = ("_fresh", "_path", "_services")
+
+    def __init__(self, robot: str, device: str) -> None:
+        super().__init__(robot, device, "webots_ros/StringStamped", _text, "data")
+        self._services = Services(robot)
+        self._path = topic_name(device)
+        self._fresh = False
+
+    def read(self) -> bool:
+        """Read the text of the oldest packet; see `Sensor.read`."""
+        self._fresh = super().read()
+        return self._fresh
+
+    def read_arrived(self) -> bool:
+        """Read the text that has already arrived; see `Sensor.read_arrived`."""
+        self._fresh = super().read_arrived()
+        return self._fresh
+
+    def take(self) -> Packet | None:
+        """Remove the oldest packet of the queue and return it.
+
+        Return None if the queue was empty in the last step, or if a packet of this step was already taken.
+        """
+        if not self._fresh or not self.queue_length:
+            return None
+        text = self.value
+        if self._ask("get_data_size", "get_int") != len(text.encode()):
+            return None  # the packet arrived after the text of this step was published
+        x, y, z = self._services.get(f"{self._path}/get_emitter_direction", "receiver_get_emitter_direction")(
+            ask=True
+        ).direction
+        packet = Packet(text, float(self._ask("get_signal_strength", "get_float")), (x, y, z))
+        self._fresh = False
+        self._ask("next_packet", "get_bool")
+        return packet
+
+    @property
+    def queue_length(self) -> int:
+        """The number of packets in the queue."""
+        return int(self._ask("get_queue_length", "get_int"))
+
+    @property
+    def channel(self) -> int:
+        """The channel; -1 means all channels."""
+        return int(self._ask("get_channel", "get_int"))
+
+    def set_channel(self, channel: int) -> None:
+        """Set the channel; -1 receives on all channels.
+
+        Raises:
+            WrongData: also if the simulator ignores the channel.
+        """
+        refused = f"{self.device} refuses the channel {channel}"
+        self._services.confirm(f"{self._path}/set_channel", "set_int", refused, value=channel)
+        if (kept := self.channel) != channel:
+            raise WrongData(self.robot, f"{self.device} ignores the channel {channel} and keeps {kept}")
+
+    def close(self) -> None:
+        """Close the connections."""
+        super().close()
+        self._services.close()
+
+    def _ask(self, name: str, type_name: str) -> float:
+        answer: float = self._services.ask(f"{self._path}/{name}", type_name)
+        return answer
+
+
+def _text(message: bytes | memoryview) -> str:
+    """Return the text of a webots_ros/StringStamped."""
+    text: str = message_type("webots_ros/StringStamped").codec.decode(message).data
+    return text

@@ -1,0 +1,177 @@
+"""Keyboard and joystick of a robot, which every robot has without a node in the world.
+
+In a pod nobody can press a key, so the stub and MuJoCo also let a program press keys and move the joystick.
+Webots reads the keys of its own window instead.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, ClassVar, NamedTuple
+
+from palaestra_trainer.ros import RosSubscriber
+from palaestra_trainer.webots.devices import Sensor
+from palaestra_trainer.webots.message_decoding import NumberReading
+from palaestra_trainer.webots.services import Services
+
+ALL = -1  # releases all keys or buttons
+_INT8, _INT32 = "b", "i"  # webots_ros/Int8Stamped, webots_ros/Int32Stamped
+
+
+class _Input(Sensor):
+    """A device that publishes a message for each pressed key, and none while no key is pressed."""
+
+    __slots__ = ("_services",)
+    listed: ClassVar[bool] = False
+
+    def __init__(self, robot: str, device: str, type_name: str, codes: str, topic: str) -> None:
+        super().__init__(robot, device, type_name, NumberReading(device, codes), topic)
+        self._services = Services(robot)
+
+    def read(self) -> bool:
+        """Read the messages of the last step.
+
+        The number of messages is unknown. But the controller responds to a request only after it has sent the
+        messages of the step.
+
+        Raises:
+            SimulatorDead, SimulatorHung, WrongData: as `RosService` and `RosSubscriber`.
+        """
+        self._services.ask(f"{self.device}/get_sampling_period", "get_int")
+        return self.read_arrived()
+
+    def press(self, key: int) -> None:
+        """Press a key or button, in the stub or MuJoCo, until it is released.
+
+        Raises:
+            WrongData: also if too many keys are pressed.
+            SimulatorDead: also in Webots, which does not have this service.
+        """
+        self._own("press", "set_int", f"{self.device} refuses to press {key}", value=key)
+
+    def release(self, key: int = ALL) -> None:
+        """Release a key or button; by default all of them.
+
+        Raises:
+            WrongData: also if the key is not pressed.
+            SimulatorDead: also in Webots, which does not have this service.
+        """
+        self._own("release", "set_int", f"{self.device}: {key} is not pressed", value=key)
+
+    def close(self) -> None:
+        """Close the connections."""
+        super().close()
+        self._services.close()
+
+    def _pressed(self) -> tuple[int, ...]:
+        """Return the numbers that arrived, each once, in the order in which they arrived."""
+        return tuple(dict.fromkeys(self._values.arrived()))
+
+    def _own(self, name: str, type_name: str, refused: str, **request: Any) -> None:
+        """Call a service that Webots does not have."""
+        self._services.confirm(f"palaestra/{self.device}/{name}", type_name, refused, **request)
+
+
+class Keyboard(_Input):
+    """The keyboard; `value` is a tuple of the keys that were pressed in the last step.
+
+    A key is its character code, such as ord("W"), or a number from Webots' manual, such as 315 for the up
+    arrow. Shift adds 65536, Ctrl 131072 and Alt 262144 to the number.
+    """
+
+    __slots__ = ()
+
+    def __init__(self, robot: str) -> None:
+        super().__init__(robot, "keyboard", "webots_ros/Int32Stamped", _INT32, "key")
+
+    def read_arrived(self) -> bool:
+        """Read the keys that have already arrived.
+
+        Raises:
+            SimulatorDead, WrongData: as `RosSubscriber`.
+        """
+        self._value = self._pressed()
+        self.late = False
+        return True
+
+
+class JoystickState(NamedTuple):
+    """The state of a joystick.
+
+    Attributes:
+        buttons: the numbers of the buttons that were pressed in the last step.
+        axes: the position of each axis, -128 to 127; 0 until a joystick is connected.
+        povs: the direction of each hat switch (point of view); 0 until a joystick is connected.
+    """
+
+    buttons: tuple[int, ...]
+    axes: tuple[int, ...]
+    povs: tuple[int, ...]
+
+
+class Joystick(_Input):
+    """A joystick; `value` is a `JoystickState`.
+
+    Args:
+        robot: the ROS name of the robot's controller.
+        axes: the number of axes to read. The stub and MuJoCo have 6.
+        povs: the number of hat switches to read. The stub and MuJoCo have 1.
+    """
+
+    __slots__ = ("_axes", "_positions", "_topics")
+
+    def __init__(self, robot: str, axes: int = 2, povs: int = 0) -> None:
+        super().__init__(robot, "joystick", "webots_ros/Int8Stamped", _INT8, "pressed_button")
+        names = [*(f"axis{at}" for at in range(axes)), *(f"pov{at}" for at in range(povs))]
+        self._axes = axes
+        self._positions = [0] * len(names)
+        self._topics = [
+            RosSubscriber(f"/{robot}/joystick/{name}", "webots_ros/Int8Stamped", NumberReading(name, _INT8))
+            for name in names
+        ]
+
+    def enable(self, period_ms: int) -> None:
+        """Make the joystick publish every `period_ms` of simulated time, and subscribe to its topics.
+
+        Raises:
+            SimulatorDead: also if the joystick has fewer axes or hat switches.
+            WrongData, SimulatorHung: as `Sensor.enable`.
+        """
+        super().enable(period_ms)
+        for topic in self._topics:
+            topic.connect()
+
+    def read_arrived(self) -> bool:
+        """Read the buttons and positions that have already arrived.
+
+        Raises:
+            SimulatorDead, WrongData: as `RosSubscriber`.
+        """
+        for at, topic in enumerate(self._topics):
+            self._positions[at] = [self._positions[at], *topic.arrived()][-1]
+        axes, povs = self._positions[: self._axes], self._positions[self._axes :]
+        self._value = JoystickState(self._pressed(), tuple(axes), tuple(povs))
+        self.late = False
+        return True
+
+    def move(self, axes: Sequence[int] = (), povs: Sequence[int] = ()) -> None:
+        """Move the first axes and hat switches to these positions, -128 to 127, in the stub or MuJoCo.
+
+        Raises:
+            WrongData: also if there are too many positions, or one of them is out of range.
+            SimulatorDead: also in Webots, which does not have these services.
+        """
+        for name, positions in (("set_axes", axes), ("set_povs", povs)):
+            refused = f"{self.device} refuses {name} with {list(positions)}"
+            self._own(name, "set_float_array", refused, values=list(positions))
+
+    @property
+    def connected(self) -> bool:
+        """Whether a joystick is connected; in the stub and MuJoCo, pressing or moving it connects it."""
+        return bool(self._services.ask("joystick/is_connected", "get_bool"))
+
+    def close(self) -> None:
+        """Close the connections."""
+        super().close()
+        for topic in self._topics:
+            topic.close()
