@@ -16,7 +16,7 @@ DESCRIBE_WORKLOAD = "; `kubectl describe workload` shows it"  # only the Workloa
 
 
 def held(situation: ReplicaContext) -> Finding | None:
-    """The replica does not start: its run is lost, or an object of the spec is missing or not for jobs."""
+    """The replica may not start: for example, its run is lost, or an object of the spec is missing."""
     if situation.hold is None:
         return None
     job = situation.seen.job

@@ -45,7 +45,7 @@ def image_name_is_invalid(situation: ReplicaContext) -> Finding | None:
 
 
 def no_progress(situation: ReplicaContext) -> Finding | None:
-    """The replica's pods are interrupted repeatedly without progress; Kubernetes has no limit of its own."""
+    """The replica's pods are interrupted repeatedly without progress; Kubernetes does not limit this."""
     limit = situation.job.spec.most_fruitless
     pods = situation.counted.fruitless + _taken_and_not_replaced(situation)
     if limit == 0 or pods < limit:

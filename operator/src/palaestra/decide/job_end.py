@@ -26,7 +26,7 @@ _EXIT_CODE = re.compile(r"exit code (\d{1,3})\b")
 
 
 def ended_by_others(situation: ReplicaContext) -> Finding | None:
-    """The Job is complete, but the built-in loop did not report its end: a library ended the process."""
+    """The Job is complete, but its trainer reported no end of training: a library ended the process."""
     job, pod = situation.seen.job, situation.seen.pod
     if job is None or job.end is not JobEnd.COMPLETE or pod is None:
         return None

@@ -65,7 +65,7 @@ def name_taken(situation: ReplicaContext) -> Finding | None:
 
 
 def old_pod_holds_claim(situation: ReplicaContext) -> Finding | None:
-    """A pod of an earlier TrainingJob of the same name may still write to the common `existingClaim`."""
+    """A pod of an earlier TrainingJob of the same name may still write to the job's `existingClaim`."""
     old = next(iter(situation.seen.former), None)
     if situation.seen.job is not None or old is None:
         return None
