@@ -36,7 +36,7 @@ OUTLIVED_S = 60  # seconds; if a proxy ends after the main process, it normally 
 
 
 def marked(situation: ReplicaContext) -> Finding | None:
-    """The pod is marked for replacement and still runs."""
+    """An annotation of the Job marks the pod for replacement, and the pod still runs."""
     if situation.pod is None or situation.pod.gone_by is not None:
         return None
     mark = mark_of(situation, situation.pod)

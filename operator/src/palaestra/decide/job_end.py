@@ -44,7 +44,7 @@ def job_is_complete(situation: ReplicaContext) -> Finding | None:
 
 
 def stopped(situation: ReplicaContext) -> Finding | None:
-    """The operator stopped the replica; the mark on the Job has the reason."""
+    """The operator stopped the replica; an annotation of the Job has the reason."""
     job = situation.seen.job
     why = stop_of(job) if job is not None else None
     return None if job is None or why is None else _with_phase(_ended(situation, job, why))
