@@ -70,7 +70,11 @@ def test_a_program_without_rospy_calls_listens_and_is_listed(peer):
 
 
 def test_our_node_answers_the_master_and_tools(master):
-    """`rosnode info` and `rosnode ping` call these methods."""
+    """ROS's own programs call our node like any other node.
+
+    The master calls `publisherUpdate` and `paramUpdate`, a subscriber calls `requestTopic`, `rosnode ping`
+    calls `getPid`, and `rosnode info` also calls `getBusInfo`. The other methods complete ROS's slave API.
+    """
     name = own_node.ensure_node("tester")
     with xmlrpc.client.ServerProxy(own_node.node_uri()) as node:
         answers = {

@@ -42,9 +42,9 @@ def damaged_message(type_name: str, data: bytes, damages: Sequence[Damage], fiel
 
 
 def _with_reading_of_any_size(payload: bytes, type_name: str, field: str, value: float) -> bytes:
-    """Return a message whose reading has variable size, with `value` in place of each float.
+    """Return `payload` with `value` in place of each float of its reading, which has a variable size.
 
-    If the reading is bytes, such as a depth image, each float32 in the bytes is replaced.
+    If the reading is a field of bytes, such as the data of a depth image, each float32 in it is replaced.
     """
     if not type_name or not field:
         return payload
@@ -62,7 +62,7 @@ def _with_reading_of_any_size(payload: bytes, type_name: str, field: str, value:
 
 
 def _with_reading(payload: bytes, reading: struct.Struct, behind: int, value: float) -> bytes:
-    """Return a message with `value` in place of each float of its reading; `behind` bytes follow it."""
+    """Return `payload` with `value` for each float of its reading; `behind` bytes follow the reading."""
     end = len(payload) - behind
     start = end - reading.size
     codes = reading.format.lstrip("<")

@@ -20,7 +20,7 @@ from palaestra_sim.faults.kinds import FaultEvent, InjectedFault, Trigger
 
 _MOST_MS: Final = 3_600_000.0
 _MOST_MIB: Final = 1_048_576.0
-# Float32 has the smallest range of all types of fields, so each wrong value must fit into a float32.
+# A wrong value can replace a float32 or a float64, so it must fit into the smaller type, float32.
 _FLOAT32: Final = struct.Struct("<f")
 _SIGNALS: Final = ("SIGABRT", "SIGBUS", "SIGFPE", "SIGILL", "SIGKILL", "SIGSEGV")
 

@@ -42,7 +42,7 @@ class MujocoBody:
         self._joints: Any = None  # views of MuJoCo's arrays; None before the first model
         self._speeds: Any = None
         self._controls: Any = None
-        # The target speeds and their corrections, in the robot's axes; see `command`.
+        # Target speeds and their corrections, in the robot's axes; see `command` and `_lagged`.
         self._wanted: Sequence[float] = _REST
         self._changes: Sequence[float] = _REST
         self._aims: Sequence[float] = _REST

@@ -128,7 +128,9 @@ class Motor:
     def halt(self) -> None:
         """Stop the shaft; the motor accelerates again from speed 0."""
         self.speed_rad_s = 0.0
-        self._rate = 0.0  # current velocity of a kinematic motor
+        # A kinematic motor accelerates this speed toward its commanded velocity. With a finite target the
+        # speed is never negative, and the side of the target gives the direction.
+        self._rate = 0.0
         self.changed = True
 
     def set_position(self, target_rad: float) -> None:

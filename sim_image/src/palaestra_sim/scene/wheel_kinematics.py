@@ -92,7 +92,7 @@ class Drive:
 
     def twist(self, speeds: Sequence[float]) -> Twist:
         """Return vx, vy in m/s and omega in rad/s of the robot's origin, from speeds in rad/s."""
-        if len(speeds) == _THREE:  # faster: the loop below takes twice as long
+        if len(speeds) == _THREE:  # the loop below would take twice as long
             (x0, y0, t0), (x1, y1, t1), (x2, y2, t2) = self.to_twist
             s0, s1, s2 = speeds
             return x0 * s0 + x1 * s1 + x2 * s2, y0 * s0 + y1 * s1 + y2 * s2, t0 * s0 + t1 * s1 + t2 * s2
@@ -248,7 +248,7 @@ def _any_direction(holds: Sequence[_Hold], arms: Sequence[float]) -> list[Twist]
     size = (squares[0][0] + squares[1][1] + squares[2][2]) / 3.0
     if _determinant(squares) < _LEAST_VOLUME * size**3:
         return []
-    if len(rows) == len(columns):  # this keeps the symmetry of mirrored wheels to the last bit
+    if len(rows) == len(columns):  # the inverse of a square matrix keeps mirrored wheels exactly symmetric
         solved = list(zip(*_inverse(_rows(rows)), strict=True))
     else:
         inverse = _inverse(squares)

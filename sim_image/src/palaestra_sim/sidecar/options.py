@@ -107,5 +107,5 @@ def _address(text: str) -> Address:
     try:
         return Address.parse(text)
     except ValueError as error:
-        # argparse prints the message of this exception only; it drops the message of a ValueError.
+        # argparse prints the message of an ArgumentTypeError, but not the message of a ValueError.
         raise argparse.ArgumentTypeError(str(error)) from error

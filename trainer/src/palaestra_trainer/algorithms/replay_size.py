@@ -53,8 +53,8 @@ class ReplaySize:
         """Return the largest number of rows for which memory and the disk for checkpoints suffice."""
         in_memory = memory_bytes // self.row_bytes
         on_disk = disk_bytes // self.row_bytes
-        # If the buffer has at most `every_steps` rows, two checkpoints need not have any row in common. If it
-        # has more rows, each checkpoint has its own copy of `every_steps` rows.
+        # If the buffer has at most `every_steps` rows, two checkpoints may have no row in common. If it has
+        # more rows, each checkpoint except the newest has its own copy of `every_steps` rows.
         fitting = on_disk - keep * every_steps
         return max(0, min(in_memory, fitting if fitting >= every_steps else on_disk // (keep + 1)))
 

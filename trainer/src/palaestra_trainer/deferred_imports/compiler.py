@@ -18,7 +18,8 @@ from types import ModuleType
 from typing import Any
 
 NAME = "torch._dynamo"
-_ANSWER = "__dynamo_disable"  # attribute of a function in which PyTorch stores the result of `disable`
+# PyTorch stores the result of `disable(function)` in this attribute of the function.
+_ANSWER = "__dynamo_disable"
 
 # The functions of the stand-in, each with the module of PyTorch that calls it.
 _OF_PYTORCH = {"disable": "torch._compile", "graph_break": "torch.optim.optimizer"}

@@ -35,7 +35,7 @@ log = structlog.get_logger(__name__)
 _UNKNOWN = "extra_forbidden"  # pydantic's type of the error for an unknown field
 
 CONFIG_VARIABLE = "PALAESTRA_CONFIG"
-CONFIRM_EPISODES = 100  # with 100 episodes, a success rate of 95 % is known to within 4 %
+CONFIRM_EPISODES = 100  # a measured success rate of 95 % is then right to about 4 points
 
 Positive = Annotated[int, Field(ge=1)]
 Reward = Literal["Dense", "Sparse"]

@@ -54,7 +54,7 @@ class RosService:
         data = self._type.request.frame(fields)
         try:
             (self._wire or self._connect()).send(data)
-        except BaseException:  # after Ctrl-C too, the next call would read the response to this request
+        except BaseException:  # for Ctrl-C too, because the next call would read this request's response
             self.close()
             raise
 
@@ -67,7 +67,7 @@ class RosService:
         wire = self._asked()
         try:
             return self._read_answer(wire)
-        except BaseException:  # after Ctrl-C too, the next call would read the response to this request
+        except BaseException:  # for Ctrl-C too, because the next call would read this request's response
             self.close()
             raise
 
@@ -151,7 +151,7 @@ def call_together(
         if meanwhile is not None and sent:
             meanwhile(sent[-1])
         return [service.finish() for service in sent]
-    except BaseException:  # after Ctrl-C too, the next calls would read the responses to these requests
+    except BaseException:  # for Ctrl-C too, because later calls would read these requests' responses
         for service in sent:
             service.close()
         raise

@@ -141,7 +141,8 @@ class RosSubscriber:
                 self.simulator, f"{self.name} has a publisher that does not respond"
             ) from error
         except OSError as error:
-            raise SimulatorDead(self.simulator, f"{self.name} has a publisher that no longer runs") from error
+            fact = f"{self.name} has a publisher that cannot be reached: {error.strerror or error}"
+            raise SimulatorDead(self.simulator, fact) from error
         except UnreadableAnswer as error:
             raise WrongData(
                 self.simulator, f"{self.name} has a publisher that sends invalid responses: {error}"

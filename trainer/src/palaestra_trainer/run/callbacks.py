@@ -31,8 +31,8 @@ from palaestra_trainer.job.user_code.kwargs import AcceptedArguments
 log = structlog.get_logger(__name__)
 
 FIELD = "algorithm.callbacks"
-# These callbacks of Stable-Baselines3 evaluate the model, or need an EvalCallback. Each text names the field
-# of a job that replaces the callback.
+# These callbacks of Stable-Baselines3 evaluate the model, or need an EvalCallback. Each text gives the reason
+# of the refusal, and the alternative.
 _OF_EVALUATION: Mapping[type[BaseCallback], str] = {
     EvalCallback: "a run evaluates on simulators of its own; set trainer.evaluation",
     StopTrainingOnRewardThreshold: "a run ends at a success rate; set trainer.evaluation.stopAtSuccessRate",

@@ -42,7 +42,8 @@ from palaestra_trainer.waiting.greenlets import away_s, let_others
 log = structlog.get_logger(__name__)
 
 LOOK_EVERY_S = 0.1
-# A canceled start ends at once, except if it waits for a program that does not respond.
+# Longest wait for canceled starts. Usually they end at once; a start that waits for a program that does not
+# respond takes longer.
 SETTLE_S = 10.0
 # A simulator that must be recycled after two dozen resets is recycled every few seconds. Logging each time
 # would fill the log.
@@ -74,7 +75,7 @@ class Restarter:
         self.watcher: Watcher = watcher or NullWatcher()
         self.group = group or Group()
         self.tried = self.lost = self.stepped = False
-        # The mistake in the configuration that the fault of the last process shows; empty: no mistake.
+        # The mistake in the configuration that caused the fault of the last process; empty: no mistake.
         self._refusal = ""
         self._budget = RestartBudget(member.name, limit or RestartLimit(), clock)
         self._clock = clock

@@ -20,9 +20,9 @@ from greenlet import getcurrent, greenlet
 from palaestra_trainer.waiting import shutdown_deadline
 from palaestra_trainer.waiting.wait_time import count_wait
 
-# After this time the first greenlet waits alone and with its own deadline, so a fault is attributed to the
-# right simulator. The time is longer than a step, because the wait alone counts as a turn of this greenlet.
-# It is short compared with the deadline, which begins only when the greenlet waits alone.
+# If no response has arrived after this time, the first greenlet waits alone and with its own deadline, so a
+# fault is attributed to the right simulator. The time is longer than a step, because a wait alone counts as a
+# turn of the waiting greenlet. It is short compared with the deadline, which begins with the wait alone.
 _SOON_MS = 500
 
 
@@ -129,7 +129,7 @@ def take_turns(works: Iterable[Callable[[], Any]]) -> list[Any]:
             for turn in _ready(waiting):
                 turn.switch()
             waiting = [turn for turn in waiting if not turn.done]
-    except BaseException:  # after Ctrl-C too, because no work may continue in a later call
+    except BaseException:  # for Ctrl-C too, because no work may continue in a later call
         for turn in turns:
             if not turn.dead:
                 turn.throw()

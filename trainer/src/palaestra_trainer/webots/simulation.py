@@ -220,7 +220,7 @@ class Stepper:
             silent = self._read_sensors()
             for name in self._tracked:
                 self._tracked[name] = self._observer.finish_pose(name)
-        except BaseException:  # after Ctrl-C too, because messages that arrive later belong to this step
+        except BaseException:  # for Ctrl-C too: messages of this step may arrive later
             for sensor in self._sensors:
                 sensor.late = True
             raise

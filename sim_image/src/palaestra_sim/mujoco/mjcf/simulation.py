@@ -67,7 +67,7 @@ class MjcfSimulation:
         self._states = BodyStates(model, tree.bodies)
         self._step_s = basic_step_ms / 1000.0
         self._steps = round(self._step_s / float(model.model.opt.timestep))
-        # Makes the timestep exact, because a file may round 1/240 s.
+        # A file may round its timestep, for example 1/240 s, so the exact timestep is set here.
         model.model.opt.timestep = self._step_s / self._steps
         self._pending: list[Callable[[], None]] = []
         self._reset_asked = False

@@ -10,8 +10,8 @@ from palaestra_protocol.metrics import Family, Label, counter, gauge, histogram
 from palaestra_protocol.pod.status import Cause, FaultKind, Role
 from palaestra_trainer.simulators.stats import STEP_S
 
-# The scale of returns is not known in advance, and returns are often negative. So the buckets are symmetric
-# around 0, and each bound is at most two and a half times the previous bound.
+# The scale of returns is not known in advance, and returns are often negative. So the bounds of the buckets
+# are symmetric around 0, and each positive bound is at most two and a half times the next smaller one.
 DECADES = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
 RETURNS = (*(-decade for decade in reversed(DECADES)), 0.0, *DECADES)
 LENGTHS = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0, 10_000.0)

@@ -41,7 +41,7 @@ class FileLock:
         """
         with _held_lock:
             mine = (os.getpid(), path)
-            if mine in _held:  # to open and close the file again would release the lock
+            if mine in _held:  # if this process opened and closed the file again, it would lose the lock
                 return None
             try:
                 descriptor = _locked(path)
