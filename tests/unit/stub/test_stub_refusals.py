@@ -100,7 +100,7 @@ def test_all_that_is_refused_comes_in_one_message_with_a_line_for_each_kind_and_
             f" remove physics, {elsewhere}"
         ),
         f"my.wbt:7:16: the stub simulates no Cone as a boundingObject; {elsewhere}",
-        "my.wbt:9:1: controllerArgs without --name=; generate the world",
+        "my.wbt:9:1: controllerArgs without --name=; add --name=NAME",
         "my.wbt:9:1: controllerArgs without --synchronize: the stub steps only on request; add it",
         f"my.wbt:10:18: the stub simulates no Theseus on a robot; {elsewhere}",
         f"my.wbt:10:30: the stub simulates no Minotaur on a robot; {elsewhere}",

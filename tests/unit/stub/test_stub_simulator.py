@@ -41,7 +41,7 @@ def test_nothing_starts_from_a_wrong_world(ros, tmp_path):
 @pytest.mark.parametrize(
     ("change", "fact"),
     [
-        (('"--name=robotino" ', ""), "controllerArgs without --name=; generate the world"),
+        (('"--name=robotino" ', ""), "controllerArgs without --name=; add --name=NAME"),
         (('"--synchronize"', ""), "controllerArgs without --synchronize"),
         (('"--synchronize"', '"--synchronize" "--use-sim-time"'), "the stub does not know --use-sim-time"),
         (('"--synchronize"', '"--synchronize" "--use-ros-control"'), "does not know --use-ros-control"),

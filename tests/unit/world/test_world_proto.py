@@ -184,7 +184,8 @@ def test_a_template_is_refused_with_its_line_and_the_remedies(text: str, line: i
 
     assert message.startswith(f"{line}:")
     assert message.endswith(
-        "this PROTO has a template; templates are not expanded; add it to a file of stand-ins or leave it out"
+        "this PROTO has a template; templates are not expanded; "
+        "add this type to a file of stand-ins, or leave it out"
     )
 
 

@@ -37,7 +37,7 @@ def read_arguments(reading: NodeReader, node: SceneNode) -> ControllerArguments:
     texts = node.texts("controllerArgs")
     names = [text.removeprefix("--name=") for text in texts if text.startswith("--name=")]
     if not names and not reading.leave_out.names:
-        reading.refuse(node, "controllerArgs without --name=", "generate the world")
+        reading.refuse(node, "controllerArgs without --name=", "add --name=NAME")
     if "--synchronize" not in texts and not reading.leave_out.names:
         fact = f"controllerArgs without --synchronize: {reading.simulator} steps only on request"
         reading.refuse(node, fact, "add it")

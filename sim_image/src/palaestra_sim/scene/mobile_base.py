@@ -87,7 +87,7 @@ class MobileBase:
         speeds = [wheel.speed_rad_s for wheel in wheels]
         demands = [wheel.demand(step_s) for wheel in wheels]
         vx, vy, omega = law.twist(list(map(sub, demands, speeds)))
-        # The number of steps that the change takes at the largest accelerations, for all three axes together.
+        # The number of steps that the change takes at the largest accelerations; the slowest axis decides.
         steps = max(abs(vx) / (_X * step_s), abs(vy) / (_Y * step_s), abs(omega) / (_TURN * step_s))
         if steps > 1.0 and not self._kinematic:
             demands = [

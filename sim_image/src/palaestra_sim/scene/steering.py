@@ -17,7 +17,7 @@ from palaestra_sim.scene.motors import Motor
 from palaestra_sim.scene.wheel_kinematics import Direction, Twist, Wheel
 
 _PARALLEL: Final = 0.05  # largest sine of the angle between parallel tires: 2.9 degrees
-_LEAST_GAIN: Final = 1e-3  # driven tires that roll less than this per unit of motion do not move the robot
+_LEAST_GAIN: Final = 1e-3  # driven tires that roll less than this, in m per m driven, do not move the robot
 _LEAST_ARM_M: Final = 1e-3  # least distance from the fixed axle to the farthest steered tire
 
 

@@ -70,7 +70,7 @@ def parse_proto(data: bytes, name: str) -> Proto:
     source = Source(data=data, name=name, kind="PROTO")
     source.header()
     for place in _templates(data):
-        remedy = "templates are not expanded; add it to a file of stand-ins or leave it out"
+        remedy = "templates are not expanded; add this type to a file of stand-ins, or leave it out"
         raise source.error(place, "this PROTO has a template", remedy)
     proto = _ProtoReader(source, tokenize(source)).proto()
     if error := refusal(_undeclared(proto)):

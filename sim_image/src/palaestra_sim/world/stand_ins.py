@@ -142,7 +142,7 @@ class _Entry:
     def _declared(self, text: object) -> dict[str, ProtoField]:
         """Return the fields that every object has, followed by the declared fields."""
         if not isinstance(text, str):
-            self._refuse("fields", "this is not text", "declare fields as SFVec3f size 1 1 1, one a line")
+            self._refuse("fields", "this is not text", "declare fields as SFVec3f size 1 1 1, one per line")
         try:
             declared = parse_fields(text, self._type)
         except WorldError as error:

@@ -101,7 +101,7 @@ def test_what_is_not_refused_learns(algorithm):
         ("PPO", {"n_epochs": 0}, "n_epochs: 0 is refused; give a number of at least 1"),
         ("TD3", {"policy_delay": 0}, "policy_delay: 0 is refused; give a number of at least 1"),
         ("SAC", {"gamma": 99.0}, "gamma: 99.0 is refused; give 0 to 1"),
-        ("SAC", {"gradient_steps": 0}, "gradient_steps: 0 learns nothing; give a number above 0, or -1"),
+        ("SAC", {"gradient_steps": 0}, "gradient_steps: with 0 nothing is learned; give a number above 0"),
         ("DQN", {"train_freq": [0, "episode"]}, "train_freq: [0, 'episode'] is refused"),
         ("DQN", {"train_freq": [1, "episode"]}, "train_freq: counts in episodes, which only one collecting"),
         ("PPO", {"policy_kwargs": {"net_arch": [0]}}, "policy_kwargs.net_arch: a layer of 0 is refused"),

@@ -98,7 +98,7 @@ def out_of_range(cls: type, given: Mapping[str, Any]) -> Iterator[tuple[str, str
             ranges["batch_size"] = Range(LEAST_BATCH[ancestor.__name__])
     yield from _outside("", given, ranges)
     if given.get("gradient_steps") == 0:
-        yield "gradient_steps", "0 learns nothing; give a number above 0, or -1 for as many as steps"
+        yield "gradient_steps", "with 0 nothing is learned; give a number above 0, or -1 for as many as steps"
     policy = given.get("policy_kwargs")
     if isinstance(policy, dict):
         yield from _outside("policy_kwargs.", policy, RANGES_OF_POLICY)

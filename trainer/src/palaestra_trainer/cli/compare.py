@@ -36,7 +36,7 @@ writes:
   a line for each batch of episodes and a sentence to standard output, or with --json one JSON object
 
 No run uses the seeds. The bounds are right after any number of episodes, so a comparison may be ended, or
-continued with more --episodes, whenever you like; at most one of 20 comparisons is wrong.
+continued with more --episodes, whenever you like. The probability that a comparison is wrong is at most 5 %.
 """
 EXIT_CODES = """\
 exit codes:

@@ -76,7 +76,7 @@ def _end(summary: Mapping[str, Any], end: Mapping[str, Any], outcome: Mapping[st
     code = end.get("exit_code", outcome.get("exit_code"))
     words = text(end.get("reason") or outcome.get("reason"))
     if code is None:
-        return "open", "no record of an end: it runs, or its trainer was killed"
+        return "open", "no record of an end: the run continues, or its trainer was killed"
     if code == 0:
         return "good", words
     return ("interrupted" if code == _INTERRUPTED else "failed"), words or f"exit code {code}"

@@ -33,7 +33,7 @@ def link_curves(directory: RunDirectory, configuration: Configuration) -> None:
     if not uid or (run.parent.name, run.name) != (uid, str(configuration.replica)):
         return
     job = f"{configuration.job}-{uid[:8]}"
-    # Relative, because TensorBoard mounts the claim at another path.
+    # The target is relative, because TensorBoard mounts the claim at another path.
     target = f"../../{uid}/{run.name}/{directory.tensorboard.name}"
     try:
         with ExitStack() as stack:

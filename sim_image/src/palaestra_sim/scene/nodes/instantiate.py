@@ -78,7 +78,7 @@ class Instantiator:
         return [node for node in grown if node is not None]
 
     def _grow(self, written: Node, scope: Scope, parent: SceneNode) -> SceneNode | None:
-        if len(self.nodes) > MAX_NODES:  # raise at once, because 2 to the 60th nodes may follow
+        if len(self.nodes) > MAX_NODES:  # raise at once, because the rest may need all memory
             fact = f"the world has more than {MAX_NODES} nodes"
             raise scope.error(written, fact, "remove a cycle of PROTOs or of USE, or use fewer nodes")
         try:
@@ -211,9 +211,8 @@ class Instantiator:
 
     def _refuse_unknown(self, value: Value, source: Node, scope: Scope) -> None:
         (bound,) = value.items
-        fact = (
-            f"{source.type_name} has a field IS {getattr(bound, 'name', '')}, which the PROTO does not have"
-        )
+        name = getattr(bound, "name", "")
+        fact = f"{source.type_name} has IS {name}, but the PROTO has no field {name}"
         self.refused.append(scope.error(source, fact, "declare it in the head of the PROTO"))
 
 

@@ -27,7 +27,7 @@ _NEXT_TO_IT: Final = "put it next to the world, or next to this file"
 _TOGETHER: Final = (
     "copy it next to the world, or name a folder that holds both (--root, or world.root of a job)"
 )
-_SMALLER: Final = "attach fewer models"
+_SMALLER: Final = "attach fewer models, and no model to itself"
 
 
 class _Named(NamedTuple):

@@ -89,7 +89,7 @@ def test_a_right_environment_has_figures_and_no_problem(tried):
         ({"seen": lambda it: np.array([it.steps])}, "dtype int64, not float32"),
         (
             {"seen": lambda it: np.array([it.steps], np.float32)},
-            "number [0] leaves 0.0 to 1.0; widen the space, or clip the observation",
+            "number [0] is not between 0.0 and 1.0; widen the space, or clip the observation",
         ),
         ({"seen": lambda _: np.zeros(1, np.float32)}, "no observation changed in 6 steps"),
         ({"reward": lambda _: 0.0}, "every reward of 6 steps was 0; check the reward"),

@@ -62,7 +62,7 @@ def beyond(space: spaces.Space[Any], observation: Any) -> str:
     for name, part in parts:
         value = observation[name] if name else observation
         if fact := mismatch(part, value):
-            # The sentence omits the value, because otherwise each step would add a different problem.
+            # The sentence omits the numbers of a Box, because otherwise each step would add a new problem.
             where = f"observation {name}".rstrip()
             known = fact if not isinstance(part, spaces.Box) else _outside(part, np.asarray(value))
             return f"{where} is not in its space: {known}; widen the space, or clip the observation"
@@ -71,7 +71,7 @@ def beyond(space: spaces.Space[Any], observation: Any) -> str:
 
 def _outside(space: spaces.Box, value: np.ndarray) -> str:
     place = tuple(int(index) for index in np.argwhere((value < space.low) | (value > space.high))[0])
-    return f"number {list(place)} leaves {space.low[place]} to {space.high[place]}"
+    return f"number {list(place)} is not between {space.low[place]} and {space.high[place]}"
 
 
 def _objections(
