@@ -117,7 +117,7 @@ class MujocoPhysics:
         self._settled = False
 
     def reset(self) -> None:
-        """Discard the state of the solver, such as the forces of the last step, from which it would start.
+        """Discard the start values of the solver, such as the forces of the last step.
 
         The positions and speeds of bodies and joints stay as the scene has set them.
         """

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FrontOptions:
-    """Options that imitate the timing of Webots' controller, which differs by world and machine.
+    """Options that imitate the timing of Webots' controller; this timing differs between worlds and machines.
 
     Attributes:
         step_sleep_s: minimum real time of a `time_step` in seconds, to imitate a larger world.

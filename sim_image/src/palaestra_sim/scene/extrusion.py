@@ -128,7 +128,7 @@ def _axes(spine: Sequence[Vector]) -> list[tuple[Vector, Vector]]:
 
 
 def _first_z(spine: Sequence[Vector], y: Vector) -> Vector:
-    """Return z at the start of an open spine: z at its first bend; for a straight spine, z turned with it."""
+    """Return z at the start of an open spine: z at its first bend; without a bend, z turned like y."""
     bends = (
         cross(minus(spine[k + 1], spine[k]), minus(spine[k - 1], spine[k])) for k in range(1, len(spine) - 1)
     )

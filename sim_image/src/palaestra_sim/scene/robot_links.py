@@ -1,7 +1,7 @@
 """Find the joints of a robot that forces move, in a physics with forces.
 
 The parts on such a joint have physics. A joint that drives or steers a wheel does not count, nor does a joint
-on a wheel. A caster on the floor does not count either, because it follows a driving robot without forces.
+on a wheel. A caster on the floor does not count either, because it only follows the motion of the robot.
 """
 
 from __future__ import annotations

@@ -31,7 +31,7 @@ class Beam(NamedTuple):
 
     @property
     def level(self) -> bool:
-        """Whether its height is constant."""
+        """Whether the height of the beam is constant."""
         return self.slope == 0.0
 
     def seen_from(self, pose: Pose) -> Beam:

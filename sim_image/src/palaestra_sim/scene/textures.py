@@ -175,7 +175,7 @@ def _on_plane(point: Vector) -> Coordinates:
 
 
 def _on_box(point: Vector) -> Coordinates:
-    """Return the coordinates of a point of a box, of which each side has the whole texture."""
+    """Return the texture coordinates of a point of a box; each side of the box shows the whole texture."""
     x, y, z = point
     side = max(range(3), key=lambda axis: abs(point[axis]))
     if side == _UP:

@@ -32,7 +32,7 @@ class Described(Protocol):
 
     @property
     def robots(self) -> Sequence[Robot]:
-        """Its robots."""
+        """The robots of the world."""
         ...
 
     @property

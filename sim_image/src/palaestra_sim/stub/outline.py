@@ -1,8 +1,8 @@
 """The outlines of shapes as seen from above: discs, blocks and hulls of obstacles, and discs of robots.
 
-A shape has one outline for its whole height. This outline is exact for boxes and for upright cylinders. For
-other shapes, this outline is the widest outline. Contacts use this outline; rays meet the true surface of
-such a shape.
+A shape has one outline for its whole height. This outline is exact for boxes and for upright cylinders. Any
+other shape is narrower than its outline at some heights: contacts use the outline, but rays meet the true
+surface of the shape.
 
 The outline of a robot is a set of discs that are fixed in the robot's frame. A disc looks the same at every
 heading, so the check for a contact takes the same time at every heading. A box is replaced by a row of discs

@@ -96,8 +96,8 @@ class NavigateEnv(gymnasium.Env[Observation, Any]):
     ## End of an episode
 
     An episode is terminated when the robot is within 0.15 m of the target (`info["is_success"]`), or when an
-    object is nearer than 0.05 m to its outline. After `max_steps` steps, the option `time_up` decides between
-    terminated and truncated, as in `MoveToTargetEnv`.
+    object is nearer than 0.05 m to the outline of the robot. After `max_steps` steps, the option `time_up`
+    decides between terminated and truncated, as in `MoveToTargetEnv`.
 
     ## Info
 

@@ -95,7 +95,7 @@ class Verdict(StrEnum):
 
 
 def verdict(pairs: Pairs, margin: float) -> Verdict:
-    """Return the verdict of the episodes so far; at most 5 % of comparisons ever get a wrong verdict.
+    """Return the verdict of the episodes so far; it is ever wrong with a probability of at most 5 %.
 
     Args:
         pairs: the episodes so far.

@@ -252,7 +252,11 @@ class MasterApi:
             self._updates.append(Update(uri, "publisherUpdate", topic, publishers, node))
 
     def _report_changes(self, name: str, value: Any, *, but: str | None) -> None:
-        """Add an update for each subscriber, except the node `but` if it changed a name it subscribes to."""
+        """Add an update for each subscriber.
+
+        The node `but` made the change. It gets no update of a change at or below the name to which it
+        subscribes.
+        """
         for change in changes(name, value, self._nodes.names(Kind.PARAMETER)):
             for node, uri in self._nodes.members(Kind.PARAMETER, change.subscribed):
                 if not (change.by_caller and node == but):

@@ -65,7 +65,7 @@ class Fleet:
     def start(self, check: Check = go_on, *, stepped: bool = False) -> None:
         """Start all members at the same time; return when enough members of each group are up.
 
-        Also wait until the first start of every member has ended. The start of further members continues in
+        Also wait until the first start of every member has ended. If a first start failed, it is repeated in
         the background.
 
         Args:

@@ -117,8 +117,8 @@ class Observer:
     def contact_points(self, name: str) -> tuple[Vector, ...]:
         """Return the points at which the node with DEF `name`, or a part of it, touches other objects.
 
-        The points are x, y, z in meters, in the world. The stub and MuJoCo give no points on a floor, and the
-        stub gives only those of robots.
+        The points are x, y, z in meters, in the world. The stub and MuJoCo report no points on a floor. The
+        stub reports only the points of robots.
         """
         service = self._services.get("supervisor/node/get_contact_points", "node_get_contact_points")
         found = service(node=self.node(name), include_descendants=True).contact_points

@@ -119,7 +119,7 @@ class Connector(OutputDevice):
     __slots__ = ()
 
     def lock(self) -> None:
-        """Lock to the connector in front; without one, lock as soon as one is there."""
+        """Lock to the connector in front; if the world sets `autoLock`, also to one that comes later."""
         self._command("lock", "set_bool", value=True)
 
     def unlock(self) -> None:
@@ -196,7 +196,7 @@ class Speaker(OutputDevice):
             volume: 0 to 1.
             pitch: factor of the frequency, above 0.
             balance: -1 (left) to 1 (right).
-            loop: whether it is repeated until `stop`.
+            loop: whether the sound is repeated until `stop`.
         """
         self._command(
             "play_sound",
@@ -213,7 +213,7 @@ class Speaker(OutputDevice):
         self._command("stop", "set_string", value=file)
 
     def plays(self, file: str = "") -> bool:
-        """Return whether a sound file is playing; "": whether any is."""
+        """Return whether a sound file is playing; for "", whether any sound file is playing."""
         service = self._services.get(f"{self._path}/is_sound_playing", "speaker_is_sound_playing")
         return bool(service(sound=file).value)
 
@@ -223,5 +223,5 @@ class Speaker(OutputDevice):
 
     @property
     def speaking(self) -> bool:
-        """Whether it speaks."""
+        """Whether the loudspeaker speaks."""
         return bool(self._ask("is_speaking", "get_bool"))

@@ -197,10 +197,10 @@ class Supervisor:
             force: x, y, z in N.
             offset: the point at which the force acts, in meters in the axes of the node; None: the center of
                 mass.
-            relative: whether the force is in the axes of the node; if not, it is in those of the world.
+            relative: whether the force is in the axes of the node; if not, it is in the axes of the world.
 
         Raises:
-            WrongData: also if the simulator does not simulate forces, as the stub.
+            WrongData: also if the simulator does not simulate forces; an example is the stub.
         """
         push = {"node": self._observer.node(name), "force": _xyz(force), "relative": relative}
         if offset is None:
@@ -272,7 +272,7 @@ class Supervisor:
             quality: 1 to 100, for JPEG.
 
         Raises:
-            WrongData: also if the simulator does not render, as the stub, or cannot write the file.
+            WrongData: also if the simulator cannot render, as the stub cannot, or cannot write the file.
         """
         self._confirm("export_image", "save_image", path, filename=str(path), quality=quality)
 

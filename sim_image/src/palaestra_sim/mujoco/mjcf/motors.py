@@ -79,7 +79,7 @@ class ActuatorMotor(Motor):
         self._aim: float | None = None  # current target of a position servo
 
     def put(self, angle_rad: float) -> None:
-        """Handle the event that a client has set the joint position; a commanded motor holds it."""
+        """Respond to a client that has set the joint position; a motor with a command holds this position."""
         if self._commanded and self._actuator.control is not Control.FORCE:
             super().put(angle_rad)
         self._aim = None

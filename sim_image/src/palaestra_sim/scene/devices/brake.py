@@ -1,8 +1,7 @@
 """Brake: the damping of a joint, which limits the speed that its motor reaches.
 
-The torque of a damper is its constant times the speed of the shaft. So a motor with a limited torque turns at
-most at a speed of the torque divided by the constant. A joint without a motor moves only in a physics with
-forces.
+The torque of a damper is its constant times the speed of the shaft. So the speed of a motor is at most its
+maximum torque divided by the constant. A joint without a motor moves only in a physics with forces.
 """
 
 from __future__ import annotations

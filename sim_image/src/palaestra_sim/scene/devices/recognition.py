@@ -63,7 +63,7 @@ class Recognition:
         return b"" if self.eye is None else self.eye.painted(_paint)
 
     def silent(self) -> bool:
-        """Return whether it has no segmentation image."""
+        """Return whether the camera has no segmentation image."""
         return self.eye is None or not self.segments
 
     def segment(self, *, on: bool) -> bool:

@@ -2,9 +2,9 @@
 
 A read returns the written value at once, but the simulation applies the value at the beginning of the next
 basic step. A write of `translation` or `rotation` moves an object, and a write of `customData` reaches the
-robot. A write that only changes the look of an object is accepted too, because Webots does not simulate the
-effect of the look either. `write_rules` refuses a write that would not have the effect that it has in Webots.
-Otherwise the client would read the value back although nothing had changed.
+robot. A write that only changes the look of an object is accepted too, because the motion does not depend on
+the look. `write_rules` refuses a write that would not have the effect that it has in Webots. Otherwise the
+client would read the value back although nothing had changed.
 
 As in Webots, a value that is invalid for the field is ignored without an error.
 """

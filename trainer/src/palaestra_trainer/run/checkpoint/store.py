@@ -105,7 +105,10 @@ class Saver:
         return complete
 
     def _prune(self, step: int) -> None:
-        """Keep only the newest checkpoints up to `step`; later ones are damaged, or the run began again."""
+        """Keep only the newest checkpoints up to `step`.
+
+        Later checkpoints are removed: they are damaged, or the run has begun again since they were written.
+        """
         reached = sorted((path for path in _steps(self._folder) if _step(path) <= step), key=_step)
         for path in set(_steps(self._folder)).difference(reached[-self._keep :]):
             shutil.rmtree(path, ignore_errors=True)
