@@ -139,6 +139,8 @@ def test_a_world_that_does_not_fit_is_not_there_at_all(source, tmp_path) -> None
     """A partly written world must not be there at the next start."""
     (tmp_path / "work" / "collect-1.wbt").mkdir(parents=True)
 
-    with pytest.raises(SidecarError, match=r"^--work: .*: Is a directory; give a folder with free space$"):
+    with pytest.raises(
+        SidecarError, match=r"^--work: .*: Is a directory; give a writable folder with space$"
+    ):
         world_files.named(source(), tmp_path / "work", IDENTITY, clock=False)
     assert [path.name for path in (tmp_path / "work").iterdir()] == ["collect-1.wbt"]

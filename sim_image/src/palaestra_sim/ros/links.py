@@ -14,11 +14,12 @@ from palaestra_protocol.ros import sockets
 from palaestra_protocol.ros.tcpros import FrameReader, FramingError, decode_header, encode_header
 from palaestra_sim.ros.loop import Loop
 
-# The node closes a finished connection after this time. By then roscpp and rospy have closed the connection
-# themselves. A client that reads until the end of the stream waits for the node.
+# The node closes a finished connection after one to two times this time. By then roscpp and rospy have closed
+# the connection themselves. A client that reads until the end of the stream waits until the node closes it.
 LINGER_S = 1.0
 
-# If a client stops reading in the middle of a long response, the node closes the connection after this time.
+# If a client has not read the whole response when its connection is finished, the node closes the connection
+# after this time.
 SEND_S = 60.0
 
 

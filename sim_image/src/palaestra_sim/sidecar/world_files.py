@@ -120,7 +120,7 @@ def _written(
         path.parent.mkdir(parents=True, exist_ok=True)
         write_whole(path, generated)
     except OSError as error:
-        raise SidecarError(f"--work: {work}: {error.strerror}; give a folder with free space") from error
+        raise SidecarError(f"--work: {work}: {error.strerror}; give a writable folder with space") from error
     return path
 
 

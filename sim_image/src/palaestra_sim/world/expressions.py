@@ -58,7 +58,7 @@ def parse_formula(written: object) -> Expression:
         return Expression(str(written), float(written))
     if not isinstance(written, str):
         fact = f"{written!r} is not a length"
-        raise ValueError(f"{fact}; write a number, the name of a field, or a formula")  # noqa: TRY004 - of a file
+        raise ValueError(f"{fact}; write a number, the name of a field, or a formula")  # noqa: TRY004 - it is in a file
     if len(written) > MAX_LENGTH:
         raise ValueError(f"a formula has more than {MAX_LENGTH} characters; shorten it")
     return Expression(written, _Reader(written).formula())

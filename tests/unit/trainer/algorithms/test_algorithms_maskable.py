@@ -245,8 +245,8 @@ def test_an_environment_without_masks_is_refused_before_a_simulator_starts(run, 
     assert code == 2
     assert {entry for member in members for entry in member.log} <= {"stop"}
     assert (
-        "environment.id: MoveToTargetEnv-v0 has no method action_masks, which MaskablePPO asks for allowed "
-        "actions; define action_masks(self), which returns a bool for each action, or use PPO"
+        "environment.id: MoveToTargetEnv-v0 has no method action_masks, which MaskablePPO calls to get the "
+        "allowed actions; define action_masks(self), which returns a bool for each action, or use PPO"
     ) in last_word().reason
 
 

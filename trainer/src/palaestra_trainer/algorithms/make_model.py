@@ -154,9 +154,9 @@ def _refuse_dropping_all(model: BaseAlgorithm) -> None:
     if not isinstance(model, TQC) or model.top_quantiles_to_drop_per_net < model.critic.n_quantiles:
         return
     raise ConfigurationError(
-        f"{hyperparameters.FIELD}.top_quantiles_to_drop_per_net: {model.top_quantiles_to_drop_per_net} of "
-        f"{model.critic.n_quantiles} quantiles of each critic leaves none; lower it, or raise "
-        "policy_kwargs.n_quantiles"
+        f"{hyperparameters.FIELD}.top_quantiles_to_drop_per_net: dropping "
+        f"{model.top_quantiles_to_drop_per_net} of {model.critic.n_quantiles} quantiles of each critic "
+        "leaves none; lower it, or raise policy_kwargs.n_quantiles"
     )
 
 

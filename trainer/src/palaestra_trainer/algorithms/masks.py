@@ -37,8 +37,8 @@ def refuse_without_masks(algorithm: Algorithm, env: gymnasium.Env[Any, Any], nam
     """
     if is_masked(algorithm) and not gives_masks(env):
         raise ConfigurationError(
-            f"environment.id: {name} has no method {ACTION_MASKS}, which {algorithm.name} asks for allowed "
-            f"actions; define {ACTION_MASKS}(self), which returns a bool for each action, or use PPO"
+            f"environment.id: {name} has no method {ACTION_MASKS}, which {algorithm.name} calls to get the "
+            f"allowed actions; define {ACTION_MASKS}(self), which returns a bool for each action, or use PPO"
         )
 
 

@@ -118,8 +118,8 @@ class OwnBuffer(BaseBuffer):
         """
         raise ConfigurationError(
             f"{field_of(type(self))}: the checkpoint has lost {np.count_nonzero(~kept)} rows, but only the "
-            f"code of {type(self).__name__} could remove what belongs to them; restore the run directory "
-            "from a copy, or begin a new run"
+            f"code of {type(self).__name__} could remove its own data for these rows; restore the run "
+            "directory from a copy, or begin a new run"
         )
 
     def _own_state(self) -> dict[str, Any]:

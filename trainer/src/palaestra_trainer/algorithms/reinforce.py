@@ -68,7 +68,7 @@ class REINFORCE(BaseAlgorithm):
         "MultiInputPolicy": MultiInputActorCriticPolicy,
     }
 
-    def __init__(  # noqa: PLR0913, PLR0917 - one argument a hyperparameter, as in Stable-Baselines3
+    def __init__(  # noqa: PLR0913, PLR0917 - one argument per hyperparameter, as in Stable-Baselines3
         self,
         policy: str | type[ActorCriticPolicy],
         env: GymEnv | str | None,

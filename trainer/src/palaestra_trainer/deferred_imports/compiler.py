@@ -48,7 +48,7 @@ class _StandIn(ModuleType):
             raise AttributeError(name)
         # A function that a user's program passes to `disable` must stay disabled when another function is
         # compiled. So only PyTorch's own calls of `disable` get the stand-in.
-        asks = sys._getframe(1).f_globals.get("__name__")  # noqa: SLF001 - inspect.stack reads source files
+        asks = sys._getframe(1).f_globals.get("__name__")  # noqa: SLF001 - inspect.stack is slow
         if asks == _OF_PYTORCH.get(name):
             return getattr(self, f"_{name}")
         return getattr(self.give_way(), name)

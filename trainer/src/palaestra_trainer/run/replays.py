@@ -40,7 +40,7 @@ def keep_replays(directory: RunDirectory, evaluation: EvaluationResult, name: st
 
 def films_of(content: Mapping[str, Any]) -> dict[str, bytes]:
     """Return the episodes in the content of replays.json as animated GIFs by title."""
-    from palaestra_trainer.reporting.film import animated  # noqa: PLC0415 - a run without recordings draws none
+    from palaestra_trainer.reporting.film import animated  # noqa: PLC0415 - few programs draw films
 
     return {replay.title: animated(replay) for replay in replays_of(content)}
 

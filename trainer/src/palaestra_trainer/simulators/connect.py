@@ -176,9 +176,10 @@ def _process(configuration: Configuration, entry: SimulatorConfiguration, run: P
     inside = run / "worlds" / Path(entry.world).name
     world = inside if inside.exists() else Path(entry.world)
     if not world.exists() or entry.driver == "command":
+        missing = f"the program of driver {entry.driver}" if world.exists() else f"the world {world}"
         raise ConfigurationError(
-            f"{entry.name}: {world} with driver {entry.driver} cannot be started on this machine; "
-            "copy the whole run directory, or evaluate in the pod"
+            f"{entry.name}: {missing} is not on this machine; copy the whole run directory, or evaluate in "
+            "the pod"
         )
     names = (
         f"--job={configuration.job}",

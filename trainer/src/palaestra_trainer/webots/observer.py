@@ -111,7 +111,7 @@ class Observer:
         position = at.position.x, at.position.y, at.position.z
         rotation = turn.orientation.x, turn.orientation.y, turn.orientation.z, turn.orientation.w
         if not all(map(math.isfinite, (*position, *rotation))):
-            raise WrongData(self.node_name, f"the pose of {name} is {position}, {rotation}")
+            raise WrongData(self.node_name, f"the pose of {name} is not finite: {position}, {rotation}")
         return position, rotation
 
     def contact_points(self, name: str) -> tuple[Vector, ...]:

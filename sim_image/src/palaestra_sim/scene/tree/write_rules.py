@@ -33,7 +33,7 @@ _ACTING: Final = DEVICES.keys() | frozenset(
 # Fields that only people read. `name` is one of these fields, because a running controller has already read
 # the names of its devices.
 _FOR_PEOPLE: Final = frozenset(("description", "info", "model", "name", "recognitionColors", "title"))
-_ELSEWHERE: Final = "write it into the world file, or use driver webots"
+_ELSEWHERE: Final = "change the world file, or use driver webots"
 _HOLDING: Final = frozenset(("Group", "Pose", "Transform"))  # only the children of these nodes have an effect
 _PLACING: Final = frozenset(("translation", "rotation"))
 _SIZES: Final = {
