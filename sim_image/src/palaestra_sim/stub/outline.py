@@ -21,7 +21,8 @@ from palaestra_sim.stub.obstacles import Block, Disc, Hull
 
 _Z: Final = 2
 _ALONG_Z: Final = frozenset(("cylinder", "capsule"))
-# Maximum number of discs for one box. If a box is over eight times as long as wide, its discs have gaps.
+# Maximum number of discs for one box. If a box is over eight times as long as wide, its discs are
+# more than one radius apart.
 _MOST_DISCS: Final = 16
 
 
@@ -39,7 +40,8 @@ def discs_of_box(
     """Return discs that cover a box except its corners, and that do not extend beyond the box.
 
     The center of the box is at x, y; its length is along the heading. The discs are on the longer axis, at
-    most one radius apart. So the outline of a long side has dents of at most 7 % of the width.
+    most one radius apart if the box is at most eight times as long as wide. The outline of a long side then
+    has dents of at most 7 % of the width.
     """
     if width_m > length_m:
         return discs_of_box(x_m, y_m, heading_rad + math.pi / 2.0, width_m, length_m)

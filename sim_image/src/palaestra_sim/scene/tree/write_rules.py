@@ -34,7 +34,7 @@ _ACTING: Final = DEVICES.keys() | frozenset(
 # the names of its devices.
 _FOR_PEOPLE: Final = frozenset(("description", "info", "model", "name", "recognitionColors", "title"))
 _ELSEWHERE: Final = "change the world file, or use driver webots"
-_HOLDING: Final = frozenset(("Group", "Pose", "Transform"))  # only the children of these nodes have an effect
+_HOLDING: Final = frozenset(("Group", "Pose", "Transform"))  # these nodes act only through their children
 _PLACING: Final = frozenset(("translation", "rotation"))
 _SIZES: Final = {
     "Box": ("size",),

@@ -1,6 +1,6 @@
 """The progress of a run, in one object for all its readers.
 
-The training loop, the VecEnv and the evaluations report to the `Progress` object, each from its own thread.
+The training loop, the VecEnv and the evaluations report to the `Progress` object, from several threads.
 /status, /metrics, the log, the summary and the watchdog read the object.
 """
 
