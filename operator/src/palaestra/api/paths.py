@@ -39,7 +39,7 @@ def path_of(text: str) -> Path:
         name, index, key = found.groups()
         try:
             pieces.append(name or (int(index) if index else json.loads(key)))
-        except ValueError:  # the quoted key contains an escape that JSON does not define
+        except ValueError:  # the quoted key is not a JSON string, for example because of its escapes
             return ()
         at = found.end()
     return tuple(pieces)

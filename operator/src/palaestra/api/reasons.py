@@ -2,7 +2,7 @@
 
 from enum import StrEnum
 
-# Limit of every message, in characters. The API server has this limit for the message of an event.
+# Limit of every message, in characters. The API events.k8s.io/v1 has this limit for a note, in bytes.
 LONGEST_MESSAGE = 1024
 
 

@@ -59,8 +59,8 @@ def concerns(event: Mapping[str, Any], job: TrainingJob) -> bool:
     kind, name, uid = about.get("kind"), about.get("name", ""), about.get("uid")
     if kind == KIND:
         return name == job.metadata.name and uid in {None, job.metadata.uid}
-    # Kubernetes appends five characters to the name of a Job's pod. The plan appends ten hexadecimal digits
-    # to the name of a ConfigMap. The names of most claims end in the job's uid.
+    # A pod has the name of its Job, with five more characters at the end. The name of a ConfigMap ends in ten
+    # hexadecimal digits. The names of most claims end in the job's uid.
     ending = rf"[a-z0-9]{{5}}|[0-9a-f]{{10}}|{re.escape(job.metadata.uid or '')}"
     replica = rf"{re.escape(job.metadata.name)}-[0-9]+(-({ending}))?"
     claims = (

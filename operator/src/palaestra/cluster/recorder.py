@@ -22,7 +22,7 @@ from palaestra.objects import Object
 
 log = structlog.get_logger("palaestra.cluster")
 
-LONGEST_MESSAGE = 1024  # characters that an API server accepts
+LONGEST_MESSAGE = 1024  # characters; events.k8s.io/v1 has the same limit, in bytes
 LONGEST_NAME = 253
 REMEMBERED = 2048
 COMPONENT = "palaestra-operator"
@@ -78,13 +78,13 @@ class Recorder:
                 self._remember(name, 1)
             else:
                 self._again(event, count + 1)
-        except AlreadyExists:  # an earlier operator process has written the event
+        except AlreadyExists:  # another operator process wrote the event, or this one has forgotten its count
             if once:
                 self._remember(name, 1)
                 return
             found = self._api.get(EVENTS, namespace, name)
             self._again(event, int(found.get("count") or 1) + 1)
-        except NotFound:  # the API server deletes events after an hour
+        except NotFound:  # the API server has deleted the event, by default after an hour
             self._api.create(EVENTS, event)
             self._remember(name, 1)
 

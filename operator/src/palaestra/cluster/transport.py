@@ -192,7 +192,8 @@ class Transport:
         response = self._send(call, Timeout(connect=min(self.limits.connect_s, left_s), read=left_s))
         try:
             return self._answer(response, call, deadline)
-        except BaseException:  # after Ctrl-C too, the next request would read the rest of this response
+        except BaseException:  # also KeyboardInterrupt
+            # In an open connection, the next request would read the rest of this response.
             response.close()
             raise
         finally:

@@ -21,7 +21,7 @@ from palaestra.observe.models import JobEnd, JobView, PodView
 from palaestra_protocol.pod.status import ExitCode
 
 LAST_WORD_S = 30  # longest wait in seconds for the end of a pod, after the end of its Job
-# Finds the exit code in the Job's message if the pod was deleted.
+# This expression finds the exit code in a failed Job's message, in case the pod was deleted.
 _EXIT_CODE = re.compile(r"exit code (\d{1,3})\b")
 
 

@@ -30,8 +30,8 @@ from palaestra.local.run import RunOptions, run
 from palaestra_protocol.pod.status import ExitCode
 from palaestra_sim.errors import SimError
 
-# This process polls, because the kernel reports the end of a parent only through a pidfd, which some systems
-# lack.
+# Seconds between two checks whether the parent still runs. A pidfd would report the parent's end at once, but
+# some systems have no pidfd.
 PARENT_CHECK_S = 0.5
 
 
@@ -65,7 +65,7 @@ def main() -> int:
     """Run the request on standard input, and return the exit code of `palaestra run`."""
     request = ChildRequest.from_json(sys.stdin.buffer.read())
     sys.stdout = TextIOWrapper(BufferedWriter(LimitedFile(sys.stdout.fileno())), errors="replace")
-    # The other program has already ended, so another process is the parent.
+    # The program that started this process has already ended, so another process is the parent.
     if os.getppid() != request.process:
         return int(ExitCode.INTERRUPTED)
     Thread(target=_end_with, args=(request.control, request.process), daemon=True).start()

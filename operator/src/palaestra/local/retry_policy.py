@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
-IDLE_PODS = 5  # consecutive ignored pod failures without progress before the replica fails
+# Consecutive pods without progress after which an ignored failure fails the replica.
+IDLE_PODS = 5
 # The first wait before the next pod; the wait doubles as in Kubernetes, where it starts at 10 s.
 FIRST_WAIT_S = 1.0
 MOST_WAIT_S = 60.0

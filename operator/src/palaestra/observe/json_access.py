@@ -7,7 +7,7 @@ from typing import Any
 from palaestra.api.text import one_line
 
 MOST_TEXT = 600
-MOST_ITEMS = 128  # containers or conditions of a pod; a planned pod has at most 34 containers
+MOST_ITEMS = 128  # limit of any list; a planned pod has at most 34 init containers
 MOST_COUNT = 2_000_000_000  # the maximum of a count in a status
 
 

@@ -49,7 +49,7 @@ from palaestra.plan import GivenWorld
 
 RECHECK_S = 10.0  # seconds between two requests for an object that may be missing
 KUEUE = "kueue.x-k8s.io"
-KUEUE_S = 10.0  # seconds after which the operator requests again whether the cluster has Kueue
+KUEUE_S = 10.0  # seconds between two checks whether the cluster serves Kueue's API
 
 _READ = {
     ReferenceKind.CONFIG_MAP: CONFIG_MAPS,
@@ -204,8 +204,8 @@ class JobObserver:
         except Forbidden:
             if source.kind is not ReferenceKind.SECRET:
                 raise
-            # The operator has no permission to read Secrets in this namespace, so treat the Secret as one
-            # without the label.
+            # The operator has no permission to read Secrets in this namespace. So it treats the Secret like
+            # one without the label that opens it to jobs.
             return {}
 
     def _has_kueue(self) -> bool:

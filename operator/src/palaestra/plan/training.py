@@ -23,7 +23,7 @@ FILE = "training.yaml"
 LOOPBACK = "127.0.0.1"
 NEVER = Recycle(after_resets=0)
 DO_NOT_AGE = (Driver.STUB, Driver.MUJOCO)
-# Source: after this number of resets, the paper's simulator ended with a bus error.
+# Source: the paper in CITATION.cff, whose Webots ended with a bus error after this number of resets.
 AFTER_24_RESETS = Recycle(after_resets=24)
 
 
