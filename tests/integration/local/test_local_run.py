@@ -175,7 +175,7 @@ def test_ctrl_c_ends_with_75_says_how_to_go_on_and_leaves_no_process(desk, event
     out, _ = process.communicate(timeout=PATIENCE_S)
 
     assert process.returncode == 75
-    assert "interrupted; the same command starts its program again" in out
+    assert "interrupted; the same command starts the job's program again" in out
     assert not _processes_that_name(desk.folder)
     assert left_of(pids) == []
 
@@ -190,7 +190,7 @@ def test_a_second_ctrl_c_does_not_wait_for_the_trainer_and_leaves_no_process(des
     out, _ = process.communicate(timeout=PATIENCE_S)
 
     assert process.returncode == 130
-    assert "killed; the same command starts its program again" in out
+    assert "killed; the same command starts the job's program again" in out
     assert not _processes_that_name(desk.folder)
     assert left_of(pids) == []
 

@@ -181,7 +181,7 @@ def test_the_demo_plays_a_policy_until_it_is_interrupted(finished, tmp_path):
 
     assert code == 75, output
     assert " succeeded" in output
-    assert "interrupted; the same command starts its program again" in output
+    assert "interrupted; the same command starts the job's program again" in output
     assert "<title>" in page
     with pytest.raises(OSError, match="refused"):
         urllib.request.urlopen(address, timeout=5)

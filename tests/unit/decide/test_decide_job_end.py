@@ -62,7 +62,7 @@ def test_a_spent_backoff_limit_tells_of_the_last_failure(accepted, last_word):
     assert attempts == [1, 2, 3]
     assert scene.replica().reason == "BackoffLimitSpent"
     assert scene.replica().message == (
-        "3 pods failed, as many as backoffLimit allows; the last: exit code 70, Unexpected: error 3"
+        "3 pods failed, more than backoffLimit allows; the last: exit code 70, Unexpected: error 3"
     )
     assert scene.replica().restarts.trainer == 2
 

@@ -269,7 +269,7 @@ def test_an_ephemeral_run_is_named_in_a_condition(accepted):
     """A user who chose `ephemeral` by mistake must see that the run will be deleted."""
     scene = accepted(storage={"ephemeral": True})
 
-    assert scene.status.conditions[0].message.endswith("; the run is ephemeral and goes with its pod")
+    assert scene.status.conditions[0].message.endswith("; the run is ephemeral and is deleted with its pod")
 
 
 def test_each_action_and_each_change_is_one_event(make_scene):

@@ -74,7 +74,7 @@ def test_a_pod_refused_for_its_sizes_names_the_fields_that_set_them(accepted, wo
     scene.settle()
 
     assert scene.replica().message.endswith(
-        f"{words}; a new job sets {fields}, the chart sets jobs.resources for all jobs"
+        f"{words}; set {fields} in a new job, or jobs.resources in the chart for all jobs"
     )
 
 

@@ -191,8 +191,8 @@ NOTED = [
     ("callback: stable_baselines3.common.callbacks.EvalCallback", "set trainer.evaluation"),
     ("callback: rl_zoo3.callbacks.ParallelTrainCallback", "it needs Zoo's own training"),
     ("monitor_kwargs: \"dict(info_keywords=('is_success',))\"", "monitor_kwargs: left out; a run records"),
-    ('replay_buffer_kwargs: "dict(handle_timeout_termination=True)"', "a run does the same as with True"),
-    ('replay_buffer_kwargs: "dict(handle_timeout_termination=False)"', "left out; a run does as with True"),
+    ('replay_buffer_kwargs: "dict(handle_timeout_termination=True)"', "its value is True, as in the file"),
+    ('replay_buffer_kwargs: "dict(handle_timeout_termination=False)"', "its value is True, unlike"),
     (
         'replay_buffer_kwargs: "dict(size=1)"',
         "replay_buffer_kwargs.size: left out; the buffer of a run has no",

@@ -131,13 +131,13 @@ ROWS: dict[Reason, ReasonText] = {
     Reason.RUN_LOST: ReasonText(
         "{fact}; restore it, or run `palaestra restart {name}` to train from step 0 again",
         "the replica has trained, and its claim does not exist or its run directory is empty; the operator "
-        "suspends it and creates no new claim, because it would train from step 0",
+        "suspends the replica and creates no new claim, because the replica would train from step 0",
         "restore the claim under its name, or the run directory; after you have restored a run directory, or "
         "to train from step 0 again, run `palaestra restart NAME` ([a lost run](../howto/lost-run.md))",
     ),
     Reason.RUN_RESTARTED: ReasonText(
-        "the run that was at step {step} is lost; the replica begins with what its run directory holds, at "
-        "step 0 if that is empty, because the annotation palaestra.dev/restart-lost-runs asks for it",
+        "the run that was at step {step} is lost; the annotation palaestra.dev/restart-lost-runs was set, so "
+        "the replica resumes from its run directory, or starts at step 0 if the directory is empty",
         "a person gave a lost run up, or has restored it",
         "nothing",
         warning=False,
@@ -260,7 +260,7 @@ ROWS: dict[Reason, ReasonText] = {
         "update the node's Kubernetes",
         "the kubelet does not start the main container if a sidecar's first start failed (Kubernetes issue "
         "132826); the operator replaces the pod, at most `backoffLimit` times",
-        "update the nodes to 1.34 or newer",
+        "update the nodes to 1.34.3 or newer",
     ),
     Reason.START_TIMEOUT: ReasonText(
         "{what}",
@@ -320,7 +320,7 @@ ROWS: dict[Reason, ReasonText] = {
         "raise `activeDeadlineSeconds` before the end, or create a new TrainingJob",
     ),
     Reason.BACKOFF_LIMIT_SPENT: ReasonText(
-        "{pods} pods failed, as many as backoffLimit allows; the last: {how}",
+        "{pods} pods failed, more than backoffLimit allows; the last: {how}",
         "all retries failed",
         "read the message of the last failure and the trainer's log",
     ),
@@ -344,7 +344,7 @@ ROWS: dict[Reason, ReasonText] = {
         "the last good checkpoint is kept",
     ),
     Reason.NO_PROGRESS: ReasonText(
-        "{pods} consecutive pods were disrupted or interrupted without one new step; "
+        "{pods} pods were disrupted or interrupted since the last new step; "
         "use non-preemptible nodes, or save checkpoints more often",
         "as many pods as `noProgressLimit` ended without a new step: the cluster disrupts pods before they "
         "make progress, or the trainer always exits with 75",

@@ -12,8 +12,8 @@ COMPARE = """\
 Plays the policies of the run directories A and B on the same episodes, in the simulator that evaluates A's
 policy. Ends when the results show that one policy succeeds more often, or that the success rates differ by no
 more than --margin. No run uses the seeds of these episodes. Prints a line for each 20 episodes and a sentence
-at the end. The bounds are right after any number of episodes: at most one of 20 comparisons is wrong, even if
-you end a comparison early, or repeat it with more --episodes.
+at the end. After any number of episodes, the probability that the result is wrong is at most 5 %. This is
+true even if you end a comparison early, or repeat it with more --episodes.
 """
 EXIT_CODES = """\
 exit codes:

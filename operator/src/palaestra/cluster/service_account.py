@@ -30,7 +30,7 @@ def account(files: Path | None = None, clock: Callable[[], float] = time.monoton
     folder = files or FILES
     host, port = os.environ.get(HOST), os.environ.get(PORT)
     if not host or not port:
-        raise NotConfigured(f"{HOST} and {PORT} are not set, although a pod has both")
+        raise NotConfigured(f"{HOST} or {PORT} is not set, so this process does not run in a pod")
     authority = folder / "ca.crt"
     if not text_of(authority):
         raise NotConfigured(f"{authority} is missing or empty")

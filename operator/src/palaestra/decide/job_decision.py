@@ -34,7 +34,7 @@ from palaestra.decide.restart_counts import counted
 from palaestra.observe.json_access import MOST_COUNT
 from palaestra.observe.models import Observed, ReplicaObserved
 
-EPHEMERAL = "; the run is ephemeral and goes with its pod"
+EPHEMERAL = "; the run is ephemeral and is deleted with its pod"
 
 
 def decide(job: TrainingJob, observed: Observed, prepared: Prepared, times: Times) -> Decision:

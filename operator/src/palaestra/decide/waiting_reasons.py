@@ -255,7 +255,7 @@ def _remedy_of(words: str) -> str:
         fields = " and ".join(sorted({field for name in names if (field := _field(name))}))
     else:
         fields = _EVERY if _SIZES.search(words) is not None else ""
-    return f"; a new job sets {fields}, the chart sets jobs.resources for all jobs" if fields else ""
+    return f"; set {fields} in a new job, or jobs.resources in the chart for all jobs" if fields else ""
 
 
 def _field(container: str) -> str:

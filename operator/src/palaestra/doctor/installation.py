@@ -111,7 +111,7 @@ def operator_rights(site: Site) -> Iterator[CheckResult]:
     if unread:
         fact = f"service account {name} may not {', '.join(unread)} in {site.namespace}"
         yield warning(
-            what, f"{fact}; the status of a queued job does not explain why Kueue does not admit it", ROLES
+            what, f"{fact}, so the status of a queued job does not explain why Kueue does not admit it", ROLES
         )
     if not denied and not unread:
         yield right(what, f"suffice in {site.namespace}")

@@ -96,9 +96,9 @@ def uses(run_directory: Path) -> tuple[str, ...]:
     report = run_directory / "report.html"
     ways = {
         "report": str(report) if report.exists() else "",
-        "look at it": typed("tensorboard", "--logdir", curves) if curves.exists() else "",
+        "see the curves": typed("tensorboard", "--logdir", curves) if curves.exists() else "",
         "try the policy": typed("palaestra-eval", run_directory) if measurable else "",
-        "take it along": typed("palaestra", "export", run_directory, "--to", "onnx") if measurable else "",
+        "export it": typed("palaestra", "export", run_directory, "--to", "onnx") if measurable else "",
     }
     return _lines(ways)
 

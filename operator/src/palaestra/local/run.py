@@ -180,7 +180,7 @@ def _say_readable(line: str) -> None:
 def _tell(outcome: RunOutcome, path: Path, *, built_in: bool) -> None:
     if outcome.exit_code in {ExitCode.INTERRUPTED, KILLED} and not built_in:
         ended = "killed" if outcome.exit_code == KILLED else "interrupted"
-        say(f"{ended}; the same command starts its program again")
+        say(f"{ended}; the same command starts the job's program again")
     elif outcome.exit_code == ExitCode.INTERRUPTED:
         place = "before it trained" if outcome.steps is None else f"at step {outcome.steps}"
         after = "there" if outcome.saved in {None, outcome.steps} else f"step {outcome.saved}"

@@ -27,13 +27,13 @@ JOBS = gauge(
 )
 REPLICAS_WAITING = gauge(
     "palaestra_replicas_waiting",
-    "Replicas that wait before a training or another attempt of it, by the reason in their status.",
+    "Replicas that wait for the start of an attempt, by the reason in their status.",
     Label(name="job_namespace", bound="namespace with jobs"),
     Label(name="reason", values=WAITING),
 )
 TIME_TO_RUNNING = histogram(
     "palaestra_job_time_to_running_seconds",
-    "Time from a TrainingJob's creation until it first ran, with the queue and the images.",
+    "Time from a TrainingJob's creation until it first ran, including the waits for queue and images.",
     WAITS,
 )
 RESTARTS = counter(

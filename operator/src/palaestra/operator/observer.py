@@ -153,7 +153,7 @@ class JobObserver:
         except NotFound:
             found = None
         if found is None or found["metadata"]["resourceVersion"] != metadata["resourceVersion"]:
-            raise Outdated("the caches are older than the cluster, so nothing was planned")
+            raise Outdated("the cached TrainingJob differs from the cluster's, so nothing was planned")
         return found
 
     def forget(self, key: Key) -> None:

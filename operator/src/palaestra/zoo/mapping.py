@@ -118,7 +118,7 @@ def _policy_arguments(draft: Draft, value: Any) -> None:
             del arguments["net_arch"]
             draft.note(
                 "policy_kwargs.net_arch",
-                "left out; Stable-Baselines3 has no layers that policy and value share since 1.8; "
+                "left out; since 1.8, Stable-Baselines3 has no layers that policy and value share; "
                 "write {pi: [...], vf: [...]}",
             )
     if arguments:
@@ -166,9 +166,9 @@ def _buffer_option(draft: Draft, word: str, option: Any) -> None:
     if name not in _BUFFER_OPTIONS:
         draft.note(word, "left out; the buffer of a run has no such option")
     elif option is _BUFFER_OPTIONS[name]:
-        draft.note(word, f"left out; a run does the same as with {option}")
+        draft.note(word, f"left out; in a run, its value is {option}, as in the file")
     else:
-        draft.note(word, f"left out; a run does as with {_BUFFER_OPTIONS[name]}")
+        draft.note(word, f"left out; in a run, its value is {_BUFFER_OPTIONS[name]}, unlike in the file")
 
 
 def _old_hindsight(word: str) -> Callable[[Draft, Any], None]:
