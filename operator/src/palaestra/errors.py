@@ -54,7 +54,7 @@
     ├── ZooError                     a file of RL-Baselines3-Zoo cannot be converted (zoo.hyperparameter_file)
     └── TrialFailed                  the trial's job did not succeed in time (smoke_test)
 
-A message names the field, the fact and the remedy: `spec.steps: 0 is less than 1; use 1 or more`.
+A message names the field, the fact and the remedy: `spec.trainer.steps: 0 is less than 1; use 1 or more`.
 """
 
 

@@ -1,7 +1,7 @@
 """The TrainingJob: its models, its validation, and the files that are generated from the models.
 
 The models are the only source: the CustomResourceDefinition, its rules and the reference page are generated
-from them. No module here uses a cluster, a file or a clock.
+from them. No module here uses a cluster or a clock, and only `generated_files` reads files.
 """
 
 from palaestra.api.job import API_VERSION, KIND, Metadata, Spec, TrainingJob

@@ -203,7 +203,7 @@ class Spec(ApiModel):
 
     @property
     def most_fruitless(self) -> int:
-        """Return the limit of consecutive interrupted pods without a new step; 0: no limit."""
+        """Return the limit of disrupted or interrupted pods since the last new step; 0: no limit."""
         return FRUITLESS_PODS if self.no_progress_limit is None else self.no_progress_limit
 
     rules = (

@@ -1,9 +1,8 @@
 """The pod that reads the volume of a run after the run's own pod has ended.
 
-This module is pure. The pod is built from the template of the replica's Job in the cluster. So the reader pod
-has the same security context, scheduling, pull secrets and trainer image as the run's pods. The pod mounts
-the volume read-only and has no service account token. Kubernetes ends the pod at its deadline, also without a
-deletion.
+This module is pure. The reader pod's spec takes the security context, the scheduling, the pull secrets and
+the trainer's image from the pod template of the replica's Job. The reader pod mounts the volume read-only and
+has no service account token. Kubernetes ends it at its deadline, even if the client does not delete it.
 """
 
 import copy
@@ -54,8 +53,8 @@ def reading_pod(job: TrainingJob, template: Mapping[str, Any], name: str, lives_
 def _reader(template: Mapping[str, Any], lives_s: int) -> dict[str, Any]:
     """Return the container: the trainer's image and security context, with only the run mounted, read-only.
 
-    The container has the resources of the ROS master's container. These are small, and the namespace's quotas
-    have admitted them before.
+    The container has the resources of the ROS master's container. These resources are small, and the
+    namespace's quotas have admitted them before.
     """
     trainer = trainer_of(template)
     [master] = (each for each in template["spec"]["initContainers"] if each["name"] == ROS_MASTER)

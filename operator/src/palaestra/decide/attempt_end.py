@@ -97,7 +97,7 @@ def replaced(attempt: EndedAttempt) -> Explanation | None:
 
 
 def disrupted(attempt: EndedAttempt) -> Explanation | None:
-    """The cluster interrupted the pod; a condition of the pod has the cause."""
+    """The cluster disrupted the pod; a condition of the pod has the cause."""
     if attempt.pod is None or not attempt.pod.disruption:
         return None
     return _disrupted(attempt, attempt.pod.disruption)

@@ -45,7 +45,7 @@ def image_name_is_invalid(situation: ReplicaContext) -> Finding | None:
 
 
 def no_progress(situation: ReplicaContext) -> Finding | None:
-    """The replica's pods are interrupted repeatedly without progress; Kubernetes does not limit this."""
+    """Pods of the replica end early too often without a new step; Kubernetes has no limit of its own."""
     limit = situation.job.spec.most_fruitless
     pods = situation.counted.fruitless + _taken_and_not_replaced(situation)
     if limit == 0 or pods < limit:
@@ -92,9 +92,10 @@ def _is_past_its_start(situation: ReplicaContext) -> bool:
 
 
 def _taken_and_not_replaced(situation: ReplicaContext) -> bool:
-    """Return whether the newest pod was interrupted, and the Job has not created the next pod yet.
+    """Return whether the newest pod ended early, and the Job has not created the next pod yet.
 
-    Kubernetes doubles the wait for the next pod each time, so the interrupted pod is counted at once.
+    A pod ends early if it is disrupted or interrupted. Kubernetes doubles the wait for the next pod each time,
+    so the ended pod is counted at once.
     """
     pod = situation.seen.pod
     if pod is None or not situation.counted.furthest_step or mark_of(situation, pod) is not None:

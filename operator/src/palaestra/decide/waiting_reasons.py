@@ -167,7 +167,7 @@ def pod_filled_its_storage(situation: ReplicaContext) -> Finding | None:
 
 
 def pod_was_taken(situation: ReplicaContext) -> Finding | None:
-    """The newest pod was interrupted, and the next pod does not exist yet."""
+    """The newest pod was disrupted or interrupted, and the next pod does not exist yet."""
     pod = situation.seen.pod
     if pod is None or pod.phase != "Failed" or failed_by_itself(pod):
         return None

@@ -1,7 +1,7 @@
 """Trim an object for a cache to the fields that `observe` reads.
 
-The pod template and the managedFields are most of an object's size, but two hundred jobs with their pods must
-fit into little memory. The observation of trimmed objects equals the observation of whole objects.
+The pod template and the managedFields are most of an object's size. Without them, two hundred jobs with their
+pods fit into little memory. The observation of trimmed objects equals the observation of whole objects.
 """
 
 import json

@@ -1,9 +1,9 @@
 """Delete the claims of deleted TrainingJobs, if no volume was ever bound to them.
 
-A claim outlives its TrainingJob because its volume stores the run. A claim that was never bound stores no
-run, but counts against quotas forever. A claim has no owner, so the garbage collector does not delete it. A
-claim could have an owner reference until it is bound. But if the operator did not remove this reference in
-time, the garbage collector would delete the run together with the job.
+With `retain: Keep`, a claim outlives its TrainingJob, because its volume stores the run. Such a claim has no
+owner, so the garbage collector does not delete it. If it was never bound, it stores no run, but counts
+against quotas forever. A claim could have an owner reference until it is bound. But if the operator did not
+remove this reference in time, the garbage collector would delete the run together with the job.
 """
 
 import structlog

@@ -1,7 +1,7 @@
 """Threads that take keys from the queue and reconcile them; only one thread at a time has a key.
 
-An object that causes errors does not delay other objects. After an error, a worker logs and counts the key
-and retries it with growing pauses. Meanwhile the workers reconcile the other keys.
+An object that causes errors does not delay other objects. After an error, a worker logs the error, and
+retries the key after a pause that grows with each failure. Meanwhile the workers reconcile the other keys.
 """
 
 import threading
