@@ -1,7 +1,8 @@
 """Option names of other projects, and the TrainingJob fields that replace them.
 
-A user may write such a name as a field of a job, which the operator checks, or as a hyperparameter, which the
-trainer checks. Both print the remedy from this table.
+A user may write such a name as a field of a job or as a hyperparameter. The operator and the command line
+check the fields, and the trainer checks the hyperparameters. Each error message has a remedy from
+this table.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """The HTTP server of operator, trainer and sidecar.
 
 A table maps methods and paths to functions (`Routes`). Each connection carries one request. If a request is
-not complete at its deadline, or is too long, the server closes the connection without a response. The number
-of connections is limited, as `connection_limits` describes.
+not complete at its deadline, or has more than MOST_REQUEST_BYTES, the server closes the connection without a
+response. The number of connections is limited, as `connection_limits` describes.
 
 Errors are JSON: {"error": "<field>: <fact>"}. The status is 404 for an unknown path, 405 for a wrong method,
 411 for a POST without Content-Length and 413 for a body that is too long. Requests are not logged, because

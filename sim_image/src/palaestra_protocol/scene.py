@@ -85,7 +85,8 @@ class Triangles:
         flat = _numbers(fields, "points", 3 * MOST_POINTS)
         corners = fields.parts("triangles", _index, 3 * MOST_TRIANGLES)
         if len(flat) % 3 or len(corners) % 3:
-            raise ProtocolError(f"{path or 'body'}: the number of points or triangles is not a multiple of 3")
+            fact = "the number of coordinates or corners is not a multiple of 3"
+            raise ProtocolError(f"{path or 'body'}: {fact}")
         if corners and max(corners) >= len(flat) // 3:
             raise fields.error("triangles", "refers to a point that does not exist")
         return cls(

@@ -86,7 +86,7 @@ def test_a_number_that_is_not_finite_is_written_as_none() -> None:
     ("changes", "message"),
     [
         ({"nodes": [FLOOR.to_json()] * 2}, "body.nodes: two nodes have the same name"),
-        ({"meshes": [{"points": [0.0], "triangles": []}]}, "meshes[0]: the number of points or triangles"),
+        ({"meshes": [{"points": [0.0], "triangles": []}]}, "meshes[0]: the number of coordinates or corners"),
         (
             {"meshes": [{"points": [0.0] * 3, "triangles": [0, 0, 1]}]},
             "meshes[0].triangles: refers to a point",

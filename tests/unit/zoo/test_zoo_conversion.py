@@ -208,7 +208,7 @@ NOTED = [
     ("learning_rate: const_0.1", "learning_rate: const_0.1 falls linearly to 0, as in Zoo"),
     (
         'policy_kwargs: "dict(net_arch=[64, dict(pi=[8])])"',
-        "policy_kwargs.net_arch: left out; Stable-Baselines3",
+        "policy_kwargs.net_arch: left out; since 1.8, Stable",
     ),
     ('policy_kwargs: "dict(a=Own, gamma=1)"', "policy_kwargs.a: left out; Own does not name a module"),
     ('policy_kwargs: "open(1)"', "policy_kwargs: left out; open(1) is not a mapping"),

@@ -94,8 +94,8 @@ def _is_past_its_start(situation: ReplicaContext) -> bool:
 def _taken_and_not_replaced(situation: ReplicaContext) -> bool:
     """Return whether the newest pod ended early, and the Job has not created the next pod yet.
 
-    A pod ends early if it is disrupted or interrupted. Kubernetes doubles the wait for the next pod each time,
-    so the ended pod is counted at once.
+    A pod ends early if it is disrupted or interrupted. Kubernetes doubles the wait for the next pod each
+    time, so the ended pod is counted at once.
     """
     pod = situation.seen.pod
     if pod is None or not situation.counted.furthest_step or mark_of(situation, pod) is not None:

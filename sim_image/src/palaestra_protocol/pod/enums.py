@@ -11,7 +11,7 @@ class ExitCode(IntEnum):
 
     - DONE: the run is complete.
     - CONFIGURATION: the configuration is wrong; do not retry.
-    - INTERRUPTED: a signal ended the trainer, which saved a checkpoint first.
+    - INTERRUPTED: a signal ended the trainer, or no ROS master responded; retry.
     - FAULT_BUDGET: a simulator failed too often; do not retry.
     - DIVERGED: the learner diverged; do not retry.
     - STALLED: no environment step completed for too long; retry.
