@@ -108,7 +108,7 @@ SENTENCES = [
      "use letters, digits, '-', '_' and '.', no '/'")),
     ({"trainer.initialPolicy": {"claim": "a", "path": "../b/model.zip"}},
      ('spec.trainer.initialPolicy.path: "../b/model.zip" is not the path of a model.zip; give an absolute '
-     "path, or with a claim a path on it, without hidden folders and `..`")),
+     "path; with a claim, give a path on the claim, without hidden folders and `..`")),
     ({"trainer.image": "my image"},
      'spec.trainer.image: "my image" is not an image; write it as registry/name:tag'),
     ({"managedBy": "me"},
@@ -126,7 +126,7 @@ SENTENCES = [
     ({"scheduling.podAnnotations": {"note": LONG}},
      "spec.scheduling.podAnnotations.note: is longer than 1024 characters; shorten it"),
     ({"trainer.environment.options": {"a": json.loads("[" * 17 + "]" * 17)}},
-     "spec.trainer.environment.options: is nested deeper than 16; flatten it"),
+     "spec.trainer.environment.options: is nested deeper than 16 levels; flatten it"),
     ({"trainer.environment.options": {"a": list(range(1000))}},
      "spec.trainer.environment.options: contains more than 1000 values; shorten it"),
     ({"trainer.environment.options": {"a": "x" * 5000}},

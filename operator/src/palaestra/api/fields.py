@@ -82,7 +82,7 @@ PATTERNS: dict[str, tuple[str, str]] = {
     CLASS_NAME: ("the name of a class", "write it as module:Class"),
     POLICY_FILE: (
         "the path of a model.zip",
-        "give an absolute path, or with a claim a path on it, without hidden folders and `..`",
+        "give an absolute path; with a claim, give a path on the claim, without hidden folders and `..`",
     ),
     ENVIRONMENT_ID: (
         "the id of an environment",
@@ -203,7 +203,9 @@ _MOST_VALUES = 1000
 def _plain(value: object, depth: int) -> int:
     """Return the number of values in `value`; raise an error for a value that JSON cannot represent."""
     if depth > _DEEPEST:
-        raise PydanticCustomError("free", "is nested deeper than {most}; flatten it", {"most": _DEEPEST})
+        raise PydanticCustomError(
+            "free", "is nested deeper than {most} levels; flatten it", {"most": _DEEPEST}
+        )
     if isinstance(value, dict):
         if not all(isinstance(key, str) for key in value):
             raise PydanticCustomError("free", "has a key that is not text; quote it")

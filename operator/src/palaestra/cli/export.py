@@ -10,8 +10,8 @@ from palaestra.local.trainer_program import run_program
 
 PROGRAM = "palaestra-export"
 EXPORT = """\
-Writes the best policy of the run directory RUN as one file, for programs without Palaestra or PyTorch. With
-the observation as the environment returned it, the file returns the action that the environment takes. The
+Writes the best policy of the run directory RUN as one file, for programs without Palaestra or PyTorch. For
+an observation as the environment returns it, the file returns the action as the environment takes it. The
 file is written only if it returns the actions of the policy for 1,000 observations. It contains a data sheet
 of observations and actions, and the environment, steps and success of the run. Export only runs that you
 trust.

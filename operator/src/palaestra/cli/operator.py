@@ -63,7 +63,7 @@ def add(commands: Commands) -> None:
         "--metrics-address",
         metavar="HOST:PORT",
         default="0.0.0.0:8080",
-        help="address of /healthz, /readyz and /metrics; default: 0.0.0.0:8080, every address, also of IPv6",
+        help="address of /healthz, /readyz and /metrics; default: 0.0.0.0:8080, every IPv4 and IPv6 address",
     )
     _add_cluster(parser)
     _add_pods(parser)

@@ -79,7 +79,7 @@ def _environments(draft: Draft, value: Any) -> None:
         draft.note(
             "n_envs",
             f"{value} became {MOST_COLLECTING}, because a pod has at most 32 simulators and one evaluates; "
-            "a rollout of n_steps is shorter in the same proportion",
+            "a rollout has n_steps rows of each simulator, so it is shorter in the same proportion",
         )
 
 
@@ -219,7 +219,9 @@ def _callbacks(draft: Draft, value: Any) -> None:
         if reason := _CALLBACKS.get(last):
             draft.note("callback", f"{name} is left out; {reason}")
         elif module.startswith("rl_zoo3"):
-            draft.note("callback", f"{name} is left out; it needs Zoo's own training; write one of your own")
+            draft.note(
+                "callback", f"{name} is left out; it needs Zoo's own training; write a callback of your own"
+            )
         else:
             callback: dict[str, Any] = {"name": _as_class(name)}
             draft.algorithm.setdefault("callbacks", []).append(
