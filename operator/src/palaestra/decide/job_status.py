@@ -86,7 +86,7 @@ def started(old: Status, observed: Observed) -> datetime | None:
 
 
 def columns(job: TrainingJob, replicas: Sequence[ReplicaStatus]) -> dict[str, Any]:
-    """Return the columns of `kubectl get tj`; each column has the worst value among the replicas."""
+    """Return the columns of `kubectl get tj`; each figure is the worst value among the replicas."""
     up = sum(replica.phase in {Phase.RUNNING, Phase.SUCCEEDED} for replica in replicas)
     steps = [replica.step for replica in replicas if replica.step is not None]
     saved = [replica.last_checkpoint.time for replica in replicas if replica.last_checkpoint is not None]

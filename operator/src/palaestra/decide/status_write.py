@@ -24,7 +24,7 @@ from palaestra.observe.json_access import part, text
 PROGRESS_EVERY_S = 30
 _WITH_OTHERS = frozenset({"activeSeconds", "activeSince"})  # written together with other changes, never alone
 _OF_JOB = frozenset({"lastCheckpointTime", "leftOut", "nodes", "step", "successRate"})
-_FIRST = frozenset(  # fields that are never removed from the status after their first value
+_FIRST = frozenset(  # a first value of these fields is written at once; later values count as progress
     {"step", "target", "successRate", "successInterval", "lastCheckpoint"}
 )
 _OF_REPLICA = frozenset(

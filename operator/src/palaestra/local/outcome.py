@@ -62,7 +62,7 @@ class RunOutcome:
 
     @classmethod
     def of(cls, run_directory: Path) -> Self | None:
-        """Return the result of the run in this directory; None if the run has not ended, or was killed."""
+        """Return the result of the run in this directory; None if its runner has not ended, or was killed."""
         try:
             return cls(**json.loads((run_directory / FILE).read_bytes()))
         except (OSError, ValueError, TypeError):  # the file is missing, or another program wrote it
