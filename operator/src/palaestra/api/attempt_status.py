@@ -21,7 +21,7 @@ class Fault(StatusModel):
     """One fault of one simulator."""
 
     time: datetime = Field(strict=False)
-    """Time at which the trainer detected it."""
+    """Time at which the trainer detected the fault."""
 
     simulator: Word
     """Group and number: `collect-0`."""
@@ -33,7 +33,7 @@ class Fault(StatusModel):
     """Description of the fault, in a sentence."""
 
     step: Count
-    """Environment steps trained at that time."""
+    """Environment steps trained when the trainer detected the fault."""
 
 
 class LastAttempt(StatusModel):
@@ -43,48 +43,50 @@ class LastAttempt(StatusModel):
     """Number of the attempt, from 1."""
 
     exit_code: Count | None = None
-    """Exit code of the trainer; absent: unknown, for example because its node was lost."""
+    """Exit code of the trainer; absent: unknown, for example because the pod's node was lost."""
 
     reason: Word
-    """Reason for its end, in one word: `Disrupted`, `SimulatorBudgetSpent`, `Succeeded`, ..."""
+    """Reason for the end of the attempt, in one word: `Disrupted`, `SimulatorBudgetSpent`, `Succeeded`,
+    ..."""
 
     message: Sentence
-    """Reason for its end, in a sentence for people."""
+    """Reason for the end of the attempt, in a sentence for people."""
 
     log: Annotated[Listed[Line], Field(max_length=MOST_LINES)] = ()
     """Last lines of the trainer's log, the newest last, each truncated to 200 characters."""
 
     faults: Annotated[Listed[Fault], Field(max_length=MOST_FAULTS)] = ()
-    """Last faults of its simulators, the newest last."""
+    """Last faults of the attempt's simulators, the newest last."""
 
     restarts: Count = 0
-    """Restarts of simulators after a fault."""
+    """Number of restarts of simulators after faults in this attempt."""
 
 
 class Faults(StatusModel):
     """Number of simulator faults by kind, and of slow steps, over all attempts."""
 
     dead: Count = 0
-    """Refused or closed connections."""
+    """Faults in which a simulator refused or closed a connection."""
 
     hung: Count = 0
-    """Timeouts."""
+    """Faults in which a simulator did not respond in time."""
 
     slow: Count = 0
-    """Steps that took more than ten times as long as usual; they are not faults and cause no restart."""
+    """Steps that took more than ten times as long as usual and more than 50 ms. Slow steps are not faults and
+    cause no restart."""
 
     wrong_data: Count = 0
-    """Invalid answers."""
+    """Faults in which a simulator sent wrong data."""
 
 
 class Goodput(StatusModel):
     """Time of the trainer by activity, over all attempts, in whole seconds."""
 
     stepping: Seconds = 0
-    """Seconds in which training waited for simulators to compute a step."""
+    """Seconds in which the training thread waited for simulators to compute a step."""
 
     transport: Seconds = 0
-    """Seconds of steps spent on requests, responses and the environment's code."""
+    """Seconds that steps took in addition, for requests, responses and the environment's code."""
 
     learning: Seconds = 0
     """Seconds spent in the algorithm."""
@@ -99,11 +101,12 @@ class Goodput(StatusModel):
     """Seconds before the first step of each attempt."""
 
     recovering: Seconds = 0
-    """Seconds in which every simulator was broken, or a resumed run restored its simulators to the state at
-    the checkpoint."""
+    """Seconds in which training waited because no simulator could step, or for a step that ended with a
+    fault; and seconds in which a resumed run restored its simulators to the state at the checkpoint."""
 
     recycling: Seconds = 0
-    """Seconds in which training waited for a healthy simulator to restart, as `recycle` schedules it."""
+    """Seconds in which training waited for the restart of a healthy simulator that had reached a limit of
+    `recycle`."""
 
 
 class MemoryKills(StatusModel):
@@ -116,7 +119,8 @@ class MemoryKills(StatusModel):
     """Number of kills that the operator observed, over all attempts."""
 
     limit: Word | None = None
-    """Memory limit of the container, as `512Mi`; absent: it has no limit, so its node ran out of memory."""
+    """Memory limit of the container, as `512Mi`; absent: the container has no limit, so its node ran out of
+    memory."""
 
     last: datetime = Field(strict=False)
     """Time of the last kill, by the node's clock."""
@@ -125,4 +129,5 @@ class MemoryKills(StatusModel):
     """UID of the pod of the last kill; absent: the status had no room for it."""
 
     run: Count | None = None
-    """Number of the container's run that was killed last in that pod, from 0; absent if `pod` is absent."""
+    """Number of restarts that the container had in that pod before the last kill; absent if `pod` is
+    absent."""

@@ -68,10 +68,10 @@ class Resources(ApiModel):
     """CPU, memory and devices of one container, as in a pod."""
 
     requests: Quantities = Field(default={})
-    """Resource requests of the container (`cpu`, `memory`, ...); default: Palaestra's own small
-    requests."""
+    """Resource requests of the container (`cpu`, `memory`, ...); default: those of the installation, or else
+    Palaestra's own small requests."""
 
     limits: Quantities = Field(default={})
-    """Resource limits of the container; the CPU limit also sets PyTorch's number of threads. If
-    only `requests` names CPU or memory, Palaestra's default limit stays, raised to the request if that is
-    more."""
+    """Resource limits of the container; the CPU limit also sets PyTorch's number of threads. If `requests`
+    names CPU or memory and `limits` does not, the default limit stays, or is raised to the request if the
+    request is larger."""

@@ -65,8 +65,8 @@ class Network(ApiModel):
     """Connections that the pods may open; a job cannot change which connections reach its pods."""
 
     egress: Egress = Field(default=Egress.OPEN, strict=False)
-    """`Open`: the pods may connect to anything. `Closed`: to nothing, not even to DNS; training needs no
-    connection."""
+    """`Open`: the pods may connect to anything. `Closed`: the pods may connect to nothing, not even to DNS;
+    the built-in loop needs no connection."""
 
 
 class Metadata(ApiModel):
@@ -82,7 +82,7 @@ class Metadata(ApiModel):
     """UID, set by the API server; absent in a job that was not applied to a cluster."""
 
     generation: Count | None = Field(default=None, exclude=True)
-    """Number of the spec's version, set by the API server."""
+    """Generation of the spec, set by the API server."""
 
     labels: Annotated[dict[str, Annotated[str, Field(max_length=63)]], Field(max_length=64)] = Field(
         default={}
@@ -117,7 +117,8 @@ class RosMaster(ApiModel):
     """The ROS master of a replica, and the container that copies the sidecar into images of your own."""
 
     resources: Resources = Resources()
-    """CPU and memory of each of the two containers, which do not run at the same time."""
+    """CPU and memory of the ROS master's container. With driver `command`, the container `install-sidecar`
+    has the same resources; it ends before the ROS master starts."""
 
 
 class Spec(ApiModel):
@@ -133,10 +134,10 @@ class Spec(ApiModel):
         SimulatorGroup(name="collect", role=Role.COLLECT),
         SimulatorGroup(name="evaluate", role=Role.EVALUATE),
     )
-    """Groups of simulators in each replica; at most 32 simulators in total."""
+    """Groups of simulators; a replica has all groups, with at most 32 simulators together."""
 
     ros_master: RosMaster | None = None
-    """The ROS master; absent: the resources that the installation or else Palaestra gives it."""
+    """Resources of the ROS master; absent: the installation's defaults, or else Palaestra's."""
 
     trainer: Trainer = Trainer()
     """The task, the algorithm and the length of training."""
@@ -149,34 +150,32 @@ class Spec(ApiModel):
     `palaestra run` refuses `true`."""
 
     backoff_limit: Annotated[int, Field(ge=0, le=100)] = 3
-    """Number of times that a replica's failed pod is retried: n retries, n + 1 pods. Disruptions by the
-    cluster are not counted."""
+    """Number of times that a failed pod of a replica is retried: n retries mean at most n + 1 failed pods.
+    Disruptions by the cluster are not counted."""
 
     active_deadline_seconds: Seconds | None = Field(default=None, json_schema_extra={MAY_CHANGE: True})
-    """Seconds that the job may be active, without suspended time; absent: no limit. `palaestra run`
-    applies the limit to each replica and starts counting again each time it is run."""
+    """Seconds that the job may be active, without suspended time; absent: no limit. `palaestra run` applies
+    the limit to each replica, and each run of the command starts counting at 0."""
 
     stall_deadline_seconds: Seconds = Field(default=600, json_schema_extra={MAY_CHANGE: True})
-    """Seconds without a training or evaluation step after which the trainer exits and is retried. The
-    trainer uses the value with which its replica was started. If a trainer still responds and its step count
-    has not changed for the current value plus two minutes, the operator replaces its pod, at most
-    `backoffLimit` times."""
+    """Seconds without a training or evaluation step after which the trainer exits and is retried. The trainer
+    uses the value with which its replica was started. If a trainer has taken no step for the current value
+    plus two minutes but still responds, the operator replaces its pod, at most `backoffLimit` times."""
 
     start_timeout_seconds: Seconds | None = Field(default=None, json_schema_extra={MAY_CHANGE: True})
-    """Seconds that a replica may wait for its first step, for example for an image or a node. After that
-    it fails with the reason for which it waited. Absent: 21,600. Time in a queue, suspended time, and time in
-    which the trainer and its simulators run are not counted. After the first step, only
-    `activeDeadlineSeconds` limits a wait. In each pod, the ROS master and the trainer may also take that long
-    from the start of their containers to their first answer, by the value with which the replica's Job was
-    created. `palaestra run` uses the field only for that answer, and allows at most
-    600."""
+    """Seconds that a replica may wait for its first step, for example for an image or a node. After that, the
+    replica fails with the reason for which it waited. Absent: 21,600. Time in a queue, suspended time, and
+    time in which the trainer and its simulators run are not counted. After the first step, only
+    `activeDeadlineSeconds` limits a wait. In each pod, this value also limits the seconds from the start of a
+    container to its first response, for the ROS master and for the trainer; a later change does not affect
+    this limit. `palaestra run` uses the field only for this limit, and allows at most 600."""
 
     no_progress_limit: Annotated[int, Field(ge=0, le=100)] | None = Field(
         default=None, json_schema_extra={MAY_CHANGE: True}
     )
-    """Consecutive pods that may be disrupted or interrupted without a new step before the replica fails.
-    Absent: 6; 0: no limit. Counting starts after the first reported step and includes only pods whose
-    trainer ran."""
+    """Number of pods without progress at which the replica fails: pods that were disrupted, or deleted with
+    time to save, since `furthestStep` in the status last rose. Absent: 6; 0: no limit. Counting starts after
+    the first reported step. Pods whose trainer never ran are not counted."""
 
     ttl_seconds_after_finished: Annotated[int, Field(ge=0, le=315_360_000)] | None = Field(
         default=None, json_schema_extra={MAY_CHANGE: True}
@@ -190,11 +189,11 @@ class Spec(ApiModel):
     """Network access of the pods."""
 
     image_pull_secrets: Annotated[NamedList[PullSecret], Field(max_length=8)] = ()
-    """Secrets for pulling the pod's images."""
+    """Secrets for pulling the images of the job's pods."""
 
     managed_by: Annotated[str, Field(min_length=1, max_length=63, pattern=QUALIFIED)] | None = None
-    """Controller that reconciles this job, as `example.com/name`; absent: Palaestra's operator, which
-    ignores jobs with any other value."""
+    """Controller that reconciles this job, as `example.com/name`; absent: `palaestra.dev/operator`, which is
+    Palaestra's operator. This operator ignores jobs with any other value."""
 
     @property
     def start_timeout_s(self) -> int:

@@ -31,7 +31,7 @@ class Toleration(ApiModel):
     """Key of the taint."""
 
     operator: TolerationOperator = Field(default=TolerationOperator.EQUAL, strict=False)
-    """`Exists`: any value. `Equal`: the value below."""
+    """`Exists` tolerates any value of the taint; `Equal` tolerates only `value`."""
 
     value: Annotated[str, Field(max_length=63)] | None = None
     """Value of the taint; absent with `Exists`."""
@@ -91,7 +91,8 @@ class Scheduling(ApiModel):
     """Queue, priority, nodes and metadata of the pods."""
 
     queue_name: ObjectName | None = None
-    """Kueue queue; Kueue then starts and suspends the job. Absent: the job starts without a queue."""
+    """Name of a LocalQueue of Kueue; Kueue then starts and suspends the job. Absent: the job starts without a
+    queue."""
 
     priority_class_name: ObjectName | None = None
     """Priority class of the pods, not one that begins with `system-`; absent: the cluster's default. The
@@ -105,18 +106,19 @@ class Scheduling(ApiModel):
     (`jobs.allowedTolerations`), unless the job requests an extended resource of that name."""
 
     affinity: FreeObject = Field(default={})
-    """Affinity of the pods, as in a pod. Terms about pods may select those of the job's own namespace, and a
-    required anti-affinity only pods of the job itself (`palaestra.dev/job: NAME`), unless the cluster's
-    installation allows more (`jobs.allowedAffinityNamespaces`, `jobs.allowedAntiAffinityLabels`)."""
+    """Affinity of the pods, in the format of a pod's spec. An affinity to other pods may select only pods in
+    the job's own namespace. A required anti-affinity may select only pods of the job itself
+    (`palaestra.dev/job: NAME`). The cluster's installation can allow more (`jobs.allowedAffinityNamespaces`,
+    `jobs.allowedAntiAffinityLabels`)."""
 
     runtime_class_name: ObjectName | None = None
     """Runtime class of the pods, such as `nvidia`; absent: the cluster's default. The cluster's installation
     must allow it (`jobs.allowedRuntimeClasses`)."""
 
     pod_labels: LabelMap = Field(default={})
-    """Additional pod labels. Each key needs a domain of yours, such as `example.com/team`, because Services
-    and NetworkPolicies of other users select pods by common labels. The cluster's installation must allow
-    each key (`jobs.allowedPodLabels`)."""
+    """Additional pod labels. Each key needs a domain of yours, such as `example.com/team`: Services and
+    NetworkPolicies of other users may select pods by a label without a domain. The cluster's installation
+    must allow each key (`jobs.allowedPodLabels`)."""
 
     pod_annotations: TextMap = Field(default={})
     """Additional pod annotations. The cluster's installation must allow each key

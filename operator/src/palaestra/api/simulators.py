@@ -62,7 +62,7 @@ class WorldSource(ApiModel):
 
     Every simulator runs its own copy. In the copy, only the `controllerArgs` of robots whose controller is
     `ros` change: `--name=` is set, `--synchronize` is added, and at most one simulator keeps `--clock`. A
-    model of MuJoCo has them in a text of `<custom>`.
+    model of MuJoCo has these arguments in `<text name="controllerArgs">` inside of `<custom>`.
     """
 
     inline: Annotated[str, Field(min_length=1, max_length=200_000)] | None = None
@@ -71,22 +71,24 @@ class WorldSource(ApiModel):
     use `kubectl apply --server-side`."""
 
     config_map: ConfigMapKey | None = None
-    """ConfigMap key with such a text; relative URLs are refused."""
+    """ConfigMap key whose value is the text of a world, as for `inline`; a world with relative URLs is
+    refused."""
 
     builtin: Builtin | None = Field(default=None, strict=False)
     """A world that ships with Palaestra. `arena`: four by four meters with four cylinders and a Robotino.
-    `seeing`: an arena without cylinders, with a red pole, and a Robotino with a color and a depth camera.
-    `court`: three by three meters with boxes and cylinders, and a TurtleBot3 Burger. `pen`: 1.2 by 0.8 meters
-    with two cylinders, and an e-puck."""
+    `seeing`: the same arena with a red pole, and a Robotino with a color and a depth camera; the cylinders
+    are under the floor until a task raises them. `court`: three by three meters with boxes and cylinders, and
+    a TurtleBot3 Burger. `pen`: 1.2 by 0.8 meters with two cylinders, and an e-puck."""
 
     file: Annotated[str, Field(max_length=1024, pattern=WORLD_FILE)] | None = None
     """Absolute path of a `.wbt` file, or of a model of MuJoCo (`.xml`), in the simulator's image (`palaestra
-    run`: on this machine). PROTOs, meshes and textures are next to it; the rest of its Webots project, such
-    as `controllers/`, is next to its folder."""
+    run`: on this machine). Put PROTOs, meshes and textures next to this file, and the rest of the Webots
+    project, such as `controllers/`, next to the file's folder."""
 
     root: Annotated[str, Field(max_length=1024, pattern=ABSOLUTE_FOLDER)] | None = None
-    """Absolute path of a folder above `file`, with all files that the world names. A model of MuJoCo that
-    names one outside, also by a link, is refused. Absent: the nearest folder that holds all of them."""
+    """Absolute path of a folder above `file` that contains all files to which the world refers. A world that
+    refers to a file outside of this folder is refused; a model of MuJoCo must not do so through a link
+    either. Absent: the nearest folder that contains all these files."""
 
     rules = (
         Rule(
@@ -142,8 +144,9 @@ class Restart(ApiModel):
     """How many times one simulator is restarted after faults."""
 
     limit: Annotated[int, Field(ge=0, le=1000)] = 10
-    """Restarts after faults within the window. One more fault ends the replica (exit code 80). If at least
-    `minSimulators` others are left, training continues without this simulator instead."""
+    """Number of restarts after faults within the window. If one more fault occurs, the replica fails (exit
+    code 80). If at least `minSimulators` other simulators of the group are left, training continues without
+    this simulator instead."""
 
     within_seconds: Seconds = 600
     """Length of the window in seconds."""
@@ -162,16 +165,17 @@ class SimulatorGroup(ApiModel):
     """Number of simulators of this group in each replica."""
 
     min_simulators: Annotated[int, Field(ge=1, le=16)] | None = None
-    """Number of simulators that training needs. Training starts when that many are ready, and continues
-    without a simulator that has used up its restarts while that many are left. Absent: all of them."""
+    """Number of simulators of this group that training needs. Training starts when that many are ready and
+    the first start of each simulator has succeeded or failed. If a simulator has used up its restarts,
+    training continues without it, as long as that many are left. Absent: `count`."""
 
     image: Image | None = None
     """Container image; absent: this release's image for the driver. `palaestra run` ignores it."""
 
     driver: Driver = Field(default=Driver.STUB, strict=False)
-    """`stub`: the simulator that ships with Palaestra, without masses and pictures. `mujoco`: MuJoCo, with
-    the same worlds, options and ROS interface. `webots`: Webots; Palaestra has no image for it yet, so set
-    `image` to your own. `command`: any program with the same ROS interface."""
+    """`stub`: Palaestra's own simulator, which simulates no masses and renders no pictures. `mujoco`: MuJoCo,
+    with the same worlds, options and ROS interface as the stub. `webots`: Webots; Palaestra has no image for
+    it yet, so set `image` to your own. `command`: any program with the same ROS interface."""
 
     command: Words = ()
     """Program and arguments, for driver `command` only."""
@@ -180,12 +184,12 @@ class SimulatorGroup(ApiModel):
     """World that the simulators load, from exactly one of four sources."""
 
     recycle: Recycle | None = None
-    """When a healthy simulator is restarted between two episodes; absent: after 24 resets. Absent with
-    driver `stub` or `mujoco`: never, because these neither leak memory nor slow down."""
+    """When a healthy simulator is restarted between two episodes; absent: after 24 resets. With driver `stub`
+    or `mujoco`, absent means never, because these simulators neither leak memory nor slow down."""
 
     standby: bool = False
-    """`true` runs a second simulator in the same container, which takes over at once when the first is
-    recycled or fails. The container then has twice the memory."""
+    """`true` runs a second simulator in the same container. The second simulator takes over at once when the
+    first one is recycled or fails. The container then has twice the memory."""
 
     options: Words = ()
     """Options for the simulator's command line, one word per item."""
@@ -195,14 +199,14 @@ class SimulatorGroup(ApiModel):
 
     start_deadline_seconds: Seconds = Field(default=60, json_schema_extra={MAY_CHANGE: True})
     """Seconds from the trainer's request to start a simulator until the trainer counts the start as failed.
-    Image pulls are not counted. The operator ends no pod because of it."""
+    Image pulls are not counted. The operator does not end a pod because of this deadline."""
 
     env: Environment = ()
     """Environment variables of the simulator's container."""
 
     resources: Resources = Resources()
-    """CPU and memory of one simulator; a standby doubles the memory. If memory is absent, the request is
-    160Mi, with driver `mujoco` 256Mi, and the limit is 2Gi."""
+    """CPU and memory of one simulator; a standby doubles the memory. If neither the job nor the installation
+    sets memory, the request is 160Mi (256Mi with driver `mujoco`) and the limit is 2Gi."""
 
     rules = (
         Rule(

@@ -64,10 +64,10 @@ class Condition(StatusModel):
     """`True`, `False` or `Unknown`."""
 
     reason: Word
-    """Reason, in one word for programs."""
+    """Reason for the state of the condition, in one word for programs."""
 
     message: Sentence
-    """Reason, in a sentence for people: the fact and the remedy."""
+    """Reason for the state of the condition, in a sentence for people: the fact and the remedy."""
 
     last_transition_time: datetime = Field(strict=False)
     """Time of the last change of `status`."""
@@ -107,9 +107,10 @@ class Restarts(StatusModel):
     """Pods replaced because the job was suspended and resumed."""
 
     operator: Count = 0
-    """Pods that the operator replaced because the kubelet does not recover them: `TrainerNotStarted`,
-    `RestartPolicyDropped`, `Stalled`; pods whose trainer a failed probe interrupted: `ProbeFailed`; and pods
-    that a container of others kept alive. At most `backoffLimit`."""
+    """Pods that the operator replaced because the kubelet does not repair them (`TrainerNotStarted`,
+    `RestartPolicyDropped`, `Stalled`); and pods whose trainer the kubelet ended because a probe failed
+    (`ProbeFailed`). Pods that a container of another program kept alive after the trainer's end count here
+    too. The count is at most `backoffLimit`."""
 
 
 class PodReference(StatusModel):
@@ -140,14 +141,14 @@ class LostRun(StatusModel):
     later attempt began."""
 
     step: Count
-    """Step of its newest checkpoint; without a checkpoint, the highest step."""
+    """Step of the run's newest checkpoint; without a checkpoint, the run's highest step."""
 
     pod: PodReference | None = None
     """Newest pod of the lost run; absent: none is known."""
 
     restarted: datetime | None = Field(default=None, strict=False)
-    """Time at which the operator let the replica begin again, because a person asked for it. Absent: the
-    replica waits for that."""
+    """Time at which the operator let the replica begin again, because a person set the annotation
+    `palaestra.dev/restart-lost-runs`. Absent: the replica waits for a person."""
 
 
 class SimulatorStatus(StatusModel):
@@ -169,13 +170,15 @@ class SimulatorStatus(StatusModel):
     """Last fault, in a sentence; absent: none in this attempt."""
 
     flapping: bool = False
-    """Whether it fails repeatedly."""
+    """Whether the simulator fails repeatedly: it was restarted after faults three times or more within
+    `restart.withinSeconds`. The value stays `true` for 600 seconds after the last of these restarts."""
 
     given_up: bool = False
-    """Whether its restarts are used up and training continues without it."""
+    """Whether the simulator has used up its restarts and training continues without it."""
 
     standby: Word | None = None
-    """State of its standby, `starting` or `ready`; absent: it has no standby."""
+    """State of the simulator's standby, `starting` or `ready`; absent: there is no standby, or the standby is
+    down."""
 
 
 class SuccessInterval(StatusModel):
@@ -188,7 +191,7 @@ class SuccessInterval(StatusModel):
     """Upper bound, 0 to 1."""
 
     episodes: Count
-    """Number of episodes."""
+    """Number of episodes from which the interval was computed."""
 
 
 class ReplicaStatus(StatusModel):
@@ -229,7 +232,7 @@ class ReplicaStatus(StatusModel):
     or the environment reports no success."""
 
     success_interval: SuccessInterval | None = None
-    """Interval of the true success rate; absent: `successRate` is absent."""
+    """Interval (Wilson, 95 %) for the true success rate of the policy; absent: `successRate` is absent."""
 
     mean_return: float | None = None
     """Mean return of recent training episodes; absent: no episode has ended yet."""
@@ -244,19 +247,20 @@ class ReplicaStatus(StatusModel):
     """Newest checkpoint; absent: none yet."""
 
     last_progress: datetime | None = Field(default=None, strict=False)
-    """Time of the last progress of `step` or of an evaluation, by the operator's clock. It is for people; no
+    """Time of the last step of training or evaluation, by the operator's clock. The field is for people; no
     timeout uses it. Absent: the current attempt has not started to train."""
 
     furthest_step: Count | None = None
-    """Highest step of all attempts. A new attempt resumes from the last checkpoint, which may be behind it.
+    """Highest step of all attempts. A new attempt resumes from the last checkpoint, whose step may be lower.
     Absent: not known yet."""
 
     fruitless: Count = 0
-    """Consecutive pods whose trainer ran and that were disrupted or interrupted without a step beyond
-    `furthestStep`; limited by `noProgressLimit`. Counting starts after the first reported step."""
+    """Number of pods that were disrupted, or deleted with time to save, since `furthestStep` last rose;
+    limited by `noProgressLimit`. Counting starts after the first reported step. Pods whose trainer never ran
+    are not counted."""
 
     simulator_restarts: Count = 0
-    """Restarts of simulators after a fault in the current attempt."""
+    """Number of restarts of simulators after faults in the current attempt."""
 
     restarts: Restarts = Restarts()
     """Restarts, by cause."""
@@ -271,14 +275,14 @@ class ReplicaStatus(StatusModel):
     """Faults of the simulators by kind, over all attempts; absent: not known yet."""
 
     goodput: Goodput | None = None
-    """Time spent by activity, in seconds; absent: not known yet."""
+    """Seconds that the trainer has spent on each activity, over all attempts; absent: not known yet."""
 
     steps_lost: Count | None = None
-    """Environment steps of episodes that a fault ended early, and steps repeated after an interruption, over
-    all attempts; absent: not known yet."""
+    """Environment steps that were lost, over all attempts: steps of episodes that a fault ended early, and
+    steps after the checkpoint from which an attempt resumed. Absent: not known yet."""
 
     lost: LostRun | None = None
-    """Run that the replica has lost last; absent: none."""
+    """The run that the replica lost last; absent: none."""
 
 
 class Release(StatusModel):
@@ -291,10 +295,10 @@ class Release(StatusModel):
     """Image of the stub simulator."""
 
     mujoco: Image
-    """Image of MuJoCo."""
+    """Image of the MuJoCo simulator."""
 
     webots: Image
-    """Image of Webots, which Palaestra does not build yet."""
+    """Image of Webots; Palaestra does not build this image yet."""
 
 
 class Status(StatusModel):
@@ -321,7 +325,7 @@ class Status(StatusModel):
         KNOWN_ITEMS,
     ] = ()
     """`Accepted`, `Running`, `Suspended`, `Succeeded` and `Failed`, each with its reason; `Reconciling` while
-    the job has not reached the state in its spec; `Stalled` if a person must act first."""
+    the job has not reached the state in its spec; `Stalled` if the job has failed or waits for a person."""
 
     start_time: datetime | None = Field(default=None, strict=False)
     """Time at which the first pod started, by its node's clock; absent: no pod has started."""
@@ -335,11 +339,12 @@ class Status(StatusModel):
     when another field changes."""
 
     active_since: datetime | None = Field(default=None, strict=False)
-    """Time at which `activeSeconds` was updated, by the operator's clock. Absent: the job is suspended, has
-    ended, or is not reconciled yet."""
+    """Time at which `activeSeconds` was updated, by the operator's clock. Absent: the job is not accepted
+    yet, is suspended, or has ended."""
 
     running: Word | None = None
-    """Replicas that run or have succeeded, of all replicas: `2/2`; absent: not reconciled yet."""
+    """Number of replicas that run or have succeeded, and number of all replicas, as `2/2`; absent: not
+    reconciled yet."""
 
     step: Count | None = None
     """Lowest step of all replicas; absent: not known yet."""
@@ -351,7 +356,7 @@ class Status(StatusModel):
     """Highest attempt of all replicas; absent: no pod yet."""
 
     restarts: Count | None = None
-    """Most failures of one replica's trainer, which count against `backoffLimit`; absent: none."""
+    """Highest number of a replica's pods that were replaced because the trainer failed; absent: none."""
 
     last_checkpoint_time: datetime | None = Field(default=None, strict=False)
     """Earliest of the times at which replicas saved their newest checkpoints; absent: no replica has one."""
@@ -364,9 +369,9 @@ class Status(StatusModel):
     none."""
 
     left_out: Words | None = None
-    """Nodes that the simulators leave out of their worlds because they cannot simulate them: a line for each
-    group and kind of node. Absent: none is reported. A program of the job's own (`trainer.command`) need not
-    report any."""
+    """Parts of the worlds that the simulators cannot simulate and have left out; each line begins with the
+    name of the group. Absent: none is reported; a program of the job's own (`trainer.command`) may not report
+    them."""
 
     replicas: Annotated[
         Listed[ReplicaStatus],

@@ -19,11 +19,12 @@ class Retain(StrEnum):
 class Storage(ApiModel):
     """The volume of a replica's run directory: a new claim, an existing claim, or an ephemeral volume.
 
-    `palaestra run` ignores it and keeps its runs in a folder.
+    `palaestra run` ignores these fields and keeps its runs in a folder.
     """
 
     size: Quantity = "1Gi"
-    """Size of the claim that the operator creates for each replica."""
+    """Size of the claim that the operator creates for each replica; with `ephemeral`, size limit of the
+    volume in the pod."""
 
     storage_class_name: ObjectName | None = None
     """Storage class of the claim; absent: the cluster's default."""
@@ -33,16 +34,18 @@ class Storage(ApiModel):
     `Delete`: the claim is deleted too."""
 
     ephemeral: bool = False
-    """`true` keeps the run in the pod, so it is deleted with the pod; a condition reports this."""
+    """`true` keeps the run in the pod, so the run is deleted with the pod; the condition `Accepted` reports
+    this."""
 
     existing_claim: ObjectName | None = None
     """Claim in the job's namespace with the label `palaestra.dev/for-jobs: "true"`; absent: the operator
     creates a claim for each replica. Several replicas on one claim need access mode ReadWriteMany."""
 
     resume_from: Annotated[str, Field(min_length=1, max_length=63, pattern=FOLDER)] | None = None
-    """Folder of another job's run on the existing claim; its name is the UID of that job. Each replica
-    resumes from the newest checkpoint of the replica with the same number and trains up to its own `steps`.
-    Algorithm and environment must be the same. Absent: training starts from the beginning."""
+    """Folder of another job's run on the existing claim; the name of the folder is the UID of that job. Each
+    replica resumes from the newest checkpoint of the replica with the same number and trains up to its own
+    `steps`. Both jobs must have the same algorithm and environment. Absent: training starts from the
+    beginning."""
 
     rules = (
         Rule(

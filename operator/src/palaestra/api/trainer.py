@@ -53,8 +53,8 @@ class EnvironmentWrapper(ApiModel):
     """A wrapper of gymnasium or of your own, derived from gymnasium.Wrapper."""
 
     name: Annotated[str, Field(min_length=1, max_length=256, pattern=CLASS_NAME)]
-    """Its class as `module:Class`, such as `gymnasium.wrappers:ClipAction`; the trainer must be able to
-    import the module."""
+    """Class of the wrapper as `module:Class`, such as `gymnasium.wrappers:ClipAction`; the trainer must be
+    able to import the module."""
 
     options: FreeObject = Field(default={})
     """Keyword arguments of the class."""
@@ -75,12 +75,13 @@ class Task(ApiModel):
     """Keyword arguments of the environment, as in `gymnasium.make`."""
 
     wrappers: Annotated[Listed[EnvironmentWrapper], Field(max_length=16)] | None = None
-    """Wrappers around the environment, the first one innermost. Their observations, actions and rewards are
-    those of training, evaluations and the exported policy."""
+    """Wrappers around the environment, the first one innermost. Training and evaluations use the wrapped
+    environment, and the exported policy has its observations and actions."""
 
     frame_stack: Annotated[int, Field(ge=2, le=64)] | None = None
-    """Number of newest observations that the policy gets as one, in the layout of Stable-Baselines3's
-    VecFrameStack, after all wrappers; absent: the newest only."""
+    """Number of newest observations that are stacked into one for the policy, in the layout of
+    Stable-Baselines3's VecFrameStack. The observations are stacked after all wrappers. Absent: the policy
+    gets the newest observation only."""
 
     guards = (NO_PASSWORD_IN_OPTIONS,)
 
@@ -132,7 +133,7 @@ class Callback(ApiModel):
     """A callback of your own, derived from Stable-Baselines3's BaseCallback."""
 
     name: Annotated[str, Field(min_length=1, max_length=256, pattern=CLASS_NAME)]
-    """Its class as `module:Class`; the trainer must be able to import the module."""
+    """Class of the callback as `module:Class`; the trainer must be able to import the module."""
 
     options: FreeObject = Field(default={})
     """Keyword arguments of the class."""
@@ -144,9 +145,10 @@ class Algorithm(ApiModel):
     """The learning algorithm."""
 
     name: Annotated[str, Field(min_length=1, max_length=256, pattern=ALGORITHM)] = "DQN"
-    """DQN, PPO, A2C, SAC, TD3 and DDPG are from Stable-Baselines3, QRDQN, TQC, TRPO, CrossQ, RecurrentPPO and
-    MaskablePPO from sb3-contrib; REINFORCE is Palaestra's. `module:Class` is a class that is compatible with
-    Stable-Baselines3. docs/reference/algorithms.md has the observations and actions that each takes."""
+    """From Stable-Baselines3: DQN, PPO, A2C, SAC, TD3 and DDPG. From sb3-contrib: QRDQN, TQC, TRPO, CrossQ,
+    RecurrentPPO and MaskablePPO. From Palaestra: REINFORCE. `module:Class` is a class of yours that is
+    compatible with Stable-Baselines3. docs/reference/algorithms.md lists the observations and actions that
+    each algorithm supports."""
 
     hyperparameters: FreeObject = Field(default={})
     """Keyword arguments of the algorithm's class, spelled as in Python (`learning_rate`, not
@@ -156,27 +158,28 @@ class Algorithm(ApiModel):
     """Normalization of observations and rewards; `{}`: both; absent: neither."""
 
     cnn: Cnn | None = Field(default=None, strict=False)
-    """Convolutional network for observations that are images. `small`: 16 and 32 channels and 128 units,
-    which trains about twice as fast; absent: Stable-Baselines3's NatureCNN."""
+    """Convolutional network for observations that are images. `small`: 16 and 32 channels and 128 units; this
+    network trains about twice as fast as NatureCNN. Absent: Stable-Baselines3's NatureCNN."""
 
     policy: Annotated[str, Field(min_length=1, max_length=256, pattern=POLICY)] | None = None
-    """Policy of the algorithm, such as MlpPolicy, or `module:Class`; absent: the one that fits the
-    observation."""
+    """Policy of the algorithm, such as MlpPolicy, or `module:Class`; absent: the policy that fits the
+    observation space."""
 
     callbacks: Annotated[Listed[Callback], Field(max_length=16)] | None = None
-    """Callbacks that are called at every step and rollout of the built-in loop, in this order."""
+    """Callbacks that the built-in loop calls at every step and rollout, in the order of this list."""
 
 
 class InitialPolicy(ApiModel):
     """The policy with which a new run begins, instead of random weights."""
 
     claim: ObjectName | None = None
-    """Claim in the job's namespace with the label `palaestra.dev/for-jobs: "true"`, mounted read-only;
-    absent: the file is in the trainer's image, or with `palaestra run` on this machine."""
+    """Claim in the job's namespace with the label `palaestra.dev/for-jobs: "true"`, mounted read-only.
+    Absent: the file is in the trainer's image (`palaestra run`: on this machine)."""
 
     path: Annotated[str, Field(min_length=1, max_length=1024, pattern=POLICY_FILE)]
-    """Path of a `model.zip`, on the claim or absolute; on a claim it may be `<job UID>/<replica>/model.zip`.
-    Only its tensors are read, so the policy's networks must be the same."""
+    """Path of a `model.zip`: relative to the claim, such as `<job UID>/<replica>/model.zip`, or absolute
+    without a claim. Only the tensors and the statistics of the normalization are read, so the file must have
+    the same networks as the job's policy."""
 
     rules = (
         Rule(
@@ -198,12 +201,13 @@ class Evaluation(ApiModel):
     """Episodes of one evaluation; every evaluation uses the same seeds."""
 
     stop_at_success_rate: Annotated[float, Field(gt=0, le=1)] | None = None
-    """Success rate, above 0 and up to 1, at which training ends early: an evaluation must reach it, and then
-    the confirmation of that evaluation. Absent: training runs for all `steps`."""
+    """Success rate, above 0 and up to 1, at which training ends early. An evaluation must reach this rate,
+    and then the confirmation of that evaluation must reach it too. Absent: training runs for all `steps`."""
 
     confirm_episodes: Annotated[int, Field(ge=0, le=10_000)] | None = None
-    """Episodes that confirm an evaluation that would end training, and the best evaluation at the end of
-    training. They use other seeds than evaluations do. 0: no confirmation; absent: 100."""
+    """Number of episodes of a confirmation: a policy is evaluated again with other seeds. The policy of an
+    evaluation that would end training is confirmed, and so is the best policy at the end of training. 0: no
+    confirmation; absent: 100."""
 
     rules = (
         Rule(
@@ -228,7 +232,7 @@ class Checkpoint(ApiModel):
     """Environment steps between two checkpoints; a checkpoint is saved at the end of a rollout."""
 
     keep: Annotated[int, Field(ge=1, le=100)] = 3
-    """Number of newest checkpoints that are kept."""
+    """Number of newest checkpoints that are kept; older checkpoints are deleted."""
 
 
 def _actions(trainer: "Trainer") -> str | None:
@@ -280,8 +284,8 @@ class Trainer(ApiModel):
     """How often a checkpoint is saved, and how many are kept."""
 
     initial_policy: InitialPolicy | None = None
-    """Policy with which a new run begins. A run that has a checkpoint resumes from that instead. Absent: the
-    weights are random."""
+    """Policy with which a new run begins. A run that has a checkpoint resumes from the checkpoint instead.
+    Absent: the weights are random."""
 
     command: Words = ()
     """Program and arguments that replace the built-in training loop; empty: the built-in loop."""
@@ -291,7 +295,8 @@ class Trainer(ApiModel):
 
     resources: Resources = Resources()
     """CPU, memory and GPUs of the trainer. If `limits` or `requests` name a GPU (`nvidia.com/gpu`,
-    `amd.com/gpu`) and the image's PyTorch finds it, the built-in loop trains on it; otherwise on the CPU."""
+    `amd.com/gpu`) and the image's PyTorch finds the GPU, the built-in loop trains on the GPU; otherwise it
+    trains on the CPU."""
 
     rules = (
         *(_needs(name, "continuous", "discrete") for name in ("SAC", "TD3", "DDPG", "TQC", "CrossQ")),
