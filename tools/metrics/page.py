@@ -71,19 +71,21 @@ def table(families: Sequence[Family]) -> str:
         f"| `{it.name}` | {_type(it)} | {'<br>'.join(map(_label, it.labels))} | {it.meaning} |"
         for it in families
     )
-    return "\n".join(("| metric | type | labels | what it tells |", "|---|---|---|---|", *rows, ""))
+    return "\n".join(("| metric | type | labels | meaning |", "|---|---|---|---|", *rows, ""))
 
 
 def cardinality() -> str:
     """Return the number of series in a large cluster, by program and in total."""
     rows = [f"| {it.name} | {it.series} | {it.count:,} | {it.series * it.count:,} |" for it in PROGRAMS]
     total = sum(it.series * it.count for it in PROGRAMS)
-    cluster = f"{JOBS:,} jobs that all run, of {REPLICAS} replicas with {SIMULATORS} simulators each"
+    cluster = (
+        f"{JOBS:,} running jobs with {REPLICAS} replicas each, and {SIMULATORS} simulators in each replica"
+    )
     return "\n".join(
         (
             f"{cluster}, in {NAMESPACES} namespaces:",
             "",
-            "| program | series of one, at most | programs | series |",
+            "| program | most series of one program | number of programs | most series |",
             "|---|---|---|---|",
             *rows,
             f"| all | | | {total:,} |",

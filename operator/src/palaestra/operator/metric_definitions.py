@@ -21,24 +21,24 @@ VERB = Label(name="verb", values=("get", "list", "watch", "create", "patch", "ap
 
 JOBS = gauge(
     "palaestra_jobs",
-    "TrainingJobs by namespace and phase; exported by the leading operator.",
+    "TrainingJobs by namespace and phase; only the leading operator exports them.",
     Label(name="job_namespace", bound="namespace with jobs"),
     Label(name="phase", values=tuple(Phase)),
 )
 REPLICAS_WAITING = gauge(
     "palaestra_replicas_waiting",
-    "Replicas that wait for the start of an attempt, by the reason in their status.",
+    "Replicas that wait until the cluster or a person removes a problem, by the reason in their status.",
     Label(name="job_namespace", bound="namespace with jobs"),
     Label(name="reason", values=WAITING),
 )
 TIME_TO_RUNNING = histogram(
     "palaestra_job_time_to_running_seconds",
-    "Time from a TrainingJob's creation until it first ran, including the waits for queue and images.",
+    "Time from a TrainingJob's creation until it first ran, including waits in a queue and for images.",
     WAITS,
 )
 RESTARTS = counter(
     "palaestra_replica_restarts_total",
-    "Restarts in replicas: of pods by the cause of their replacement, and of simulators.",
+    "Replaced pods by cause; with cause simulator: restarts of simulators after faults.",
     Label(name="cause", values=tuple(Restarts.model_fields)),
 )
 REPLICA_ENDS = counter(
@@ -48,7 +48,7 @@ REPLICA_ENDS = counter(
 )
 RECONCILED = histogram(
     "palaestra_operator_reconcile_duration_seconds",
-    "Time that one reconcile of a TrainingJob took; conflict is harmless, error is not.",
+    "Time that one reconcile of a TrainingJob took; the result conflict is harmless, error is not.",
     SECONDS,
     Label(name="result", values=RESULTS),
 )
@@ -58,14 +58,14 @@ QUEUE_WAIT = histogram(
 )
 REQUESTS = counter(
     "palaestra_operator_requests_total",
-    "Requests to the API server; code 0: no response.",
+    "Requests to the API server; code 0: the API server did not respond.",
     VERB,
     Label(name="resource", bound="kind of object"),
     Label(name="code", bound="HTTP status that occurred"),
 )
 REQUEST_DURATION = histogram(
     "palaestra_operator_request_duration_seconds",
-    "Time that a request to the API server took, watches aside.",
+    "Time that a request to the API server took; watches are not measured.",
     SECONDS,
     VERB,
 )

@@ -13,18 +13,25 @@ SLOT = Label(name="slot", values=SLOTS, bound="simulator of the sidecar")
 STATE = Label(name="state", values=tuple(SidecarState))
 KIND = Label(name="kind", values=FAULT_KINDS)
 
-UP = gauge("palaestra_simulator_up", "1 if the simulator's process runs.", SLOT)
-STATES = gauge("palaestra_simulator_state", "1 for the state that the simulator is in.", SLOT, STATE)
-STARTS = counter("palaestra_simulator_starts_total", "How often the simulator was started.", SLOT)
+UP = gauge("palaestra_simulator_up", "1 if the simulator's process runs, else 0.", SLOT)
+STATES = gauge(
+    "palaestra_simulator_state",
+    "1 for the current state of the simulator, 0 for the other states.",
+    SLOT,
+    STATE,
+)
+STARTS = counter("palaestra_simulator_starts_total", "Number of starts of the simulator.", SLOT)
 EXITS = counter(
     "palaestra_simulator_unexpected_exits_total",
-    "Unexpected ends of the simulator: with an exit code, by a signal, or unknown.",
+    "Unexpected ends of the simulator's process: with an exit code, by a signal, or unknown.",
     SLOT,
     KIND,
 )
-MEMORY = gauge("palaestra_simulator_rss_bytes", "Memory of its processes.", SLOT)
+MEMORY = gauge("palaestra_simulator_rss_bytes", "Resident memory of the simulator's processes.", SLOT)
 PROCESSOR = counter(
-    "palaestra_simulator_cpu_seconds_total", "Processor time of its processes since its last start.", SLOT
+    "palaestra_simulator_cpu_seconds_total",
+    "Processor time of the simulator's processes since the simulator's last start.",
+    SLOT,
 )
 BUILD = gauge(
     "palaestra_sidecar_build_info",

@@ -41,18 +41,24 @@ CAUSE = Label(name="cause", values=(*(kind for kind in FaultKind if kind is not 
 
 
 STEPS = counter("palaestra_trainer_steps_total", "Valid environment steps so far.")
-TARGET_STEPS = gauge("palaestra_trainer_target_steps", "Steps at which the run ends.")
-STEPS_PER_SECOND = gauge("palaestra_trainer_steps_per_second", "Speed over the last 30 seconds.")
+TARGET_STEPS = gauge("palaestra_trainer_target_steps", "Number of steps at which the run ends.")
+STEPS_PER_SECOND = gauge(
+    "palaestra_trainer_steps_per_second", "Environment steps per second of training over the last 30 seconds."
+)
 STEPS_LOST = counter(
     "palaestra_trainer_steps_lost_total",
-    "Valid steps lost: in episodes that a fault cut, or played again after an interruption.",
+    "Valid steps lost: steps of episodes that a fault ended early, and steps repeated after a resume.",
 )
 EXTRA_STEPS = counter(
     "palaestra_trainer_extra_steps_total", "Simulation steps taken because a message was late."
 )
-IDLE = gauge("palaestra_trainer_idle_seconds", "Seconds since the last environment step of any simulator.")
+IDLE = gauge(
+    "palaestra_trainer_idle_seconds",
+    "Seconds since the last environment step of any simulator, or since the start.",
+)
 STALL_DEADLINE = gauge(
-    "palaestra_trainer_stall_deadline_seconds", "Idle seconds after which the trainer ends as stalled."
+    "palaestra_trainer_stall_deadline_seconds",
+    "Idle seconds after which the trainer's watchdog ends the trainer.",
 )
 SECONDS = counter(
     "palaestra_trainer_seconds_total",
@@ -63,7 +69,7 @@ SECONDS = counter(
 EPISODES = counter("palaestra_trainer_episodes_total", "Training episodes that ended without a fault.")
 RETURN = histogram(
     "palaestra_trainer_episode_return",
-    "Return of each training episode of this attempt; no sum, as returns may be negative.",
+    "Return of each training episode of this attempt; no sum, because returns may be negative.",
     RETURNS,
 )
 RETURN_MEAN = gauge(
@@ -72,7 +78,7 @@ RETURN_MEAN = gauge(
 )
 RETURN_QUANTILE = gauge(
     "palaestra_trainer_episode_return_quantile",
-    "Quantiles of the returns of the last 100 training episodes: minimum, median, maximum.",
+    "Quantiles of the returns of the last 100 training episodes; rank 0: minimum, 0.5: median, 1: maximum.",
     Label(name="rank", values=tuple(f"{quantile:g}" for quantile in QUANTILES)),
 )
 LENGTH = histogram(
@@ -88,28 +94,29 @@ EVALUATIONS = counter(
 )
 EVALUATION_SUCCESS = gauge(
     "palaestra_trainer_evaluation_success_ratio",
-    "Share of successful episodes in the last evaluation or confirmation.",
+    "Share of successful episodes in the last evaluation or confirmation of this attempt.",
 )
 EVALUATION_BOUND = gauge(
     "palaestra_trainer_evaluation_success_bound_ratio",
-    "Bounds of the 95 % interval around that share.",
+    "Bounds of the 95 % interval of palaestra_trainer_evaluation_success_ratio.",
     Label(name="bound", values=("low", "high")),
 )
 EVALUATION_EPISODES = gauge(
-    "palaestra_trainer_evaluation_episodes", "Episodes of the last evaluation or confirmation."
+    "palaestra_trainer_evaluation_episodes",
+    "Number of episodes of the last evaluation or confirmation of this attempt.",
 )
 EVALUATION_RETURN = gauge(
     "palaestra_trainer_evaluation_return_mean",
-    "Mean return of the episodes of the last evaluation or confirmation.",
+    "Mean return of the episodes of the last evaluation or confirmation of this attempt.",
 )
 EVALUATION_LENGTH = gauge(
     "palaestra_trainer_evaluation_length_mean_steps",
-    "Mean length of the episodes of the last evaluation or confirmation.",
+    "Mean length of the episodes of the last evaluation or confirmation of this attempt.",
 )
 
 LOSS = gauge(
     "palaestra_trainer_loss",
-    "Losses of the last update, as train/* in TensorBoard.",
+    "Losses of the last update, the same values as train/* in TensorBoard.",
     Label(name="loss", values=LOSSES),
 )
 EXPLORATION = gauge(
@@ -121,21 +128,25 @@ LEARNING_RATE = gauge("palaestra_trainer_learning_rate", "Learning rate of the l
 
 CHECKPOINT_STEPS = gauge("palaestra_trainer_checkpoint_steps", "Step of the newest checkpoint.")
 CHECKPOINT_INTERVAL = gauge(
-    "palaestra_trainer_checkpoint_interval_steps", "Steps after which a checkpoint is due."
+    "palaestra_trainer_checkpoint_interval_steps",
+    "Environment steps between two checkpoints (checkpoint.everySteps).",
 )
 CHECKPOINT_TIME = gauge(
     "palaestra_trainer_checkpoint_timestamp_seconds",
     "Unix time at which this attempt wrote its newest checkpoint.",
 )
 CHECKPOINT_DURATION = histogram(
-    "palaestra_trainer_checkpoint_duration_seconds", "Time to write a checkpoint.", CHECKPOINT_S
+    "palaestra_trainer_checkpoint_duration_seconds",
+    "Time to write each checkpoint of this attempt.",
+    CHECKPOINT_S,
 )
 CHECKPOINT_SIZE = gauge(
     "palaestra_trainer_checkpoint_size_bytes",
-    "Size of the newest checkpoint of this attempt, with the files that it shares with older ones.",
+    "Size of the newest checkpoint of this attempt, with the files that it shares with older checkpoints.",
 )
 CHECKPOINT_FAILURES = counter(
-    "palaestra_trainer_checkpoint_failures_total", "Checkpoints of this attempt not written: disk full."
+    "palaestra_trainer_checkpoint_failures_total",
+    "Checkpoints of this attempt that were not written, because the volume was full.",
 )
 
 SIMULATORS = gauge(
@@ -143,7 +154,7 @@ SIMULATORS = gauge(
 )
 BUILD = gauge(
     "palaestra_trainer_build_info",
-    "Always 1; the label holds the release.",
+    "Always 1; the label is the release.",
     Label(name="version", bound="release"),
 )
 
@@ -161,7 +172,7 @@ RESTARTS = counter(
 )
 BUDGET = gauge(
     "palaestra_simulator_restart_budget_spent_ratio",
-    "Share of restart.limit spent within restart.withinSeconds; at 1, the next fault is final.",
+    "Share of restart.limit spent within restart.withinSeconds; at 1, the next fault causes no restart.",
     SIMULATOR,
 )
 RESETS = counter("palaestra_simulator_resets_total", "Episodes begun, in training and evaluation.", SIMULATOR)
