@@ -78,14 +78,12 @@ def cardinality() -> str:
     """Return the number of series in a large cluster, by program and in total."""
     rows = [f"| {it.name} | {it.series} | {it.count:,} | {it.series * it.count:,} |" for it in PROGRAMS]
     total = sum(it.series * it.count for it in PROGRAMS)
-    cluster = (
-        f"{JOBS:,} running jobs with {REPLICAS} replicas each, and {SIMULATORS} simulators in each replica"
-    )
+    cluster = f"{JOBS:,} jobs that all run, of {REPLICAS} replicas with {SIMULATORS} simulators each"
     return "\n".join(
         (
             f"{cluster}, in {NAMESPACES} namespaces:",
             "",
-            "| program | most series of one program | number of programs | most series |",
+            "| program | series of one program, at most | number of programs | series |",
             "|---|---|---|---|",
             *rows,
             f"| all | | | {total:,} |",

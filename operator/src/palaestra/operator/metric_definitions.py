@@ -33,12 +33,12 @@ REPLICAS_WAITING = gauge(
 )
 TIME_TO_RUNNING = histogram(
     "palaestra_job_time_to_running_seconds",
-    "Time from a TrainingJob's creation until it first ran, including waits in a queue and for images.",
+    "Time from a TrainingJob's creation until it first ran, including queues and image pulls.",
     WAITS,
 )
 RESTARTS = counter(
     "palaestra_replica_restarts_total",
-    "Replaced pods by cause; with cause simulator: restarts of simulators after faults.",
+    "Restarts of pods by cause; cause simulator counts restarts of simulators in a pod.",
     Label(name="cause", values=tuple(Restarts.model_fields)),
 )
 REPLICA_ENDS = counter(
@@ -65,7 +65,7 @@ REQUESTS = counter(
 )
 REQUEST_DURATION = histogram(
     "palaestra_operator_request_duration_seconds",
-    "Time that a request to the API server took; watches are not measured.",
+    "Time that a request to the API server took, without watches.",
     SECONDS,
     VERB,
 )

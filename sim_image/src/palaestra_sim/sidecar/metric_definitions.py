@@ -27,10 +27,10 @@ EXITS = counter(
     SLOT,
     KIND,
 )
-MEMORY = gauge("palaestra_simulator_rss_bytes", "Resident memory of the simulator's processes.", SLOT)
+MEMORY = gauge("palaestra_simulator_rss_bytes", "Memory of the simulator's processes.", SLOT)
 PROCESSOR = counter(
     "palaestra_simulator_cpu_seconds_total",
-    "Processor time of the simulator's processes since the simulator's last start.",
+    "Processor time of the simulator's processes since its last start.",
     SLOT,
 )
 BUILD = gauge(

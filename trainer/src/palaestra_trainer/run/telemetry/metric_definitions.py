@@ -47,7 +47,7 @@ STEPS_PER_SECOND = gauge(
 )
 STEPS_LOST = counter(
     "palaestra_trainer_steps_lost_total",
-    "Valid steps lost: steps of episodes that a fault ended early, and steps repeated after a resume.",
+    "Valid steps of episodes that a fault ended, and steps that a resumed run played again.",
 )
 EXTRA_STEPS = counter(
     "palaestra_trainer_extra_steps_total", "Simulation steps taken because a message was late."
@@ -78,7 +78,7 @@ RETURN_MEAN = gauge(
 )
 RETURN_QUANTILE = gauge(
     "palaestra_trainer_episode_return_quantile",
-    "Quantiles of the returns of the last 100 training episodes; rank 0: minimum, 0.5: median, 1: maximum.",
+    "Quantiles of the returns of the last 100 training episodes; rank 0.5 is the median.",
     Label(name="rank", values=tuple(f"{quantile:g}" for quantile in QUANTILES)),
 )
 LENGTH = histogram(
@@ -98,7 +98,7 @@ EVALUATION_SUCCESS = gauge(
 )
 EVALUATION_BOUND = gauge(
     "palaestra_trainer_evaluation_success_bound_ratio",
-    "Bounds of the 95 % interval of palaestra_trainer_evaluation_success_ratio.",
+    "Bounds of the 95 % interval around the success ratio of the last evaluation or confirmation.",
     Label(name="bound", values=("low", "high")),
 )
 EVALUATION_EPISODES = gauge(
@@ -146,7 +146,7 @@ CHECKPOINT_SIZE = gauge(
 )
 CHECKPOINT_FAILURES = counter(
     "palaestra_trainer_checkpoint_failures_total",
-    "Checkpoints of this attempt that were not written, because the volume was full.",
+    "Checkpoints that this attempt could not write, because the disk was full.",
 )
 
 SIMULATORS = gauge(
