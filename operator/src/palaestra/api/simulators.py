@@ -144,12 +144,12 @@ class Restart(ApiModel):
     """How many times one simulator is restarted after faults."""
 
     limit: Annotated[int, Field(ge=0, le=1000)] = 10
-    """Number of restarts after faults within the window. If one more fault occurs, the replica fails (exit
-    code 80). If at least `minSimulators` other simulators of the group are left, training continues without
-    this simulator instead."""
+    """Number of restarts after faults within `withinSeconds`. If one more fault occurs, the replica fails
+    (exit code 80). If at least `minSimulators` other simulators of the group are left, training continues
+    without this simulator instead."""
 
     within_seconds: Seconds = 600
-    """Length of the window in seconds."""
+    """Seconds of the sliding window in which restarts are counted for `limit`."""
 
 
 class SimulatorGroup(ApiModel):

@@ -58,7 +58,8 @@ class Condition(StatusModel):
     """A condition of the job, in the format of Kubernetes' own conditions."""
 
     type: ConditionType = Field(strict=False)
-    """`Accepted`, `Running`, `Suspended`, `Succeeded` or `Failed`; `Reconciling` or `Stalled`."""
+    """`Accepted`, `Running`, `Suspended`, `Succeeded` or `Failed`; also `Reconciling` or `Stalled`, which
+    exist only while they are true."""
 
     status: ConditionStatus = Field(strict=False)
     """`True`, `False` or `Unknown`."""

@@ -69,7 +69,8 @@ class Task(ApiModel):
     """Id in gymnasium's registry; `module:Name-v0` imports the module first."""
 
     reward: Reward = Field(default=Reward.DENSE, strict=False)
-    """`Dense`: a reward at every step. `Sparse`: a reward at the last step of an episode only."""
+    """`Dense`: a reward at every step. `Sparse`: a reward at the last step of an episode only, or with
+    `MoveToTargetGoalEnv-v0` at each step within 0.20 m of the goal."""
 
     options: FreeObject = Field(default={})
     """Keyword arguments of the environment, as in `gymnasium.make`."""
