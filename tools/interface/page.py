@@ -23,7 +23,8 @@ _TITLES: Final = {
     "battery_sensor": "Battery",
     "keyboard": "Keyboard",
     "joystick": "Joystick",
-    "palaestra": "Services of ours",
+    "palaestra": "Services that Webots lacks",
+    "": "Topics that are not below a robot",
 }
 _HEAD: Final = ("| path | type | md5 | stub | MuJoCo | Webots | tested by |", "|---|---|---|---|---|---|---|")
 
