@@ -60,7 +60,7 @@ ROWS: dict[Reason, ReasonText] = {
     Reason.CHECKING_WORLDS: ReasonText(
         "the worlds of the job are checked before anything is created; the large worlds of a namespace are "
         "checked one after the other",
-        "the operator checks large worlds in a process of its own, for one job of a namespace at a time",
+        "the operator checks large worlds in a separate process, for one job of a namespace at a time",
         "nothing; if it takes minutes, other jobs of the namespace come first",
         warning=False,
     ),
@@ -104,9 +104,9 @@ ROWS: dict[Reason, ReasonText] = {
     ),
     Reason.SCHEDULING_NOT_ALLOWED: ReasonText(
         "{field}: {fact} is not allowed in this cluster; {remedy}",
-        "a priority, a runtime class, a toleration or an affinity to other pods affects pods of others; an "
-        "installation allows only those that it names",
-        "allow what the message names with the value of the chart that it names "
+        "a priority, a runtime class, a toleration or an affinity to other pods affects the pods of other "
+        "users; an installation allows only the settings that it names",
+        "allow the setting by the chart's value that the message names "
         "([install](../howto/install.md#what-pods-may-ask-for)); the job then starts",
     ),
     Reason.NO_KUEUE: ReasonText(
@@ -117,7 +117,7 @@ ROWS: dict[Reason, ReasonText] = {
     Reason.NAME_TAKEN: ReasonText(
         "Job {name} belongs to another owner{deleting}; delete it or rename this TrainingJob",
         "a Job of another owner has the name that a replica's Job needs",
-        "wait while it is being deleted; otherwise delete it, or rename the TrainingJob",
+        "if the Job is being deleted, wait; otherwise delete the Job, or rename the TrainingJob",
     ),
     Reason.OLD_POD_TERMINATING: ReasonText(
         "pod {pod} of an earlier TrainingJob of this name has not ended and mounts claim {claim}; "
@@ -147,7 +147,8 @@ ROWS: dict[Reason, ReasonText] = {
     ),
     Reason.QUEUED: ReasonText(
         "waits in queue {queue} for Kueue{taken}{why}{again}",
-        "Kueue has not admitted the replica yet, or has evicted it; the text after the colon is Kueue's",
+        "Kueue has not admitted the replica yet, or has evicted it; after the colon, the message has Kueue's "
+        "own message",
         "wait, or change what the message names: see [queues](../howto/queues.md#train-in-a-queue)",
         warning=False,
     ),
@@ -204,11 +205,11 @@ ROWS: dict[Reason, ReasonText] = {
     Reason.RETRYING: ReasonText(
         "pod {pod} failed: {how}; {next_pod}",
         "a pod failed and counts against `backoffLimit`",
-        "read the last lines of the trainer's log in `lastAttempt.log` in the status",
+        "read the last lines of the trainer's log: `lastAttempt.log` in the status",
     ),
     Reason.UNSCHEDULABLE: ReasonText(
         "no node fits pod {pod}: {words}; free resources or request less",
-        "the scheduler finds no node; the message quotes it",
+        "the scheduler finds no node; the message quotes the scheduler",
         "add nodes, lower `resources`, or check `nodeSelector` and `tolerations`",
     ),
     Reason.IMAGE_PULL: ReasonText(
@@ -232,7 +233,7 @@ ROWS: dict[Reason, ReasonText] = {
     Reason.PODS_REFUSED: ReasonText(
         "no pod can be created: {words}{remedy}",
         "the API server refuses a pod or its claim because of a quota, a LimitRange, Pod Security, a webhook "
-        "or a missing PriorityClass; the message quotes it",
+        "or a missing PriorityClass; the message quotes the API server",
         "raise the quota, or allow what the message names ([queues and quotas](../howto/queues.md#quotas)); "
         "the creation is retried automatically",
     ),
@@ -253,7 +254,8 @@ ROWS: dict[Reason, ReasonText] = {
         "{what}; read the simulator's log or raise startDeadlineSeconds",
         "a simulator did not become ready within `startDeadlineSeconds`; the trainer retries until "
         "`restart.limit` is reached (`SimulatorBudgetSpent`)",
-        "run `kubectl logs POD -c sim-GROUP-N`; if the simulator is only slow, raise the deadline",
+        "run `kubectl logs POD -c sim-GROUP-N`; if the simulator is only slow, raise `startDeadlineSeconds` "
+        "in a new TrainingJob",
     ),
     Reason.TRAINER_NOT_STARTED: ReasonText(
         "all sidecars of pod {pod} run and the node has not started the trainer for {seconds} s; "
@@ -285,13 +287,14 @@ ROWS: dict[Reason, ReasonText] = {
         "pod {pod} was evicted because of its ephemeral storage ({words}); "
         "write less to /tmp, or, if the run is ephemeral, raise spec.storage.size",
         "the pod wrote more to temporary volumes than its limit, or the node's disk is full",
-        "write less to /tmp; if the run is ephemeral, raise `spec.storage.size`",
+        "write less to /tmp; if the run is ephemeral, raise `spec.storage.size` in a new TrainingJob",
     ),
     Reason.STORAGE_FULL: ReasonText(
         "the volume of the run is full: {words}; free some space, or request more with spec.storage.size",
         "the run directory is full; the last checkpoint is complete, and the run is retried from it while "
         "`backoffLimit` allows",
-        "delete old runs on the volume, enlarge the claim, or lower `spec.trainer.checkpoint.keep`",
+        "delete old runs on the volume, enlarge the claim, or lower `spec.trainer.checkpoint.keep` in a new "
+        "TrainingJob",
     ),
     Reason.NODE_LOST: ReasonText(
         "pod {pod} should have ended more than {seconds} s ago and node {node} has not confirmed it; "
@@ -308,8 +311,9 @@ ROWS: dict[Reason, ReasonText] = {
     ),
     Reason.STALLED: ReasonText(
         "{what}; read the stacks in the trainer's log",
-        "the step count has not changed for `stallDeadlineSeconds`; the trainer exits and is retried; if it "
-        "still responds, the operator replaces its pod, at most `backoffLimit` times",
+        "no environment step for `stallDeadlineSeconds`, so the trainer exits and is retried; or the trainer "
+        "responds, but its step count has not changed for two minutes more than `stallDeadlineSeconds`, so "
+        "the operator replaces its pod, at most `backoffLimit` times",
         "run `kubectl logs POD -c trainer`; if a step may take that long, raise the deadline in a new "
         "TrainingJob",
     ),
@@ -334,7 +338,8 @@ ROWS: dict[Reason, ReasonText] = {
         "a simulator had more than `restart.limit` faults within `restart.withinSeconds`; "
         "the replica is not retried",
         "if the message names memory, raise `spec.simulators[].resources.limits.memory`; otherwise read "
-        "`lastAttempt.faults` in the status; if these faults are acceptable, raise `restart.limit`",
+        "`lastAttempt.faults` in the status; if these faults are acceptable, raise `restart.limit`, in a new "
+        "TrainingJob",
     ),
     Reason.DIVERGED: ReasonText(
         "the learner diverged (exit code 81): {words}",
@@ -348,8 +353,8 @@ ROWS: dict[Reason, ReasonText] = {
         "use non-preemptible nodes, or save checkpoints more often",
         "as many pods as `noProgressLimit` ended without a new step: the cluster disrupts pods before they "
         "make progress, or the trainer always exits with 75",
-        "lower `spec.trainer.checkpoint.everySteps`, or use non-preemptible nodes; your own program "
-        "(`trainer.command`) must report its steps with `palaestra_trainer.report`",
+        "use non-preemptible nodes, or lower `spec.trainer.checkpoint.everySteps` in a new TrainingJob; your "
+        "own program (`trainer.command`) must report its steps with `palaestra_trainer.report`",
     ),
     Reason.JOB_FAILED: ReasonText(
         "the Job failed: {words}",
@@ -359,8 +364,8 @@ ROWS: dict[Reason, ReasonText] = {
     Reason.KEPT_ALIVE: ReasonText(
         "the trainer of pod {pod} has ended, and container {containers} keeps the pod alive; the operator "
         "ends the pod {seconds} s after the trainer; inject native sidecars, or none",
-        "a mesh or an agent has added a container to the pod, and it does not end with the trainer; "
-        "the result is the trainer's",
+        "a mesh or an agent has added a container to the pod, which still runs after the trainer has ended; "
+        "the operator reports the result of the trainer",
         "inject native sidecars or none: see [install](../howto/install.md#containers-that-others-add)",
     ),
     Reason.SUCCEEDED: ReasonText(
