@@ -311,9 +311,9 @@ ROWS: dict[Reason, ReasonText] = {
     ),
     Reason.STALLED: ReasonText(
         "{what}; read the stacks in the trainer's log",
-        "no environment step for `stallDeadlineSeconds`, so the trainer exits and is retried; or the trainer "
-        "responds, but its step count has not changed for two minutes more than `stallDeadlineSeconds`, so "
-        "the operator replaces its pod, at most `backoffLimit` times",
+        "no environment step for `stallDeadlineSeconds`, so the trainer exits and is retried. If the trainer "
+        "still responds, but its step count does not change for two more minutes, the operator replaces its "
+        "pod, at most `backoffLimit` times",
         "run `kubectl logs POD -c trainer`; if a step may take that long, raise the deadline in a new "
         "TrainingJob",
     ),
