@@ -364,7 +364,7 @@ ROWS: dict[Reason, ReasonText] = {
     Reason.KEPT_ALIVE: ReasonText(
         "the trainer of pod {pod} has ended, and container {containers} keeps the pod alive; the operator "
         "ends the pod {seconds} s after the trainer; inject native sidecars, or none",
-        "a mesh or an agent has added a container to the pod, which still runs after the trainer has ended; "
+        "a container that a mesh or an agent has added to the pod still runs after the trainer has ended; "
         "the operator reports the result of the trainer",
         "inject native sidecars or none: see [install](../howto/install.md#containers-that-others-add)",
     ),
