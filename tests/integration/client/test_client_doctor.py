@@ -59,6 +59,7 @@ def test_missing_nodes_storage_and_operator_are_reported(found):
         "to read jobs": "ok",
         "to author jobs": "ok",
         "to read logs": "ok",
+        "to view simulators": "ok",
         "to fetch runs": "ok",
         "sidecars": "ok",
         "storage class": "wrong",
@@ -207,6 +208,7 @@ def test_what_a_person_may_not_do_is_named_and_what_cannot_be_seen_is_unknown(fo
     assert "get trainingjobs, list trainingjobs, watch trainingjobs" in findings["to read jobs"].fact
     assert findings["to author jobs"].verdict is CheckStatus.WRONG
     assert findings["to read logs"].verdict is CheckStatus.UNKNOWN  # not every user needs this permission
+    assert findings["to view simulators"].verdict is CheckStatus.UNKNOWN
     assert findings["to fetch runs"].verdict is CheckStatus.UNKNOWN
     assert "create pods/exec" in findings["to fetch runs"].fact
     assert findings["storage class"].verdict is CheckStatus.UNKNOWN

@@ -67,6 +67,7 @@ TASKS: tuple[tuple[str, tuple[Right, ...]], ...] = (
     ("read jobs", (may("palaestra.dev", "trainingjobs", "get list watch"), may("", "events", "list"))),
     ("author jobs", (may("palaestra.dev", "trainingjobs", "create patch delete"),)),
     ("read logs", (may("", "pods/log", "get"),)),
+    ("view simulators", (may("", "pods/proxy", "get"),)),
     (
         "fetch runs",
         (
