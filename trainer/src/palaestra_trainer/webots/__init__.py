@@ -40,11 +40,12 @@ from palaestra_trainer.webots.motion_sensors import (
     LightSensor,
 )
 from palaestra_trainer.webots.mujoco import MujocoActuator, MujocoSensor
-from palaestra_trainer.webots.observer import Mode, Observer
+from palaestra_trainer.webots.observer import Mode, NodeName, Observer
 from palaestra_trainer.webots.obstacles import FLOOR, Thing
 from palaestra_trainer.webots.outputs import LED, Brake, Connector, Emitter, OutputDevice, Pen, Speaker
 from palaestra_trainer.webots.simulation import Actuator, Stepper
-from palaestra_trainer.webots.supervisor import MovieSettings, Supervisor, ViewLabel
+from palaestra_trainer.webots.supervisor import Supervisor
+from palaestra_trainer.webots.view_settings import MovieSettings, ViewLabel
 
 __all__ = [
     "FLOOR",
@@ -79,6 +80,7 @@ __all__ = [
     "MovieSettings",
     "MujocoActuator",
     "MujocoSensor",
+    "NodeName",
     "Observer",
     "OutputDevice",
     "Packet",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 import math
-from typing import Any, Final, TypeVar
+from typing import Any, Final, NamedTuple, TypeVar
 
 from palaestra_protocol.fields import ProtocolError, decoded
 from palaestra_protocol.scene import MOST_SCENE_BYTES, MOST_STATE_BYTES, SceneState, VisibleScene
@@ -20,6 +20,7 @@ _Data = TypeVar("_Data", VisibleScene, SceneState)
 
 _SCENE: Final = "palaestra/scene"
 _SCENE_STATE: Final = "palaestra/scene_state"
+_OF_NODES: Final = (0x09, 0x19)  # the types of SFNode and MFNode. Source: WbFieldType of Webots
 
 
 class Mode(enum.IntEnum):
@@ -28,6 +29,13 @@ class Mode(enum.IntEnum):
     PAUSE = 0
     REAL_TIME = 1
     FAST = 2
+
+
+class NodeName(NamedTuple):
+    """The DEF name of a node, "" if it has none, and its type or the name of its PROTO."""
+
+    definition: str
+    type_name: str
 
 
 class Observer:
@@ -106,13 +114,7 @@ class Observer:
 
         The position is x, y, z in meters. The rotation is a quaternion: x, y, z, w.
         """
-        node = self.node(name)
-        at, turn = (service(node=node) for service in self._pose_services())
-        position = at.position.x, at.position.y, at.position.z
-        rotation = turn.orientation.x, turn.orientation.y, turn.orientation.z, turn.orientation.w
-        if not all(map(math.isfinite, (*position, *rotation))):
-            raise WrongData(self.node_name, f"the pose of {name} is not finite: {position}, {rotation}")
-        return position, rotation
+        return self._pose_of(self.node(name), name)
 
     def contact_points(self, name: str) -> tuple[Vector, ...]:
         """Return the points at which the node with DEF `name`, or a part of it, touches other objects.
@@ -128,6 +130,55 @@ class Observer:
         """Return the type of the node with DEF `name`, such as Solid, or the name of its PROTO."""
         service = self._services.get("supervisor/node/get_type_name", "node_get_name")
         return str(service(node=self.node(name)).name)
+
+    def text(self, name: str) -> str:
+        """Return the node with DEF `name` as text of a world file, with its current fields."""
+        service = self._services.get("supervisor/node/export_string", "node_get_string")
+        return str(service(node=self.node(name)).value)
+
+    def device_pose(self, device: str) -> tuple[Vector, Quaternion]:
+        """Return position and rotation, in the world, of a device of the supervisor; see `full_pose`.
+
+        Raises:
+            WrongData: also if the supervisor's robot has no such device.
+        """
+        service = self._services.get("supervisor/get_from_device", "supervisor_get_from_string")
+        node = self._known(service(value=device).node, f"the robot has no device {device}")
+        return self._pose_of(node, device)
+
+    def center_of_mass(self, name: str) -> Vector:
+        """Return the center of mass, in meters in the world, of the Solid with DEF `name` and its parts."""
+        service = self._services.get("supervisor/node/get_center_of_mass", "node_get_center_of_mass")
+        center = service(node=self.node(name)).centerOfMass
+        return center.x, center.y, center.z
+
+    def is_balanced(self, name: str) -> bool:
+        """Return whether the center of mass of the Solid with DEF `name` is above its support polygon."""
+        service = self._services.get("supervisor/node/get_static_balance", "node_get_static_balance")
+        return bool(service(node=self.node(name)).balance)
+
+    def length(self, name: str, field: str) -> int:
+        """Return the number of values in a field of the node with DEF `name`; -1 if it has only one value."""
+        service = self._services.get("supervisor/field/get_count", "field_get_count")
+        return int(service(field=self.field(name, field)).count)
+
+    def nodes_in(self, name: str, field: str) -> tuple[NodeName, ...]:
+        """Return the nodes in a field of the node with DEF `name`, such as its children.
+
+        Raises:
+            WrongData: also if the field does not hold nodes.
+        """
+        if self.field_type(name, field) not in _OF_NODES:
+            raise WrongData(self.node_name, f"{name}.{field} holds values; read it with get_field")
+        handle = self.field(name, field)
+        count = self.length(name, field)
+        service = self._services.get("supervisor/field/get_node", "field_get_node")
+        found = [service(field=handle, index=index).node for index in range(abs(count))]
+        return tuple(
+            NodeName(self._name_of(node, "get_def"), self._name_of(node, "get_type_name"))
+            for node in found
+            if node
+        )
 
     def translation(self, name: str) -> tuple[float, float, float]:
         """Return the translation field, in meters, of the node with DEF `name`."""
@@ -204,6 +255,17 @@ class Observer:
             self._services.get("supervisor/node/get_position", "node_get_position"),
             self._services.get("supervisor/node/get_orientation", "node_get_orientation"),
         )
+
+    def _pose_of(self, node: int, name: str) -> tuple[Vector, Quaternion]:
+        at, turn = (service(node=node) for service in self._pose_services())
+        position = at.position.x, at.position.y, at.position.z
+        rotation = turn.orientation.x, turn.orientation.y, turn.orientation.z, turn.orientation.w
+        if not all(map(math.isfinite, (*position, *rotation))):
+            raise WrongData(self.node_name, f"the pose of {name} is not finite: {position}, {rotation}")
+        return position, rotation
+
+    def _name_of(self, node: int, kind: str) -> str:
+        return str(self._services.get(f"supervisor/node/{kind}", "node_get_name")(node=node).name)
 
     def _read(self, kind: type[_Data], path: str, most_bytes: int) -> _Data:
         text = self._services.ask(path, "get_string")

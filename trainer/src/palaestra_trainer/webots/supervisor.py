@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-from dataclasses import dataclass
 from pathlib import Path
 
 from palaestra_trainer.errors import SimulatorDead
@@ -11,46 +10,7 @@ from palaestra_trainer.ros import call_together
 from palaestra_trainer.webots.fields import Value, encoded, kind_of, turn_about_z
 from palaestra_trainer.webots.observer import Mode, Observer, Vector
 from palaestra_trainer.webots.services import Services
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ViewLabel:
-    """A text over the view of a world.
-
-    Attributes:
-        text: the text; "" removes the label.
-        number: the number of the label, 0 or more.
-        at: x and y of its upper left corner, 0 to 1 of the view, from the upper left corner of the view.
-        size: the height of the font, 0 to 1 of the view.
-        rgb: the color, 0xRRGGBB.
-        transparency: 0 to 1.
-        font: the name of a font of Webots.
-    """
-
-    text: str
-    number: int = 0
-    at: tuple[float, float] = (0.0, 0.0)
-    size: float = 0.1
-    rgb: int = 0xFF0000
-    transparency: float = 0.0
-    font: str = "Arial"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MovieSettings:
-    """Settings of a recording.
-
-    Attributes:
-        size: width and height in pixels.
-        quality: 1 to 100.
-        acceleration: how many times faster than simulated time the movie plays.
-        caption: whether the movie shows that acceleration.
-    """
-
-    size: tuple[int, int] = (640, 480)
-    quality: int = 90
-    acceleration: int = 1
-    caption: bool = False
+from palaestra_trainer.webots.view_settings import MovieSettings, ViewLabel
 
 
 class Supervisor:
@@ -93,6 +53,16 @@ class Supervisor:
         # The response may be lost, because the controller that sends it restarts too.
         with contextlib.suppress(SimulatorDead):
             self._services.ask("supervisor/world_reload", "get_bool")
+        self._observer.close()
+        self._services.close()
+
+    def load_world(self, path: str | Path) -> None:
+        """Load another world file of the simulator's machine; all connections must be opened again.
+
+        In Webots the controllers of the new world start. The stub and MuJoCo start again with the new world.
+        """
+        with contextlib.suppress(SimulatorDead):
+            self._services.get("supervisor/world_load", "set_string")(value=str(path))
         self._observer.close()
         self._services.close()
 
@@ -164,6 +134,41 @@ class Supervisor:
         wire = encoded(kind, where, value)
         service = self._services.get(f"supervisor/field/set_{kind.name}", f"field_set_{kind.name}")
         service(field=self._observer.field(name, field), index=index, value=wire)
+
+    def insert_value(self, name: str, field: str, value: Value, index: int = -1) -> None:
+        """Insert a value into a field, with several values, of the node with DEF `name`.
+
+        Args:
+            name: the DEF name of the node.
+            field: the field.
+            value: the value, in the form that `get_field` returns.
+            index: the position of the new value; -1: after the last value.
+
+        Raises:
+            ConfigurationError: the field holds nodes, or values of another type.
+            WrongData: also if the field has only one value, or the simulator refuses the write.
+        """
+        where = f"{name}.{field}"
+        kind = kind_of(self._observer.field_type(name, field), where)
+        wire = encoded(kind, where, value)
+        handle = self._observer.field(name, field)
+        self._confirm(
+            f"field/insert_{kind.name}",
+            f"field_set_{kind.name}",
+            where,
+            field=handle,
+            index=index,
+            value=wire,
+        )
+
+    def remove_value(self, name: str, field: str, index: int = -1) -> None:
+        """Remove a value, or a node, from a field with several values; -1: the last one.
+
+        Raises:
+            WrongData: also if the field has no such value.
+        """
+        handle = self._observer.field(name, field)
+        self._confirm("field/remove", "field_remove", f"{name}.{field}", field=handle, index=index)
 
     def set_joint(self, name: str, position: float) -> None:
         """Move the joint with DEF `name` to a position in radians or meters, at rest.
