@@ -32,7 +32,7 @@ def world(simulator, master, tmp_path_factory):
     """Yield a facade and a robot in a running simulator; only MuJoCo simulates the mass of the box."""
     del master
     text = WORLD.replace("PHYSICS", PHYSICS_NODE if simulator == "mujoco" else "")
-    text = Setting(simulator).text(text + robot(""), "gravity 0")
+    text = Setting(simulator).text(text + robot(""), "gravity 0").replace("WorldInfo", "DEF INFO WorldInfo")
     with running(text, tmp_path_factory.mktemp("world"), simulator) as started:
         yield started
 
@@ -185,3 +185,101 @@ def test_a_movie_has_a_frame_for_each_40_ms_of_simulated_time(world, simulator, 
         frames = [frame.to_ndarray(format="rgb24").shape for frame in file.decode(video=0)]
     assert set(frames) == {(48, 64, 3)}
     assert len(frames) == pytest.approx(50 * STEP_MS / 40, abs=5)
+
+
+def test_fields_with_several_values_grow_and_shrink(world):
+    """`info` of the WorldInfo is such a field."""
+    webots, _ = world
+    for text, index in (("last", -1), ("first", 0)):
+        webots.supervisor.insert_value("INFO", "info", text, index)
+    grown = [webots.supervisor.get_field("INFO", "info", index) for index in (0, 1)]
+    length = webots.observer.length("INFO", "info")
+    webots.supervisor.remove_value("INFO", "info", 0)
+    left = webots.supervisor.get_field("INFO", "info")
+    webots.supervisor.remove_value("INFO", "info")
+
+    assert (grown, length, left) == (["first", "last"], 2, "last")
+    assert webots.observer.length("INFO", "info") == 0
+    with pytest.raises(WrongData, match=r"refuses remove for INFO.info"):
+        webots.supervisor.remove_value("INFO", "info")
+
+
+def test_a_value_cannot_be_inserted_into_a_field_with_one_value(world):
+    """Webots prints an error on its console, which the program does not see."""
+    webots, _ = world
+
+    with pytest.raises(WrongData, match=r"refuses insert_vec3f for WALL.translation"):
+        webots.supervisor.insert_value("WALL", "translation", (0.0, 0.0, 0.0))
+    assert webots.observer.length("WALL", "translation") == -1
+
+
+def test_the_nodes_in_a_field_are_named(world):
+    """The world itself is the node with the name ""."""
+    webots, _ = world
+
+    inside = webots.observer.nodes_in("", "children")
+
+    assert inside == (("INFO", "WorldInfo"), ("WALL", "Solid"), ("BOX", "Solid"), ("R", "Robot"))
+    assert webots.observer.nodes_in("WALL", "boundingObject") == (("", "Box"),)
+    with pytest.raises(WrongData, match=r"WALL.translation holds values; read it with get_field"):
+        webots.observer.nodes_in("WALL", "translation")
+
+
+def test_a_node_is_exported_as_text_that_can_be_inserted(world):
+    """A program may copy an object of its world."""
+    webots, onlooker = world
+    text = webots.observer.text("WALL").replace('"wall"', '"copy"')
+
+    webots.supervisor.insert_node(
+        "",
+        "children",
+        f"DEF COPY {text.partition(' ')[2]}" if "DEF" not in text else text.replace("DEF WALL", "DEF COPY"),
+    )
+    onlooker.advance()
+    pose = webots.observer.full_pose("COPY")
+    webots.supervisor.remove_node("COPY")
+
+    assert pose[0] == pytest.approx(WALL.position)
+
+
+def test_the_center_of_mass_of_a_box_is_its_middle(world, simulator):
+    """The stub has no masses."""
+    webots, _ = world
+
+    center = webots.observer.center_of_mass("BOX")
+
+    assert center == pytest.approx(webots.observer.full_pose("BOX")[0], abs=1e-6), simulator
+
+
+def test_a_world_that_does_not_exist_is_refused_and_the_old_one_is_kept(world):
+    """The program learns at once that the world did not change."""
+    webots, _ = world
+
+    with pytest.raises(WrongData, match=r"refuses world_load for /nowhere\.wbt"):
+        webots.supervisor.load_world("/nowhere.wbt")
+
+    assert webots.observer.exists("BOX")
+
+
+def test_another_world_is_loaded(simulator, master, tmp_path):
+    """A program may go through a list of worlds with one simulator."""
+    del master
+    first, second = tmp_path / "first", tmp_path / "second.wbt"
+    first.mkdir()
+    gps = f'GPS {{ name "gps" {BOX.fields} }}'
+    with running(Setting(simulator).text(robot("")), first, simulator) as (webots, onlooker):
+        before = webots.observer.exists("HERE")
+        nodes = 'DEF HERE Solid { name "here" }' + robot(gps, name=webots.robot_name)
+        second.write_text(Setting(simulator).text(nodes))
+        webots.supervisor.load_world(second)
+        webots.wait_available()
+        onlooker.connect()
+        onlooker.advance()
+        after = webots.observer.exists("HERE"), webots.observer.device_pose("gps")
+        with pytest.raises(WrongData, match=r"the robot has no device .?sonar"):
+            webots.observer.device_pose("sonar")
+
+    assert not before
+    assert after[0]
+    assert after[1][0] == pytest.approx(BOX.position)
+    assert after[1][1] == pytest.approx(quaternion(BOX.rotation))

@@ -59,10 +59,14 @@ class Supervisor:
     def load_world(self, path: str | Path) -> None:
         """Load another world file of the simulator's machine; all connections must be opened again.
 
-        In Webots the controllers of the new world start. The stub and MuJoCo start again with the new world.
+        The supervisor of the new world must have the same ROS name.
+
+        Raises:
+            WrongData: also if the simulator refuses the world; it then keeps the old one.
         """
+        # The response may be lost, as in `reload`.
         with contextlib.suppress(SimulatorDead):
-            self._services.get("supervisor/world_load", "set_string")(value=str(path))
+            self._confirm("world_load", "set_string", path, value=str(path))
         self._observer.close()
         self._services.close()
 
