@@ -140,7 +140,9 @@ class Plugin:
         if bool(certificate) is not bool(key):
             raise self._failure("returned only one of certificate and key")
         if token and not (token.isascii() and token.isprintable()):
-            raise self._failure("returned a token that is not one line of text")
+            raise self._failure(
+                "returned a token with other characters than printable ASCII, such as a line break"
+            )
         return Credentials(
             token=token or None,
             certificate=str(certificate) if certificate else None,

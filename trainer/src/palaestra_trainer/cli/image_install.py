@@ -93,8 +93,8 @@ def _target() -> Path:
     first, *_ = os.environ.get("PYTHONPATH", "").split(os.pathsep)
     if not first:
         raise ConfigurationError(
-            "PYTHONPATH: is not set, but a project is installed into its first folder; "
-            "run this in a Dockerfile FROM palaestra-trainer"
+            "PYTHONPATH: does not begin with a folder, so the folder in which to install the project is not "
+            "known; run this in a Dockerfile FROM palaestra-trainer"
         )
     return Path(first)
 

@@ -94,8 +94,9 @@ class RunData:
         figures: name and value of each main result, in the order of the page.
         asked: name and value of each setting of the job, in the order of the page.
         versions: name and version of the programs and the machine.
-        evaluations: the evaluations in the order of steps.
-        confirmations: the confirmations in the order of steps.
+        evaluations: the regular evaluations of the policy, in the order of steps.
+        confirmations: the evaluations of chosen policies with other seeds (`confirmEpisodes`), in the order
+            of steps.
         curves: curves of the training by name.
         faults: the faults in the order of time.
         fault_count: number of all faults of the run; `faults` may have fewer.
