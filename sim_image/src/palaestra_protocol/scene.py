@@ -104,7 +104,7 @@ class VisualShape:
         size: the extent along x, y and z in meters; for round shapes: diameter, diameter, height. For a mesh,
             the factors by which its points are multiplied.
         pose: the pose in the frame of the node.
-        color: the color of the whole shape.
+        color: red, green, blue and alpha of the whole shape, 0 to 1.
         mesh: for the kind MESH, the index of the mesh in `VisibleScene.meshes`; otherwise None.
     """
 

@@ -29,7 +29,7 @@ def authorization(
     """Return a function that returns the header `Authorization` of a user; an auth-provider is ignored.
 
     Args:
-        user: the user in a kubeconfig.
+        user: the user's settings in a kubeconfig, such as `token` or `exec`.
         folder: the folder of the kubeconfig; relative paths start in this folder.
         cluster: the information about the cluster that a plugin gets.
         context: the TLS settings, to which a plugin's certificate is added.

@@ -35,7 +35,7 @@ class Recorder:
         """Prepare the recorder, without a request.
 
         Args:
-            api: the API server.
+            api: the API server that stores the events.
             component: the name of the reporting program, as `kubectl describe` shows it.
             instance: the name of the reporting process.
         """

@@ -14,7 +14,7 @@ class Radio:
     """Delivers packets from the emitters of each robot to the receivers of all other robots.
 
     Args:
-        robots: the devices of each robot.
+        robots: for each robot, its devices; only emitters and receivers among them are used.
     """
 
     def __init__(self, robots: Iterable[Iterable[object]]) -> None:

@@ -18,7 +18,7 @@ class Evaluated:
         success_rate: share of successful episodes, 0 to 1; None: the environment does not report success.
         low: lower bound of the rate's 95 % interval; None if the rate is None.
         high: upper bound of the rate's 95 % interval; None if the rate is None.
-        returns: return of each episode.
+        returns: return of each episode: the sum of its rewards.
         mean_length: mean number of steps of an episode.
     """
 
@@ -65,11 +65,11 @@ class Replay:
         frame_s: seconds of simulated time from one frame to the next.
         targets: positions of the target, each as the number of the first frame with this position, and x and
             y in meters.
-        low: smallest x and y of the floor; None: unknown.
-        high: greatest x and y of the floor.
+        low: smallest x and y of the floor in meters; None: unknown.
+        high: greatest x and y of the floor in meters; None: unknown.
         outlines: obstacles, each as x, y, half length, half width and radius of the rounding in meters, and
             heading in radians.
-        radius_m: radius of the robot.
+        radius_m: radius of the circle that stands for the robot.
     """
 
     title: str
@@ -98,7 +98,7 @@ class RunData:
         confirmations: the evaluations of chosen policies with other seeds (`confirmEpisodes`), in the order
             of steps.
         curves: curves of the training by name.
-        faults: the faults in the order of time.
+        faults: faults of simulators, in the order of time.
         fault_count: number of all faults of the run; `faults` may have fewer.
         goodput: seconds of the run under each cause of `GoodputLedger`.
         checkpoints: step, size and time of each checkpoint, as texts.

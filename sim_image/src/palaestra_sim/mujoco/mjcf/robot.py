@@ -31,8 +31,8 @@ class Equipment:
     """The devices of a robot.
 
     Attributes:
-        devices: all devices, by name.
-        joints: the number of the joint, for each device on a joint, by the name of the device.
+        devices: all devices, by the name of the device.
+        joints: for each device on a joint, the id of that joint, by the name of the device.
         motors: the actuators that are motors.
         actuators: the actuators that are not motors.
         samples: functions that set the values of the sensors.

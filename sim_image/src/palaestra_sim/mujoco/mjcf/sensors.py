@@ -51,7 +51,7 @@ class ModelSensor:
 
     Attributes:
         model: the whole model.
-        number: the number of the sensor.
+        number: the id of the sensor in the model.
         name: the name of the device.
         numbers: a view of the sensor's current numbers in MuJoCo's data.
         shaft: the joint that the sensor measures; a new joint, which is not used, if the sensor measures no
