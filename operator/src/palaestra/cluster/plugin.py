@@ -56,7 +56,7 @@ class Plugin:
         """
         command, version = entry.get("command"), entry.get("apiVersion")
         if not isinstance(command, str) or not command:
-            raise NotConfigured("exec: command is missing; name the program")
+            raise NotConfigured("exec: command is missing, or is not text; name the program")
         if version not in VERSIONS:
             raise NotConfigured(f"exec: apiVersion {version!r} is not known; use {' or '.join(VERSIONS)}")
         mode = entry.get("interactiveMode") or ("" if version == VERSIONS[0] else "IfAvailable")

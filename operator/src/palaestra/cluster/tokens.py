@@ -26,7 +26,11 @@ class FileToken:
         if self._clock() - self._read_at >= FRESH_S:
             self._text = text_of(self._file)
             if not self._text.isprintable() or not self._text:
-                fact = "is not one line" if self._text else "is missing or empty"
+                fact = (
+                    "has a character that cannot be printed, such as a line break"
+                    if self._text
+                    else "is missing, empty, unreadable or not ASCII"
+                )
                 raise Unreachable(0, "NoCredentials", f"{self._file} {fact}")
             self._read_at = self._clock()
         return f"Bearer {self._text}"

@@ -112,7 +112,8 @@ def _copy(folder: Path, source: Path) -> None:
         shutil.copytree(folder, source, ignore=left_out)
     except (PermissionError, shutil.Error) as error:
         raise ConfigurationError(
-            f"{folder}: user {os.getuid()} cannot read all of it; `chmod --recursive a+rX` it on your machine"
+            f"{folder}: user {os.getuid()} cannot copy all of it; `chmod --recursive a+rX` it on your "
+            "machine, and remove links to missing files"
         ) from error
 
 
