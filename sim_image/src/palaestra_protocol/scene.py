@@ -383,7 +383,7 @@ def _pose(fields: Fields, name: str) -> PoseNumbers:
 
 
 def _names(content: object, name: str, most: int) -> tuple[str, ...]:
-    """Return the keys of the object in the field `name` of `content`, which `Fields` has accepted."""
+    """Return the keys of the object in the field `name`; `Fields` has already accepted `content`."""
     found = tuple(cast("Mapping[str, Mapping[str, object]]", content)[name])
     if len(found) > most or any(len(one) > MOST_NAME for one in found):
         raise ProtocolError(f"{name}: has more than {most} names, or one is longer than {MOST_NAME}")

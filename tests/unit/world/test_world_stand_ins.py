@@ -300,7 +300,7 @@ def test_a_users_file_is_what_the_manual_shows() -> None:
         ),
         (
             '[A]\nwall = { path = "p", thickness = 1, height = 1 }',
-            "mine.toml: A: wall: its path is not a field with a list of points, or closed is not true or false;",
+            "mine.toml: A: wall: its path is not a field with a list of points, or closed is not true",
         ),
     ],
 )

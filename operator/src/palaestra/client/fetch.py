@@ -101,7 +101,7 @@ def _with_remedies(source: RunSource, target: Path, deadline: float) -> Iterator
         raise TookTooLong(
             f"{source.directory} in pod {source.pod}: was not copied in time; allow more time with --timeout"
         ) from error
-    except (ApiError, ClientError):  # some of these errors are OSErrors, which a later clause replaces
+    except (ApiError, ClientError):  # some are OSErrors, but the clause for OSError is not for them
         raise
     except CommandFailed as error:
         raise NotFetched(

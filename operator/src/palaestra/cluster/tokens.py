@@ -1,4 +1,4 @@
-"""A token in a file, which the kubelet or another program replaces before it expires."""
+"""A token in a file; the kubelet or another program replaces the token before it expires."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -9,7 +9,7 @@ FRESH_S = 60.0  # seconds until the next read; a kubelet replaces a token minute
 
 
 class FileToken:
-    """The token in a file, which is read again after a minute."""
+    """The token in a file; the file is read again after a minute."""
 
     def __init__(self, file: Path, clock: Callable[[], float]) -> None:
         self._file = file

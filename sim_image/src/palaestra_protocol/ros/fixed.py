@@ -1,4 +1,4 @@
-"""Messages of fixed size: their values become one flat sequence of numbers, which one struct packs.
+"""Messages of fixed size: one struct packs all values of a message, as a flat sequence of numbers.
 
 Every motor command and every step is such a message, so the speed of this code limits the speed of a
 simulator.

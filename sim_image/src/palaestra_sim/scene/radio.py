@@ -1,4 +1,4 @@
-"""The radio between emitters and receivers, which decides which receivers get a packet."""
+"""The radio between emitters and receivers: it selects the receivers that get a packet."""
 
 from __future__ import annotations
 

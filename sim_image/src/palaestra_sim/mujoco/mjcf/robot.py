@@ -85,7 +85,7 @@ class _Fitter:
     def fit(self) -> Equipment:
         """Return the devices."""
         model = self._model.model
-        self._model.settle()  # computes the lengths of tendons, which motors read
+        self._model.settle()  # computes the lengths of tendons, because motors read these lengths
         for index in range(model.nu):
             self._add_actuator(index)
         for index in range(model.nsensor):

@@ -23,7 +23,7 @@ from palaestra_sim.scene.radar_targets import Bounds, RadarTarget, RadarTargets
 
 _LIGHT_M_S: Final = 299_792_458.0
 _MILLIWATT: Final = 0.001
-_NEAREST_M: Final = 0.001  # minimum distance in the formula of the power, which would be infinite at 0
+_NEAREST_M: Final = 0.001  # minimum distance in the formula of the power; at 0 m the power would be infinite
 _Gauss = Callable[[float, float], float]
 
 
