@@ -97,13 +97,13 @@ class RunData:
         evaluations: the regular evaluations of the policy, in the order of steps.
         confirmations: the evaluations of chosen policies with other seeds (`confirmEpisodes`), in the order
             of steps.
-        curves: curves of the training by name.
+        curves: step and value of each point of each curve, by the name of the curve.
         faults: faults of simulators, in the order of time.
         fault_count: number of all faults of the run; `faults` may have fewer.
         goodput: seconds of the run under each cause of `GoodputLedger`.
         checkpoints: step, size and time of each checkpoint, as texts.
         attempts: start and reason of each attempt, as texts.
-        replays: recorded episodes.
+        replays: recorded episodes of one evaluation.
         replayed: the evaluation that recorded the episodes, in words.
         repeat: sentences and commands to repeat the run.
         files: name and text of the files in the report.
