@@ -98,7 +98,7 @@ def test_a_training_yaml_is_read_as_it_was(path):
 
 @pytest.mark.parametrize("path", TRAININGS, ids=name_of)
 def test_a_training_yaml_of_a_job_that_uses_nothing_new_has_no_new_field(path):
-    """A job may name a trainer image of 0.1.0, which logs a warning for each unknown field."""
+    """A job may name a trainer image of 0.1.0; that trainer logs a warning for each unknown field."""
     example, layout = path.stem.rsplit(".", 1)
     job = identified(load((OLD / "jobs" / f"{example}.yaml").read_text()), UID)
     images = Images.of_release("0.0.0")
@@ -137,7 +137,7 @@ def test_a_last_word_is_read_and_has_the_same_fields():
     [(TrainerStatus, "trainer-status.json"), (Termination, "interrupted/termination.json")],
 )
 def test_what_a_newer_trainer_reports_besides_is_ignored(kind, record):
-    """A job may name an image with a newer trainer, which reports fields that this release does not know."""
+    """A job may name a newer trainer image; that trainer reports fields that this release does not know."""
     known = json.loads((OLD / record).read_text())
     checkpointed = (known["last_checkpoint"] or {}) | {"of_tomorrow": 1}
 

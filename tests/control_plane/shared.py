@@ -38,7 +38,7 @@ ADDRESS = "plane.json"  # this file is written when the control plane is ready
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """One run of pytest: its process, and the folder of its control plane, which may not exist yet."""
+    """One run of pytest: its process, and the folder of its control plane; the folder may not exist yet."""
 
     owner: int
     folder: Path

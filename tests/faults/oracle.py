@@ -1,4 +1,4 @@
-"""Conditions about the end state, pods and owners of a run, which hold after any fault."""
+"""Conditions that hold after any fault, about the end state, the pods and the owners of a run."""
 
 import threading
 from collections import Counter, defaultdict

@@ -1,4 +1,4 @@
-"""The small TrainingJobs of `make soak`, whose simulators may fail any number of times."""
+"""The small TrainingJobs of `make soak`; their simulators may fail any number of times."""
 
 import copy
 

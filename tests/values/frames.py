@@ -24,7 +24,7 @@ def turn(axis, angle_rad):
 
 
 def axis_angle(rotation):
-    """Return axis (x, y, z) and angle of a rotation, which must not be half a turn."""
+    """Return axis (x, y, z) and angle of a rotation; the angle must not be half a turn."""
     angle_rad = np.arccos((np.trace(rotation) - 1.0) / 2.0)
     if angle_rad < 1e-9:
         return np.array([0.0, 0.0, 1.0, 0.0])

@@ -35,7 +35,7 @@ def changed(job: Given, changes: Mapping[str, Any]) -> TrainingJob:
 
     Args:
         job: the job, as the path of a file, YAML text, plain data or the model.
-        changes: the new values by the paths of their fields, which docs/reference/trainingjob.md lists. A
+        changes: the new values by the paths of their fields; docs/reference/trainingjob.md lists the paths. A
             path may omit `spec.`: `{"trainer.algorithm.hyperparameters.learning_rate": 1e-3}`.
 
     Raises:

@@ -104,7 +104,7 @@ class VisualShape:
         size: the extent along x, y and z in meters; for round shapes: diameter, diameter, height. For a mesh,
             the factors by which its points are multiplied.
         pose: the pose in the frame of the node.
-        color: the color of the whole shape.
+        color: red, green, blue and alpha of the whole shape, 0 to 1.
         mesh: for the kind MESH, the index of the mesh in `VisibleScene.meshes`; otherwise None.
     """
 
@@ -383,7 +383,7 @@ def _pose(fields: Fields, name: str) -> PoseNumbers:
 
 
 def _names(content: object, name: str, most: int) -> tuple[str, ...]:
-    """Return the keys of the object in the field `name` of `content`, which `Fields` has accepted."""
+    """Return the keys of the object in the field `name`; `Fields` has already accepted `content`."""
     found = tuple(cast("Mapping[str, Mapping[str, object]]", content)[name])
     if len(found) > most or any(len(one) > MOST_NAME for one in found):
         raise ProtocolError(f"{name}: has more than {most} names, or one is longer than {MOST_NAME}")

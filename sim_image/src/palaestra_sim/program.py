@@ -62,7 +62,7 @@ class Program:
     """The program of one simulator.
 
     Attributes:
-        name: the name of the program.
+        name: the name of the command, such as palaestra-stub.
         description: the description in the program's help.
         physics: returns a new physics object for a world that is about to be loaded.
         mjcf: returns the simulation of an MJCF world; None if the program does not simulate MJCF. The last

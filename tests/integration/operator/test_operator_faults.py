@@ -125,7 +125,7 @@ def test_an_upgrade_touches_nothing_of_a_running_job(place, start):
 
 
 def test_a_job_that_is_made_again_after_an_upgrade_has_its_old_images(place, start):
-    """A user may delete the Job of a replica to restart it, which must not change its images."""
+    """A user may delete the Job of a replica to restart the replica; its images must stay the same."""
     start("--trainer-image=trainer:1")
     place.train()
     place.pods()

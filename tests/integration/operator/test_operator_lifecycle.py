@@ -171,7 +171,7 @@ def claim(name):
 
 
 def test_a_claim_that_is_for_jobs_no_more_keeps_its_job_suspended(place, start):
-    """Running pods may continue, but a resumed job needs a new pod, which must not use the claim."""
+    """Running pods may continue, but a resumed job needs a new pod, and this pod must not use the claim."""
     start()
     place.create(CLAIMS, claim("runs"))
     place.train(storage={"existingClaim": "runs"})
@@ -189,7 +189,7 @@ def test_a_claim_that_is_for_jobs_no_more_keeps_its_job_suspended(place, start):
 
 
 def test_a_job_of_another_controller_is_left_alone(place, start):
-    """The field `managedBy` names another controller, which alone may act on the job."""
+    """The field `managedBy` names another controller; only that controller may act on the job."""
     start()
     place.train("theirs", managedBy="example.com/other")
     place.train("ours")

@@ -212,7 +212,7 @@ def test_a_suspended_job_that_is_stopped_is_deleted_and_not_made_again(write, pl
 
 
 def test_edits_of_policy_and_job_are_said_once_and_stay(place, start, control_plane):
-    """The author must learn of an edit, which may have a reason and is therefore not undone."""
+    """The author must learn of an edit. It may have a reason, so the operator does not undo it."""
     start()
     place.train()
     place.pods()

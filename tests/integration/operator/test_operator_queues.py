@@ -78,7 +78,7 @@ def allowed(api):
 
 
 def job_in_queue(place):
-    """Create a TrainingJob with a queue, and return its Job, which waits."""
+    """Create a TrainingJob with a queue, and return its Job; the Job waits in the queue."""
     place.train(scheduling=QUEUE)
     return eventually(lambda: place.get(JOBS, "job-0"))
 

@@ -80,7 +80,7 @@ GET_FIELD_2025A = "88d5309880e1463a89aff87d30e09f1c"
 
 
 def test_a_client_of_webots_r2025a_is_served_too(peer, dial):
-    """Webots R2025a renamed a field of three requests, which changes the md5 sum but not the bytes."""
+    """Webots R2025a renamed a field of three requests; their md5 sums changed, but not their bytes."""
     peer.do(
         lambda: peer.node.serve(
             "field", "webots_ros/node_get_field", lambda it: {"field": it.node + it.proto}

@@ -84,7 +84,7 @@ def test_a_port_in_use_is_one_line():
 
 
 def test_a_kill_of_its_owner_leaves_nothing():
-    """When the owner is killed, the kernel closes the pipe to the master, which then ends."""
+    """When the owner is killed, the kernel closes the pipe to the master, and the master ends."""
     with started(sys.executable, "-c", OWNER, stdin=subprocess.PIPE) as owner:
         pid, uri = owner.stdout.readline().split()
         with xmlrpc.client.ServerProxy(uri) as master:  # this connection stays open

@@ -1,4 +1,4 @@
-"""Our own ROS node, which a program uses if rospy is not installed; with rospy, it uses rospy's node."""
+"""A program uses our own ROS node if rospy is not installed; with rospy, it uses rospy's node."""
 
 import os
 import re

@@ -25,7 +25,7 @@ ROLES = {"collect-0": "Collect", "collect-1": "Collect", "evaluate-0": "Evaluate
 
 @pytest.fixture(scope="session")
 def fakes() -> ModuleType:
-    """Return the module of the fake simulators, which is also a program."""
+    """Return the module of the fake simulators; the module is also a program."""
     spec = importlib.util.spec_from_file_location("fakes", PROGRAM)
     assert spec
     assert spec.loader

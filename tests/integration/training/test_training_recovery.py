@@ -205,7 +205,7 @@ class OwnSidecar:
 
 @pytest.fixture
 def own_sidecar():
-    """Yield a sidecar, which the test may kill and start again."""
+    """Yield a sidecar; the test may kill it and start it again."""
     own = OwnSidecar()
     own.start()
     yield own

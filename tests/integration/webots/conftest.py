@@ -97,5 +97,5 @@ def arena(standing):
 
 @pytest.fixture
 def own_arena(start):
-    """Yield an included arena that runs only for this test, which may stop it."""
+    """Yield an included arena that runs only for this test; the test may stop it."""
     return start()

@@ -103,7 +103,7 @@ def test_unknown_axes_are_refused(axes):
 
 
 def test_the_light_sensor_reads_a_number(measured):
-    """Its message has a variance too, which is not part of the reading."""
+    """A message of the light sensor has a variance too; the variance is not part of the reading."""
     _, measuring, _ = measured
 
     assert isinstance(measuring.sensors["light sensor"].value, float)

@@ -36,7 +36,7 @@ sys.stdin.read()
 
 
 def test_a_child_that_prints_without_end_is_not_stopped_by_a_full_pipe(tmp_path):
-    """Webots forwards the output of its controllers, which no script reads."""
+    """Webots forwards the output of its controllers, and no script reads this output."""
     mark = tmp_path / "done"
     program = CHATTERBOX.replace('print("done", file=sys.stderr, flush=True)', f"open({str(mark)!r}, 'w')")
     child = start_child([sys.executable, "-c", program], stderr=subprocess.PIPE)

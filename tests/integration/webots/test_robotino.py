@@ -38,7 +38,7 @@ def test_a_reset_puts_it_where_the_episode_begins(arena, heading):
 
 
 def test_after_a_reset_it_stands_and_obeys(arena):
-    """A reset ends the motors' velocity control, which the facade must restore."""
+    """A reset ends the motors' velocity control; the facade must restore this control."""
     arena.scene.reset(1, START, (1.0, 0.0))
     arena.robot.drive(0.5, 0.0, 0.0)
     arena.robot.advance()

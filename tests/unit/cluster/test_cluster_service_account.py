@@ -65,7 +65,7 @@ def test_a_token_that_cannot_be_read_is_no_end(files):
     clock = Clock()
     header = account(files, clock).authorization
     (files / "token").rename(files / "elsewhere")
-    with pytest.raises(Unreachable, match="token is missing or empty"):
+    with pytest.raises(Unreachable, match="token is missing, empty, unreadable or not ASCII"):
         header()
 
     (files / "elsewhere").rename(files / "token")

@@ -204,7 +204,7 @@ NOTED = [
     ("noise_std: 0.1", "noise_std: 0.1 is left out; without noise_type it has no effect"),
     ("n_steps: 3", "n_steps: 3 is left out; rows of several simulators share a buffer, so only 1 works"),
     ('normalize: "dict(epsilon=1e-3)"', "normalize.epsilon: left out; algorithm.normalize has no such field"),
-    ('normalize: "yes please"', "normalize: left out; is not a Python expression"),
+    ('normalize: "yes please"', "normalize: left out; is not a Python expression, or is nested too deeply"),
     ("learning_rate: const_0.1", "learning_rate: const_0.1 falls linearly to 0, as in Zoo"),
     (
         'policy_kwargs: "dict(net_arch=[64, dict(pi=[8])])"',

@@ -26,7 +26,7 @@ class FieldDoc:
     """The documentation of one field, or of the whole TrainingJob, whose path is empty.
 
     Attributes:
-        path: the names of the fields from the TrainingJob to this field, whose name is the last.
+        path: the names of the fields from the TrainingJob to this field; the last is the name of this field.
         schema: the structural schema of the field's value.
         required: whether the parent must have this field.
         children: the fields of the value; for a list, the fields of each item.

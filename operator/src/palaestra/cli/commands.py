@@ -13,7 +13,7 @@ class Command(NamedTuple):
     """One command.
 
     Attributes:
-        module: the module in `palaestra.cli`, whose function `add` declares the command.
+        module: name of a module in `palaestra.cli`; the module's function `add` declares the command.
         summary: the line in the help.
     """
 

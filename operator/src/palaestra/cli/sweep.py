@@ -31,8 +31,8 @@ from palaestra_protocol.pod.status import ExitCode
 from palaestra_protocol.signals import obeyed
 
 FAILED = 1
-# Number of trials of a search that run at the same time in a cluster. The number is small, because a search
-# does not learn from running trials.
+# Default number of trials that run at the same time in a cluster, for a Sweep with `optuna`. The number is
+# small, because Optuna does not learn from running trials.
 SEARCHED_AT_ONCE = 4
 SWEEP = """\
 Trains the job of the Sweep in FILE with different values of some fields, each with several seeds. Checks

@@ -41,7 +41,7 @@ class Client:
 
     Attributes:
         api: the connection to the cluster, for requests about other objects.
-        namespace: the namespace of the jobs.
+        namespace: the namespace of all jobs that this client creates or finds.
     """
 
     def __init__(

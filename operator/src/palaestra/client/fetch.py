@@ -63,12 +63,13 @@ def fetch(
     """Return the new folder `into/<job>/<replica>`: policy, report and TensorBoard data of a run.
 
     Args:
-        api: the cluster.
-        job: the job of the run.
-        replica: the number of the replica.
+        api: the connection to the cluster.
+        job: the job whose run is fetched.
+        replica: the number of the run's replica, from 0.
         into: the folder for results.
         deadline: the time on the monotonic clock by which the call must have ended.
-        most_bytes: the limit for all files together; None: `TIMES` times the volume that the job requests.
+        most_bytes: the greatest size of all files together, in bytes; None: `TIMES` times the volume that the
+            job requests.
 
     Raises:
         NotFetched: the folder exists already, the run does not exist, or folder or run cannot be accessed.
@@ -100,7 +101,7 @@ def _with_remedies(source: RunSource, target: Path, deadline: float) -> Iterator
         raise TookTooLong(
             f"{source.directory} in pod {source.pod}: was not copied in time; allow more time with --timeout"
         ) from error
-    except (ApiError, ClientError):  # some of these errors are OSErrors, which a later clause replaces
+    except (ApiError, ClientError):  # some are OSErrors, but the clause for OSError is not for them
         raise
     except CommandFailed as error:
         raise NotFetched(

@@ -29,10 +29,10 @@ def unpack(chunks: Iterator[bytes], into: Path, wanted: Collection[str], most_by
     """Write the files of a tar stream into a new folder, and read the stream to its end.
 
     Args:
-        chunks: the chunks of the stream.
+        chunks: consecutive pieces of the stream's bytes, of any size.
         into: the new folder.
         wanted: names of the requested files and folders.
-        most_bytes: the limit of bytes of all files together.
+        most_bytes: the greatest size of all files together, in bytes.
 
     Raises:
         WrongArchive: the stream is not a tar, has members that were not requested, or is too large.

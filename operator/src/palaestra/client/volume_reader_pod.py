@@ -23,7 +23,7 @@ def reading_pod(job: TrainingJob, template: Mapping[str, Any], name: str, lives_
     """Return the pod; the TrainingJob owns it, so that the two are deleted together.
 
     Args:
-        job: the job of the run.
+        job: the job whose volume the pod mounts.
         template: the pod template of the replica's Job.
         name: name of the pod, different for each call.
         lives_s: whole seconds after which the pod ends by itself.

@@ -27,8 +27,8 @@ def changes(
     If the object is replaced by a new object of the same name, the iteration ends too.
 
     Args:
-        api: the cluster.
-        resource: kind of the object.
+        api: the connection to the cluster.
+        resource: kind of the object, with its API group and its name in URLs.
         namespace: the namespace of the object.
         name: the name of the object.
         deadline: the time on the monotonic clock by which the iteration must have ended.

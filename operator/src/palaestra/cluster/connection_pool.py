@@ -62,7 +62,7 @@ def dialed(pool: PoolManager, server: str, wait_s: float) -> socket.socket:
     """
     target = pool.connection_from_url(server)
     first = target.proxy or target
-    # mypy sees only the protocol of these classes, which does not declare `sock`.
+    # mypy sees only the protocol of these classes, and this protocol does not declare `sock`.
     connection: Any = target.ConnectionCls(
         host=first.host or "", port=first.port, timeout=wait_s, **target.conn_kw
     )

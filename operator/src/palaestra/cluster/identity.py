@@ -29,7 +29,7 @@ def authorization(
     """Return a function that returns the header `Authorization` of a user; an auth-provider is ignored.
 
     Args:
-        user: the user in a kubeconfig.
+        user: the user's settings in a kubeconfig, such as `token` or `exec`.
         folder: the folder of the kubeconfig; relative paths start in this folder.
         cluster: the information about the cluster that a plugin gets.
         context: the TLS settings, to which a plugin's certificate is added.
@@ -91,7 +91,10 @@ class _OfPlugin:
 
 def _of_file(file: Path) -> Authorization:
     if not text_of(file):
-        raise NotConfigured(f"{TOKEN_FILE}: {file} is missing or empty; log in again, or name another file")
+        raise NotConfigured(
+            f"{TOKEN_FILE}: {file} is missing, empty, unreadable or not ASCII; "
+            "log in again, or name another file"
+        )
     return FileToken(file, time.monotonic)
 
 
@@ -102,5 +105,8 @@ def _always(header: str | None) -> Authorization:
 def _one_line(text: object, field: str) -> str:
     found = str(text).strip()
     if not found or not found.isascii() or not found.isprintable():
-        raise NotConfigured(f"{field} is not one line of text; copy it again, on one line")
+        raise NotConfigured(
+            f"{field} is empty, or has other characters than printable ASCII, such as a line break; "
+            "copy it again, on one line"
+        )
     return found

@@ -46,7 +46,10 @@ def impersonation(user: Mapping[str, Any]) -> Headers:
 
 def _text(value: object, field: str) -> str:
     if not isinstance(value, str) or not value.isprintable():
-        raise NotConfigured(f"{field}: {value!r} is not one line of text; write it as text, in quotes")
+        raise NotConfigured(
+            f"{field}: {value!r} is not text of printable characters; "
+            "write it as text, in quotes, on one line"
+        )
     return value
 
 

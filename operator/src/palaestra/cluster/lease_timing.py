@@ -66,8 +66,8 @@ class Tenure:
     """A leader's own view: the time at which it sent the last successful renewal.
 
     Attributes:
-        sent: time on the leader's clock, just before the request.
-        duration_s: duration of the Lease.
+        sent: seconds on the leader's clock, just before the request.
+        duration_s: `leaseDurationSeconds` of the Lease.
     """
 
     sent: float

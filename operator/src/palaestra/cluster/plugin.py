@@ -56,7 +56,7 @@ class Plugin:
         """
         command, version = entry.get("command"), entry.get("apiVersion")
         if not isinstance(command, str) or not command:
-            raise NotConfigured("exec: command is missing; name the program")
+            raise NotConfigured("exec: command is missing, or is not text; name the program")
         if version not in VERSIONS:
             raise NotConfigured(f"exec: apiVersion {version!r} is not known; use {' or '.join(VERSIONS)}")
         mode = entry.get("interactiveMode") or ("" if version == VERSIONS[0] else "IfAvailable")
@@ -140,7 +140,9 @@ class Plugin:
         if bool(certificate) is not bool(key):
             raise self._failure("returned only one of certificate and key")
         if token and not (token.isascii() and token.isprintable()):
-            raise self._failure("returned a token that is not one line of text")
+            raise self._failure(
+                "returned a token with other characters than printable ASCII, such as a line break"
+            )
         return Credentials(
             token=token or None,
             certificate=str(certificate) if certificate else None,

@@ -35,7 +35,7 @@ class Recorder:
         """Prepare the recorder, without a request.
 
         Args:
-            api: the API server.
+            api: the API server that stores the events.
             component: the name of the reporting program, as `kubectl describe` shows it.
             instance: the name of the reporting process.
         """
@@ -78,7 +78,7 @@ class Recorder:
                 self._remember(name, 1)
             else:
                 self._again(event, count + 1)
-        except AlreadyExists:  # another operator process wrote the event, or this one has forgotten its count
+        except AlreadyExists:  # another process wrote the event, or this process has forgotten the count
             if once:
                 self._remember(name, 1)
                 return

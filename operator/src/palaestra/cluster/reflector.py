@@ -49,7 +49,7 @@ class Reflector:
             api: the API server.
             resource: the kind of objects.
             namespace: the namespace to watch; None for all namespaces.
-            labels: a label selector.
+            labels: the label selector of the objects to watch; None: all objects of the kind.
             keep: reduces an object to the copy that the store gets. The metadata of the copy must have
                 namespace, name and labels.
             changed: called after the store is updated, with the cached copy of the object; for a deleted

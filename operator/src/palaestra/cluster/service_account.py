@@ -33,9 +33,9 @@ def account(files: Path | None = None, clock: Callable[[], float] = time.monoton
         raise NotConfigured(f"{HOST} or {PORT} is not set, so this process does not run in a pod")
     authority = folder / "ca.crt"
     if not text_of(authority):
-        raise NotConfigured(f"{authority} is missing or empty")
+        raise NotConfigured(f"{authority} is missing, empty, unreadable or not ASCII")
     if not text_of(folder / "token"):
-        raise NotConfigured(f"{folder / 'token'} is missing or empty")
+        raise NotConfigured(f"{folder / 'token'} is missing, empty, unreadable or not ASCII")
     server = f"https://[{host}]:{port}" if ":" in host else f"https://{host}:{port}"
     proxy = proxy_of_environment(server, os.environ)
     try:

@@ -1,4 +1,4 @@
-"""A token in a file, which the kubelet or another program replaces before it expires."""
+"""A token in a file; the kubelet or another program replaces the token before it expires."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -9,7 +9,7 @@ FRESH_S = 60.0  # seconds until the next read; a kubelet replaces a token minute
 
 
 class FileToken:
-    """The token in a file, which is read again after a minute."""
+    """The token in a file; the file is read again after a minute."""
 
     def __init__(self, file: Path, clock: Callable[[], float]) -> None:
         self._file = file
@@ -26,7 +26,11 @@ class FileToken:
         if self._clock() - self._read_at >= FRESH_S:
             self._text = text_of(self._file)
             if not self._text.isprintable() or not self._text:
-                fact = "is not one line" if self._text else "is missing or empty"
+                fact = (
+                    "has a character that cannot be printed, such as a line break"
+                    if self._text
+                    else "is missing, empty, unreadable or not ASCII"
+                )
                 raise Unreachable(0, "NoCredentials", f"{self._file} {fact}")
             self._read_at = self._clock()
         return f"Bearer {self._text}"

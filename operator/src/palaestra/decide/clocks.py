@@ -22,7 +22,7 @@ class Wait:
 
     Attributes:
         key: identifies the wait within a replica; a wait with another key begins again.
-        seconds: the deadline.
+        seconds: the deadline, in seconds from the beginning of the wait.
         begun_s: the time on the monotonic clock at which the wait began; None: the time of the first
             reconcile that found the wait.
     """

@@ -81,9 +81,9 @@ def last_progress(situation: ReplicaContext) -> datetime | None:
 def standstill(situation: ReplicaContext) -> Wait | None:
     """Return the wait for the next step of training or evaluation; None if the trainer does not train.
 
-    The wait began at the last step of an environment, whose age the trainer reports. The trainer also reports
-    the time of this step by its own clock, so the operator compares this time only with the trainer's earlier
-    reports.
+    The wait began at the last step of an environment. The trainer reports the age of this step. It also
+    reports the time of this step by its own clock, so the operator compares this time only with the trainer's
+    earlier reports.
     """
     polled = situation.seen.polled
     if polled is None or not situation.trains or situation.pod is None:

@@ -170,7 +170,7 @@ def _messages(replica: Data) -> Data:
 
 
 def _memory_kills(replica: Data) -> Data:
-    """Return a replica with only container, count and time of each kill, which identify the kill."""
+    """Return a replica with only container, count and time of each kill; these three identify the kill."""
     kills = [{name: kill[name] for name in _OF_KILL} for kill in replica.get("memoryKills", ())]
     return {**replica, "memoryKills": kills}
 

@@ -22,9 +22,9 @@ class CheckResult:
 
     Attributes:
         what: the subject of the check.
-        verdict: the result.
+        verdict: whether the subject is right or wrong, works with a risk, or is unknown.
         fact: the observation, in a sentence.
-        remedy: the action to take; empty if the result is right.
+        remedy: the action to take; empty if the verdict is RIGHT.
     """
 
     what: str

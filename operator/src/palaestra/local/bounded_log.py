@@ -19,7 +19,7 @@ _LONGEST_NOTE = 200
 
 
 class LimitedFile(RawIOBase):
-    """A log file for appending, which never has more than `first + 2 * last` bytes.
+    """A log file for appending; it never has more than `first + 2 * last` bytes.
 
     One exception: data that is longer than `last` is written whole.
     """

@@ -1,4 +1,4 @@
-"""The progress of a run, which its trainer reports at `/status`."""
+"""The progress of a run, as the run's trainer reports it at `/status`."""
 
 from contextlib import suppress
 from dataclasses import dataclass

@@ -44,7 +44,8 @@ class Result:
         directory: the run directory.
         policy: the path of `model.zip`, the policy with the best evaluation; None if the file does not exist.
         steps: environment steps from which the run has learned.
-        success_rate: success rate of the policy, 0 to 1.
+        success_rate: success rate of the best policy, 0 to 1; if the run is not complete, of the last
+            evaluation.
         steps_per_second: environment steps per second over the whole run.
         faults: number of faults of all simulators.
     """

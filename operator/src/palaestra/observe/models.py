@@ -142,7 +142,7 @@ class PodView:
     """One pod of a replica.
 
     Attributes:
-        version: its resourceVersion.
+        version: the pod's resourceVersion.
         started: the time at which a kubelet accepted the pod; None if no kubelet has accepted it.
         phase: Pending, Running, Succeeded, Failed or Unknown.
         reason, message: the pod's own reason and message, for example after an eviction; usually "".
@@ -249,7 +249,7 @@ class JobView:
     """The batch/v1 Job of a replica.
 
     Attributes:
-        version: its resourceVersion.
+        version: the resourceVersion of the Job.
         suspended: the current value of `spec.suspend`.
         suspend_set: the value of `spec.suspend` that the operator set last, from its annotation; None: the
             Job has no annotation, for example because the operator created the Job for a queue.

@@ -81,9 +81,9 @@ class Controller:
 
     Args:
         caches: the watched objects.
-        looking: observes a job.
-        acting: executes actions.
-        reporting: writes status and events.
+        looking: reads the current state of a job's objects and trainers.
+        acting: executes the actions of a decision.
+        reporting: writes the job's status, then its events.
         layout: the layout of this release in this cluster.
         times: returns the clocks of a reconcile; its argument is the record of the last reconcile.
     """

@@ -16,10 +16,10 @@ class Informer:
     """The objects of one kind; the cached copies may be slightly behind the cluster.
 
     Args:
-        api: the cluster.
-        resource: the kind.
+        api: the connection to the cluster.
+        resource: the kind of the objects.
         namespaces: the namespaces to watch; empty: all namespaces.
-        labels: a label selector.
+        labels: the label selector of the objects to watch; None: all objects of the kind.
         keep: reduces an object to the copy that the cache gets.
         changed: called with the reduced copy of each object that changed.
     """

@@ -205,7 +205,7 @@ class JobObserver:
             if source.kind is not ReferenceKind.SECRET:
                 raise
             # The operator has no permission to read Secrets in this namespace. So it treats the Secret like
-            # one without the label that opens it to jobs.
+            # a Secret without the label that allows jobs to use a Secret.
             return {}
 
     def _has_kueue(self) -> bool:

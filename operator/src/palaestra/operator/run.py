@@ -55,7 +55,7 @@ class Operator:
     Args:
         api: the cluster.
         options: the options of the command line.
-        metrics: the operator's metrics.
+        metrics: the metrics that this operator updates.
     """
 
     def __init__(self, api: Api, options: OperatorOptions, metrics: Metrics) -> None:

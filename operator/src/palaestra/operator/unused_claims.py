@@ -25,7 +25,7 @@ class UnusedClaims:
     Args:
         api: the cluster, for reads that must not come from a cache.
         caches: the watched objects.
-        writer: for deletions.
+        writer: the client that deletes claims.
     """
 
     def __init__(self, api: Api, caches: Caches, writer: FencedClient) -> None:

@@ -27,8 +27,8 @@ Denied = Mapping[int | None, ApiError]  # errors by replica; the key None is for
 Lacking = tuple[str, str]  # uid of a Job or pod, and the field selector of the events to read
 Change = tuple[str, int]  # uid and generation of a Job
 
-# If a webhook does not respond, the API server responds with an internal error, and its message has this
-# word.
+# If a webhook does not respond, the API server responds with an internal error. The message of this error
+# has this word.
 _BY_A_WEBHOOK = "webhook"
 # If a disruption budget forbids an eviction, the API server responds with 429, as if it were busy. The
 # message of this response has these words.
@@ -67,7 +67,7 @@ class ForeignJobs(BoundedCache[str, tuple[float, Object]]):
     def among(self, key: Key, uid: str, cached: Collection[str]) -> list[Object]:
         """Return the foreign Jobs whose names a TrainingJob needs; each was read at most ten seconds ago.
 
-        `cached` has the names of the Jobs in the cache, which are not foreign.
+        `cached` has the names of the Jobs in the cache; these Jobs are not foreign.
         """
         met = {name: met for name, met in self.known(key, uid).items() if name not in cached}
         self.keep(key, uid, met)

@@ -32,7 +32,7 @@ class Workers:
     """Threads that work on one queue.
 
     Args:
-        queue: the queue of keys.
+        queue: the namespace and name of each job to reconcile.
         reconcile: reconciles one job; returns the seconds until the next reconcile, or None.
         gate: a reconcile starts only while this event is set.
         seconds: the histogram for the durations of reconciles, with the label `result`.

@@ -25,8 +25,8 @@ SECURITY = {
     "readOnlyRootFilesystem": True,
 }
 # The shortest period of a probe is a second, but the ROS master starts in a quarter of a second. So each
-# execution of the probe's command polls the port until it is open. A TCP probe of the kubelet cannot reach
-# the port, which is on loopback.
+# execution of the probe's command polls the port until it is open. The port is on
+# loopback, so a TCP probe of the kubelet cannot reach it.
 MASTER_ANSWERS = "until (exec 3<>/dev/tcp/{host}/{port}) 2>/dev/null; do sleep 0.05; done"
 
 

@@ -1,4 +1,4 @@
-"""The batch/v1 Job of a replica, which creates the replica's pods, one at a time."""
+"""The batch/v1 Job of a replica; the Job creates the replica's pods, one at a time."""
 
 from collections.abc import Mapping
 from typing import Any

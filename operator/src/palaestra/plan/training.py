@@ -23,7 +23,7 @@ FILE = "training.yaml"
 LOOPBACK = "127.0.0.1"
 NEVER = Recycle(after_resets=0)
 DO_NOT_AGE = (Driver.STUB, Driver.MUJOCO)
-# Source: the paper in CITATION.cff, whose Webots ended with a bus error after this number of resets.
+# In the experiments of the paper in CITATION.cff, Webots ended with a bus error after this number of resets.
 AFTER_24_RESETS = Recycle(after_resets=24)
 
 

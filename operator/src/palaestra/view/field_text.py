@@ -12,7 +12,7 @@ def field_text(field: FieldDoc, width: int, *, recursive: bool = False) -> str:
     """Return the text about a field: type, default, description, rules, and the fields of its value.
 
     Args:
-        field: the field.
+        field: the documentation of the field.
         width: the width of a line in characters; a long name or type may exceed it.
         recursive: whether to list the names and types of all fields below, without their descriptions.
     """

@@ -1,4 +1,4 @@
-"""The progress of a job, which `palaestra watch` redraws each second."""
+"""The picture of a job's progress; `palaestra watch` redraws it each second."""
 
 from datetime import datetime
 

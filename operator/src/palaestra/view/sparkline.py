@@ -12,7 +12,7 @@ def sparkline(
     """Return one bar character for each value, higher for larger values, or a space for an unknown value.
 
     Args:
-        values: the values, oldest first.
+        values: numbers to draw, oldest first; None: unknown.
         lowest: the value of the lowest bar; None: the smallest value in `values`.
         highest: the value of the highest bar; None: the largest value in `values`.
     """

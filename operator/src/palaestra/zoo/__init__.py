@@ -5,7 +5,7 @@ becomes a note.
 
 - `conversion`: one entry of a file as a TrainingJob with its notes
 - `draft`: the job and the notes during the conversion of an entry
-- `expressions`: Python expressions in a file, which are read as data and never evaluated
+- `expressions`: reads the Python expressions in a file as data, and never evaluates them
 - `hyperparameter_file`: the entries and the algorithm of a file
 - `mapping`: the field of a TrainingJob for each key of an entry
 """

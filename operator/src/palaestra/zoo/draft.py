@@ -19,7 +19,7 @@ class Draft:
         algorithm: fields of `trainer.algorithm`, without `hyperparameters`.
         hyperparameters: the keyword arguments of the algorithm's class.
         options: the keyword arguments of the environment.
-        wrappers: the wrappers of the environment.
+        wrappers: `name` and `options` of each wrapper of the environment.
         frame_stack: number of observations that are stacked.
         collecting: number of collecting simulators.
         steps: length of training in environment steps.

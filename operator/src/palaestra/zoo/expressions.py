@@ -61,7 +61,7 @@ def _parsed(text: str) -> ast.expr:
     try:
         return ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError):
-        raise NotPlain("is not a Python expression") from None
+        raise NotPlain("is not a Python expression, or is nested too deeply") from None
 
 
 def _pairs(node: ast.expr) -> Iterator[tuple[str, ast.expr]]:

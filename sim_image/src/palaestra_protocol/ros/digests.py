@@ -32,7 +32,7 @@ def full_text(find: Callable[[str], Message], message: Message) -> str:
 
     Args:
         find: returns the definition of a nested message by its name.
-        message: the definition of the message.
+        message: the definition of the outer message.
     """
     inside = (f"{_LINE}\nMSG: {name}\n{find(name).text}" for name in dict.fromkeys(_nested(find, message)))
     return "\n".join((message.text, *inside))

@@ -1,4 +1,4 @@
-"""Messages of fixed size: their values become one flat sequence of numbers, which one struct packs.
+"""Messages of fixed size: one struct packs all values of a message, as a flat sequence of numbers.
 
 Every motor command and every step is such a message, so the speed of this code limits the speed of a
 simulator.
@@ -55,7 +55,7 @@ class Record:
     """A message of fixed size, or some consecutive fields of a message.
 
     Attributes:
-        names: the names of the fields.
+        names: the name of each field, in the order of their bytes.
         parts: the `FixedPart` of each field; None if the field is one number.
         placed: for each field, its entry in `parts`, and the index of its first number in the flat sequence.
         empties: the value that each field has if it is absent.

@@ -55,8 +55,8 @@ class RpcServer(TcpServer):
     Args:
         address: host and port on which the server listens; port 0 means that the system chooses a free port.
         find: returns the method with a name, or None. The server calls methods in several threads.
-        request_s: see REQUEST_S.
-        idle_s: see IDLE_S.
+        request_s: time limit for reading a request after its first byte, and for sending the response.
+        idle_s: time limit of the wait for the next request.
 
     Raises:
         OSError: the address is in use, or does not belong to this machine.

@@ -24,8 +24,8 @@ def damaged_message(type_name: str, data: bytes, damages: Sequence[Damage], fiel
     """Return a framed message of a topic, changed by all `damages`.
 
     Args:
-        type_name: the message type.
-        data: the framed message.
+        type_name: the type of the message, as `package/Name`.
+        data: the framed message: four bytes with its length, then its bytes.
         damages: the faults to apply, in this order.
         field: the field with the sensor's reading; "" means the last field.
     """

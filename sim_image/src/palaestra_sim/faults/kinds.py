@@ -36,9 +36,9 @@ class Trigger:
     """The events at which a fault occurs: one event, every n-th event, a random share of events, or all.
 
     Attributes:
-        event: the kind of event.
+        event: the kind of event that the fault counts.
         at: the number of the only event at which the fault occurs; None if the other attributes decide.
-        every: the fault occurs at each event whose number is a multiple of `every`.
+        every: the fault can occur only at an event whose number is a multiple of `every`.
         probability: the probability of the fault at each such event.
     """
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from palaestra_sim.errors import SimError
 
 _WRONG = 2
-_GENERATORS = {"genmsg", "genpy"}  # modules of ROS, which Debian's python3-genpy installs
+_GENERATORS = {"genmsg", "genpy"}  # modules of ROS; Debian's package python3-genpy installs both
 
 _EPILOG = """\
 The program writes FOLDER/webots_ros. ROS's tools find the package if FOLDER is /usr/share, or is on

@@ -120,7 +120,7 @@ def add_matter(body: Any, matter: MassProperties, frame: Pose, geoms: Mapping[Sh
     """Add the mass of a Solid to a body.
 
     Args:
-        body: the body.
+        body: the body, in MuJoCo's MjSpec, that gets the mass.
         matter: the mass of the Solid.
         frame: the pose of the Solid in the frame of the body.
         geoms: the geoms of the Solid's shapes.

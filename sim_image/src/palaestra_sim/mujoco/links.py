@@ -32,7 +32,7 @@ class Added:
 
     Attributes:
         link: the link in the scene.
-        body: the body of the link.
+        body: the body of the link, in MuJoCo's MjSpec.
         joint, servo, sensor: the joint, the servo and the force sensor; None if the link has no such part.
     """
 
@@ -152,8 +152,8 @@ class LinkBody:
 
     Args:
         added: the parts of the link in the model.
-        model: the compiled model.
-        data: the data of the model.
+        model: the compiled model (MjModel).
+        data: the current state of the model (MjData).
 
     Attributes:
         link: the link in the scene.

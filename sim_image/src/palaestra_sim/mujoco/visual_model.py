@@ -39,8 +39,8 @@ class VisualModel:
         things: the visible shapes; a shape's index is the number of its geom. The last geom is the sky.
         model, data: the model and the data of MuJoCo.
         positions, rotations: arrays of the geoms' poses in the frames of their shapes, (n, 3) and (n, 3, 3).
-        planes: the numbers of the geoms that are Planes.
-        sun: the direction of the sun's light.
+        planes: the ids of the geoms that are Planes.
+        sun: unit vector in which the sun's light travels.
         scene, option, camera: the objects of MuJoCo's visualizer.
     """
 
@@ -62,7 +62,7 @@ def build(things: Sequence[Drawn], sky: Vector, sun: Vector) -> VisualModel:
     Args:
         things: all visible shapes, without the sky.
         sky: the color of the sky: red, green and blue from 0 to 1.
-        sun: the direction of the sun's light.
+        sun: unit vector in which the sun's light travels.
     """
     spec = mujoco.MjSpec()
     for name, value in _QUALITY.items():

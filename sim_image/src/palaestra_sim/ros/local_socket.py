@@ -32,7 +32,7 @@ class LocalSocket:
     """The socket, from its creation to `close`.
 
     Args:
-        loop: the event loop.
+        loop: the event loop that accepts and serves connections.
         path: the path of the socket; an existing file is replaced.
         answers: for each request line, the function that returns the response.
 

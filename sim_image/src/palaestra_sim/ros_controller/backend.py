@@ -41,10 +41,11 @@ class MotionBackend(Protocol):
         """Apply a force in the next basic step.
 
         Args:
-            node: the node.
-            force: the force.
+            node: the node on which the force acts.
+            force: the force in N.
             relative: whether the force is in the axes of the node, not in the axes of the world.
-            offset: the point at which the force acts, in the node's frame; None for the center of mass.
+            offset: the point at which the force acts, in meters in the node's frame; None for the center of
+                mass.
         """
         ...
 

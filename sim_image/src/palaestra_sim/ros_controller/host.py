@@ -21,7 +21,7 @@ class Host(Protocol):
 
     Attributes:
         world_path: the path of the loaded world.
-        options: the options of controllers.
+        options: the timing of the imitated controllers.
         clock: returns seconds of real time, from any origin.
     """
 

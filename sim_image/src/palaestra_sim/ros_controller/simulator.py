@@ -36,7 +36,7 @@ class RunningSimulator:
         world_path: the world file; each reload reads the file again.
         load: returns the simulation of a world file, which starts in the given mode.
         make_node: returns the ROS node for a name.
-        options: the options of controllers.
+        options: the timing of the imitated controllers.
         mode: the simulation mode at the start.
         clock: returns seconds of real time, from any origin.
 

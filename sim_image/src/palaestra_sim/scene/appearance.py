@@ -112,7 +112,7 @@ class Appearance:
         self._starts: dict[str, PoseNumbers] = {}
 
     def scene(self, world: str) -> VisibleScene:
-        """Return the visible shapes of the world, whose name is `world`."""
+        """Return the visible shapes of the world; `world` is its name."""
         self._refresh()
         table = MeshTable()
         names = {node.frame: node.name for node in self._nodes if node.frame is not None}

@@ -17,7 +17,7 @@ class Build:
     """The parts of a robot's body.
 
     Attributes:
-        base: its wheels.
+        base: the robot's wheels, and the motion that they command.
         outline: the shapes with which the robot collides, in the robot's frame.
         heights: z of the lower and of the upper end of the body, in the robot's frame.
         links: the parts on the robot's joints that forces move; empty if the physics has no such joints.
@@ -35,7 +35,7 @@ class Body(Protocol):
     """A robot that stands on the floor: a pose, a velocity, and wheels if it has any.
 
     Attributes:
-        base: its wheels.
+        base: the robot's wheels, and the motion that they command.
         x, y: the position of the robot's origin in the world, in meters, in the axes of the ground.
         heading_rad: the heading, in (-pi, pi].
         c, s: cosine and sine of the heading.

@@ -18,13 +18,13 @@ _WIDEST_RAD: Final = 3.1  # widest field of view of a flat image
 
 @dataclass(slots=True, kw_only=True)
 class Lens:
-    """The lens of a camera, which looks along the x axis of its frame, with z up.
+    """The lens of a camera; the camera looks along the x axis of its frame, with z up.
 
     Attributes:
         size: width and height in pixels.
         field_of_view_rad: the angle from the left edge to the right edge.
-        near_m: the nearest visible distance.
-        far_m: the farthest visible distance; 0 for no limit.
+        near_m: the smallest visible distance.
+        far_m: the greatest visible distance; 0 for no limit.
     """
 
     size: tuple[int, int]

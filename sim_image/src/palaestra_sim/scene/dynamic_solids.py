@@ -1,4 +1,4 @@
-"""Dynamic solids: Solids with physics, which move when they are pushed."""
+"""Dynamic solids: Solids with a Physics node; they move when they are pushed."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """The faces of an Extrusion: a cross-section that is moved along a spine. Pure.
 
 Webots converts an Extrusion to an IndexedFaceSet by a PROTO with a template; this module computes the same
-faces. Webots converts a bent spine with a `splineSubdivision` to a curve, which this module does not compute.
+faces. Webots converts a bent spine with a `splineSubdivision` to a curve; this module computes no such curve.
 Source: Extrusion.proto of Webots R2023b, and ISO/IEC 14772-1, 6.18.
 """
 

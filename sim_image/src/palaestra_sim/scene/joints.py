@@ -37,7 +37,7 @@ class Joint:
     """A hinge or a slider, in the frame of the node that contains it.
 
     Attributes:
-        axis: unit vector.
+        axis: unit vector of the joint's axis.
         anchor: a point on the axis of a hinge, in meters.
         slides: whether the joint is a slider.
         start: the position in the file, in rad or m.

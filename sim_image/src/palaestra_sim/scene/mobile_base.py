@@ -1,4 +1,4 @@
-"""The mobile base of a robot, which computes the robot's speed from the commands to its wheels' motors.
+"""The mobile base: it computes a robot's speed from the commands to the motors of the robot's wheels.
 
 `wheel_kinematics` relates wheel speeds to the robot's motion. In Webots torque and friction limit the
 acceleration of a robot. Here three limits replace torque and friction: 10 m/s2 along x, 6 m/s2 along y, and

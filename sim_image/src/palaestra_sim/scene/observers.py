@@ -29,8 +29,8 @@ class OutlineObservers:
 
         Args:
             nodes: all nodes of the world.
-            floors_m: returns the heights of the floors.
-            now_ms: returns the simulated time.
+            floors_m: returns the heights of the floors in meters.
+            now_ms: returns the simulated time in milliseconds.
         """
         if not (self._radars or self._shaded):
             return

@@ -33,12 +33,12 @@ def standing(node: SceneNode, frame: Pose) -> Pose:
 
 
 def looking(node: SceneNode, place: Frame) -> Frame:
-    """Return the frame of a device, which looks along x with z up, or in an old file along -z with y up."""
+    """Return the frame of a device that looks along x with z up, or in an old file along -z with y up."""
     return _in_axes(node, place, _LOOKING)
 
 
 def pointing(node: SceneNode, place: Frame) -> Frame:
-    """Return the frame of a device, which points along x with z up, or in an old file along z with y up."""
+    """Return the frame of a device that points along x with z up, or in an old file along z with y up."""
     return _in_axes(node, place, _POINTING)
 
 

@@ -27,7 +27,7 @@ def save(
 
     Args:
         path: the path of the file.
-        size: width and height.
+        size: width and height in pixels.
         pixels: blue, green, red and alpha of each pixel, row by row from the top left.
         quality: the quality of a JPEG file, from 1 to 100.
         alpha: whether a PNG file stores the alpha values.

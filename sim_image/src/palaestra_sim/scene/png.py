@@ -20,7 +20,7 @@ def encode(size: tuple[int, int], pixels: bytes | bytearray | memoryview, *, alp
     """Return the bytes of a PNG file.
 
     Args:
-        size: width and height.
+        size: width and height in pixels.
         pixels: blue, green, red and alpha of each pixel, row by row from the top left.
         alpha: whether the file stores the alpha values.
     """

@@ -1,4 +1,4 @@
-"""The radio between emitters and receivers, which decides which receivers get a packet."""
+"""The radio between emitters and receivers: it selects the receivers that get a packet."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class Radio:
     """Delivers packets from the emitters of each robot to the receivers of all other robots.
 
     Args:
-        robots: the devices of each robot.
+        robots: for each robot, its devices; only emitters and receivers among them are used.
     """
 
     def __init__(self, robots: Iterable[Iterable[object]]) -> None:

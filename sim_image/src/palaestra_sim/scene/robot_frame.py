@@ -18,7 +18,7 @@ from palaestra_sim.scene.geometry import (
 
 
 class RobotFrame(Frame):
-    """The frame of a robot with a body, which drives upright at a constant height.
+    """The frame of a robot with a body; the robot drives upright at a constant height.
 
     The robot is at the top of the world, not inside another node, so its frame has the pose of the body. The
     body uses the axes of the ground.

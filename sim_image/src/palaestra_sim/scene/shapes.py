@@ -174,7 +174,7 @@ def _mesh(reading: NodeReader, node: SceneNode, place: Frame, grown: _Grown) -> 
         return
     written = face_set(node)
     mesh = None if written is None else placed(written, grown.scale)
-    if mesh is None:  # the face set contains no face
+    if mesh is None:  # the face set has no usable face
         middle, size = box_of(list(zip(points[0::3], points[1::3], points[2::3], strict=True)))
         x, y, z = (max(it * factor, _LEAST_M) for it, factor in zip(size, grown.scale, strict=True))
         yield Shape(kind="box", size=(x, y, z), local=grown.at(middle), place=place, node=node)

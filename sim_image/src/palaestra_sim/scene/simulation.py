@@ -108,7 +108,7 @@ class Simulation:
             world: the parsed world.
             physics: the physics that moves the robots.
             name: the name of the world file, in errors.
-            mode: the mode at the start.
+            mode: the simulation mode at the start.
             descriptions: the descriptions of the types that are not base types.
             leave_out: the nodes that may be left out, if they cannot be simulated.
 

@@ -21,9 +21,9 @@ def letters(text: str, corner: Point, font: Font, size: tuple[int, int]) -> Iter
 
     Args:
         text: a text of one or more lines.
-        corner: the upper left corner of the first letter.
+        corner: column and row of the pixel at the upper left corner of the first letter.
         font: the font of all letters.
-        size: the size of the image; pixels outside it are not yielded.
+        size: width and height of the image in pixels; pixels outside it are not yielded.
 
     Raises:
         UnsimulatedError: Pillow is missing.

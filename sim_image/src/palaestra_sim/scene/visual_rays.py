@@ -218,7 +218,7 @@ def _sheet(origin: Vector, direction: Vector, half: Vector) -> float:
 
 
 def _ball(origin: Vector, direction: Vector, half: Vector) -> float:
-    """Return the distance in meters to an ellipsoid, which is scaled to a ball of radius 1."""
+    """Return the distance in meters to an ellipsoid; the calculation scales it to a ball of radius 1."""
     ox, oy, oz = (at / size for at, size in zip(origin, half, strict=True))
     dx, dy, dz = (towards / size for towards, size in zip(direction, half, strict=True))
     return _root(dx * dx + dy * dy + dz * dz, ox * dx + oy * dy + oz * dz, ox * ox + oy * oy + oz * oz - 1.0)
@@ -269,6 +269,6 @@ def _scaled(mesh: Mesh, scale: Vector) -> list[Vector]:
 
 
 def _of_mesh(points: Sequence[Vector], mesh: Mesh) -> Surface:
-    """Return the surface of triangles, which a ray meets only from outside."""
+    """Return the surface of triangles that a ray meets only from outside."""
     scaled = Mesh(tuple(points), mesh.triangles)
     return lambda origin, direction: nearest_triangle(scaled, origin, direction, front=True)

@@ -69,7 +69,7 @@ class Drawn:
     Attributes:
         kind: the kind of shape; a "ball" whose three sizes differ is an ellipsoid.
         size: x, y, z in meters; for round shapes 2 r, 2 r, height; for a mesh, its scale factors.
-        color: the color of the whole shape.
+        color: red, green, blue and alpha of the whole shape, 0 to 1.
         local: the pose of the shape in the frame `place`; the lengths are meters of the world, with all
             scales applied.
         place: the frame that carries the shape; None for the world.

@@ -1,4 +1,4 @@
-"""Read the round end points of hinges as wheels, which a motor drives or steers, or which only roll."""
+"""Read the round end points of hinges as wheels: driven or steered by a motor, or only rolling."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The report on a world for its author, which `palaestra-stub --check` and the other simulators print."""
+"""The report on a world for its author; each simulator prints it, such as `palaestra-stub --check`."""
 
 from __future__ import annotations
 

@@ -9,9 +9,9 @@ ports.
 - `project`: makes a Webots project around that world, with links to the files around the source world
 - `drivers`: the command lines of stub, MuJoCo, Webots and other programs
 - `lifecycle`: the table of states, events and actions; pure
-- `simulator`: the owner of a simulator's state, which handles events in order and runs the table's actions
+- `simulator`: owns a simulator's state, handles events in order and runs the table's actions
 - `process`: the only module that starts a process
-- `reaper`: a small program between sidecar and simulator, which ends all descendants of the simulator
+- `reaper`: a small program between sidecar and simulator; it ends all descendants of the simulator
 - `signals`: the thread that waits for signals
 - `output`: forwards the simulator's output line by line
 - `left_out`: reads the simulator's report on the nodes that it leaves out of its world

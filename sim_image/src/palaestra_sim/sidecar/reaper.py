@@ -1,4 +1,4 @@
-"""The reaper: a program between the sidecar and a simulator, which ends all processes of the simulator.
+"""The reaper: a program, between the sidecar and a simulator, that ends all the simulator's processes.
 
 The sidecar starts one reaper for each start of the simulator, as `python -I -S reaper.py PROGRAM ...`. The
 standard input of the reaper is a pipe from the sidecar; its descriptor 3 is a pipe to the sidecar:
@@ -117,7 +117,7 @@ def _keep(pid: int, woken: int) -> int:
 def _obey(pid: int) -> bool:
     """Run one command of the sidecar; return whether the command is to kill all processes.
 
-    `pid` is the first process of the simulator, which is not reaped yet.
+    `pid` is the simulator's first process; it is not reaped yet.
     """
     command = os.read(COMMANDS, 1)
     if command == TERMINATE:

@@ -170,7 +170,7 @@ class Block:
         return dx * self.c + dy * self.s, dy * self.c - dx * self.s
 
     def _way_out(self, x: float, y: float, radius: float) -> Contact:
-        """Return the contact of a robot, whose center is inside the block, with the block's nearest face."""
+        """Return the contact of a robot with the nearest face; the robot's center is inside the block."""
         out_x = self.half_x - abs(x)
         out_y = self.half_y - abs(y)
         if out_x < out_y:

@@ -70,7 +70,7 @@ class Rounded(NamedTuple):
     """An obstacle whose outline differs between heights.
 
     Attributes:
-        shape: the shape in the world.
+        shape: the shape of the obstacle.
         inward: the pose of the ground's axes in the frame of the shape.
     """
 
@@ -126,7 +126,7 @@ class SlopedBeams:
 
         Args:
             solids: the upright obstacles.
-            floors_m: the heights of the floors.
+            floors_m: the height of each floor.
             rounded: all other obstacles.
         """
         self._rounded = tuple(rounded)

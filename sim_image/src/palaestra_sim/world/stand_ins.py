@@ -132,7 +132,7 @@ class _Entry:
             if rest != {kinds[0]: True}:
                 self._refuse(
                     kinds[0],
-                    "the type also has a shape, or the value is not true",
+                    "the type also has other keys, or the value is not true",
                     f"write {kinds[0]} = true alone",
                 )
             return StandIn(name=self._type, fields=self._fields, kind=kinds[0])
@@ -194,7 +194,9 @@ class _Entry:
             keys = _FIELDS_OF_FORM[kind]
             if not isinstance(written, dict) or not {*keys} <= written.keys() <= {*keys, "path", "closed"}:
                 self._refuse(
-                    place, "its keys are wrong", f"write {{ {', '.join(f'{key} = 1' for key in keys)} }}"
+                    place,
+                    "it is not a table with the right keys",
+                    f"write {{ {', '.join(f'{key} = 1' for key in keys)} }}",
                 )
             return tuple(self._formula(written[key], f"{place}.{key}") for key in keys)
         if kind == "sphere":
@@ -222,7 +224,7 @@ class _Entry:
         closed = written.get("closed", False) if isinstance(written, dict) else None
         declared = self._fields.get(path)
         if declared is None or declared.type not in ("MFVec2f", "MFVec3f") or not isinstance(closed, bool):
-            fact = "its path is not a field with a list of points"
+            fact = "its path is not a field with a list of points, or closed is not true or false"
             self._refuse(place, fact, 'declare MFVec3f path [ … ], and write path = "path"')
         return path, closed
 

@@ -73,7 +73,7 @@ def test_where_there_is_no_gpu_a_job_that_asks_for_one_trains_on_the_cpu_and_say
 
 @pytest.mark.usefixtures("no_gpu")
 def test_a_run_that_asked_for_a_gpu_is_measured_where_there_is_none(play, job, directory, make_member):
-    """A person evaluates a model of a cluster on a laptop, with the training.yaml of the cluster."""
+    """A policy that was trained in a cluster is evaluated on a laptop; its training.yaml asks for a GPU."""
     play(job())
 
     with capture_logs() as logs:

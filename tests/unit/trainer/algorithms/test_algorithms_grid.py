@@ -1,4 +1,4 @@
-"""Each algorithm trains with each pair of spaces that it supports, and survives a fault and a resume."""
+"""Each algorithm trains despite faults with each pair of spaces that it supports, and resumes exactly."""
 
 from __future__ import annotations
 

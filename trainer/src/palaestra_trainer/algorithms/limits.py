@@ -130,7 +130,7 @@ def _layers(layers: Any) -> Iterator[tuple[str, str]]:
 
 
 def _first(frequency: Any) -> Any:
-    """Return the number in a frequency, which may be a list of number and unit; None if it has no number."""
+    """Return the number in a frequency, or in its list of number and unit; None without a number."""
     value = frequency[0] if isinstance(frequency, list | tuple) and frequency else frequency
     return value if _is_number(value) else None
 

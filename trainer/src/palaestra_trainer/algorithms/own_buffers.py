@@ -67,7 +67,9 @@ class OwnBuffer(BaseBuffer):
         ConfigurationError: a checkpoint cannot hold one of these attributes.
     """
 
-    _rows_only: type[BaseBuffer]  # the buffer for valid rows that this class extends
+    # The buffer for valid rows, such as `ValidReplayBuffer`. `with_valid_rows` makes a class that extends
+    # this class and that buffer, and sets this attribute.
+    _rows_only: type[BaseBuffer]
 
     def __init__(
         self,

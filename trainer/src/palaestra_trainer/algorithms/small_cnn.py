@@ -1,4 +1,4 @@
-"""A small convolutional network for images, which Stable-Baselines3 uses as a features extractor.
+"""A small convolutional network, as a features extractor of Stable-Baselines3 for images.
 
 This network has layers of 16 and 32 channels and 128 units; NatureCNN has 32, 64 and 64 channels and 512
 units.

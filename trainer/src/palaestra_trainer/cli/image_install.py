@@ -93,8 +93,8 @@ def _target() -> Path:
     first, *_ = os.environ.get("PYTHONPATH", "").split(os.pathsep)
     if not first:
         raise ConfigurationError(
-            "PYTHONPATH: is not set, but a project is installed into its first folder; "
-            "run this in a Dockerfile FROM palaestra-trainer"
+            "PYTHONPATH: does not begin with a folder, so the folder in which to install the project is not "
+            "known; run this in a Dockerfile FROM palaestra-trainer"
         )
     return Path(first)
 
@@ -112,7 +112,8 @@ def _copy(folder: Path, source: Path) -> None:
         shutil.copytree(folder, source, ignore=left_out)
     except (PermissionError, shutil.Error) as error:
         raise ConfigurationError(
-            f"{folder}: user {os.getuid()} cannot read all of it; `chmod --recursive a+rX` it on your machine"
+            f"{folder}: user {os.getuid()} cannot copy all of it; `chmod --recursive a+rX` it on your "
+            "machine, and remove links to missing files"
         ) from error
 
 

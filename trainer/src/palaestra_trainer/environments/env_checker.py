@@ -71,7 +71,7 @@ class Checked(gymnasium.Wrapper[Any, Any, Any, Any]):
     """A wrapper that checks the results of resets and steps, and returns them unchanged.
 
     Args:
-        env: the environment.
+        env: the environment to check.
         name: name of the environment in messages.
 
     Raises:

@@ -15,8 +15,8 @@ def result(step: Transition, options: Episodes, extra_steps: int) -> Result:
     """Return reward, terminated, truncated and info of a step.
 
     Args:
-        step: the step.
-        options: options of the task.
+        step: distances and outcome of the step.
+        options: options of the task, which hold the rewards.
         extra_steps: control periods that the step waited for a late sensor.
     """
     outcome, terms = step.outcome, reward_terms(options.reward, step)

@@ -23,7 +23,7 @@ def episode_seed(run_seed: int, stream: str, simulator: int, episode: int) -> in
 
     Args:
         run_seed: the replica's seed, not negative.
-        stream: name of the stream, which stands for the purpose of the episode.
+        stream: name of the stream of seeds; each purpose of episodes has its own stream.
         simulator: index of the simulator among the simulators of its role; 0 if several simulators share a
             stream, as in evaluations.
         episode: number of the episode in the whole run, counted from 0.

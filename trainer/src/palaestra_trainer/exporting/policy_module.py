@@ -28,8 +28,8 @@ class Normalizer(nn.Module):
     """Normalizes a part of an observation as `TrainedPolicy.predict` does, with the same precision.
 
     Args:
-        mean: mean of each number.
-        variance: variance of each number.
+        mean: mean of each number in this part of the training's observations; has the part's shape.
+        variance: variance of the same numbers; has the same shape.
         clip: largest absolute value of a result.
         epsilon: number that is added to the variance.
     """

@@ -78,7 +78,10 @@ def _difference(
 ) -> float:
     """Return the largest difference between actions, as a share of the range; refuse one above tolerance."""
     if ours.shape != expected.shape:
-        raise ExportError(f"actions have the shape {ours.shape}, not {expected.shape}; {_REMEDY}")
+        raise ExportError(
+            f"the actions of the exported policy have the shape {ours.shape}, but those of the original "
+            f"policy {expected.shape}; {_REMEDY}"
+        )
     apart = _apart(ours, expected)
     span, allowed = _span_and_tolerance(acting, expected, magnitudes(acting, observations))
     if (apart > allowed).any():

@@ -57,7 +57,7 @@ class EpisodeRunner:
         restarter: the restarter of the member.
         playing: whether an episode is running.
         observation: the last observation of the member.
-        reset_info: info of the last reset.
+        reset_info: the environment's info of the last reset.
     """
 
     def __init__(self, restarter: Restarter) -> None:

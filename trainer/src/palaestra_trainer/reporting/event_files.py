@@ -1,7 +1,7 @@
 """Read scalars from the bytes of TensorBoard's event files.
 
-Palaestra has its own reader, because TensorBoard's reader takes a second to import. The reader skips an
-incomplete record at the end of a file, which a kill may leave. Source of the format:
+Palaestra has its own reader, because TensorBoard's reader takes a second to import. If a kill left
+an incomplete record at the end of a file, the reader skips this record. Source of the format:
 tensorflow/core/util/event.proto and summary.proto, tensorflow/core/lib/io/record_writer.h.
 """
 

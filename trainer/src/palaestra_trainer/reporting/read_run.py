@@ -28,7 +28,7 @@ from palaestra_trainer.reporting.read_replays import replays_of
 from palaestra_trainer.reporting.run_data import Evaluated, Points, ReportedFault, RunData
 from palaestra_trainer.reporting.tolerant_files import head, json_file, lines, yaml_file
 
-MOST_CURVES_BYTES = 64 * 2**20  # limit for all event files together, which take 5 s to read
+MOST_CURVES_BYTES = 64 * 2**20  # limit for all event files together; this many bytes take 5 s to read
 _INTERRUPTED = 75
 _TRAINING_FIRST = ("rollout/", "reward/", "train/")
 

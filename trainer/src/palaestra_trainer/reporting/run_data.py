@@ -18,7 +18,7 @@ class Evaluated:
         success_rate: share of successful episodes, 0 to 1; None: the environment does not report success.
         low: lower bound of the rate's 95 % interval; None if the rate is None.
         high: upper bound of the rate's 95 % interval; None if the rate is None.
-        returns: return of each episode.
+        returns: return of each episode: the sum of its rewards.
         mean_length: mean number of steps of an episode.
     """
 
@@ -65,11 +65,11 @@ class Replay:
         frame_s: seconds of simulated time from one frame to the next.
         targets: positions of the target, each as the number of the first frame with this position, and x and
             y in meters.
-        low: smallest x and y of the floor; None: unknown.
-        high: greatest x and y of the floor.
+        low: smallest x and y of the floor in meters; None: unknown.
+        high: greatest x and y of the floor in meters; None: unknown.
         outlines: obstacles, each as x, y, half length, half width and radius of the rounding in meters, and
             heading in radians.
-        radius_m: radius of the robot.
+        radius_m: radius of the circle that stands for the robot.
     """
 
     title: str
@@ -94,15 +94,16 @@ class RunData:
         figures: name and value of each main result, in the order of the page.
         asked: name and value of each setting of the job, in the order of the page.
         versions: name and version of the programs and the machine.
-        evaluations: the evaluations in the order of steps.
-        confirmations: the confirmations in the order of steps.
-        curves: curves of the training by name.
-        faults: the faults in the order of time.
+        evaluations: the regular evaluations of the policy, in the order of steps.
+        confirmations: the evaluations of chosen policies with other seeds (`confirmEpisodes`), in the order
+            of steps.
+        curves: step and value of each point of each curve, by the name of the curve.
+        faults: faults of simulators, in the order of time.
         fault_count: number of all faults of the run; `faults` may have fewer.
         goodput: seconds of the run under each cause of `GoodputLedger`.
         checkpoints: step, size and time of each checkpoint, as texts.
         attempts: start and reason of each attempt, as texts.
-        replays: recorded episodes.
+        replays: recorded episodes of one evaluation.
         replayed: the evaluation that recorded the episodes, in words.
         repeat: sentences and commands to repeat the run.
         files: name and text of the files in the report.

@@ -64,7 +64,7 @@ class RobotinoAbc(RobotAbc, Omnidrive, Localization, Distances, Bumper):
 
 
 class Scene(ABC):
-    """Places the robot and other objects for episodes, which is possible only in a simulation.
+    """Places the robot and other objects for episodes; only a simulation can place objects.
 
     An episode begins in three steps. `begin` restores the initial positions of all objects, `layout` returns
     these positions, and `place` puts the robot on a free position.

@@ -23,7 +23,7 @@ class JointRobot(SimulatedRobot, Joints):
     Attributes:
         motors: names of the robot's motors.
         sensors: names of the robot's PositionSensors.
-        greatest: the greatest command of each motor.
+        greatest: the greatest command of each motor, in the unit of `command`.
         commanded: the quantity that `command` sets: position (rad, m), velocity, force (N) or torque (N m).
             The value "control" is for actuators of MuJoCo that have no equivalent motor in Webots, such as
             "mujoco/biceps".

@@ -20,7 +20,7 @@ from palaestra_trainer.waiting.wait_time import count_wait
 
 _TIMEVAL = struct.Struct("@ll")
 _BUFFER_BYTES = 8192
-_MOST_KEPT_BYTES = 4 << 20  # large enough to keep the buffer for images, which arrive at each step
+_MOST_KEPT_BYTES = 4 << 20  # an image arrives at each step, so a buffer of its size is kept
 
 # A wake-up costs 30 us on a virtual machine, more than the stub needs for its response. So if the last wait
 # was short, the next wait first polls a few times, and yields the processor between the polls.

@@ -187,7 +187,7 @@ class Attempt:
         return DONE if learned else NOTHING_LEARNED
 
     def write_end(self, end: End) -> None:
-        """Write the termination message of this attempt, which ends now, and the report of the run."""
+        """Write the termination message of this attempt, as it ends, and the report of the run."""
         write_end(self._directory, self._progress, end)
 
     def _prepare(self, stack: ExitStack) -> tuple[RunContext, Learning, SavedCheckpoint | None]:

@@ -166,7 +166,7 @@ def _naming(name: str) -> Iterator[None]:
     try:
         yield
     except TrainerError:
-        raise  # for example a fault or a signal, which the callback did not cause
+        raise  # the cause is not the callback, but for example a fault or a signal
     except (Exception, SystemExit) as error:  # code of the job's author may raise anything
         raise CallbackFailed(f"callback {name}: raised {fact_of(error)}") from error
 

@@ -143,8 +143,8 @@ def compare(
         b: the run directory of B.
         make_here: a function of a run directory; the result is a function that creates the simulators.
         rules: the rules of the comparison.
-        report: called after each batch; the last call comes before the stop of the simulators, which takes at
-            most a minute.
+        report: called after each batch; the last call comes before the simulators are stopped, because the
+            stop may take a minute.
         check: called often; it raises to cancel the comparison.
 
     Raises:

@@ -18,7 +18,7 @@ class RunContext:
     Attributes:
         configuration: the configuration of the run.
         directory: the run directory.
-        fleet: the simulators.
+        fleet: all simulators of the run.
         progress: the progress of the run.
         interruption: the check that raises Interrupted after a signal has arrived.
     """

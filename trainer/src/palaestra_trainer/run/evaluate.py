@@ -92,7 +92,7 @@ def measure(
         configuration: the configuration of the run.
         model: the model.zip of the run directory.
         make_members: a function that creates the simulators.
-        episodes: number of episodes.
+        episodes: number of episodes to play.
         stream: name of the seed stream.
         report: called with the result before the simulators are stopped. If they do not stop within a minute,
             the process ends.

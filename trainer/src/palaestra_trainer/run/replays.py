@@ -19,7 +19,7 @@ def keep_replays(directory: RunDirectory, evaluation: EvaluationResult, name: st
 
     Args:
         directory: the run directory.
-        evaluation: the evaluation.
+        evaluation: the results and recordings of the evaluation's episodes.
         name: description of the evaluation for people.
     """
     episodes = [

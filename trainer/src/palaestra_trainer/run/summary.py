@@ -1,4 +1,4 @@
-"""Write the result of a run to summary.json, which `palaestra run` prints."""
+"""Write the result of a run to summary.json; `palaestra run` prints this file."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ _NEEDED = frozenset({"target", "steps", "success_rate", "success_interval"})  # 
 def summarise(directory: RunDirectory, progress: Progress) -> dict[str, Any]:
     """Return the summary of a run that has completed its training.
 
-    `success_rate`, `success_interval` and `mean_return` are results of the policy in model.zip, which learned
-    for `best_step` steps. The values come from the confirmation of that policy, or else from its evaluation;
-    without an evaluation they are null. Faults and restarts are those of all attempts. `duration_s` and the
-    speed count all attempts too, and so does `goodput`, the seconds by cause. `trained_share` is the share of
-    these seconds that was spent on training.
+    `success_rate`, `success_interval` and `mean_return` are results of the policy in model.zip; this policy
+    learned for `best_step` steps. The values come from the confirmation of that policy, or else from its
+    evaluation; without an evaluation they are null. Faults and restarts are those of all attempts.
+    `duration_s` and the speed count all attempts too, and so does `goodput`, the seconds by cause.
+    `trained_share` is the share of these seconds that was spent on training.
     """
     best = measured(directory)
     counters = progress.counted()

@@ -29,8 +29,8 @@ from palaestra_trainer.waiting import shutdown_deadline
 
 log = structlog.get_logger(__name__)
 
-# A pause costs two service calls per simulator and a copy of the model, which is too much for a shorter
-# learning phase.
+# A pause costs two service calls per simulator and a copy of the model. A shorter learning phase is not worth
+# this cost.
 LONG_LEARNING_S = 0.5
 COUNTED_BY_STEP = ("episodes", "extra_steps")
 

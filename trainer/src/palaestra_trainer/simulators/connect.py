@@ -109,7 +109,7 @@ class OwnSimulator:
     """A new simulator with a shipped world, as a process of this program; `close` ends it.
 
     Args:
-        world: the name of the world.
+        world: the name of the shipped world, such as `arena`.
         driver: the simulator program, `stub` or `mujoco`.
 
     Raises:

@@ -1,4 +1,4 @@
-"""Entry points for `gymnasium.make`, which create environments with a given robot or find a simulator."""
+"""Entry points for `gymnasium.make`; each creates an environment with a given robot, or finds a simulator."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class EntryPoint(Generic[_Made]):
         options: the class of the environment's options.
 
     Attributes:
-        environment_class: the class of the environment, whose docstring describes the task.
+        environment_class: the class of the environment; its docstring describes the task.
     """
 
     def __init__(self, environment: str, kind: Callable[..., _Made], options: _Options) -> None:

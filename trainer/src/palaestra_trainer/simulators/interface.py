@@ -62,7 +62,7 @@ class Member(Protocol):
 
 @runtime_checkable
 class Spared(Protocol):
-    """A member with a standby, which is a second simulator that can take over."""
+    """A member with a standby; the standby is a second simulator that can take over."""
 
     def spare(self) -> str | None:
         """Return a value of `StandbyState`; None if no standby can take over, now or soon."""
@@ -101,7 +101,7 @@ class Watcher(Protocol):
         ...
 
     def fault(self, simulator: str, fault: SimulatorFault, steps_lost: int) -> None:
-        """Receive the fault of a simulator, which truncates an episode after `steps_lost` steps."""
+        """Receive the fault of a simulator; the fault truncates an episode after `steps_lost` steps."""
         ...
 
     def started(self, simulator: str) -> None:

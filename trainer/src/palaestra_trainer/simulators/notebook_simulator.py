@@ -61,8 +61,8 @@ class NotebookMember:
     """A member in a facade's simulator, which the program starts and pauses, and the trainer restarts.
 
     Args:
-        place: the simulator.
-        wanted: the environment.
+        place: the facade's simulator, with robot and scene.
+        wanted: the id and the options of the environment to create.
 
     Raises:
         ConfigurationError: the environment is unknown, or does not accept its options or the robot.

@@ -126,7 +126,7 @@ class Restarter:
         """Begin to restart the member after a fault; repeat the restart until the member is up or lost.
 
         Args:
-            fault: the fault of the member.
+            fault: the fault that was detected: which simulator failed, and how.
             steps_lost: environment steps of the episode that the fault truncated.
         """
         self._report(fault, steps_lost)

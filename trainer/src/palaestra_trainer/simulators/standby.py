@@ -1,4 +1,4 @@
-"""A member with a spare, which is a second simulator that takes over when the first must be restarted.
+"""A member with a spare: a second simulator that takes over when the first must be restarted.
 
 Both simulators belong to one sidecar and differ in their ROS names. A restart swaps their roles: the spare
 takes over at once if it is ready. The other simulator is restarted in its own thread and becomes the spare.
@@ -189,8 +189,8 @@ class Side:
         self.wanted = False
         preparation, self._preparation = self._preparation, None
         while preparation is not None and not preparation.done():
-            # The kill makes the start fail, which ends its thread. A second kill may be needed, because a
-            # process that has not started yet cannot be killed.
+            # The kill makes the start fail, and then the start's thread ends. A second kill may be needed,
+            # because a process that has not started yet cannot be killed.
             self.abandon()
             wait([preparation], _ASK_AGAIN_S)
         self.simulator.stop()

@@ -59,7 +59,7 @@ class FakeScene(Scene):
     """The scene of a fake robot on a floor.
 
     Args:
-        robot: the robot.
+        robot: the fake robot that the scene places.
         layout: the floor and the obstacles on it at the start of each episode.
     """
 

@@ -1,4 +1,4 @@
-"""Send curves to an MLflow server, by the client of `mlflow-skinny`, which has no local store."""
+"""Send curves to an MLflow server, by the client of `mlflow-skinny`; this client has no local store."""
 
 from __future__ import annotations
 

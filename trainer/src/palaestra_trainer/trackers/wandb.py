@@ -26,7 +26,7 @@ class Wandb(Tracker):
     """Sends the curves of a run to Weights & Biases.
 
     Args:
-        project: project of the run.
+        project: name of the project, at Weights & Biases, to which the run is added.
         mode: `offline` only writes files in the run directory; `online` also uploads, and needs WANDB_API_KEY
             and network access.
         entity: user or team of the project; None: the default of the account.

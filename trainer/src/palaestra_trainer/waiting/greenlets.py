@@ -22,7 +22,7 @@ from palaestra_trainer.waiting.wait_time import count_wait
 
 # If no response has arrived after this time, the first greenlet waits alone and with its own deadline, so a
 # fault is attributed to the right simulator. The time is longer than a step, because a wait alone counts as a
-# turn of the waiting greenlet. It is short compared with the deadline, which begins with the wait alone.
+# turn of the waiting greenlet. The time is short compared with that deadline.
 _SOON_MS = 500
 
 

@@ -60,10 +60,10 @@ class RecognizedObject(NamedTuple):
     Attributes:
         position: x, y, z in meters in the axes of the camera.
         orientation: rotation in the axes of the camera as a quaternion: x, y, z, w.
-        position_on_image: x and y of its middle in the image, in pixels from the upper left corner.
+        position_on_image: x and y of the object's middle in the image, in pixels from the upper left corner.
         size_on_image: width and height in the image, in pixels.
-        colors: its `recognitionColors`: red, green, blue of each color, 0 to 1.
-        model: its `model`.
+        colors: the object's field `recognitionColors`: red, green, blue of each color, 0 to 1.
+        model: the object's field `model`.
     """
 
     position: tuple[float, float, float]

@@ -19,10 +19,10 @@ class RadarTarget(NamedTuple):
     """One target of a radar.
 
     Attributes:
-        distance_m: its distance.
-        received_power_dbm: the power of its echo.
-        speed_m_s: the speed at which it moves away; negative if it comes closer.
-        azimuth_rad: its direction in the horizontal plane of the radar; positive to the right.
+        distance_m: distance between the target and the radar.
+        received_power_dbm: the power of the target's echo.
+        speed_m_s: the speed at which the target moves away; negative if it comes closer.
+        azimuth_rad: direction of the target in the horizontal plane of the radar; positive to the right.
     """
 
     distance_m: float

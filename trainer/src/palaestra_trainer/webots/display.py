@@ -142,7 +142,8 @@ class Display(OutputDevice):
         handle = self._services.get(f"{self._path}/{make}", f"display_{make}")(**request).ir
         if not handle:
             given = request.get("filename", "an image")
-            raise WrongData(self.robot, f"{self.device} refuses {make} for {given}; use a PNG or JPEG file")
+            fact = f"{self.device} refuses {make} for {given}"
+            raise WrongData(self.robot, f"{fact}; use a PNG or JPEG file that the simulator can read")
         try:
             where = {"x": at[0], "y": at[1], "blend": int(blend)}
             self._command("image_paste", "display_image_paste", ir=handle, **where)

@@ -1,4 +1,4 @@
-"""The registry of the open facades of this process, which environments may use.
+"""The registry of this process's open facades; environments may use these facades.
 
 If a notebook creates an environment after `Webots(...)`, the environment should use the simulator of this
 facade. A facade is offered until it is closed, except while an environment uses it. A forked process does not

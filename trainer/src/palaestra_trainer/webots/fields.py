@@ -35,7 +35,10 @@ def kind_of(type_number: int, field: str) -> FieldCodec:
     """
     kind = _KINDS.get(type_number & ~_MULTIPLE)
     if kind is None:
-        raise ConfigurationError(f"{field}: holds nodes, not values; give their DEF names instead")
+        raise ConfigurationError(
+            f"{field}: holds nodes, not values; call this method with the DEF name of one of these nodes, "
+            "and with a field of that node"
+        )
     return kind
 
 

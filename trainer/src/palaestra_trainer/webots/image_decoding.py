@@ -41,7 +41,7 @@ class _Layout:
         head: the bytes from the frame_id to the data, equal in all messages of this layout.
         data_at: the offset of the first number, in bytes.
         length: length of the whole message, in bytes.
-        shape: shape of the array.
+        shape: shape of the array: height, width and, if there are several, channels; or points and 3.
         strides: strides of the array, in bytes.
     """
 

@@ -1,4 +1,4 @@
-"""Keyboard and joystick of a robot, which every robot has without a node in the world.
+"""Keyboard and joystick of a robot; every robot has both, without nodes for them in the world.
 
 In a pod nobody can press a key, so the stub and MuJoCo also let a program press keys and move the joystick.
 Webots reads the keys of its own window instead.

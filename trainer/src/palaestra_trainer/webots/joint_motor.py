@@ -62,8 +62,8 @@ class JointMotor:
     def release(self) -> None:
         """Send no command, so that the motor keeps the state that the simulator's reset has set.
 
-        The world defines that state: the position in the file, or the control of a keyframe, which may hold a
-        robot upright. A command of 0 would replace that state.
+        The world defines that state: the position in the file, or the control of a keyframe; this control may
+        hold a robot upright. A command of 0 would replace that state.
         """
         self._ready = False
 

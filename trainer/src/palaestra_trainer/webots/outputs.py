@@ -192,8 +192,8 @@ class Speaker(OutputDevice):
         """Play a sound file, whose path is relative to the controller.
 
         Args:
-            file: the file.
-            volume: 0 to 1.
+            file: the path of the sound file.
+            volume: loudness, 0 (silent) to 1.
             pitch: factor of the frequency, above 0.
             balance: -1 (left) to 1 (right).
             loop: whether the sound is repeated until `stop`.

@@ -144,7 +144,7 @@ class Supervisor:
 
         Args:
             name: the DEF name of the node.
-            field: the field.
+            field: the name of a field with several values, such as "point".
             value: the value, in the form that `get_field` returns.
             index: the position of the new value; -1: after the last value.
 
@@ -248,7 +248,7 @@ class Supervisor:
         Args:
             name: the DEF name of the node; "": the world itself.
             field: the field, such as "children".
-            text: the nodes.
+            text: one or more nodes, in the syntax of a world file.
             index: the position in the field; -1: after the last node.
 
         Raises:

@@ -15,7 +15,7 @@ class ViewLabel:
         at: x and y of its upper left corner, 0 to 1 of the view, from the upper left corner of the view.
         size: the height of the font, 0 to 1 of the view.
         rgb: the color, 0xRRGGBB.
-        transparency: 0 to 1.
+        transparency: 0 (opaque) to 1 (invisible).
         font: the name of a font of Webots.
     """
 
@@ -34,7 +34,7 @@ class MovieSettings:
 
     Attributes:
         size: width and height in pixels.
-        quality: 1 to 100.
+        quality: quality of the video, 1 to 100.
         acceleration: how many times faster than simulated time the movie plays.
         caption: whether the movie shows that acceleration.
     """

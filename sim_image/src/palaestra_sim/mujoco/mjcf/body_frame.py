@@ -15,7 +15,7 @@ from palaestra_sim.scene.geometry import (
 
 
 class BodyFrame(Frame):
-    """The frame of a body, whose pose MuJoCo computes.
+    """The frame of a body; MuJoCo computes the body's pose.
 
     A client may set the pose of a body that has a free joint, and of a body without joints whose parent is
     the world. For all other bodies, joints or parent bodies determine the pose.

@@ -24,12 +24,12 @@ class Model:
     computes them for the state after the last step, and does not affect the next step.
 
     Args:
-        model: MuJoCo's model.
+        model: the compiled model (MjModel).
         keyframe: the number of the keyframe with which the world begins; None for the initial positions in
             the model (`qpos0`).
 
     Attributes:
-        model, data: the model and the data of MuJoCo.
+        model, data: the compiled model (MjModel), and its current state (MjData).
     """
 
     def __init__(self, model: Any, keyframe: int | None = None) -> None:
@@ -81,7 +81,7 @@ class Model:
 
         Args:
             kind: the type of the object: a value of MuJoCo's mjtObj.
-            number: the number of the object.
+            number: the id of the object among the objects of its type.
         """
         self.settle()
         found = np.zeros(6)

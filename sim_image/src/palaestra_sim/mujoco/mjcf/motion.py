@@ -17,7 +17,7 @@ class BodyMotion:
     """The motion of the bodies of one model.
 
     Args:
-        model: the model.
+        model: the model, with its current state.
         bodies: maps a node to the number of its body.
     """
 

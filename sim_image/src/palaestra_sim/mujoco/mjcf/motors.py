@@ -45,8 +45,8 @@ class ModelActuator:
         control: the quantity that the actuator's control sets.
         scale: the value of the control for a position, velocity or force of 1 at the joint.
         length: returns the position of the actuator's joint or tendon, in rad or m; None if it has neither.
-        read: returns the control.
-        write: sets the control.
+        read: returns the current control.
+        write: sets the control to a value.
         force: returns the force or torque at the joint, in N or N m.
     """
 

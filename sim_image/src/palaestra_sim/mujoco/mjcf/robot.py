@@ -31,8 +31,8 @@ class Equipment:
     """The devices of a robot.
 
     Attributes:
-        devices: all devices, by name.
-        joints: the number of the joint, for each device on a joint, by the name of the device.
+        devices: all devices, by the name of the device.
+        joints: for each device on a joint, the id of that joint, by the name of the device.
         motors: the actuators that are motors.
         actuators: the actuators that are not motors.
         samples: functions that set the values of the sensors.
@@ -85,7 +85,7 @@ class _Fitter:
     def fit(self) -> Equipment:
         """Return the devices."""
         model = self._model.model
-        self._model.settle()  # computes the lengths of tendons, which motors read
+        self._model.settle()  # computes the lengths of tendons, because motors read these lengths
         for index in range(model.nu):
             self._add_actuator(index)
         for index in range(model.nsensor):

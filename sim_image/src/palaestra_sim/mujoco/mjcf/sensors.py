@@ -51,7 +51,7 @@ class ModelSensor:
 
     Attributes:
         model: the whole model.
-        number: the number of the sensor.
+        number: the id of the sensor in the model.
         name: the name of the device.
         numbers: a view of the sensor's current numbers in MuJoCo's data.
         shaft: the joint that the sensor measures; a new joint, which is not used, if the sensor measures no
@@ -216,7 +216,8 @@ _INERTIAL_UNIT: Final = _own(INERTIAL_UNIT)
 _GPS: Final = _own(GPS)
 _TOUCH_SENSOR: Final = _own(TOUCH_SENSOR)
 _MUJOCO_SENSOR: Final = _own(MUJOCO_SENSOR)
-_CAMERA: Final = replace(CAMERA, attach=lambda _camera, _robot: None)  # the device already has its camera
+# `camera` above has already set the device's `eye`, which `Camera.attach` would replace.
+_CAMERA: Final = replace(CAMERA, attach=lambda _camera, _robot: None)
 _OF_ONE: Final[dict[int, Callable[[ModelSensor], Measured]]] = {
     int(mujoco.mjtSensor.mjSENS_RANGEFINDER): _distance,
     int(mujoco.mjtSensor.mjSENS_TOUCH): _touch,

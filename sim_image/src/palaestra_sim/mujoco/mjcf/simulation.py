@@ -221,7 +221,7 @@ class MjcfSimulation:
         self._reset_asked = False
         self.time_ms = 0
         self._model.reset()
-        self._model.settle()  # computes the lengths of tendons, which motors read
+        self._model.settle()  # computes the lengths of tendons, because motors read these lengths
         for motor in self._equipment.motors:
             motor.reset()
         for actuator in self._equipment.actuators:

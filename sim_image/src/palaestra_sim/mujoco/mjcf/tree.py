@@ -53,7 +53,7 @@ def grow(
     """Return the nodes of a model, with their frames.
 
     Args:
-        model: the model.
+        model: the model, with its current state.
         description: the names that the file gives to robot and devices.
         equipment: the devices; `grow` adds their nodes to this object.
         body: the number of the robot's body.

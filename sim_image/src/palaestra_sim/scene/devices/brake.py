@@ -1,4 +1,4 @@
-"""Brake: the damping of a joint, which limits the speed that its motor reaches.
+"""Brake: the damping of a joint; the damping limits the speed of the joint's motor.
 
 The torque of a damper is its constant times the speed of the shaft. So the speed of a motor is at most its
 maximum torque divided by the constant. A joint without a motor moves only in a physics with forces.

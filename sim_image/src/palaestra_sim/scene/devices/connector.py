@@ -30,7 +30,7 @@ class Connector:
         tilt_rad: maximum angle between the axes of two connectors.
         turns: number of rotations about the axis at which two connectors fit; 0 means any rotation.
         twist_rad: maximum deviation from one of these rotations.
-        others: all connectors of the world.
+        others: all connectors of the world, including this connector.
         locked: the state that a client set.
     """
 

@@ -1,4 +1,4 @@
-"""Lidar: layers of rays, which it publishes as a range image, laser scans and a point cloud.
+"""Lidar: layers of rays, whose distances are published as a range image, laser scans and a point cloud.
 
 Each layer is a row of the image, from the top down. In a row, the rays go from left to right. The rays are
 cast at each step, but only while the lidar is enabled, because they cost time. The distance of an object

@@ -23,7 +23,7 @@ from palaestra_sim.scene.radar_targets import Bounds, RadarTarget, RadarTargets
 
 _LIGHT_M_S: Final = 299_792_458.0
 _MILLIWATT: Final = 0.001
-_NEAREST_M: Final = 0.001  # minimum distance in the formula of the power, which would be infinite at 0
+_NEAREST_M: Final = 0.001  # minimum distance in the formula of the power; at 0 m the power would be infinite
 _Gauss = Callable[[float, float], float]
 
 
@@ -32,14 +32,14 @@ class RadarLimits:
     """The limits of a radar's detection.
 
     Attributes:
-        range_m: minimum and maximum distance.
-        field_of_view_rad: horizontal and vertical.
+        range_m: minimum and maximum distance of a target.
+        field_of_view_rad: horizontal and vertical angle of view.
         radial_m_s: minimum and maximum speed at which a target moves away; None for any speed.
         absolute_m_s: minimum speed, in either direction.
         cell: two targets are merged if their distances differ by less than the first number, in m, and their
             speeds by less than the second number, in m/s. If the second number is 0, speeds are not compared.
         power_w: the weakest detectable signal.
-        noise: standard deviations of distance, speed and azimuth.
+        noise: standard deviations of distance in m, speed in m/s and azimuth in rad.
     """
 
     range_m: tuple[float, float]
@@ -84,7 +84,7 @@ class Radar:
     Attributes:
         place: the frame of the radar; the radar looks along the x axis of this frame.
         node: the node of the device.
-        limits: the limits of its detection.
+        limits: distances, angles, speeds and powers at which the radar detects a target.
         gain_w_m2: the power reflected by 1 m2 at a distance of 1 m.
         occlusion: whether shapes hide targets.
         seen: the targets of the last sample.

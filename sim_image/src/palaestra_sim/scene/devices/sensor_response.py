@@ -21,7 +21,7 @@ AXES_FIELDS = """lookupTable MFVec3f; xAxis SFBool TRUE; yAxis SFBool TRUE; zAxi
 
 
 def discrete(value: float, resolution: float) -> float:
-    """Return the nearest multiple of the resolution; the value itself for -1, which means no resolution."""
+    """Return the multiple of the resolution nearest to the value; with resolution -1, the value itself."""
     return resolution * round(value / resolution) if resolution > 0.0 else value
 
 

@@ -52,7 +52,7 @@ class Instantiator:
     """Creates nodes, and numbers them.
 
     Attributes:
-        nodes: all nodes, by number.
+        nodes: all nodes that were created, by their numbers.
         refused: the mistakes in the files, because of which nodes are missing.
         ignored: the fields that a PROTO does not have; Webots ignores such fields too.
     """

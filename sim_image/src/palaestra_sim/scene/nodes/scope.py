@@ -1,7 +1,7 @@
 """The scope of a node: the file in which it is written, the `DEF`s of that file, and the values of `IS`.
 
 `USE name` refers to the last `DEF` of that name before it, in the same file. In a PROTO, `IS name` refers to
-a value of the instance, which was written in another file. So a lookup returns a value with its scope.
+a value of the instance; this value was written in another file. So a lookup returns a value with its scope.
 """
 
 from __future__ import annotations

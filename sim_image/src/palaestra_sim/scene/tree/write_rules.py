@@ -90,9 +90,13 @@ def require_room(node: SceneNode, field: str, added: Sequence[SceneNode]) -> Non
     if not any(_acts(inside) for it in added for inside in (it, *it.descendants())):
         return
     if node.type_name == "Robot" or _on_robot(node):
-        raise UnsimulatedError(f"no {added[0].type_name} can be added to a robot; {_ELSEWHERE}")
+        raise UnsimulatedError(
+            f"a {added[0].type_name} that affects the simulation cannot be added to a robot; {_ELSEWHERE}"
+        )
     if field != "children":
-        raise UnsimulatedError(f"no {added[0].type_name} can be added to {where}; {_ELSEWHERE}")
+        raise UnsimulatedError(
+            f"a {added[0].type_name} that affects the simulation cannot be added to {where}; {_ELSEWHERE}"
+        )
     _require_no_client(added, "added")
 
 
@@ -107,7 +111,9 @@ def require_removable(node: SceneNode) -> None:
     if node.outline:
         raise UnsimulatedError(f"no part of a boundingObject can be removed; {_ELSEWHERE}")
     if _on_robot(node) and any(_acts(it) for it in (node, *node.descendants())):
-        raise UnsimulatedError(f"no {node.type_name} can be removed from a robot; {_ELSEWHERE}")
+        raise UnsimulatedError(
+            f"a {node.type_name} that affects the simulation cannot be removed from a robot; {_ELSEWHERE}"
+        )
     _require_no_client([node], "removed")
 
 

@@ -24,7 +24,7 @@ _MOST: Final[Mapping[str, int]] = {
     "mesh": 40_000,
     "size": 1_000_000,
 }
-# For each element, the attributes whose numbers are multiplied to get its size.
+# For each element, the attributes whose numbers are multiplied to get the element's size.
 _SIZES: Final[Mapping[str, tuple[str, ...]]] = {
     "replicate": ("count",),
     "composite": ("count",),

@@ -34,8 +34,8 @@ class Tried:
     Attributes:
         episodes: the episodes that the environment ended.
         problems: the problems of the environment and its simulator.
-        times: the times of the steps.
-        reset_s: seconds of each reset.
+        times: number of steps, and their total seconds in the simulator, in transport and in the environment.
+        reset_s: duration of each reset, in seconds.
         rewards: number of rewards that were not 0.
         moved: whether any observation differed from the first observation of its episode.
     """

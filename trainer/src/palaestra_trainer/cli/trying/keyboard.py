@@ -39,7 +39,7 @@ class Keyboard:
 
     Args:
         terminal: descriptor of a terminal from which each key arrives at once.
-        keys: the action of each key.
+        keys: the action of each key, by the name of the key.
         check: called every tenth of a second; it raises to end the wait.
         show: called with a line for each step.
     """

@@ -37,7 +37,7 @@ class Problems:
 
 
 def check_by_libraries(env: gymnasium.Env[Any, Any], problems: Problems) -> None:
-    """Run the checkers of gymnasium and Stable-Baselines3, which play some steps; add their problems.
+    """Run the checkers of gymnasium and Stable-Baselines3 for some steps; add the problems that they find.
 
     Raises:
         SimulatorFault: the simulator failed.

@@ -69,7 +69,8 @@ def _read(path: Path, device: torch.device, most: int) -> tuple[Any, dict[str, A
     except pickle.UnpicklingError as error:  # omit PyTorch's message, which recommends to unpickle the file
         raise _refused(
             path,
-            f"{POLICY} has objects other than tensors, which are never unpickled; name another model.zip",
+            f"{POLICY} has objects other than tensors, which are never unpickled, or is damaged; "
+            "name another model.zip",
         ) from error
     except (OSError, KeyError, EOFError, RuntimeError, ValueError, zipfile.BadZipFile) as error:
         fact = f"cannot be read as a model of Stable-Baselines3 ({error}); name a model.zip"

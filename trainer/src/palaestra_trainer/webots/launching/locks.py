@@ -33,7 +33,7 @@ class FileLock:
         """Lock a file; create it if it is missing. Return None if this or another process holds the lock.
 
         Args:
-            path: the file.
+            path: the lock file.
             variable: the environment variable that names a folder above the file, for messages.
 
         Raises:
