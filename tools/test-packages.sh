@@ -8,6 +8,8 @@ cd "$(dirname "$0")/.."
 packages=(python3-rospy python3-rosmaster python3-netifaces)
 # ROS's command line, and the message types that webots_ros uses, as Python modules and as definitions.
 packages+=(python3-rosmsg python3-rosservice python3-rostopic python3-sensor-msgs ros-sensor-msgs)
+# The definitions of ROS's other common packages, with which a test compares ours.
+packages+=(ros-nav-msgs ros-std-srvs)
 # A compiler and the headers of roscpp: a test builds a client in C++.
 packages+=(g++ libroscpp-dev libsensor-msgs-dev python3-gencpp)
 # MuJoCo's cameras draw with OpenGL on the processor.
@@ -18,7 +20,8 @@ all_installed() {
   libraries=$(/sbin/ldconfig -p)
   modules='netifaces, rosmaster, rosmsg, rospy, rosservice, rostopic, sensor_msgs, gencpp'
   /usr/bin/python3 -c "import $modules" 2>/dev/null && command -v g++ >/dev/null &&
-    [[ -d /usr/share/sensor_msgs/msg && -f /usr/include/ros/ros.h && -f /usr/include/sensor_msgs/Imu.h ]] &&
+    [[ -d /usr/share/sensor_msgs/msg && -d /usr/share/nav_msgs/msg && -d /usr/share/std_srvs/srv ]] &&
+    [[ -f /usr/include/ros/ros.h && -f /usr/include/sensor_msgs/Imu.h ]] &&
     [[ $libraries == *libEGL.so.1* && $libraries == *libOpenGL.so.0* ]]
 }
 

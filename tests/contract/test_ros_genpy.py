@@ -17,7 +17,10 @@ from palaestra_protocol.ros.fixed import attribute
 from tests import ros_values
 from tests.tables import for_each
 
-NAMES, SERVICES = definitions.type_names()
+NAMES, SERVICES = (
+    (*ours, *common)
+    for ours, common in zip(definitions.type_names(), definitions.common_type_names(), strict=True)
+)
 SIDES = {side.name: side for name in SERVICES for side in definitions.service(name)}
 TYPES = {
     **{name: (message, ros_values.find) for name, message in ros_values.MESSAGES.items()},

@@ -1,10 +1,13 @@
 """Topics over a real ROS master and real sockets; a message is read when the program requests it."""
 
+import re
 import struct
+import subprocess
+import sys
 
 import pytest
 
-from palaestra_trainer.errors import SimulatorDead, SimulatorHung
+from palaestra_trainer.errors import ConfigurationError, SimulatorDead, SimulatorHung
 from palaestra_trainer.ros import RosSubscriber
 
 
@@ -45,6 +48,14 @@ def test_the_newest_message_ends_a_backlog(peer, ranges):
     ranges.next()
 
     assert ranges.newest(None).range == 0.75
+
+
+def test_all_messages_that_have_arrived_are_read_at_once(peer, ranges):
+    """A keyboard publishes any number of messages in a step."""
+    send(peer, 0.25, 0.5, 0.75)
+
+    assert [message.range for message in ranges.arrived()] == [0.25, 0.5, 0.75]
+    assert ranges.arrived() == []
 
 
 def test_with_nothing_new_the_old_value_stays(ranges):
@@ -106,3 +117,47 @@ def test_a_withdrawn_topic_closes_its_connections(peer, ranges):
 
     with pytest.raises(SimulatorDead):
         ranges.next()
+
+
+ROBOT_OF_OTHERS = """
+import sys
+import rospy
+from sensor_msgs.msg import JointState
+
+rospy.init_node("arm")
+publisher = rospy.Publisher("/arm/joints", JointState, queue_size=1, latch=True)
+publisher.publish(JointState(name=["lift", "turn"], position=[0.5, -1.0]))
+print("ready", flush=True)
+sys.stdin.read()
+"""
+
+
+def test_a_node_of_others_is_read_by_the_name_of_a_common_type(master):
+    """A robot's own nodes publish types that no simulator of ours has."""
+    del master
+    node = subprocess.Popen(
+        [sys.executable, "-c", ROBOT_OF_OTHERS], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    joints = RosSubscriber("/arm/joints", "sensor_msgs/JointState", deadline_s=30.0)
+    with node:
+        assert node.stdout.readline() == "ready\n"
+        joints.connect()
+        state = joints.next()
+        joints.close()
+        node.kill()
+
+    assert (state.name, list(state.position)) == (["lift", "turn"], [0.5, -1.0])
+
+
+@pytest.mark.parametrize(
+    ("name", "type_name", "message"),
+    [
+        ("arm/joints", "std_msgs/Bool", '"arm/joints": is not the full name of a service or topic; begin it'),
+        ("/arm/joints", "my_msgs/Joints", "my_msgs/Joints: is not a known type of this kind; use a type of"),
+        ("/arm/joints", "std_srvs/Empty", "std_srvs/Empty: is not a known type of this kind; use a type of"),
+    ],
+)
+def test_a_name_or_type_that_cannot_be_used_is_refused_at_once(name, type_name, message):
+    """The mistake is the program's, so it must not look like a simulator that does not respond."""
+    with pytest.raises(ConfigurationError, match=re.escape(message)):
+        RosSubscriber(name, type_name)

@@ -61,7 +61,7 @@ def message_type(name: str) -> MessageType:
     """Return the message type `package/Name`.
 
     Raises:
-        KeyError: `definitions.txt` has no such message.
+        KeyError: no such message is known.
     """
     find = definitions.message
     message = find(name)
@@ -74,7 +74,7 @@ def service_type(name: str) -> ServiceType:
     """Return the service type `package/name`.
 
     Raises:
-        KeyError: `definitions.txt` has no such service.
+        KeyError: no such service is known.
     """
     find = definitions.message
     request, response = definitions.service(name)
@@ -97,7 +97,7 @@ def last_field(name: str) -> struct.Struct | None:
     Return None if the field is a time, a string or an array, so that it has no layout of numbers.
 
     Raises:
-        KeyError: `definitions.txt` has no such message.
+        KeyError: no such message is known.
     """
     message = definitions.message(name)
     last = message.fields[-1]
@@ -118,7 +118,7 @@ def reading_field(name: str, field: str) -> tuple[struct.Struct, int] | None:
         field: the name of the field; "" means the last field.
 
     Raises:
-        KeyError: `definitions.txt` has no such message, or the message has no such field.
+        KeyError: no such message is known, or the message has no such field.
     """
     if not field:
         last = last_field(name)

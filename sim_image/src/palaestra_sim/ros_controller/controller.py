@@ -227,7 +227,7 @@ class RosController:
         busy = self._host_clock() - self._published_s < self._options.publish_delay_s
         return not (self._publish_due or busy)
 
-    def _stepped(self, done: bool) -> None:  # noqa: FBT001 - `Stepping` passes it by position
+    def _stepped(self, done: bool) -> None:  # noqa: FBT001 - the caller `Stepping` passes it by position
         """Respond to a step that has ended, but not before its minimum real time has passed."""
         delay_s = self._delay_s() if done else 0.0
         if delay_s > 0.0:
@@ -235,7 +235,7 @@ class RosController:
         else:
             self._finish(done)
 
-    def _finish(self, done: bool) -> None:  # noqa: FBT001 - `_stepped` passes it by position
+    def _finish(self, done: bool) -> None:  # noqa: FBT001 - the caller `_stepped` passes it by position
         self.blocked = False
         self._publish_due = self._publish_due or (done and self._heard)
         if self._publish_due:

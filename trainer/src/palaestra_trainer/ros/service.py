@@ -8,6 +8,7 @@ from typing import Any
 from palaestra_protocol.ros.rostypes import service_type
 from palaestra_protocol.ros.tcpros import LENGTH
 from palaestra_trainer.errors import SimulatorDead, UnreadableAnswer, WrongData
+from palaestra_trainer.ros.known_types import known_type, node_of
 from palaestra_trainer.ros.master import Master
 from palaestra_trainer.ros.node import ensure_node
 from palaestra_trainer.ros.tcpros_client import TcprosClient
@@ -23,14 +24,17 @@ class RosService:
         name: the full name, e.g. /robotino/robot/time_step
         type_name: e.g. webots_ros/set_int
         deadline_s: the longest time to wait for a response.
+
+    Raises:
+        ConfigurationError: the name is not a full name, or the type is not known.
     """
 
     __slots__ = ("_deadline_s", "_type", "_wire", "name", "simulator")
 
     def __init__(self, name: str, type_name: str, deadline_s: float = DEADLINE_S) -> None:
         self.name = name
-        self.simulator = name.split("/")[1]
-        self._type = service_type(type_name)
+        self.simulator = node_of(name)
+        self._type = known_type(service_type, type_name)
         self._deadline_s = deadline_s
         self._wire: TcprosClient | None = None
 

@@ -17,6 +17,7 @@ from palaestra_trainer.errors import (
     UnreadableAnswer,
     WrongData,
 )
+from palaestra_trainer.ros.known_types import known_type, node_of
 from palaestra_trainer.ros.master import Master
 from palaestra_trainer.ros.node import ensure_node, node_uri
 from palaestra_trainer.ros.tcpros_client import TcprosClient
@@ -34,6 +35,9 @@ class RosSubscriber:
         type_name: e.g. sensor_msgs/Range
         decode: returns the value in the bytes of a message; None: the whole message is decoded.
         deadline_s: the longest time to wait for a message.
+
+    Raises:
+        ConfigurationError: the name is not a full name, or the type is not known.
     """
 
     __slots__ = ("_deadline_s", "_decode", "_registered", "_type", "_wire", "name", "simulator")
@@ -46,8 +50,8 @@ class RosSubscriber:
         deadline_s: float = DEADLINE_S,
     ) -> None:
         self.name = name
-        self.simulator = name.split("/")[1]
-        self._type = message_type(type_name)
+        self.simulator = node_of(name)
+        self._type = known_type(message_type, type_name)
         self._decode = decode or self._type.codec.decode
         self._deadline_s = deadline_s
         self._wire: TcprosClient | None = None
@@ -117,6 +121,14 @@ class RosSubscriber:
         while self._wire is not None and self._wire.waiting_bytes():
             values.append(self.next())
         return values
+
+    def newest(self, default: Any) -> Any:
+        """Return the value of the last message that has arrived; `default` without a new message.
+
+        Raises:
+            SimulatorDead, WrongData: as `next`.
+        """
+        return [default, *self.arrived()][-1]
 
     def close(self) -> None:
         """Close the connection and unregister the subscriber."""

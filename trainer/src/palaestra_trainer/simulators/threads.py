@@ -14,7 +14,7 @@ def in_background(work: Callable[[], None], name: str) -> Future[None]:
     def run() -> None:
         try:
             work()
-        except BaseException as error:  # noqa: BLE001 - `result` of the future raises it
+        except BaseException as error:  # noqa: BLE001 - the future's `result` raises it
             future.set_exception(error)
         else:
             future.set_result(None)

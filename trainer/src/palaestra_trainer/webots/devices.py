@@ -100,10 +100,10 @@ class Sensor:
         Raises:
             SimulatorDead, WrongData: as `RosSubscriber`.
         """
-        values = self._values.arrived()
-        self.late = not values
-        if values:
-            self._value = values[-1]
+        value = self._values.newest(None)
+        self.late = value is None
+        if value is not None:
+            self._value = value
         return not self.late
 
     def disable(self) -> None:

@@ -148,7 +148,7 @@ class Joystick(_Input):
             SimulatorDead, WrongData: as `RosSubscriber`.
         """
         for at, topic in enumerate(self._topics):
-            self._positions[at] = [self._positions[at], *topic.arrived()][-1]
+            self._positions[at] = topic.newest(self._positions[at])
         axes, povs = self._positions[: self._axes], self._positions[self._axes :]
         self._value = JoystickState(self._pressed(), tuple(axes), tuple(povs))
         self.late = False
