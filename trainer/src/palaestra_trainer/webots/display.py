@@ -13,6 +13,7 @@ from palaestra_trainer.errors import ConfigurationError, WrongData
 from palaestra_trainer.webots.outputs import OutputDevice
 
 _FORMATS: Final = (3, 4)  # WB_IMAGE_RGB, WB_IMAGE_RGBA: also the number of channels. Source: webots/display.h
+_DIMENSIONS: Final = 3  # of an image: height, width, channels
 _SHOWN: Final = 0  # the handle of the visible image
 Point = tuple[int, int]
 
@@ -96,7 +97,7 @@ class Display(OutputDevice):
         Raises:
             ConfigurationError: the array has another shape or dtype.
         """
-        channels = image.shape[-1] if image.ndim == 3 else 0  # noqa: PLR2004 - height, width, channels
+        channels = image.shape[-1] if image.ndim == _DIMENSIONS else 0
         if channels not in _FORMATS or image.dtype != np.uint8 or not image.size:
             raise ConfigurationError(
                 f"{self.device}: an image of shape {image.shape} and dtype {image.dtype} cannot be drawn;"
