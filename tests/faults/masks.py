@@ -23,8 +23,8 @@ SHAPES = (
 )
 NUMBER = re.compile(r"\d+(\.\d+)?")
 DROPPED = frozenset({"managedFields", "resourceVersion"})
-# Only trainers report these fields. Their values depend on the time of the last poll, and no count uses them.
-TOLD = frozenset(
+# Only trainers report these fields, and their values depend on the time of the last poll.
+REPORTED = frozenset(
     {"target", "furthestStep", "lastCheckpoint", "lastProgress", "stepsLost", "goodput", "faults"}
 )
 SENTENCES = frozenset({"message", "note"})
@@ -38,7 +38,7 @@ def leaves(state: Any, path: str = "") -> Leaves:
     found: Leaves = {}
     for key, value in _members(state):
         below = f"{path}/{key}"
-        if key in DROPPED | TOLD:
+        if key in DROPPED | REPORTED:
             continue
         if isinstance(value, (Mapping, list)) and value:
             found |= leaves(value, below)

@@ -2,7 +2,7 @@
 
 The servos act along the axes of the robot, and their forces are limited. In each basic step, the wheel
 kinematics set the target speeds of the servos. The wheels themselves have no contacts. A simulation of wheels
-by rollers or capsules takes 4 to 25 times as long, and robots drift by decimeters (docs/decisions/0017).
+by rollers or capsules takes up to 28 times as long, and robots drift by decimeters (docs/decisions/0017).
 """
 
 from __future__ import annotations

@@ -19,13 +19,14 @@
 Rules:
 
 1. The sidecar starts the simulator only in the states `idle` and `failed`, in which no process runs.
-2. The sidecar cannot detect that the simulator is ready. The trainer reports readiness after a real round
-trip. 3. After a stop request, an exit is expected, with any exit code. Without such a request, an exit is a
-fault, even with code 0, because a simulator does not exit by itself. 4. After a stop request, the trainer's
-supervisor robot ends the simulation. If the process still runs at the deadline, the sidecar kills it. A
-second stop request can only make the deadline earlier. 5. At a shutdown, the sidecar itself ends the
-simulator: it sends SIGTERM, and after a deadline it kills the process. 6. An event that is not in the table
-is refused, and the state does not change.
+2. The sidecar cannot detect that the simulator is ready. The trainer reports this after a real request.
+3. After a stop request, an exit is expected, with any exit code. Without such a request, an exit is a fault,
+   even with code 0, because a simulator does not exit by itself.
+4. After a stop request, the trainer's supervisor robot ends the simulation. If the process still runs at the
+   deadline, the sidecar kills it. A second stop request can only make the deadline earlier.
+5. At a shutdown, the sidecar itself ends the simulator: it sends SIGTERM, and after a deadline it kills the
+   process.
+6. An event that is not in the table is refused, and the state does not change.
 
 This file has all decisions about states. The module `simulator` runs the actions.
 """
