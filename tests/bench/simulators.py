@@ -128,7 +128,7 @@ def wait_for_answer():
 
 def call(path, type_name, **fields):
     """Call a service once, and return the response."""
-    service = RosService(f"/{ROBOT}/{path}", f"webots_ros/{type_name}")
+    service = RosService(f"/{ROBOT}/{path}", f"webots_ros/{type_name}", DEADLINE_S)
     try:
         return service(**fields)
     finally:

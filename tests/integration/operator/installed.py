@@ -23,7 +23,7 @@ ROOT = Path(__file__).parents[3]
 USER = "system:serviceaccount:palaestra-system:palaestra-operator"
 PROGRAM = Path(sys.executable).with_name("palaestra")
 READS = ("get", "list", "watch")
-READY_S = 30
+READY_S = 120  # a start takes 2 s on an idle machine
 END_S = 10
 
 

@@ -5,7 +5,7 @@ An array is valid until the next step, which writes the next array into the same
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,8 @@ class _Rendered(Sensor):
     """A sensor whose readings the simulator must render."""
 
     __slots__ = ()
+    # The first sensor makes the simulator load OpenGL, which takes seconds on a busy machine.
+    enable_deadline_s: ClassVar[float] = 30.0
 
     def _refused(self, period_ms: int) -> WrongData:
         return WorldMisfit(
@@ -84,7 +86,8 @@ class RecognizedObjects(_Rendered):
 
     def __init__(self, robot: str, device: str) -> None:
         super().__init__(robot, device, "webots_ros/RecognitionObjects", _objects, "recognition_objects")
-        self._enable = RosService(f"/{robot}/{topic_name(device)}/recognition_enable", "webots_ros/set_int")
+        path = f"/{robot}/{topic_name(device)}/recognition_enable"
+        self._enable = RosService(path, "webots_ros/set_int", self.enable_deadline_s)
 
 
 def _objects(message: bytes | memoryview) -> tuple[RecognizedObject, ...]:

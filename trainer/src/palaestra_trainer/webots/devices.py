@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 from palaestra_trainer.errors import SimulatorHung, WrongData
 from palaestra_trainer.ros import RosService, RosSubscriber, call_together
+from palaestra_trainer.ros.service import DEADLINE_S
 from palaestra_trainer.waiting.greenlets import let_others
 from palaestra_trainer.webots.message_decoding import BOOL, FLOAT64, RANGE, NumberReading
 from palaestra_trainer.webots.services import Services
@@ -36,10 +37,12 @@ class Sensor:
         device: see above.
         late: whether the next message to arrive may belong to the previous step.
         listed: whether the robot's list of devices has the sensor; keyboard and joystick are not in it.
+        enable_deadline_s: the longest time that the simulator may take to enable the sensor.
     """
 
     __slots__ = ("_enable", "_value", "_values", "device", "late", "robot")
     listed: ClassVar[bool] = True
+    enable_deadline_s: ClassVar[float] = DEADLINE_S
 
     def __init__(
         self,
@@ -52,7 +55,7 @@ class Sensor:
         self.robot = robot
         self.device = device
         path = f"/{robot}/{topic_name(device)}"
-        self._enable = RosService(f"{path}/enable", "webots_ros/set_int")
+        self._enable = RosService(f"{path}/enable", "webots_ros/set_int", self.enable_deadline_s)
         self._values = RosSubscriber(f"{path}/{topic}", type_name, decode)
         self._value: Any = None
         self.late = False
