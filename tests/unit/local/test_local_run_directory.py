@@ -329,7 +329,7 @@ def test_the_summary_tells_what_was_measured_and_how_to_look_at_it(directory):
         "steps",
         "trained",
         "run",
-        "look",
+        "see",
         "try",
         "take",
     ]

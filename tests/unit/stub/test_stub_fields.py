@@ -178,7 +178,7 @@ def test_a_write_that_would_be_read_back_and_change_nothing_is_refused(
     handle = field(*path.split("."))
 
     with pytest.raises(
-        ServiceFailed, match=f"{fact} cannot be changed while the simulator runs; write it into"
+        ServiceFailed, match=f"{fact} cannot be changed while the simulator runs; change the world file"
     ):
         robot.call(f"supervisor/field/{setter}", field=handle, value=value)
 

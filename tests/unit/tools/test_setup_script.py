@@ -18,6 +18,7 @@ WITHOUT_ENSUREPIP = (
 PACKAGES = (
     "python3-rospy python3-rosmaster python3-netifaces "
     "python3-rosmsg python3-rosservice python3-rostopic python3-sensor-msgs ros-sensor-msgs "
+    "ros-nav-msgs ros-std-srvs "
     "g++ libroscpp-dev libsensor-msgs-dev python3-gencpp libegl1 libgl1-mesa-dri libopengl0"
 )
 NOBODY = ("setpriv", "--reuid", "65534", "--clear-groups")

@@ -129,7 +129,7 @@ def _agent(
         keys = keymap.keys_of(env.action_space, names)
         with keyboard.keys_at_once() as terminal:
             show = _drop if chosen.json else write_line
-            driver = keyboard.Keyboard(terminal, keys, interruption.check, show)
+            driver = keyboard.KeyboardDriver(terminal, keys, interruption.check, show)
             yield driver, [keymap.legend(keys, names)]
     elif chosen.agent == "zero":
         yield agents.Zero(env.action_space), []

@@ -14,7 +14,7 @@ from palaestra_trainer.webots.cameras import (
     RecognizedObject,
     RecognizedObjects,
 )
-from palaestra_trainer.webots.detectors import Packet, Radar, RadarTarget, Receiver
+from palaestra_trainer.webots.detectors import Radar, RadarTarget, RadioPacket, Receiver
 from palaestra_trainer.webots.device_check import require_node
 from palaestra_trainer.webots.devices import (
     DistanceSensor,
@@ -83,11 +83,11 @@ __all__ = [
     "NodeName",
     "Observer",
     "OutputDevice",
-    "Packet",
     "Pen",
     "PositionSensor",
     "Radar",
     "RadarTarget",
+    "RadioPacket",
     "RangeFinder",
     "Receiver",
     "RecognizedObject",

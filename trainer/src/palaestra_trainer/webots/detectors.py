@@ -87,7 +87,7 @@ class Radar(Sensor):
         return tuple(RadarTarget(*self._targets.next()) for _ in range(count))
 
 
-class Packet(NamedTuple):
+class RadioPacket(NamedTuple):
     """A received text.
 
     Attributes:
@@ -128,7 +128,7 @@ class Receiver(Sensor):
         self._fresh = super().read_arrived()
         return self._fresh
 
-    def take(self) -> Packet | None:
+    def take(self) -> RadioPacket | None:
         """Remove the oldest packet of the queue and return it.
 
         Return None if the queue was empty in the last step, or if a packet of this step was already taken.
@@ -141,7 +141,7 @@ class Receiver(Sensor):
         x, y, z = self._services.get(f"{self._path}/get_emitter_direction", "receiver_get_emitter_direction")(
             ask=True
         ).direction
-        packet = Packet(text, float(self._ask("get_signal_strength", "get_float")), (x, y, z))
+        packet = RadioPacket(text, float(self._ask("get_signal_strength", "get_float")), (x, y, z))
         self._fresh = False
         self._ask("next_packet", "get_bool")
         return packet

@@ -11,7 +11,7 @@ import pytest
 from gymnasium import spaces
 
 from palaestra_trainer.cli.trying.agents import EndEpisode, EndTry, Random, Zero, names_of_actions, zero_of
-from palaestra_trainer.cli.trying.keyboard import Keyboard
+from palaestra_trainer.cli.trying.keyboard import KeyboardDriver
 from palaestra_trainer.cli.trying.keymap import DOWN, LEFT, RIGHT, SPACE, UP, decode, keys_of, legend
 from palaestra_trainer.environments.masks import all_allowed, allows
 from palaestra_trainer.errors import ConfigurationError
@@ -139,7 +139,7 @@ def typing():
     reader, writer = os.pipe()
     shown: list[str] = []
     with os.fdopen(reader, "rb", buffering=0), os.fdopen(writer, "wb", buffering=0) as typed:
-        yield Keyboard(reader, {UP: 1, SPACE: 0}, go_on, shown.append), typed, shown
+        yield KeyboardDriver(reader, {UP: 1, SPACE: 0}, go_on, shown.append), typed, shown
 
 
 def test_each_key_is_an_action_and_others_have_no_effect(typing):

@@ -34,7 +34,7 @@ def keys_at_once() -> Iterator[int]:
         termios.tcsetattr(descriptor, termios.TCSAFLUSH, before)
 
 
-class Keyboard:
+class KeyboardDriver:
     """Waits for a key and returns its action; other keys have no effect.
 
     Args:
