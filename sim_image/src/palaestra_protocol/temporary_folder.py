@@ -73,8 +73,10 @@ def _keeper() -> Iterator[tuple[int, int]]:
     try:
         yield keeper.pid, ours
     finally:
-        os.close(ours)
+        # The folder is removed. The end of the pipe could come late, if a child of this process has a copy.
+        keeper.kill()
         keeper.wait()
+        os.close(ours)
 
 
 def _keep() -> None:

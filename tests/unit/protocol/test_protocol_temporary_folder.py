@@ -116,3 +116,19 @@ def test_a_parent_that_does_not_exist_is_an_error_and_leaves_no_keeper(tmp_path)
     """The caller reports this error with the remedy."""
     with pytest.raises(FileNotFoundError), temporary_folder("own-", tmp_path / "missing"):
         pass
+
+
+def test_a_forked_child_does_not_delay_the_end_of_the_block(tmp_path):
+    """The child has a copy of the pipe, so the keeper would not see the end of the pipe."""
+    with temporary_folder("own-", tmp_path) as folder:
+        child = os.fork()
+        if not child:
+            signal.pause()
+            os._exit(0)
+
+    gone = is_gone(folder.keeper)
+    os.kill(child, signal.SIGKILL)
+    os.waitpid(child, 0)
+
+    assert gone
+    assert list(tmp_path.iterdir()) == []
