@@ -1,7 +1,8 @@
 """A temporary folder that is removed when the process that made it ends, also after SIGKILL.
 
 A second process, the keeper, removes the folder of a process that was killed. The standard input of the
-keeper is a pipe from the folder's owner. The kernel closes this pipe when the owner ends, in whatever way.
+keeper is a pipe from the folder's owner. The kernel closes this pipe when the owner and its forked children
+have ended, in whatever way.
 
 The owner starts this file as the keeper, so the file imports only the standard library.
 """
@@ -42,17 +43,23 @@ def temporary_folder(prefix: str, parent: Path | None = None) -> Iterator[Tempor
     Raises:
         OSError: the folder cannot be made or removed, or the system cannot start another process.
     """
-    with (
-        _keeper() as (keeper, pipe),
-        tempfile.TemporaryDirectory(prefix=prefix, dir=parent) as name,
-    ):
-        os.write(pipe, os.fsencode(Path(name).absolute()))
-        yield TemporaryFolder(path=Path(name), keeper=keeper)
+    keeper, pipe = _start_keeper()
+    path: Path | None = None
+    try:
+        with tempfile.TemporaryDirectory(prefix=prefix, dir=parent) as name:
+            path = Path(name).absolute()
+            os.write(pipe, os.fsencode(path))
+            yield TemporaryFolder(path=Path(name), keeper=keeper.pid)
+    finally:
+        # The end of the pipe may come late, if a child of this process has a copy of the pipe.
+        if path is None or not os.path.lexists(path):
+            keeper.kill()
+            keeper.wait()
+        os.close(pipe)
 
 
-@contextlib.contextmanager
-def _keeper() -> Iterator[tuple[int, int]]:
-    """Start a keeper, and yield its process ID and the pipe to it; the keeper ends after the block."""
+def _start_keeper() -> tuple[subprocess.Popen[bytes], int]:
+    """Start a keeper; return its process, and the pipe to it."""
     theirs, ours = os.pipe()
     # The keeper inherits the blocked signals, so from its start only SIGKILL can end it.
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, _BLOCKED)
@@ -63,6 +70,7 @@ def _keeper() -> Iterator[tuple[int, int]]:
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
             start_new_session=True,
+            cwd="/",
         )
     except OSError:
         os.close(ours)
@@ -70,13 +78,7 @@ def _keeper() -> Iterator[tuple[int, int]]:
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         os.close(theirs)
-    try:
-        yield keeper.pid, ours
-    finally:
-        # The folder is removed. The end of the pipe could come late, if a child of this process has a copy.
-        keeper.kill()
-        keeper.wait()
-        os.close(ours)
+    return keeper, ours
 
 
 def _keep() -> None:

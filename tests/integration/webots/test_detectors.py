@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from palaestra_trainer.errors import WorldMisfit, WrongData
+from palaestra_trainer.ros import RosSubscriber
 from palaestra_trainer.webots import (
     Emitter,
     Force3DSensor,
@@ -99,6 +100,28 @@ def test_a_radar_that_sees_no_target_has_an_empty_value(detecting):
     assert len(it.radar.value) == len(TARGETS)
 
 
+def test_an_interrupted_reading_of_a_radar_does_not_shift_the_next(detecting, monkeypatch):
+    """Ctrl-C may come after the number of targets was read, and before the targets."""
+    webots, it = detecting
+    read = RosSubscriber.next
+
+    def interrupted(topic):
+        if not topic.name.endswith("/targets"):
+            return read(topic)
+        monkeypatch.undo()
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(RosSubscriber, "next", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        it.advance()
+    webots.supervisor.set_field("TARGET_0", "translation", (4.0, 0.0, 0.0))
+    it.advance()
+    distances = sorted(echo.distance_m for echo in it.radar.value)
+    webots.supervisor.set_field("TARGET_0", "translation", TARGETS[0])
+
+    assert distances == pytest.approx([4.0, math.hypot(*TARGETS[1])])
+
+
 def test_a_receiver_takes_one_packet_in_each_step(detecting):
     """The strength is 1 / square of the distance, and the direction is in the axes of the receiver."""
     _, it = detecting
@@ -174,6 +197,16 @@ def test_a_joystick_has_buttons_axes_and_hat_switches(detecting):
     assert before == (((), (0, 0, 0), (0,)), False)
     assert (pressed, it.joystick.connected) == (((2,), (-128, 5, 127), (1,)), True)
     assert it.joystick.value == ((), (0, 5, 127), (1,))
+
+
+@pytest.mark.parametrize("button", [-2, 128])
+def test_a_button_that_no_joystick_has_is_refused(detecting, button):
+    """Its number has no room in the message, which would end the simulator."""
+    _, it = detecting
+
+    with pytest.raises(WrongData, match=f"joystick refuses to press {button}"):
+        it.joystick.press(button)
+    it.advance()
 
 
 def test_a_position_that_no_joystick_has_is_refused(detecting):

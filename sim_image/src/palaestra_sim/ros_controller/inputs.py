@@ -16,6 +16,7 @@ from palaestra_sim.scene.devices.device_type import DeviceTopic, Enable, whole_s
 from palaestra_sim.scene.robot import Robot
 
 _MOST_KEYS: Final = 7  # Webots reports at most this many keys at once
+_GREATEST_KEY: Final = 2**31 - 1  # the greatest number in the message of a key
 _AXES: Final = 6  # the simulated gamepad has two sticks with two axes each, and two triggers
 _POVS: Final = 1
 _BYTE: Final = (-128, 127)
@@ -51,13 +52,14 @@ class _Pressed:
     """The keys or buttons that are pressed, in the order in which they were pressed."""
 
     most: int
+    greatest: int
     value: list[int] = field(default_factory=list)
 
     def press(self, key: int) -> bool:
-        """Press a key; return False if `key` is negative, or if too many keys are pressed already."""
+        """Press a key; return False if no key has this number, or if too many keys are pressed already."""
         if key in self.value:
             return True
-        if key < 0 or len(self.value) >= self.most:
+        if not 0 <= key <= self.greatest or len(self.value) >= self.most:
             return False
         self.value.append(key)
         return True
@@ -81,7 +83,7 @@ class _Pressed:
 
 
 def _keyboard() -> Input:
-    keys = _Pressed(_MOST_KEYS)
+    keys = _Pressed(_MOST_KEYS, _GREATEST_KEY)
     key = DeviceTopic(name="key", type_name="webots_ros/Int32Stamped", source=keys, many=True)
     return Input(name="keyboard", topics=(key,), own_rows=keys.rows())
 
@@ -90,7 +92,7 @@ def _keyboard() -> Input:
 class _Joystick:
     """A gamepad; it is connected by the first successful call of a service that moves it."""
 
-    buttons: _Pressed = field(default_factory=lambda: _Pressed(_BYTE[1]))
+    buttons: _Pressed = field(default_factory=lambda: _Pressed(_BYTE[1], _BYTE[1]))
     axes: list[int] = field(default_factory=lambda: [0] * _AXES)
     povs: list[int] = field(default_factory=lambda: [0] * _POVS)
     connected: bool = False

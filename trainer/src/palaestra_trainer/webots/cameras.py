@@ -15,6 +15,7 @@ from palaestra_trainer.errors import NoReading, WorldMisfit, WrongData
 from palaestra_trainer.ros import RosService
 from palaestra_trainer.webots.devices import Sensor, topic_name
 from palaestra_trainer.webots.image_decoding import ImageReading, PointsReading, RangesReading
+from palaestra_trainer.webots.services import Services
 
 
 class _Rendered(Sensor):
@@ -77,17 +78,38 @@ class RecognizedObject(NamedTuple):
 
 
 class RecognizedObjects(_Rendered):
-    """The objects that a camera with a Recognition node recognizes; `value` is a tuple, the nearest first.
+    """The objects that a camera with a Recognition node recognizes; `value` is a tuple of `RecognizedObject`.
 
-    A robot may have a `Camera` of the same device in addition.
+    This sensor also enables the camera. A robot may have a `Camera` of the same device in addition.
     """
 
-    __slots__ = ()
+    __slots__ = ("_services",)
 
     def __init__(self, robot: str, device: str) -> None:
         super().__init__(robot, device, "webots_ros/RecognitionObjects", _objects, "recognition_objects")
-        path = f"/{robot}/{topic_name(device)}/recognition_enable"
-        self._enable = RosService(path, "webots_ros/set_int", self.enable_deadline_s)
+        self._services = Services(robot)
+
+    def enable(self, period_ms: int) -> None:
+        """Enable the camera and its recognition.
+
+        Raises:
+            WorldMisfit: the camera has no Recognition node.
+            WrongData, SimulatorDead, SimulatorHung: as `Sensor.enable`.
+        """
+        path = topic_name(self.device)
+        if not self._services.ask(f"{path}/has_recognition", "get_bool"):
+            raise WorldMisfit(self.robot, f"{self.device} has no Recognition node; add one in the world")
+        if not self._enable(value=period_ms).success:
+            raise self._refused(period_ms)
+        self._services.confirm(
+            f"{path}/recognition_enable", "set_int", f"{self.device} refuses recognition", value=period_ms
+        )
+        super().enable(period_ms)  # subscribes to a topic that Webots advertises only now
+
+    def close(self) -> None:
+        """Close the connections."""
+        super().close()
+        self._services.close()
 
 
 def _objects(message: bytes | memoryview) -> tuple[RecognizedObject, ...]:

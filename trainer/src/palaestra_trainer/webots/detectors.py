@@ -34,7 +34,7 @@ class RadarTarget(NamedTuple):
 class Radar(Sensor):
     """A radar; `value` is a tuple of `RadarTarget`, empty if there is no target in range."""
 
-    __slots__ = ("_targets",)
+    __slots__ = ("_targets", "_unread")
 
     def __init__(self, robot: str, device: str) -> None:
         count = NumberReading(device, _COUNT)
@@ -42,6 +42,7 @@ class Radar(Sensor):
         path = f"/{robot}/{topic_name(device)}/targets"
         reading = PickedReading(device, _TARGET, range(len(_TARGET)))
         self._targets = RosSubscriber(path, "webots_ros/RadarTarget", reading)
+        self._unread = 0  # targets of a measurement whose reading was interrupted
 
     def enable(self, period_ms: int) -> None:
         """Make the radar publish every `period_ms` of simulated time, and subscribe to its topics.
@@ -51,6 +52,7 @@ class Radar(Sensor):
         """
         super().enable(period_ms)
         self._targets.connect()
+        self._unread = 0
 
     def read(self) -> bool:
         """Read the targets of the next measurement; without one in time, keep the old ones and return False.
@@ -83,8 +85,19 @@ class Radar(Sensor):
         self._targets.close()
 
     def _read_targets(self, count: int) -> tuple[RadarTarget, ...]:
-        """Read as many messages of targets as one measurement has."""
-        return tuple(RadarTarget(*self._targets.next()) for _ in range(count))
+        """Read the targets of one measurement, after those of an interrupted one.
+
+        Raises:
+            WrongData: also if the number of targets is too large for its message, and so is negative.
+        """
+        if count < 0:
+            raise WrongData(self.robot, f"{self.device} has over 127 targets; reduce its field of view")
+        targets: list[RadarTarget] = []
+        interrupted, self._unread = self._unread, self._unread + count
+        while self._unread:
+            targets.append(RadarTarget(*self._targets.next()))
+            self._unread -= 1
+        return tuple(targets[interrupted:])
 
 
 class RadioPacket(NamedTuple):
@@ -105,7 +118,8 @@ class Receiver(Sensor):
     """A receiver of texts that emitters send on the same channel.
 
     `value` is the text of the oldest packet in the queue, "" if the queue is empty. The simulator publishes
-    this text once in each step, so at most one packet can be taken from the queue in each step.
+    this text once in each step, so at most one packet can be taken from the queue in each step. A reset
+    clears the queue in the stub and in MuJoCo, but not in Webots.
 
     Properties and methods may raise SimulatorDead, SimulatorHung or WrongData.
     """
@@ -132,12 +146,24 @@ class Receiver(Sensor):
         """Remove the oldest packet of the queue and return it.
 
         Return None if the queue was empty in the last step, or if a packet of this step was already taken.
+
+        Raises:
+            WrongData: also if the packet is not a text; the packet is removed.
         """
         if not self._fresh or not self.queue_length:
             return None
-        text = self.value
-        if self._ask("get_data_size", "get_int") != len(text.encode()):
+        size = int(self._ask("get_data_size", "get_int"))
+        if size and not self.value:
             return None  # the packet arrived after the text of this step was published
+        data = self.value.encode()[:size]  # Webots publishes bytes behind the packet too
+        try:
+            text = data.decode()
+        except UnicodeDecodeError:
+            text = ""
+        if len(text.encode()) != size:
+            self._fresh = False
+            self._ask("next_packet", "get_bool")
+            raise WrongData(self.robot, f"{self.device} has received {size} bytes that are not a text")
         x, y, z = self._services.get(f"{self._path}/get_emitter_direction", "receiver_get_emitter_direction")(
             ask=True
         ).direction

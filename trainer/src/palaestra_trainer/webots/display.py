@@ -142,9 +142,12 @@ class Display(OutputDevice):
         """Make an image in the simulator, draw it, and delete it."""
         handle = self._services.get(f"{self._path}/{make}", f"display_{make}")(**request).ir
         if not handle:
-            given = request.get("filename", "an image")
-            fact = f"{self.device} refuses {make} for {given}"
-            raise WrongData(self.robot, f"{fact}; use a PNG or JPEG file that the simulator can read")
+            of_file = "filename" in request
+            given = request["filename"] if of_file else f"{request['width']} x {request['height']} pixels"
+            remedy = (
+                "use a PNG or JPEG file that the simulator can read" if of_file else "use a smaller image"
+            )
+            raise WrongData(self.robot, f"{self.device} refuses {make} for {given}; {remedy}")
         try:
             where = {"x": at[0], "y": at[1], "blend": int(blend)}
             self._command("image_paste", "display_image_paste", ir=handle, **where)

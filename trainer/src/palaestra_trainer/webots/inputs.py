@@ -6,9 +6,11 @@ Webots reads the keys of its own window instead.
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
 from typing import Any, ClassVar, NamedTuple
 
+from palaestra_trainer.errors import SimulatorDead, WorldMisfit
 from palaestra_trainer.ros import RosSubscriber
 from palaestra_trainer.webots.devices import Sensor
 from palaestra_trainer.webots.message_decoding import NumberReading
@@ -31,8 +33,8 @@ class _Input(Sensor):
     def read(self) -> bool:
         """Read the messages of the last step.
 
-        The number of messages is unknown. But the controller responds to a request only after it has sent the
-        messages of the step.
+        The number of messages is unknown. But the stub and MuJoCo respond to a request only after they have
+        sent the messages of the step. Webots may send them later; they are then read in the next step.
 
         Raises:
             SimulatorDead, SimulatorHung, WrongData: as `RosService` and `RosSubscriber`.
@@ -47,7 +49,7 @@ class _Input(Sensor):
             WrongData: also if too many keys are pressed.
             SimulatorDead: also in Webots, which does not have this service.
         """
-        self._own("press", "set_int", f"{self.device} refuses to press {key}", value=key)
+        self._call_ours("press", "set_int", f"{self.device} refuses to press {key}", value=key)
 
     def release(self, key: int = ALL) -> None:
         """Release a key or button; by default all of them.
@@ -56,7 +58,7 @@ class _Input(Sensor):
             WrongData: also if the key is not pressed.
             SimulatorDead: also in Webots, which does not have this service.
         """
-        self._own("release", "set_int", f"{self.device}: {key} is not pressed", value=key)
+        self._call_ours("release", "set_int", f"{self.device}: {key} is not pressed", value=key)
 
     def close(self) -> None:
         """Close the connections."""
@@ -67,7 +69,7 @@ class _Input(Sensor):
         """Return the numbers that arrived, each once, in the order in which they arrived."""
         return tuple(dict.fromkeys(self._values.arrived()))
 
-    def _own(self, name: str, type_name: str, refused: str, **request: Any) -> None:
+    def _call_ours(self, name: str, type_name: str, refused: str, **request: Any) -> None:
         """Call a service that Webots does not have."""
         self._services.confirm(f"palaestra/{self.device}/{name}", type_name, refused, **request)
 
@@ -134,12 +136,29 @@ class Joystick(_Input):
         """Make the joystick publish every `period_ms` of simulated time, and subscribe to its topics.
 
         Raises:
-            SimulatorDead: also if the joystick has fewer axes or hat switches.
-            WrongData, SimulatorHung: as `Sensor.enable`.
+            WrongData, SimulatorDead, SimulatorHung: as `Sensor.enable`.
         """
         super().enable(period_ms)
+        self._positions = [0] * len(self._topics)
         for topic in self._topics:
-            topic.connect()
+            # Webots advertises these topics in the first step in which a joystick is connected.
+            with contextlib.suppress(SimulatorDead):
+                topic.connect()
+
+    def read(self) -> bool:
+        """Read the messages of the last step; see `Keyboard.read`.
+
+        Raises:
+            WorldMisfit: the joystick has fewer axes.
+            SimulatorDead, SimulatorHung, WrongData: as `RosService` and `RosSubscriber`.
+        """
+        axes = int(self._services.ask("joystick/get_number_of_axes", "get_int"))
+        if 0 <= axes < self._axes:
+            raise WorldMisfit(self.robot, f"the joystick has {axes} axes; use Joystick(..., axes={axes})")
+        for topic in self._topics:
+            if axes >= 0 and not topic.connected:
+                topic.connect()
+        return self.read_arrived()
 
     def read_arrived(self) -> bool:
         """Read the buttons and positions that have already arrived.
@@ -163,7 +182,7 @@ class Joystick(_Input):
         """
         for name, positions in (("set_axes", axes), ("set_povs", povs)):
             refused = f"{self.device} refuses {name} with {list(positions)}"
-            self._own(name, "set_float_array", refused, values=list(positions))
+            self._call_ours(name, "set_float_array", refused, values=list(positions))
 
     @property
     def connected(self) -> bool:

@@ -20,7 +20,7 @@ _Data = TypeVar("_Data", VisibleScene, SceneState)
 
 _SCENE: Final = "palaestra/scene"
 _SCENE_STATE: Final = "palaestra/scene_state"
-_OF_NODES: Final = (0x09, 0x19)  # the types of SFNode and MFNode. Source: WbFieldType of Webots
+_NODE_TYPES: Final = (0x09, 0x19)  # the types of SFNode and MFNode. Source: WbFieldType of Webots
 
 
 class Mode(enum.IntEnum):
@@ -150,6 +150,8 @@ class Observer:
         """Return the center of mass, in meters in the world, of the Solid with DEF `name` and its parts."""
         service = self._services.get("supervisor/node/get_center_of_mass", "node_get_center_of_mass")
         center = service(node=self.node(name)).centerOfMass
+        if not all(map(math.isfinite, (center.x, center.y, center.z))):
+            raise WrongData(self.node_name, f"the center of mass of {name} is not finite: {center}")
         return center.x, center.y, center.z
 
     def is_balanced(self, name: str) -> bool:
@@ -168,7 +170,7 @@ class Observer:
         Raises:
             WrongData: also if the field does not hold nodes.
         """
-        if self.field_type(name, field) not in _OF_NODES:
+        if self.field_type(name, field) not in _NODE_TYPES:
             raise WrongData(self.node_name, f"{name}.{field} holds values; read it with get_field")
         handle = self.field(name, field)
         count = self.length(name, field)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import math
 from pathlib import Path
 
-from palaestra_trainer.errors import SimulatorDead
+from palaestra_trainer.errors import SimulatorDead, WrongData
 from palaestra_trainer.ros import call_together
 from palaestra_trainer.webots.fields import Value, encoded, kind_of, turn_about_z
 from palaestra_trainer.webots.observer import Mode, Observer, Vector
@@ -16,8 +17,9 @@ from palaestra_trainer.webots.view_settings import MovieSettings, ViewLabel
 class Supervisor:
     """Changes the simulation through the supervisor's controller.
 
-    Every method may raise SimulatorDead, SimulatorHung or WrongData. Changes of fields take effect in the
-    next step.
+    Every method may raise SimulatorDead, SimulatorHung or WrongData. The stub and MuJoCo refuse a call that
+    they cannot carry out. Webots confirms most of such calls, and reports the failure in its console. Changes
+    of fields take effect in the next step.
 
     Args:
         node_name: the ROS name of the supervisor.
@@ -30,6 +32,7 @@ class Supervisor:
     def __init__(self, node_name: str, observer: Observer) -> None:
         self.node_name = node_name
         self.paused = False
+        self._inserted = False
         self._observer = observer
         self._services = Services(node_name)
 
@@ -47,6 +50,9 @@ class Supervisor:
     def reset(self) -> None:
         """Reset the simulation in the next step; enabled sensors stay enabled."""
         self._services.ask("supervisor/simulation_reset", "get_bool")
+        if self._inserted:  # a reset removes inserted nodes, so their handles become invalid
+            self._inserted = False
+            self._observer.forget_handles()
 
     def reload(self) -> None:
         """Reload the world; controllers restart, so all connections must be opened again."""
@@ -64,9 +70,12 @@ class Supervisor:
         Raises:
             WrongData: also if the simulator refuses the world; it then keeps the old one.
         """
+        service = self._services.get("supervisor/world_load", "set_string")
+        service.begin(value=str(path))
         # The response may be lost, as in `reload`.
         with contextlib.suppress(SimulatorDead):
-            self._confirm("world_load", "set_string", path, value=str(path))
+            if not service.finish().success:
+                raise WrongData(self.node_name, f"refuses world_load for {path}")
         self._observer.close()
         self._services.close()
 
@@ -173,6 +182,7 @@ class Supervisor:
         """
         handle = self._observer.field(name, field)
         self._confirm("field/remove", "field_remove", f"{name}.{field}", field=handle, index=index)
+        self._observer.forget_handles()
 
     def set_joint(self, name: str, position: float) -> None:
         """Move the joint with DEF `name` to a position in radians or meters, at rest.
@@ -188,7 +198,10 @@ class Supervisor:
         service = self._services.get("supervisor/node/get_velocity", "node_get_velocity")
         twist = service(node=self._observer.node(name)).velocity
         linear, angular = twist.linear, twist.angular
-        return (linear.x, linear.y, linear.z), (angular.x, angular.y, angular.z)
+        speeds = (linear.x, linear.y, linear.z), (angular.x, angular.y, angular.z)
+        if not all(map(math.isfinite, (*speeds[0], *speeds[1]))):
+            raise WrongData(self.node_name, f"the velocity of {name} is not finite: {speeds}")
+        return speeds
 
     def set_velocity(self, name: str, linear: Vector, angular: Vector = (0.0, 0.0, 0.0)) -> None:
         """Set the linear (m/s) and angular (rad/s) velocity of the node with DEF `name`, in world axes."""
@@ -262,6 +275,7 @@ class Supervisor:
             position=index,
             nodeString=text,
         )
+        self._inserted = True
         self._observer.forget_handles()
 
     def remove_node(self, name: str) -> None:
