@@ -39,7 +39,7 @@ def test_help_says_what_it_reads_and_writes_and_how_it_ends() -> None:
         (["--health=203.0.113.1:0"], "--health: 203.0.113.1:0: Cannot assign requested address; "),
         (["--job=j"], "--work: is missing, but required with --job; give the folder"),
         (["--standby"], "--standby: two simulators need different ROS names; give --job and --work"),
-        (["--job=j", "--work=/proc/x"], "--work: /proc/x: No such file or directory; give a folder"),
+        (["--job=j", "--work=/proc/x"], "--work: /proc/x: No such file or directory; give a writable folder"),
         (["--driver=command"], "--driver command: has no program; add it after --, as in -- sim {world}"),
         (
             ["--driver=command", "--", "no-such"],

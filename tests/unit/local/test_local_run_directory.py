@@ -331,7 +331,7 @@ def test_the_summary_tells_what_was_measured_and_how_to_look_at_it(directory):
         "run",
         "see",
         "try",
-        "take",
+        "export",
     ]
     assert lines[0].endswith("95%")
     assert lines[1].endswith("50,000")
