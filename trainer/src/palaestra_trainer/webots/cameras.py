@@ -104,7 +104,8 @@ class RecognizedObjects(_Rendered):
         self._services.confirm(
             f"{path}/recognition_enable", "set_int", f"{self.device} refuses recognition", value=period_ms
         )
-        super().enable(period_ms)  # subscribes to a topic that Webots advertises only now
+        self._values.connect()  # only now, because Webots advertises the topic after `recognition_enable`
+        self.late = False
 
     def close(self) -> None:
         """Close the connections."""

@@ -32,7 +32,7 @@ class RadarTarget(NamedTuple):
 
 
 class Radar(Sensor):
-    """A radar; `value` is a tuple of `RadarTarget`, empty if there is no target in range."""
+    """A radar; `value` is a tuple with a `RadarTarget` for each target in range."""
 
     __slots__ = ("_targets", "_unread")
 
@@ -155,22 +155,17 @@ class Receiver(Sensor):
         size = int(self._ask("get_data_size", "get_int"))
         if size and not self.value:
             return None  # the packet arrived after the text of this step was published
-        data = self.value.encode()[:size]  # Webots publishes bytes behind the packet too
-        try:
-            text = data.decode()
-        except UnicodeDecodeError:
-            text = ""
-        if len(text.encode()) != size:
-            self._fresh = False
-            self._ask("next_packet", "get_bool")
-            raise WrongData(self.robot, f"{self.device} has received {size} bytes that are not a text")
         x, y, z = self._services.get(f"{self._path}/get_emitter_direction", "receiver_get_emitter_direction")(
             ask=True
         ).direction
-        packet = RadioPacket(text, float(self._ask("get_signal_strength", "get_float")), (x, y, z))
+        strength = float(self._ask("get_signal_strength", "get_float"))
         self._fresh = False
         self._ask("next_packet", "get_bool")
-        return packet
+        # Webots publishes bytes behind the packet too.
+        text = self.value.encode()[:size].decode(errors="ignore")
+        if len(text.encode()) != size:
+            raise WrongData(self.robot, f"{self.device} has received {size} bytes that are not a text")
+        return RadioPacket(text, strength, (x, y, z))
 
     @property
     def queue_length(self) -> int:
@@ -190,8 +185,7 @@ class Receiver(Sensor):
         """
         refused = f"{self.device} refuses the channel {channel}"
         self._services.confirm(f"{self._path}/set_channel", "set_int", refused, value=channel)
-        if (kept := self.channel) != channel:
-            raise WrongData(self.robot, f"{self.device} ignores the channel {channel} and keeps {kept}")
+        self._services.require_kept(self.device, "channel", channel, self.channel)
 
     def close(self) -> None:
         """Close the connections."""

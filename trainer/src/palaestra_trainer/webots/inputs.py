@@ -1,6 +1,6 @@
 """Keyboard and joystick of a robot; every robot has both, without nodes for them in the world.
 
-In a pod nobody can press a key, so the stub and MuJoCo also let a program press keys and move the joystick.
+A pod has no keyboard. So in the stub and in MuJoCo, a program can press keys and move the joystick.
 Webots reads the keys of its own window instead.
 """
 

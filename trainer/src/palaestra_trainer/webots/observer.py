@@ -32,7 +32,12 @@ class Mode(enum.IntEnum):
 
 
 class NodeName(NamedTuple):
-    """The DEF name of a node, "" if it has none, and its type or the name of its PROTO."""
+    """The name of a node.
+
+    Attributes:
+        definition: the DEF name; "" for a node without a DEF name.
+        type_name: the type, or the name of the PROTO.
+    """
 
     definition: str
     type_name: str
@@ -105,8 +110,7 @@ class Observer:
         turn = orientation.orientation
         heading = 2.0 * math.atan2(turn.z, turn.w)
         pose = (position.position.x, position.position.y, math.remainder(heading, 2.0 * math.pi))
-        if not all(map(math.isfinite, pose)):
-            raise WrongData(self.node_name, f"the pose of {name} is not finite: {pose}")
+        self._services.require_finite(f"the pose of {name}", *pose)
         return pose
 
     def full_pose(self, name: str) -> tuple[Vector, Quaternion]:
@@ -150,8 +154,7 @@ class Observer:
         """Return the center of mass, in meters in the world, of the Solid with DEF `name` and its parts."""
         service = self._services.get("supervisor/node/get_center_of_mass", "node_get_center_of_mass")
         center = service(node=self.node(name)).centerOfMass
-        if not all(map(math.isfinite, (center.x, center.y, center.z))):
-            raise WrongData(self.node_name, f"the center of mass of {name} is not finite: {center}")
+        self._services.require_finite(f"the center of mass of {name}", center.x, center.y, center.z)
         return center.x, center.y, center.z
 
     def is_balanced(self, name: str) -> bool:
@@ -262,8 +265,7 @@ class Observer:
         at, turn = (service(node=node) for service in self._pose_services())
         position = at.position.x, at.position.y, at.position.z
         rotation = turn.orientation.x, turn.orientation.y, turn.orientation.z, turn.orientation.w
-        if not all(map(math.isfinite, (*position, *rotation))):
-            raise WrongData(self.node_name, f"the pose of {name} is not finite: {position}, {rotation}")
+        self._services.require_finite(f"the pose of {name}", *position, *rotation)
         return position, rotation
 
     def _name_of(self, node: int, kind: str) -> str:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from palaestra_trainer.errors import ConfigurationError, WrongData
+from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.webots.devices import topic_name
 from palaestra_trainer.webots.services import Services
 
@@ -46,11 +46,6 @@ class OutputDevice:
         given = ", ".join(f"{field} {value!r}" for field, value in request.items())
         refused = f"{self.device} refuses {name} with {given}"
         self._services.confirm(f"{self._path}/{name}", type_name, refused, **request)
-
-    def _refuse_ignored(self, what: str, wanted: float, actual: float) -> None:
-        """Raise WrongData if the simulator confirmed a value but ignored it, as Webots does."""
-        if actual != wanted:
-            raise WrongData(self.robot, f"{self.device} ignores the {what} {wanted:g} and keeps {actual:g}")
 
     def _ask(self, name: str, type_name: str) -> Any:
         return self._services.ask(f"{self._path}/{name}", type_name)
@@ -151,7 +146,7 @@ class Emitter(OutputDevice):
             WrongData: also if the simulator ignores the channel.
         """
         self._command("set_channel", "set_int", value=channel)
-        self._refuse_ignored("channel", channel, self.channel)
+        self._services.require_kept(self.device, "channel", channel, self.channel)
 
     def set_range(self, range_m: float) -> None:
         """Set the range in meters; -1 means without a limit.
@@ -160,7 +155,7 @@ class Emitter(OutputDevice):
             WrongData: also if the range is larger than the emitter's maxRange.
         """
         self._command("set_range", "set_float", value=range_m)
-        self._refuse_ignored("range", range_m, self.range_m)
+        self._services.require_kept(self.device, "range", range_m, self.range_m)
 
     @property
     def channel(self) -> int:

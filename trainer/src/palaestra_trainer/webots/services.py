@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from palaestra_trainer.errors import WrongData
@@ -46,6 +47,24 @@ class Services:
         """
         if not self.get(path, type_name)(**request).success:
             raise WrongData(self.node_name, refused)
+
+    def require_finite(self, what: str, *numbers: float) -> None:
+        """Check the numbers of a response; `what` names their meaning in the error.
+
+        Raises:
+            WrongData: a number is not finite.
+        """
+        if not all(map(math.isfinite, numbers)):
+            raise WrongData(self.node_name, f"{what} is not finite: {numbers}")
+
+    def require_kept(self, device: str, what: str, wanted: float, actual: float) -> None:
+        """Check that the simulator has not only confirmed a value of a device, but also set it.
+
+        Raises:
+            WrongData: the simulator ignored the value, as Webots does with some values.
+        """
+        if actual != wanted:
+            raise WrongData(self.node_name, f"{device} ignores the {what} {wanted:g} and keeps {actual:g}")
 
     def close(self) -> None:
         """Close all connections."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import math
 from pathlib import Path
 
 from palaestra_trainer.errors import SimulatorDead, WrongData
@@ -142,11 +141,8 @@ class Supervisor:
             ConfigurationError: the field holds nodes, or values of another type.
             WrongData: also if the node or field does not exist, or the simulator refuses the write.
         """
-        where = f"{name}.{field}"
-        kind = kind_of(self._observer.field_type(name, field), where)
-        wire = encoded(kind, where, value)
-        service = self._services.get(f"supervisor/field/set_{kind.name}", f"field_set_{kind.name}")
-        service(field=self._observer.field(name, field), index=index, value=wire)
+        kind, request = self._field_value(name, field, value)
+        self._services.get(f"supervisor/field/set_{kind}", f"field_set_{kind}")(index=index, **request)
 
     def insert_value(self, name: str, field: str, value: Value, index: int = -1) -> None:
         """Insert a value into a field, with several values, of the node with DEF `name`.
@@ -161,18 +157,8 @@ class Supervisor:
             ConfigurationError: the field holds nodes, or values of another type.
             WrongData: also if the field has only one value, or the simulator refuses the write.
         """
-        where = f"{name}.{field}"
-        kind = kind_of(self._observer.field_type(name, field), where)
-        wire = encoded(kind, where, value)
-        handle = self._observer.field(name, field)
-        self._confirm(
-            f"field/insert_{kind.name}",
-            f"field_set_{kind.name}",
-            where,
-            field=handle,
-            index=index,
-            value=wire,
-        )
+        kind, request = self._field_value(name, field, value)
+        self._confirm(f"field/insert_{kind}", f"field_set_{kind}", f"{name}.{field}", index=index, **request)
 
     def remove_value(self, name: str, field: str, index: int = -1) -> None:
         """Remove a value, or a node, from a field with several values; -1: the last one.
@@ -199,8 +185,7 @@ class Supervisor:
         twist = service(node=self._observer.node(name)).velocity
         linear, angular = twist.linear, twist.angular
         speeds = (linear.x, linear.y, linear.z), (angular.x, angular.y, angular.z)
-        if not all(map(math.isfinite, (*speeds[0], *speeds[1]))):
-            raise WrongData(self.node_name, f"the velocity of {name} is not finite: {speeds}")
+        self._services.require_finite(f"the velocity of {name}", *speeds[0], *speeds[1])
         return speeds
 
     def set_velocity(self, name: str, linear: Vector, angular: Vector = (0.0, 0.0, 0.0)) -> None:
@@ -358,6 +343,17 @@ class Supervisor:
         """Close the connections and reset `paused`."""
         self.paused = False
         self._services.close()
+
+    def _field_value(self, name: str, field: str, value: Value) -> tuple[str, dict[str, object]]:
+        """Return the name of a field's type, and the request that writes a value to the field.
+
+        Raises:
+            ConfigurationError: the field cannot hold the value.
+        """
+        where = f"{name}.{field}"
+        kind = kind_of(self._observer.field_type(name, field), where)
+        wire = encoded(kind, where, value)
+        return kind.name, {"field": self._observer.field(name, field), "value": wire}
 
     def _confirm(self, path: str, type_name: str, subject: object, **request: object) -> None:
         """Call a service that only confirms; `subject` is the object of the call, for the message."""
