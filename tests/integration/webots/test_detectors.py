@@ -159,7 +159,7 @@ def test_a_receiver_on_another_channel_receives_nothing(detecting):
 
 
 def test_a_keyboard_has_the_keys_that_are_pressed_in_each_step(detecting):
-    """A program may press keys itself, because nobody can press any in a pod."""
+    """A pod has no keyboard, so a program must be able to press keys."""
     _, it = detecting
     for key in (ord("W"), UP_KEY):
         it.keyboard.press(key)

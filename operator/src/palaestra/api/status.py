@@ -178,8 +178,7 @@ class SimulatorStatus(StatusModel):
     """Whether the simulator has used up its restarts and training continues without it."""
 
     standby: Word | None = None
-    """State of the simulator's standby, `starting` or `ready`; absent: there is no standby, or the standby is
-    down."""
+    """State of the simulator's standby, `starting` or `ready`; absent while no standby runs."""
 
 
 class SuccessInterval(StatusModel):
