@@ -16,6 +16,7 @@ ports.
 - `output`: forwards the simulator's output line by line
 - `left_out`: reads the simulator's report on the nodes that it leaves out of its world
 - `viewing`: reads the simulator's data for viewers, at most 30 times a second
+- `last_request`: remembers when the last request came to the control port
 - `server`: the routes of the control port and of the health port
 - `metric_definitions`: declares every metric
 - `metrics`: the values in /metrics

@@ -21,6 +21,7 @@ from palaestra_protocol.temporary_folder import temporary_folder
 from palaestra_sim.errors import SidecarError, SimError
 from palaestra_sim.sidecar import metrics, process, project, signals, world_files
 from palaestra_sim.sidecar.drivers import SHOWN, Driver, Launch, command
+from palaestra_sim.sidecar.last_request import LastRequest
 from palaestra_sim.sidecar.options import EXIT_WRONG, parse
 from palaestra_sim.sidecar.output import LineHandler
 from palaestra_sim.sidecar.server import bound, control_routes, health_routes
@@ -61,7 +62,8 @@ def look_after(given: argparse.Namespace) -> int:
     try:
         simulators = prepare(given)
         missing = _missing_controllers(given)
-        control = bound("--control", given.control, control_routes(simulators))
+        requests = LastRequest()
+        control = bound("--control", given.control, requests.noted(control_routes(simulators)))
         health = bound("--health", given.health, health_routes(simulators, metrics.registry(simulators)))
     except SimError as error:
         sys.stderr.write(f"palaestra-sidecar: {error}\n")
@@ -71,6 +73,8 @@ def look_after(given: argparse.Namespace) -> int:
     health.start()
     if given.until_stdin_closes:
         threading.Thread(target=end_with_stdin, daemon=True).start()
+    if given.until_silent:
+        threading.Thread(target=end_in_silence, args=(requests, given.until_silent), daemon=True).start()
     log.info("control=%s health=%s", control.address, health.address)
     if missing:
         log.warning("warning: %s", missing)
@@ -101,8 +105,11 @@ def prepare(given: argparse.Namespace) -> tuple[SupervisedSimulator, ...]:
     Raises:
         SimError: an option, the world or the program is wrong.
     """
-    if not ipaddress.ip_address(given.control.host).is_loopback:
-        raise SidecarError(f"--control: {given.control} is not a loopback address; use 127.0.0.1 or [::1]")
+    if not (given.allow_remote_control or ipaddress.ip_address(given.control.host).is_loopback):
+        raise SidecarError(
+            f"--control: {given.control} is not a loopback address; use 127.0.0.1 or [::1], "
+            "or add --allow-remote-control"
+        )
     driver = Driver(given.driver)
     if given.program and driver is not Driver.COMMAND:
         raise SidecarError(
@@ -138,6 +145,13 @@ def end_with_stdin() -> None:
     """Send SIGTERM to this process when standard input closes, which means that the parent has ended."""
     while os.read(sys.stdin.fileno(), 4096):
         pass
+    os.kill(os.getpid(), signal.SIGTERM)
+
+
+def end_in_silence(requests: LastRequest, limit_s: float) -> None:
+    """Send SIGTERM to this process after `limit_s` seconds without a request to the control port."""
+    requests.wait_for_silence(limit_s)
+    log.warning("ends: no request to the control port for %g s", limit_s)
     os.kill(os.getpid(), signal.SIGTERM)
 
 

@@ -79,7 +79,18 @@ def _add_listeners(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("listeners (port 0: any free port)")
     group.add_argument("--control", type=_address, default="127.0.0.1:7100", metavar="HOST:PORT")
     group.add_argument("--health", type=_address, default="0.0.0.0:7200", metavar="HOST:PORT")
+    group.add_argument(
+        "--allow-remote-control",
+        action="store_true",
+        help="the control port may be no loopback address; only in a network that keeps others out",
+    )
     group.add_argument("--until-stdin-closes", action="store_true", help="exit also when stdin closes")
+    group.add_argument(
+        "--until-silent",
+        type=whole(1),
+        metavar="SECONDS",
+        help="exit also after so many seconds without a request to the control port",
+    )
 
 
 def _add_identity(parser: argparse.ArgumentParser) -> None:

@@ -25,9 +25,12 @@ from palaestra_trainer.webots.devices import (
     set_velocities,
 )
 from palaestra_trainer.webots.display import Display
-from palaestra_trainer.webots.facade import Launcher, Webots
+from palaestra_trainer.webots.facade import Webots
 from palaestra_trainer.webots.inputs import Joystick, JoystickState, Keyboard
 from palaestra_trainer.webots.joint_motor import Command, JointMotor, set_commands
+from palaestra_trainer.webots.launching.docker_launcher import Docker
+from palaestra_trainer.webots.launching.launcher import Launcher, Place, SimulatorRequest
+from palaestra_trainer.webots.launching.local_simulator import ThisMachine
 from palaestra_trainer.webots.motion_sensors import (
     GPS,
     Accelerometer,
@@ -62,6 +65,7 @@ __all__ = [
     "Connector",
     "Display",
     "DistanceSensor",
+    "Docker",
     "Emitter",
     "Force3DSensor",
     "ForceSensor",
@@ -84,6 +88,7 @@ __all__ = [
     "Observer",
     "OutputDevice",
     "Pen",
+    "Place",
     "PositionSensor",
     "Radar",
     "RadarTarget",
@@ -93,10 +98,12 @@ __all__ = [
     "RecognizedObject",
     "RecognizedObjects",
     "Sensor",
+    "SimulatorRequest",
     "Speaker",
     "Stepper",
     "Supervisor",
     "Thing",
+    "ThisMachine",
     "TouchSensor",
     "ViewLabel",
     "Webots",

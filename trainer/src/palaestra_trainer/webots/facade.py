@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Protocol, Self, TypeVar
+from typing import Self, TypeVar
 
 from palaestra_trainer.errors import (
     SimulatorDead,
@@ -22,7 +22,10 @@ from palaestra_trainer.errors import (
 )
 from palaestra_trainer.ros import RosService
 from palaestra_trainer.webots.facade_registry import FacadeRegistry
-from palaestra_trainer.webots.launching.local_simulator import ProcessLauncher
+from palaestra_trainer.webots.launcher_names import LauncherName, launcher_named
+from palaestra_trainer.webots.launching.launcher import Launcher, Place, SimulatorRequest
+from palaestra_trainer.webots.launching.owned_sidecar import OwnedSidecar
+from palaestra_trainer.webots.launching.side_by_side import launch_beside_others
 from palaestra_trainer.webots.observer import Mode, Observer
 from palaestra_trainer.webots.supervisor import Supervisor
 
@@ -33,68 +36,27 @@ _POLL_S = 0.02
 _STOP_DEADLINE_S = 5.0  # the longest time that a simulator may take to quit
 
 
-class Launcher(Protocol):
-    """Starts the process of a simulator and reports whether it runs."""
-
-    def start(self) -> None:
-        """Start the simulator without waiting until it is ready."""
-        ...
-
-    def confirm_ready(self) -> None:
-        """Report that the simulator has responded to a real request."""
-        ...
-
-    def ready(self) -> bool:
-        """Return whether the simulator runs and was confirmed as ready."""
-        ...
-
-    def expect_stop(self, deadline_s: float) -> None:
-        """Announce that the simulator will end; after `deadline_s` seconds, kill it."""
-        ...
-
-    def failure(self) -> str | None:
-        """Return the reason why the simulator no longer runs; None while it runs or starts."""
-        ...
-
-    def refused(self) -> bool:
-        """Return whether the simulator ended with exit code 2, with which a program refuses its input."""
-        ...
-
-    def wait_stopped(self, deadline_s: float) -> None:
-        """Wait until the process of the simulator has ended.
-
-        Raises:
-            SimulatorHung: the process did not end within `deadline_s` seconds.
-        """
-        ...
-
-
-class Owned(Launcher, Protocol):
-    """A launcher that belongs to one facade."""
-
-    def close(self) -> None:
-        """End the process that this launcher started."""
-        ...
-
-
 class Webots:
     """A simulator that a program can start, stop, run fast and pause.
 
-    By default the simulator is new. If the ROS names of the world are already in use on the master, `_2`,
-    `_3`, ... is appended to the names. To use a simulator that already runs, pass `launcher=Attached()`.
+    By default the simulator is new, and runs on this machine. If the ROS names of the world are already in
+    use on the master, `_2`, `_3`, ... is appended to the names.
 
     The next environment that is created without a simulator uses this simulator.
 
     Args:
         supervisor_node_name: the ROS name of the supervisor in the world.
         world_path: path of the world to load, or the name of a shipped world, e.g. "arena".
-        launcher: starts the process of the simulator; by default on this machine.
+        launcher: the place in which a new simulator starts, by its name or with settings: "process" or
+            `ThisMachine()`, "docker" or `Docker(...)`, "kubernetes" or `Kubernetes(...)`. For a simulator
+            that already runs: "attach" or `Attached()`. Or an object that starts the simulator.
         driver: the simulator program: "stub", "mujoco" or "webots".
         options: command-line options of the simulator program, e.g. ["--step-sleep-ms=5"].
         start_deadline_s: the longest time from the start until the simulator responds.
 
     Raises:
-        ConfigurationError: the process on this machine refused the world or the driver.
+        ConfigurationError: the place cannot start a simulator, or the world or the driver was refused; the
+            message has the remedy.
     """
 
     def __init__(
@@ -102,23 +64,24 @@ class Webots:
         supervisor_node_name: str,
         world_path: str | Path,
         *,
-        launcher: Launcher | None = None,
+        launcher: LauncherName | Place | Launcher = "process",
         driver: str = "stub",
         options: Sequence[str] = (),
         start_deadline_s: float = 60.0,
     ) -> None:
-        self._own: Owned | None = None
+        self._own: OwnedSidecar | None = None
         self._suffix = ""
-        if launcher is None:
-            own = ProcessLauncher.beside_others(world_path, driver, options)
-            launcher = self._own = own
-            self._suffix = own.suffix
+        chosen = launcher_named(launcher) if isinstance(launcher, str) else launcher
+        if isinstance(chosen, Place):
+            request = SimulatorRequest(world=world_path, driver=driver, options=options)
+            chosen = self._own = launch_beside_others(chosen, request)
+            self._suffix = self._own.suffix
         supervisor_node_name = self.name_of(supervisor_node_name)
         self.supervisor_node_name = supervisor_node_name
         self.world_path = world_path
         self.observer = Observer(supervisor_node_name)
         self.supervisor = Supervisor(supervisor_node_name, self.observer)
-        self._launcher = launcher
+        self._launcher = chosen
         # The probe has its own connection with a shorter deadline, because it must detect a hang early.
         self._probe = RosService(f"/{supervisor_node_name}/robot/get_time", "webots_ros/get_float", _PROBE_S)
         self._start_deadline_s = start_deadline_s

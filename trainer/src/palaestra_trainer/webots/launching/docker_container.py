@@ -1,0 +1,99 @@
+"""Start and end a sidecar in a container of a Docker Engine."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+from docker.types import DeviceRequest, Mount
+
+from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.webots.launching.docker_engine import connected, ended, engine_errors
+from palaestra_trainer.webots.launching.docker_launcher import Docker
+from palaestra_trainer.webots.launching.docker_network import ContainerNetwork, network_of
+from palaestra_trainer.webots.launching.docker_output import ContainerOutput
+from palaestra_trainer.webots.launching.launcher import SimulatorRequest
+from palaestra_trainer.webots.launching.owned_sidecar import OwnedSidecar
+from palaestra_trainer.webots.launching.sidecar_command import control_address, sidecar_options
+
+_START_S = 60.0
+_LABELS = {"palaestra.launcher": "docker"}
+
+
+class DockerLauncher(OwnedSidecar):
+    """A sidecar in a container that this program started.
+
+    Args:
+        container: the running container.
+        address: see `Sidecar`.
+        request: the simulator that the sidecar starts.
+    """
+
+    def __init__(self, container: Any, address: str, request: SimulatorRequest) -> None:
+        super().__init__(address, Path(request.world).stem, request.suffix)
+        self._container = container
+        self._open = True
+
+    def _end(self) -> None:
+        if self._open:
+            self._open = False
+            ended(self._container)
+            self._container.client.close()
+
+
+def start_container(settings: Docker, request: SimulatorRequest) -> DockerLauncher:
+    """Start a sidecar in a new container; see `Docker.launch`."""
+    image = settings.image_of(request)
+    engine = connected()
+    with ExitStack() as undo:
+        undo.callback(engine.close)
+        with engine_errors(image):
+            network = network_of(engine, settings.network)
+            container = engine.containers.create(
+                image,
+                [*network.listeners, *sidecar_options(request)],
+                **_options(settings, network, settings.folder_of(request.world)),
+            )
+            undo.callback(ended, container)
+            output = ContainerOutput(container)
+            container.start()
+        port = _control_port(output, image)
+        with engine_errors(image):
+            address = network.address(container)
+        launcher = DockerLauncher(container, f"http://{address}:{port}", request)
+        undo.pop_all()
+    return launcher
+
+
+def _options(settings: Docker, network: ContainerNetwork, folder: Path | None) -> dict[str, Any]:
+    """Return the options of `containers.create`."""
+    count = -1 if settings.gpus == "all" else settings.gpus
+    return {
+        "auto_remove": True,
+        "cap_drop": ["ALL"],
+        "device_requests": [DeviceRequest(count=count, capabilities=[["gpu"]])] if count else [],
+        "entrypoint": list(network.entrypoint),
+        "environment": dict(network.environment),
+        "labels": _LABELS,
+        "mounts": [Mount(str(folder), str(folder), "bind", read_only=True)] if folder else [],
+        "network_mode": settings.network,
+        "security_opt": ["no-new-privileges"],
+        "shm_size": settings.shm_size,
+        "stdin_open": True,
+    }
+
+
+def _control_port(output: ContainerOutput, image: str) -> int:
+    """Return the control port in the sidecar's first line.
+
+    Raises:
+        ConfigurationError: the sidecar, or the program of another image, ended without this line.
+        SimulatorDead: nothing was printed in time.
+    """
+    line = output.first_line(_START_S)
+    address = control_address(line)
+    if address is None:
+        said = output.rest() or f"{image}: the container printed {line!r}, which is not the line of a sidecar"
+        raise ConfigurationError(said)
+    return int(address.rpartition(":")[2])
