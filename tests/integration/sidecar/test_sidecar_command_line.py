@@ -35,7 +35,11 @@ def test_help_says_what_it_reads_and_writes_and_how_it_ends() -> None:
         (["--driver=gazebo"], "argument --driver: invalid choice: 'gazebo' (choose from 'stub', "),
         (["--world=/no.wbt"], "--world: /no.wbt: No such file or directory; give a .wbt or .xml file"),
         (["--control=7100"], "argument --control: '7100' is not an address such as 127.0.0.1:7100; see"),
-        (["--control=0.0.0.0:0"], "--control: 0.0.0.0:0 is not a loopback address; use 127.0.0.1 or [::1]"),
+        (
+            ["--control=0.0.0.0:0"],
+            "--control: 0.0.0.0:0 is not a loopback address; use 127.0.0.1 or [::1], or add --allow-remote-",
+        ),
+        (["--until-silent=0"], "argument --until-silent: 0 is refused; give 1 or more; see --help"),
         (["--health=203.0.113.1:0"], "--health: 203.0.113.1:0: Cannot assign requested address; "),
         (["--job=j"], "--work: is missing, but required with --job; give the folder"),
         (["--standby"], "--standby: two simulators need different ROS names; give --job and --work"),
@@ -110,6 +114,19 @@ def test_a_sidecar_may_end_with_its_standard_input(arguments, waits) -> None:
         process.stdin.close()
 
         assert process.wait(DEADLINE_S) == 0
+
+
+def test_a_sidecar_may_end_when_its_client_is_silent_and_may_listen_for_other_machines(arguments, waits):
+    """The kernel of a notebook in another pod may be killed, and no connection shows that."""
+    others = ("--control=0.0.0.0:0", "--allow-remote-control", "--until-silent=1")
+    with subprocess.Popen(arguments(waits, *others), stdout=subprocess.PIPE, text=True) as process:
+        first = process.stdout.readline()
+
+        said, _ = process.communicate(timeout=DEADLINE_S)
+
+    assert " control=0.0.0.0:" in first
+    assert "ends: no request to the control port for 1 s" in said
+    assert process.returncode == 0
 
 
 def test_options_come_last_on_the_simulators_command_line(sidecar) -> None:

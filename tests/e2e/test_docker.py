@@ -1,0 +1,35 @@
+"""A simulator in a container of a real Docker Engine, the one that carries the cluster."""
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+from tests.chart.helm import ROOT
+from tests.e2e.own_image import ARCHIVES, archives
+
+RUN_S = 240
+
+
+def test_simulators_start_in_containers_and_end_with_their_programs(cluster):
+    """test_launchers.py shows the same over a server that has no containers, and so no network of its own."""
+    del cluster
+    if ARCHIVES not in os.environ or os.environ.get("PALAESTRA_CLUSTER") == "existing":
+        pytest.skip("the release's archives or the cluster's engine are not here; `make e2e` has both")
+    beside = ROOT / "tests/cluster/beside_containers.sh"
+    told = subprocess.run(
+        [beside, archives()["stub"], sys.executable, "-m", "tests.e2e.containers"],
+        cwd=ROOT,
+        check=True,
+        timeout=RUN_S,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+
+    seen = json.loads(told.stdout)
+    assert seen["times"] == [pytest.approx(0.192)] * 2
+    assert seen["names"] == ["robotino", "robotino_2"]
+    assert "could not select device driver" in seen["refusal"]
+    assert seen["left"] == []
