@@ -29,6 +29,7 @@ from palaestra_trainer.webots.facade import Webots
 from palaestra_trainer.webots.inputs import Joystick, JoystickState, Keyboard
 from palaestra_trainer.webots.joint_motor import Command, JointMotor, set_commands
 from palaestra_trainer.webots.launching.docker_launcher import Docker
+from palaestra_trainer.webots.launching.kubernetes_launcher import Kubernetes
 from palaestra_trainer.webots.launching.launcher import Launcher, Place, SimulatorRequest
 from palaestra_trainer.webots.launching.local_simulator import ThisMachine
 from palaestra_trainer.webots.motion_sensors import (
@@ -75,6 +76,7 @@ __all__ = [
     "Joystick",
     "JoystickState",
     "Keyboard",
+    "Kubernetes",
     "Launcher",
     "Lidar",
     "LidarPoints",

@@ -9,13 +9,14 @@ from typing import Literal
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.webots.attached import Attached
 from palaestra_trainer.webots.launching.docker_launcher import Docker
+from palaestra_trainer.webots.launching.kubernetes_launcher import Kubernetes
 from palaestra_trainer.webots.launching.launcher import Launcher, Place
 from palaestra_trainer.webots.launching.local_simulator import ThisMachine
 
-LauncherName = Literal["process", "docker", "attach"]
+LauncherName = Literal["process", "docker", "kubernetes", "attach"]
 
 _LAUNCHERS: Mapping[str, Callable[[], Place | Launcher]] = MappingProxyType(
-    {"process": ThisMachine, "docker": Docker, "attach": Attached}
+    {"process": ThisMachine, "docker": Docker, "kubernetes": Kubernetes, "attach": Attached}
 )
 
 

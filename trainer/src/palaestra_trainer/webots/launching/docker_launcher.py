@@ -8,15 +8,13 @@ from __future__ import annotations
 
 import importlib.util
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 from typing import Literal
 
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.webots.launching.launcher import Place, SimulatorRequest
 from palaestra_trainer.webots.launching.owned_sidecar import OwnedSidecar
-
-_SHIPPED = ("stub", "mujoco")
+from palaestra_trainer.webots.launching.release_images import release_image
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,14 +63,7 @@ class Docker(Place):
         Raises:
             ConfigurationError: this release has no image with the simulator.
         """
-        if self.image is not None:
-            return self.image
-        if request.driver not in _SHIPPED:
-            raise ConfigurationError(
-                f"launcher docker: there is no image for driver {request.driver}; give Docker(image=...) an "
-                "image with this simulator and palaestra-sidecar"
-            )
-        return f"palaestra-{request.driver}:{version('palaestra-trainer')}"
+        return self.image or release_image(request.driver, launcher="docker")
 
     def folder_of(self, world: str | Path) -> Path | None:
         """Return the folder that a container needs for this world; None for a world in the image.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ipaddress
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -10,6 +9,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.webots.launching.addresses import is_loopback
 from palaestra_trainer.webots.launching.master import ensure_master
 from palaestra_trainer.webots.launching.sidecar_command import SIDECAR
 
@@ -73,7 +73,7 @@ def _bridge(network: Mapping[str, Any]) -> ContainerNetwork:
         )
     ensure_master(gateways[0])
     uri = os.environ["ROS_MASTER_URI"]
-    if _is_loopback(str(urlsplit(uri).hostname)):
+    if is_loopback(str(urlsplit(uri).hostname)):
         raise ConfigurationError(
             f"launcher docker: a container in network {name} cannot reach the ROS master at {uri}; set "
             f"ROS_MASTER_URI to a master that listens on {gateways[0]}, start this program without "
@@ -103,10 +103,3 @@ def _address_in(container: Any, network: str) -> str:
     if not address:
         raise ConfigurationError(f"launcher docker: the container has no address in network {network}")
     return address
-
-
-def _is_loopback(host: str) -> bool:
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost"

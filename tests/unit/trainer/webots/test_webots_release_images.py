@@ -1,0 +1,38 @@
+"""The image of a simulator comes from where the notebook's own image comes from."""
+
+import pytest
+
+from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.webots.launching.addresses import in_url, is_loopback
+from palaestra_trainer.webots.launching.release_images import release_image
+
+
+@pytest.mark.parametrize(
+    ("beside", "image"),
+    [
+        ("registry.example:5000/lab/palaestra-notebook:9", "registry.example:5000/lab/palaestra-mujoco:9"),
+        ("palaestra-trainer:9", "palaestra-mujoco:9"),
+        ("palaestra-notebook@sha256:0", "palaestra-mujoco:0.1.0"),  # its digest is of another image
+        ("lab/palaestra-notebooks:9", "palaestra-mujoco:0.1.0"),
+        ("", "palaestra-mujoco:0.1.0"),
+    ],
+)
+def test_registry_and_tag_are_those_of_the_notebook(beside, image, monkeypatch):
+    """A cluster without internet has all images of a release in one registry."""
+    monkeypatch.setattr("palaestra_trainer.webots.launching.release_images.version", lambda _: "0.1.0")
+
+    assert release_image("mujoco", "kubernetes", beside) == image
+
+
+def test_a_simulator_without_an_image_names_the_remedy():
+    """Webots has a licence and a size of its own, so a release has no image of it."""
+    with pytest.raises(ConfigurationError, match=r"driver webots; give Kubernetes\(image=\.\.\.\) an image"):
+        release_image("webots", "kubernetes")
+
+
+def test_addresses_are_written_as_urls_need_them():
+    """A cluster may have IPv6 alone, and a name of loopback is as useless to a pod as its address."""
+    assert in_url("fd00::1") == "[fd00::1]"
+    assert in_url("10.0.0.1") == "10.0.0.1"
+    assert [is_loopback(host) for host in ("::1", "127.3.4.5", "localhost")] == [True, True, True]
+    assert [is_loopback(host) for host in ("10.0.0.1", "master", "")] == [False, False, False]

@@ -1,0 +1,65 @@
+"""Run simulators in pods of a Kubernetes cluster, for a notebook in a pod of the same cluster.
+
+Each simulator is a Job with one pod: a sidecar with its simulator, and a ROS master unless one runs. The
+sidecar ends if it hears nothing from this program, so the Job ends also if the program is killed, and the
+cluster removes it. The Job belongs to the pod of this program too, and goes with that pod.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.webots.launching.launcher import Place, SimulatorRequest
+from palaestra_trainer.webots.launching.owned_sidecar import OwnedSidecar
+
+Quantities = Mapping[str, Mapping[str, str]]
+
+_RESOURCES: Quantities = MappingProxyType(
+    {
+        "requests": MappingProxyType({"cpu": "200m", "memory": "256Mi"}),
+        "limits": MappingProxyType({"memory": "1Gi"}),
+    }
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Kubernetes(Place):
+    """Starts simulators in pods of the cluster in which this program runs.
+
+    The service account of this program needs the rights that the chart gives with `jupyter.simulators`.
+
+    Attributes:
+        image: the image of the simulator, with `palaestra-sidecar`; by default the image of the stub or of
+            MuJoCo, from the registry of this program's own image.
+        resources: requests and limits of the simulator's container, as in a pod.
+        start_s: the longest time until the pod responds, including the time to download images.
+        silence_s: the pod ends after so many seconds without a sign of life of this program, at least 10.
+        lifetime_s: the pod ends after so many seconds in any case.
+    """
+
+    image: str | None = None
+    resources: Quantities = field(default_factory=lambda: _RESOURCES)
+    start_s: float = 300.0
+    silence_s: int = 120
+    lifetime_s: int = 24 * 3600
+
+    def launch(self, request: SimulatorRequest) -> OwnedSidecar:
+        """Start a sidecar in a new pod; see `Place`.
+
+        Raises:
+            ConfigurationError: the package kubernetes is missing, this program does not run in a pod, the API
+                server refuses an object, the pod does not run in time, or the sidecar refused the world or
+                the driver; the message has the remedy or the events of the pod.
+        """
+        if importlib.util.find_spec("kubernetes") is None:
+            raise ConfigurationError(
+                "launcher kubernetes: the Python package kubernetes is not installed; install "
+                "palaestra-trainer[kubernetes]"
+            )
+        from palaestra_trainer.webots.launching.kubernetes_pod import start_pod
+
+        return start_pod(self, request)
