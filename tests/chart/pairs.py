@@ -73,6 +73,7 @@ OTHERS: dict[str, Any] = {
     "jupyter.tokenSecret.name": "notebooks",
     "jupyter.tokenSecret.key": "secret",
     "jupyter.existingClaim": "notes",
+    "jupyter.simulators": True,
     "jupyter.resources": RESOURCES,
 }
 # For some values of the chart, the other values that the schema then requires.

@@ -2,9 +2,11 @@
 
 import base64
 import json
+from urllib.parse import urlsplit
 
 from tests.e2e.cluster import Cluster
 from tests.e2e.namespace import SYSTEM
+from tests.waiting import eventually
 
 NOTEBOOKS = "palaestra-jupyter"
 STATUS_CODES = """
@@ -17,6 +19,39 @@ for path in paths:
     codes[path] = server.getresponse().status
 print(json.dumps(codes))
 """
+
+# Two simulators, of which one has the ROS master of both; then the program kills itself.
+SIMULATORS = """
+import json, os, signal
+from palaestra_trainer.robots.robotino import Robotino
+from palaestra_trainer.webots import Kubernetes, Webots
+
+def driven(webots):
+    with webots:
+        robot = Robotino(webots)
+        robot.connect()
+        before = webots.observer.time()
+        robot.advance()
+        robot.close()
+        return round(webots.observer.time() - before, 6)
+
+place = Kubernetes(silence_s=10)
+first = Webots("robotino", "arena", launcher=place)
+second = Webots("robotino", "arena", launcher=place, driver="mujoco")
+periods = [driven(first), driven(second)]
+master = os.environ["ROS_MASTER_URI"]
+first.close()
+periods.append(driven(second))
+names = [first.robot_name, second.robot_name]
+print(json.dumps({"names": names, "periods": periods, "master": master}), flush=True)
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+CONNECT = (
+    "import socket, sys; socket.create_connection((sys.argv[1], int(sys.argv[2])), 5); print('connected')"
+)
+_OF_NOTEBOOKS = "app.kubernetes.io/component=notebook-simulator"
+_ENDS_S = 120
+_RUN_S = 240
 
 
 def page_of(cluster: Cluster, namespace: str, deployment: str, port: int) -> str:
@@ -68,3 +103,29 @@ def assert_the_first_notebook_drives_a_robot(cluster: Cluster) -> None:
     assert "reached after" in said
     assert "image/png" in said
     assert '"name": "stderr"' not in said
+
+
+def assert_a_notebook_starts_simulators_in_pods(cluster: Cluster, stranger: tuple[str, str]) -> None:
+    """Assert that a notebook drives simulators in pods, that nobody else can, and that they end with it.
+
+    Args:
+        cluster: the cluster.
+        stranger: namespace and name of another Deployment, which may not connect to the simulators.
+    """
+    run = ("exec", "-n", SYSTEM, f"deploy/{NOTEBOOKS}", "--", "python3", "-c", SIMULATORS)
+    said = cluster.kubectl(*run, within_s=_RUN_S)  # it ends with code 137, since the program kills itself
+    assert '{"names"' in said, said
+    seen = json.loads(next(line for line in said.splitlines() if line.startswith('{"names"')))
+    master = urlsplit(seen["master"])
+    connect = ("python3", "-c", CONNECT, str(master.hostname), str(master.port))
+
+    assert seen["names"] == ["robotino", "robotino_2"]
+    assert seen["periods"] == [0.192] * 3
+    assert inside(cluster, SYSTEM, NOTEBOOKS, *connect) == "connected\n"
+    assert "TimeoutError" in inside(cluster, *stranger, *connect)
+
+    def ended_jobs() -> bool:
+        jobs = cluster.select("jobs", SYSTEM, _OF_NOTEBOOKS)
+        return all(job.get("status", {}).get("succeeded") == 1 for job in jobs)
+
+    assert eventually(ended_jobs, _ENDS_S)

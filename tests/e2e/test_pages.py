@@ -19,6 +19,7 @@ from tests.e2e.jobs import WAIT, tiny_job
 from tests.e2e.namespace import LONG_S, OPERATOR, SYSTEM, Namespace
 from tests.e2e.served import (
     NOTEBOOKS,
+    assert_a_notebook_starts_simulators_in_pods,
     assert_notebooks_are_served_to_who_has_the_token,
     assert_the_first_notebook_drives_a_robot,
     page_of,
@@ -48,6 +49,7 @@ PROMISED = {
     "What pods may carry": {OPERATOR: 2},
     "What pods may ask for": {OPERATOR: 2},
     "TensorBoard and notebooks": {OPERATOR: 2, TENSORBOARD: 1, NOTEBOOKS: 1},
+    "Simulators of notebooks in pods": {OPERATOR: 2, TENSORBOARD: 1, NOTEBOOKS: 1},
     "Upgrade": {OPERATOR: 2, TENSORBOARD: 1, NOTEBOOKS: 1},
     "Uninstall": {},
     "In some namespaces only": {},
@@ -147,6 +149,8 @@ def test_every_command_of_the_installation_works_and_touches_no_job_that_runs(te
             stays = Stays(namespace)
         if heading == "TensorBoard and notebooks":
             assert_all_is_served(cluster)
+        if heading == "Simulators of notebooks in pods":
+            assert_a_notebook_starts_simulators_in_pods(cluster, (LAB, TENSORBOARD))
 
     assert seen == PROMISED
 

@@ -16,6 +16,7 @@ from palaestra_trainer.errors import ConfigurationError, SimulatorDead
 from palaestra_trainer.webots import Docker, ThisMachine, Webots
 from tests.docker_engine import Engine
 from tests.local_run import below
+from tests.pages import blocks
 from tests.waiting import eventually
 
 PATIENCE_S = 60.0
@@ -170,6 +171,18 @@ def test_the_container_has_what_the_settings_say(make, engine, world):
     assert host["CapDrop"] == ["ALL"]
     assert host["SecurityOpt"] == ["no-new-privileges"]
     assert [(each["Source"], each["ReadOnly"]) for each in host["Mounts"]] == [(str(world.parent), True)]
+
+
+def test_the_block_of_the_page_runs(engine, capsys, monkeypatch):
+    """A reader copies it, with an image of her own."""
+    page = (Path(__file__).parents[3] / "docs/howto/facades.md").read_text()
+    monkeypatch.setattr(engine, "images", {STUB.replace("stub", "mujoco"), "lab/simulators:2"})
+    (block,) = blocks(page, "python with-docker")
+
+    exec(compile(block, "facades.md", "exec"), {})
+
+    assert capsys.readouterr().out == "0.0\n"
+    assert engine.running() == []
 
 
 def test_a_project_of_webots_is_mounted_whole(engine, tmp_path, name):

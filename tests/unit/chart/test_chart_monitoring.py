@@ -124,3 +124,23 @@ def test_what_prometheus_takes_from_a_training_pod_is_bounded(one):
     limits = {name: bounded.get(name) for name in ("sampleLimit", "labelLimit", "bodySizeLimit")}
     assert limits == {"sampleLimit": 2000, "labelLimit": 32, "bodySizeLimit": "1MB"}
     assert not limits.keys() & none["spec"].keys()
+
+
+def test_notebooks_may_start_simulators_only_if_the_release_says_so():
+    """The token is worth as much as the right to create pods, so the default has none."""
+    mode = {"jupyter": {"enabled": True, "tokenSecret": {"name": "notebooks"}}}
+    without, with_token = (objects(merged(mode, {"jupyter": {"simulators": on}})) for on in (False, True))
+
+    def of(made, kind):
+        return [
+            each for each in made if each["kind"] == kind and each["metadata"]["name"] == "palaestra-jupyter"
+        ]
+
+    pod = of(without, "Deployment")[0]["spec"]["template"]["spec"]
+    assert pod["automountServiceAccountToken"] is False
+    assert of(without, "Role") == of(without, "ServiceAccount") == []
+    pod = of(with_token, "Deployment")[0]["spec"]["template"]["spec"]
+    assert (pod["automountServiceAccountToken"], pod["serviceAccountName"]) == (True, "palaestra-jupyter")
+    (role,), (binding,) = of(with_token, "Role"), of(with_token, "RoleBinding")
+    assert all("*" not in rule["verbs"] + rule["resources"] for rule in role["rules"])
+    assert binding["subjects"][0]["namespace"] == role["metadata"]["namespace"]

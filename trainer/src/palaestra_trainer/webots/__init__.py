@@ -30,8 +30,9 @@ from palaestra_trainer.webots.inputs import Joystick, JoystickState, Keyboard
 from palaestra_trainer.webots.joint_motor import Command, JointMotor, set_commands
 from palaestra_trainer.webots.launching.docker_launcher import Docker
 from palaestra_trainer.webots.launching.kubernetes_launcher import Kubernetes
-from palaestra_trainer.webots.launching.launcher import Launcher, Place, SimulatorRequest
+from palaestra_trainer.webots.launching.launcher import Launcher, Place
 from palaestra_trainer.webots.launching.local_simulator import ThisMachine
+from palaestra_trainer.webots.launching.simulator_request import SimulatorRequest
 from palaestra_trainer.webots.motion_sensors import (
     GPS,
     Accelerometer,

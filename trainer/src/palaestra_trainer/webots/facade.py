@@ -23,9 +23,10 @@ from palaestra_trainer.errors import (
 from palaestra_trainer.ros import RosService
 from palaestra_trainer.webots.facade_registry import FacadeRegistry
 from palaestra_trainer.webots.launcher_names import LauncherName, launcher_named
-from palaestra_trainer.webots.launching.launcher import Launcher, Place, SimulatorRequest
+from palaestra_trainer.webots.launching.launcher import Launcher, Place
 from palaestra_trainer.webots.launching.owned_sidecar import OwnedSidecar
 from palaestra_trainer.webots.launching.side_by_side import launch_beside_others
+from palaestra_trainer.webots.launching.simulator_request import SimulatorRequest
 from palaestra_trainer.webots.observer import Mode, Observer
 from palaestra_trainer.webots.supervisor import Supervisor
 

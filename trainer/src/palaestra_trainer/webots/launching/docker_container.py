@@ -13,9 +13,9 @@ from palaestra_trainer.webots.launching.docker_engine import connected, ended, e
 from palaestra_trainer.webots.launching.docker_launcher import Docker
 from palaestra_trainer.webots.launching.docker_network import ContainerNetwork, network_of
 from palaestra_trainer.webots.launching.docker_output import ContainerOutput
-from palaestra_trainer.webots.launching.launcher import SimulatorRequest
 from palaestra_trainer.webots.launching.owned_sidecar import OwnedSidecar
 from palaestra_trainer.webots.launching.sidecar_command import control_address, sidecar_options
+from palaestra_trainer.webots.launching.simulator_request import SimulatorRequest
 
 _START_S = 60.0
 _LABELS = {"palaestra.launcher": "docker"}

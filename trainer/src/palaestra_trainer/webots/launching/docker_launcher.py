@@ -12,9 +12,10 @@ from pathlib import Path
 from typing import Literal
 
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.webots.launching.launcher import Place, SimulatorRequest
+from palaestra_trainer.webots.launching.launcher import Place
 from palaestra_trainer.webots.launching.owned_sidecar import OwnedSidecar
 from palaestra_trainer.webots.launching.release_images import release_image
+from palaestra_trainer.webots.launching.simulator_request import SimulatorRequest
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

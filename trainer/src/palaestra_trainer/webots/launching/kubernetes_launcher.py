@@ -13,8 +13,9 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.webots.launching.launcher import Place, SimulatorRequest
+from palaestra_trainer.webots.launching.launcher import Place
 from palaestra_trainer.webots.launching.owned_sidecar import OwnedSidecar
+from palaestra_trainer.webots.launching.simulator_request import SimulatorRequest
 
 Quantities = Mapping[str, Mapping[str, str]]
 

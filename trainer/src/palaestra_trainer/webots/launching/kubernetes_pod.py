@@ -18,12 +18,12 @@ from palaestra_trainer.webots.launching import kubernetes_objects as objects
 from palaestra_trainer.webots.launching import kubernetes_state as state
 from palaestra_trainer.webots.launching.addresses import in_url, is_loopback
 from palaestra_trainer.webots.launching.kubernetes_launcher import Kubernetes
-from palaestra_trainer.webots.launching.launcher import SimulatorRequest
 from palaestra_trainer.webots.launching.owned_sidecar import OwnedSidecar
 from palaestra_trainer.webots.launching.pods_by_master import PodsByMaster
 from palaestra_trainer.webots.launching.release_images import release_image
 from palaestra_trainer.webots.launching.sidecar import Sidecar
 from palaestra_trainer.webots.launching.sidecar_command import sidecar_options
+from palaestra_trainer.webots.launching.simulator_request import SimulatorRequest
 
 _OWN_POD = "PALAESTRA_POD"  # the chart sets it; HOSTNAME may be another name
 _POLL_S = 0.25

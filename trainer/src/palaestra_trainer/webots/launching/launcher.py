@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
-from dataclasses import dataclass
-from pathlib import Path
 from typing import Protocol
 
 from palaestra_trainer.webots.launching.owned_sidecar import OwnedSidecar
+from palaestra_trainer.webots.launching.simulator_request import SimulatorRequest
 
 
 class Launcher(Protocol):
@@ -45,23 +43,6 @@ class Launcher(Protocol):
             SimulatorHung: the simulator did not end within `deadline_s` seconds.
         """
         ...
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SimulatorRequest:
-    """The simulator that a place starts.
-
-    Attributes:
-        world: path of the world, or the name of a world that Palaestra ships.
-        driver: the simulator program, `stub`, `mujoco` or `webots`.
-        options: command-line options for the simulator.
-        suffix: text that is appended to the ROS names in the world.
-    """
-
-    world: str | Path
-    driver: str = "stub"
-    options: Sequence[str] = ()
-    suffix: str = ""
 
 
 class Place(ABC):

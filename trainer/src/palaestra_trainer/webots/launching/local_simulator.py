@@ -12,10 +12,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.webots.launching.launcher import Place, SimulatorRequest
+from palaestra_trainer.webots.launching.launcher import Place
 from palaestra_trainer.webots.launching.master import ensure_master
 from palaestra_trainer.webots.launching.owned_sidecar import OwnedSidecar
 from palaestra_trainer.webots.launching.sidecar_command import SIDECAR, control_address, sidecar_options
+from palaestra_trainer.webots.launching.simulator_request import SimulatorRequest
 from palaestra_trainer.webots.launching.subprocesses import drain, end_child, first_line, start_child
 
 _END_S = 20.0

@@ -6,8 +6,9 @@ from contextlib import ExitStack
 from dataclasses import replace
 
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.webots.launching.launcher import Place, SimulatorRequest
+from palaestra_trainer.webots.launching.launcher import Place
 from palaestra_trainer.webots.launching.owned_sidecar import OwnedSidecar
+from palaestra_trainer.webots.launching.simulator_request import SimulatorRequest
 
 _MOST_BESIDE = 100
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from palaestra_trainer.webots.launching.launcher import SimulatorRequest
+from palaestra_trainer.webots.launching.simulator_request import SimulatorRequest
 
 SIDECAR = "palaestra-sidecar"
 _CONTROL = re.compile(r"control=(\S+)")
