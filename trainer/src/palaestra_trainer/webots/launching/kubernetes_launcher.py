@@ -52,9 +52,9 @@ class Kubernetes(Place):
         """Start a sidecar in a new pod; see `Place`.
 
         Raises:
-            ConfigurationError: the package kubernetes is missing, this program does not run in a pod, the API
-                server refuses an object, the pod does not run in time, or the sidecar refused the world or
-                the driver; the message has the remedy or the events of the pod.
+            ConfigurationError: the package kubernetes is missing, or this program does not run in a pod; the
+                API server refuses an object; the pod does not run in time; the sidecar refused the world or
+                the driver. The message has the remedy or the events of the pod.
         """
         if importlib.util.find_spec("kubernetes") is None:
             raise ConfigurationError(
