@@ -15,7 +15,7 @@ COMPILE := $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --gen
 # modules again, which takes seconds.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help setup test-packages run test check e2e images cluster cluster-down format bench soak golden lock
+.PHONY: help setup test-packages run notebook test check e2e images cluster cluster-down format bench soak golden lock
 
 help: ## list the commands
 	@grep -E '^[a-z0-9-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z0-9-]+):.*## (.*)/\1\t\2/' | expand -t 15
@@ -40,6 +40,9 @@ test-packages: .venv/test-packages ## install what only tests need from the dist
 
 run: setup ## train move-to-target on this machine, from a TrainingJob to a policy; SIM=mujoco: in MuJoCo
 	@$(BIN)/palaestra run $(JOB)
+
+notebook: setup ## open JupyterLab with the notebooks of examples/notebooks
+	@tools/notebook.sh
 
 # Four workers run at the same time, also on two processors, because many tests mostly wait for processes, leases and deadlines.
 test: setup test-packages ## run all tests, and check that generated files are current

@@ -10,6 +10,15 @@ from typing import Any
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
+NOTEBOOKS = (
+    "1-drive.ipynb",
+    "2-environment.ipynb",
+    "3-train-and-watch.ipynb",
+    "4-evaluate.ipynb",
+    "5-cluster.ipynb",
+    "6-train.ipynb",
+    "6-train.yaml",
+)
 REGISTRY = "docker.io/library"  # the prefix that a cluster adds to a name without a host
 
 
@@ -70,7 +79,7 @@ def recipes(torch: str) -> Mapping[str, Recipe]:
             files=(
                 "images/notebook/notebook.sh",
                 "images/notebook/overrides.json",
-                "examples/first-steps.ipynb",
+                *(f"examples/notebooks/{name}" for name in NOTEBOOKS),
             ),
             without=(
                 *stood_in_for,

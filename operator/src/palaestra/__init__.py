@@ -7,17 +7,19 @@ settle_imports()
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-__all__ = ["Client", "changed", "run"]
+__all__ = ["Client", "changed", "run", "show"]
 
 if TYPE_CHECKING:
     from palaestra.client import Client
     from palaestra.job_input import changed
+    from palaestra.live_view.view_process import show
     from palaestra.local.run_handle import run
 else:
     _HOMES = {
         "Client": "palaestra.client",
         "changed": "palaestra.job_input",
         "run": "palaestra.local.run_handle",
+        "show": "palaestra.live_view.view_process",
     }
 
     def __getattr__(name: str) -> Any:

@@ -50,7 +50,7 @@
     │   ├── NoRun                    the folder has no run with simulators (live_view.local_run)
     │   ├── NotNow                   the simulator does not respond now
     │   ├── NotShown                 the simulator describes no world
-    │   └── ViserMissing             the optional package of the page is not installed (cli.view_process)
+    │   └── ViserMissing             the optional package of the page is missing (live_view.view_process)
     ├── ZooError                     a file of RL-Baselines3-Zoo cannot be converted (zoo.hyperparameter_file)
     └── TrialFailed                  the trial's job did not succeed in time (smoke_test)
 

@@ -1,6 +1,5 @@
 """The example scripts and the blocks of pages work as a user runs them."""
 
-import json
 import os
 import subprocess
 import sys
@@ -61,20 +60,3 @@ def test_the_listings_of_the_paper_run_in_their_order():
 
     assert result.stdout.count("simulator fault") >= 2
     assert "done: 200 steps, mean return" in result.stdout
-
-
-def test_the_cells_of_the_first_notebook_can_be_carried_out_from_top_to_bottom(tmp_path):
-    """A user executes the cells in their order, as `make e2e` does in the notebook's pod.
-
-    A new notebook must contain no results.
-    """
-    cells = json.loads((EXAMPLES / "first-steps.ipynb").read_text())["cells"]
-    code = [cell for cell in cells if cell["cell_type"] == "code"]
-
-    result = carried_out("-c", "\n".join("".join(cell["source"]) for cell in code), folder=tmp_path)
-
-    assert "reached after" in result.stdout
-    assert "trained 600 steps, policy: " in result.stdout
-    assert (tmp_path / "runs/first/0/model.zip").exists()
-    assert result.stderr == ""
-    assert not any(cell["outputs"] for cell in code)

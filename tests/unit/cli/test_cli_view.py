@@ -3,7 +3,8 @@
 import pytest
 import yaml
 
-from palaestra.cli import main, view_process
+from palaestra.cli import main
+from palaestra.live_view import view_process
 from palaestra_protocol.http import Address, Server
 
 

@@ -10,8 +10,8 @@ from typing import Any
 from palaestra.api import TrainingJob
 from palaestra.cli.files import add_dir
 from palaestra.cli.subcommands import Commands, command
-from palaestra.cli.view_process import viewed
 from palaestra.job_input import data_of, job_of
+from palaestra.live_view.view_process import viewed
 from palaestra.local.outcome import RunOutcome
 from palaestra.local.output import say
 from palaestra.local.run import RunOptions, run

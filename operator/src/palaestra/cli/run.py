@@ -8,8 +8,8 @@ from pathlib import Path
 from palaestra.api import TrainingJob
 from palaestra.cli.files import add_dir, job
 from palaestra.cli.subcommands import Commands, command
-from palaestra.cli.view_process import viewed
 from palaestra.job_input import changed
+from palaestra.live_view.view_process import viewed
 from palaestra.local.run import RunOptions, run
 from palaestra_protocol.numbers import MOST_PORT, whole
 

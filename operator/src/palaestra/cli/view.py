@@ -14,11 +14,11 @@ from typing import Any
 
 from palaestra.cli.cluster import REFUSED, add_cluster, connected, say
 from palaestra.cli.subcommands import WRONG_INPUT, Commands, command
-from palaestra.cli.view_process import OPENED, WITH_STDIN, require_viser
 from palaestra.client import Client
 from palaestra.live_view.cluster_job import ClusterJob
 from palaestra.live_view.local_run import LocalRun, NoRun
 from palaestra.live_view.source import NotNow, NotShown, SidecarSource
+from palaestra.live_view.view_process import OPENED, WITH_STDIN, require_viser
 from palaestra_protocol.numbers import MOST_PORT, whole
 
 PORT = 8080
