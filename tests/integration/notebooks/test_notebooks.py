@@ -23,7 +23,7 @@ CELL_S, ENDS_S = 280, 60
 ORDER = {
     "1-drive.ipynb": ("of simulated time, cylinders at (1.2, 0.6)", "the wheel has turned by"),
     "2-environment.ipynb": ("Stable-Baselines3 has no complaint", "no problem found"),
-    "3-train-and-watch.ipynb": ("<iframe src=", "trained 4096 steps, success rate"),
+    "3-train-and-watch.ipynb": ("<iframe src=", "trained 4096 steps", "success rate "),
     "4-evaluate.ipynb": ("arrived after", '"success_interval"', "image/gif", "action in the middle of the"),
 }
 AT_WORK = """
