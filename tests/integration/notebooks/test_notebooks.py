@@ -114,7 +114,7 @@ def test_a_notebook_is_the_training_of_a_job(folder):
 
 
 def reply_to(client, request):
-    """Return the content of the reply to a request; a kernel that started slowly has replied to others too."""
+    """Return the content of the reply to a request; a slow kernel has replied to earlier requests too."""
     while (message := client.get_shell_msg(timeout=ENDS_S))["parent_header"]["msg_id"] != request:
         pass
     return message["content"]
