@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from tests.pages import blocks
 
 ROOT = Path(__file__).parents[3]
@@ -34,11 +36,13 @@ def test_the_facade_example_drives_and_reads():
     assert result.stderr == ""
 
 
-def test_the_blocks_of_the_page_about_facades_are_one_script():
+@pytest.mark.parametrize("driver", ["stub", "mujoco"])
+def test_the_blocks_of_the_page_about_facades_are_one_script(driver):
     """A reader pastes the page's blocks, in order, into one script, which also starts the ROS master."""
     page = (ROOT / "docs/howto/facades.md").read_text()
+    script = "\n".join(blocks(page, "python with-a-simulator"))
 
-    result = carried_out("-c", "\n".join(blocks(page, "python with-a-simulator")))
+    result = carried_out("-c", script.replace('"arena")', f'"arena", driver="{driver}")'))
 
     assert "# robotino is paused; step inside `with webots:`" in page
     assert "\nrobotino is paused; step inside `with webots:`\n" in result.stdout

@@ -175,11 +175,11 @@ def test_the_container_has_what_the_settings_say(make, engine, world):
 
 def test_the_block_of_the_page_runs(engine, capsys, monkeypatch):
     """A reader copies it, with an image of her own."""
-    page = (Path(__file__).parents[3] / "docs/howto/facades.md").read_text()
+    page = (Path(__file__).parents[3] / "docs/howto/where-simulators-run.md").read_text()
     monkeypatch.setattr(engine, "images", {STUB.replace("stub", "mujoco"), "lab/simulators:2"})
     (block,) = blocks(page, "python with-docker")
 
-    exec(compile(block, "facades.md", "exec"), {})
+    exec(compile(block, "where-simulators-run.md", "exec"), {})
 
     assert capsys.readouterr().out == "0.0\n"
     assert engine.running() == []
