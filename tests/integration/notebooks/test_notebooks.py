@@ -13,6 +13,8 @@ import yaml
 from jupyter_client.manager import start_new_kernel
 from nbclient import NotebookClient
 
+import palaestra
+from palaestra.live_view.source import ViewError
 from tests.local_run import running
 from tests.waiting import eventually
 
@@ -99,6 +101,12 @@ def test_an_interrupted_cell_and_a_killed_kernel_leave_no_process(tmp_path, end,
         kernel.shutdown_kernel(now=True)
 
     assert eventually(lambda: marked(mark) == [], ENDS_S)
+
+
+def test_a_run_without_simulators_cannot_be_shown(tmp_path):
+    """The page waits for a run that is starting, but not forever."""
+    with pytest.raises(ViewError, match="the page did not start within 0.5 s"):
+        palaestra.show(tmp_path, deadline_s=0.5)
 
 
 def test_a_notebook_is_the_training_of_a_job(folder):

@@ -31,9 +31,9 @@ with webots:
     robot.connect()
     robot.advance()
     print(webots.robot_name, webots.observer.time(), flush=True)
-sys.stdin.readline()
-robot.close()
-webots.close()
+if sys.stdin.readline() == "close\\n":
+    robot.close()
+    webots.close()
 """
 numbers = itertools.count(1)
 
@@ -126,7 +126,7 @@ def test_a_simulator_starts_in_a_pod_and_closing_leaves_nothing(place, tmp_path)
     assert running.stdout.readline() == "rover 0.192\n"
     ((job,), (policy,)) = place.all(JOBS), place.all(NETWORK_POLICIES)
 
-    assert running.communicate("\n", timeout=PATIENCE_S) == ("", "")
+    assert running.communicate("close\n", timeout=PATIENCE_S) == ("", "")
 
     spec = job["spec"]["template"]["spec"]
     assert job["metadata"]["ownerReferences"][0]["name"] == NOTEBOOK
@@ -143,6 +143,24 @@ def test_a_simulator_starts_in_a_pod_and_closing_leaves_nothing(place, tmp_path)
     for kind in (JOBS, NETWORK_POLICIES, CONFIG_MAPS):
         assert eventually(lambda kind=kind: place.all(kind) == [], PATIENCE_S)
     assert eventually(lambda: place.kubelet.processes() == [], PATIENCE_S)
+
+
+def test_a_notebook_that_ends_without_closing_takes_its_simulator_with_it(place):
+    """A user rarely closes a facade, and the pod should not wait for the silence."""
+    running = place.notebook()
+    assert running.stdout.readline() == "robotino 0.192\n"
+
+    running.communicate("end\n", timeout=PATIENCE_S)
+
+    assert eventually(lambda: place.all(JOBS) == [], PATIENCE_S)
+
+
+def test_a_notebook_without_a_label_is_refused(place):
+    """A selector without labels would admit every pod of the namespace."""
+    place.api.merge(PODS, place.namespace, NOTEBOOK, {"metadata": {"labels": None}})
+
+    assert f"pod {NOTEBOOK} has no label, so a NetworkPolicy cannot admit this pod alone" in place.refusal()
+    assert place.all(JOBS) == []
 
 
 def test_a_killed_notebook_leaves_no_simulator(place):

@@ -70,7 +70,7 @@ def make(world, name):
     """Yield a function that creates facades of that world."""
     made = []
 
-    def begin(launcher, **options):
+    def begin(launcher, world=world, **options):
         made.append(Webots(name, world, launcher=launcher, start_deadline_s=PATIENCE_S, **options))
         return made[-1]
 
@@ -183,6 +183,15 @@ def test_the_block_of_the_page_runs(engine, capsys, monkeypatch):
 
     assert capsys.readouterr().out == "0.0\n"
     assert engine.running() == []
+
+
+def test_a_path_may_be_relative(make, place, world, monkeypatch):
+    """A container has another working folder; a folder with the name of a shipped world changes nothing."""
+    monkeypatch.chdir(world.parent)
+    (world.parent / "court").mkdir()
+
+    Webots("burger", "court", launcher="docker").close()
+    assert make(place, world=Path(world.name)).robot_name.startswith("rover_")
 
 
 def test_a_project_of_webots_is_mounted_whole(engine, tmp_path, name):

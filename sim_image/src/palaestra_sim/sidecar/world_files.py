@@ -21,9 +21,13 @@ _PROJECT = "project"
 
 
 def located(world: str) -> Path:
-    """Return the path of a world: the file `world`; if it is missing, the shipped world of that name."""
+    """Return the path of a world: the file `world`; if it is missing, the shipped world of that name.
+
+    A folder with the name of a shipped world is ignored.
+    """
     path = Path(world)
-    shipped = builtin_path(world) if path.name == world and not path.exists() else None
+    missing = path.is_dir() or not path.exists()
+    shipped = builtin_path(world) if path.name == world and missing else None
     return shipped or path
 
 

@@ -3,6 +3,7 @@
 import pytest
 
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.webots import Kubernetes
 from palaestra_trainer.webots.launching.addresses import in_url, is_loopback
 from palaestra_trainer.webots.launching.release_images import release_image
 
@@ -28,6 +29,12 @@ def test_a_simulator_without_an_image_names_the_remedy():
     """Webots has a licence and a size of its own, so a release has no image of it."""
     with pytest.raises(ConfigurationError, match=r"driver webots; give Kubernetes\(image=\.\.\.\) an image"):
         release_image("webots", "kubernetes")
+
+
+def test_a_silence_that_a_busy_notebook_exceeds_is_refused():
+    """A cell that computes for some seconds must not lose its simulator."""
+    with pytest.raises(ConfigurationError, match="silence_s: 5 is refused; give 10 or more"):
+        Kubernetes(silence_s=5)
 
 
 def test_addresses_are_written_as_urls_need_them():

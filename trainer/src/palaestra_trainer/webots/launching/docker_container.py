@@ -52,7 +52,7 @@ def start_container(settings: Docker, request: SimulatorRequest) -> DockerLaunch
             network = network_of(engine, settings.network)
             container = engine.containers.create(
                 image,
-                [*network.listeners, *sidecar_options(request)],
+                [*network.listeners, *sidecar_options(settings.in_container(request))],
                 **_options(settings, network, settings.folder_of(request.world)),
             )
             undo.callback(ended, container)

@@ -7,7 +7,7 @@ closes this input, the sidecar in the container ends, and the engine removes the
 from __future__ import annotations
 
 import importlib.util
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -74,7 +74,12 @@ class Docker(Place):
         if self.folder is not None:
             return Path(self.folder).absolute()
         path = Path(world)
-        if not path.exists():
+        if not path.is_file():
             return None
         around = path.absolute().parent
         return around.parent if around.name == "worlds" else around
+
+    def in_container(self, request: SimulatorRequest) -> SimulatorRequest:
+        """Return the request with the path that the world has in the container."""
+        path = Path(request.world)
+        return replace(request, world=path.absolute()) if path.is_file() else request

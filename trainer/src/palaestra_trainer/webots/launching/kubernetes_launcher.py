@@ -17,6 +17,8 @@ from palaestra_trainer.webots.launching.launcher import Place
 from palaestra_trainer.webots.launching.owned_sidecar import OwnedSidecar
 from palaestra_trainer.webots.launching.simulator_request import SimulatorRequest
 
+_LEAST_SILENCE_S = 10
+
 Quantities = Mapping[str, Mapping[str, str]]
 
 _RESOURCES: Quantities = MappingProxyType(
@@ -47,6 +49,18 @@ class Kubernetes(Place):
     start_s: float = 300.0
     silence_s: int = 120
     lifetime_s: int = 24 * 3600
+
+    def __post_init__(self) -> None:
+        """Check the settings.
+
+        Raises:
+            ConfigurationError: `silence_s` is so short that a busy program would lose its pod.
+        """
+        if self.silence_s < _LEAST_SILENCE_S:
+            raise ConfigurationError(
+                f"launcher kubernetes: silence_s: {self.silence_s} is refused; give {_LEAST_SILENCE_S} "
+                "or more"
+            )
 
     def launch(self, request: SimulatorRequest) -> OwnedSidecar:
         """Start a sidecar in a new pod; see `Place`.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import os
 import secrets
 import threading
@@ -77,6 +78,7 @@ class KubernetesLauncher(OwnedSidecar):
         _pods.add(address, str(urlsplit(os.environ["ROS_MASTER_URI"]).hostname), self._remove)
         every_s = plan.silence_s / _SIGNS_OF_LIFE
         threading.Thread(target=_keep_alive, args=(url, self._closed, every_s), daemon=True).start()
+        atexit.register(self._delete)
 
     def _end(self) -> None:
         if not self._open:
@@ -89,7 +91,13 @@ class KubernetesLauncher(OwnedSidecar):
         for remove in removals:
             remove()
 
+    def _delete(self) -> None:
+        """Delete the pod at the exit of this program, without waiting."""
+        with suppress(ConfigurationError):  # the pod also ends by itself
+            self._cluster.delete(api.JOBS, self._pod)
+
     def _remove(self) -> None:
+        atexit.unregister(self._delete)
         self._closed.set()
         _remove(self._cluster, self._pod)
         self._cluster.close()
@@ -106,7 +114,7 @@ def _notebook(cluster: api.NamespaceClient) -> objects.Notebook:
     """Return the pod in which this program runs.
 
     Raises:
-        ConfigurationError: this program does not run in a pod of the cluster.
+        ConfigurationError: this program does not run in a pod of the cluster, or the pod has no label.
     """
     name = os.environ.get(_OWN_POD) or os.environ.get("HOSTNAME", "")
     pod = cluster.get(api.PODS, name) if name else None
@@ -116,7 +124,13 @@ def _notebook(cluster: api.NamespaceClient) -> objects.Notebook:
             f"does not run in the cluster; run it there, set {_OWN_POD} to the name of its pod, or use "
             'launcher="process"'
         )
-    return objects.Notebook.from_pod(pod)
+    notebook = objects.Notebook.from_pod(pod)
+    if not notebook.labels:
+        raise ConfigurationError(
+            f"launcher kubernetes: pod {name} has no label, so a NetworkPolicy cannot admit this pod alone; "
+            "give it a label"
+        )
+    return notebook
 
 
 def _planned(settings: Kubernetes, request: SimulatorRequest, notebook: objects.Notebook) -> objects.PodPlan:
@@ -133,7 +147,7 @@ def _planned(settings: Kubernetes, request: SimulatorRequest, notebook: objects.
         world=world,
         notebook=notebook,
         resources=settings.resources,
-        silence_s=max(settings.silence_s, 10),
+        silence_s=settings.silence_s,
         lifetime_s=settings.lifetime_s,
     )
 
@@ -164,7 +178,7 @@ def _world_file(world: str | Path) -> tuple[str, bytes] | None:
         ConfigurationError: the file cannot be read, or is too large for a ConfigMap.
     """
     path = Path(world)
-    if not path.exists():
+    if not path.is_file():
         return None
     try:
         content = path.read_bytes()
