@@ -105,7 +105,7 @@ def test_an_interrupted_cell_and_a_killed_kernel_leave_no_process(tmp_path, end,
 
 def test_a_run_without_simulators_cannot_be_shown(tmp_path):
     """The page waits for a run that is starting, but not forever."""
-    with pytest.raises(ViewError, match="the page did not start within 0.5 s"):
+    with pytest.raises(ViewError, match=r"the page did not start within 0\.5 s"):
         palaestra.show(tmp_path, deadline_s=0.5)
 
 

@@ -102,6 +102,7 @@ def show(run: Path | str, *, height: int = 480, deadline_s: float = 120.0) -> Ru
     require_viser()
     viewer = _viewer(Path(run), "--port=0", pipe=subprocess.PIPE)
     with ExitStack() as undo:
+        undo.callback(_drop, viewer.stdout)
         undo.callback(_end, viewer)
         line = _first_line(viewer, deadline_s)
         url, _, shown = line.partition(" shows ")
