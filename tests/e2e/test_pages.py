@@ -150,7 +150,7 @@ def test_every_command_of_the_installation_works_and_touches_no_job_that_runs(te
         if heading == "TensorBoard and notebooks":
             assert_all_is_served(cluster)
         if heading == "Simulators of notebooks in pods":
-            assert_a_notebook_starts_simulators_in_pods(cluster, (LAB, TENSORBOARD))
+            assert_a_notebook_starts_simulators_in_pods(cluster)
 
     assert seen == PROMISED
 

@@ -20,6 +20,8 @@ from tests.e2e.tour import tour
 pytestmark = [pytest.mark.looks_back, pytest.mark.timeout(1200)]
 
 TRIAL = "palaestra-trial"
+NOTEBOOKS = "palaestra-jupyter"  # of a release that lets notebooks start simulators (test_pages.py)
+WITH_NOTEBOOKS = {"jupyter": {"enabled": True, "simulators": True, "tokenSecret": {"name": "notebooks"}}}
 UNSEEN = {
     # An admission plugin checks this permission without an audit entry. The plugin
     # OwnerReferencesPermissionEnforcement, which OpenShift enables, applies to requests that set
@@ -52,7 +54,7 @@ def rights(used, namespace, account):
 @cache
 def roles(namespace):
     """Return the objects of the chart: for the whole cluster, or for one namespace."""
-    values = {} if namespace == SYSTEM else {"watchNamespaces": [namespace]}
+    values = WITH_NOTEBOOKS if namespace == SYSTEM else {"watchNamespaces": [namespace]}
     text = rendered(values, f"--namespace={namespace}")
     return [each for each in yaml.safe_load_all(text) if each]
 
@@ -73,7 +75,8 @@ def test_both_modes_and_both_accounts_were_looked_at(used, request):
         pytest.skip("not all tests of this folder are run")
 
     assert {(namespace == SYSTEM, account) for namespace, account in accounts(used)} == {
-        (everywhere, account) for everywhere in (True, False) for account in (OPERATOR, TRIAL)
+        *((everywhere, account) for everywhere in (True, False) for account in (OPERATOR, TRIAL)),
+        (True, NOTEBOOKS),
     }
 
 
@@ -86,7 +89,7 @@ def whole(session):
 
 def test_nobody_else_asks_the_api_server(used):
     """The pods of trainers, simulators and users' programs have no token, so they can send no request."""
-    assert {account for _, account in accounts(used)} <= {OPERATOR, TRIAL}
+    assert {account for _, account in accounts(used)} <= {OPERATOR, TRIAL, NOTEBOOKS}
 
 
 def test_nothing_was_asked_for_in_vain_but_what_others_may_open(used):
