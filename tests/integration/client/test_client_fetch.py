@@ -84,7 +84,7 @@ class Scene:
 
     def fetch(self, deadline_s=30.0):
         """Fetch the run of the job."""
-        return self.client.fetch("job", into=self.into, deadline_s=deadline_s)
+        return self.client.fetch("job", into=str(self.into), deadline_s=deadline_s)  # as users type it
 
     def left(self):
         """Return the files in the target folder."""

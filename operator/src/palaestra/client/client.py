@@ -291,7 +291,7 @@ class Client:
         name: str,
         *,
         replica: int = 0,
-        into: Path,
+        into: str | Path,
         deadline_s: float = FETCH_S,
         most_bytes: int | None = None,
     ) -> Path:
@@ -307,7 +307,7 @@ class Client:
             TookTooLong: `deadline_s` passed; no file was written.
         """
         deadline = time.monotonic() + deadline_s
-        return fetch(self.api, self.get(name), replica, into, deadline=deadline, most_bytes=most_bytes)
+        return fetch(self.api, self.get(name), replica, Path(into), deadline=deadline, most_bytes=most_bytes)
 
     def _suspended(self, name: str, *, suspend: bool) -> TrainingJob:
         with asked(name, self.namespace):
