@@ -5,7 +5,7 @@ import pytest
 from PIL import Image
 
 from palaestra_trainer.errors import ConfigurationError, WorldMisfit, WrongData
-from palaestra_trainer.webots import LED, Brake, Connector, Display, Emitter, Pen, Speaker
+from palaestra_trainer.webots import LED, Brake, Connector, Display, Emitter, Pen, Speaker, VacuumGripper
 from tests.integration.webots.own_world import OwnRobot, running
 from tests.values.worlds import PHYSICS, Setting, robot
 
@@ -13,6 +13,7 @@ WIDTH_PX, HEIGHT_PX = 12, 8
 RED, GREEN, BLUE, BLACK = (255, 0, 0), (0, 255, 0), (0, 0, 255), (0, 0, 0)
 DEVICES = """Display { name "display" width 12 height 8 }
   LED { name "led" } Pen { name "pen" } Connector { name "connector" } Speaker { name "speaker" }
+  VacuumGripper { name "vacuumgripper" }
   Emitter { name "emitter" channel 3 range 2 maxRange 5 bufferSize 100 }
   HingeJoint { jointParameters HingeJointParameters { axis 0 1 0 } device Brake { name "brake" }
     endPoint Solid { } }"""
@@ -25,7 +26,7 @@ class Commanded(OwnRobot):
 
     def equip(self):
         """Add the devices."""
-        kinds = (LED, Brake, Connector, Display, Emitter, Pen, Speaker)
+        kinds = (LED, Brake, Connector, Display, Emitter, Pen, Speaker, VacuumGripper)
         self.devices = {kind: kind(self.node_name, kind.__name__.lower()) for kind in kinds}
         self.simulation.add([], list(self.devices.values()))
 
@@ -53,6 +54,17 @@ def test_a_connector_is_locked_and_unlocked(devices):
     for command in (connector.lock, connector.unlock):
         command()
         states.append(connector.locked)
+
+    assert states == [True, False]
+
+
+def test_a_vacuum_gripper_is_switched_on_and_off(devices):
+    """It has no boundingObject, so it could hold nothing in Webots either."""
+    gripper = devices[VacuumGripper]
+    states = []
+    for command in (gripper.turn_on, gripper.turn_off):
+        command()
+        states.append(gripper.on)
 
     assert states == [True, False]
 

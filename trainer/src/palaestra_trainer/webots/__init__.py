@@ -27,7 +27,13 @@ from palaestra_trainer.webots.devices import (
 from palaestra_trainer.webots.display import Display
 from palaestra_trainer.webots.facade import Webots
 from palaestra_trainer.webots.inputs import Joystick, JoystickState, Keyboard
-from palaestra_trainer.webots.joint_motor import Command, JointMotor, set_commands
+from palaestra_trainer.webots.joint_motor import (
+    Command,
+    EffortFeedback,
+    JointMotor,
+    MotorLimits,
+    set_commands,
+)
 from palaestra_trainer.webots.launching.docker_launcher import Docker
 from palaestra_trainer.webots.launching.kubernetes_launcher import Kubernetes
 from palaestra_trainer.webots.launching.launcher import Launcher, Place
@@ -47,7 +53,16 @@ from palaestra_trainer.webots.motion_sensors import (
 from palaestra_trainer.webots.mujoco import MujocoActuator, MujocoSensor
 from palaestra_trainer.webots.observer import Mode, NodeName, Observer
 from palaestra_trainer.webots.obstacles import FLOOR, Thing
-from palaestra_trainer.webots.outputs import LED, Brake, Connector, Emitter, OutputDevice, Pen, Speaker
+from palaestra_trainer.webots.outputs import (
+    LED,
+    Brake,
+    Connector,
+    Emitter,
+    OutputDevice,
+    Pen,
+    Speaker,
+    VacuumGripper,
+)
 from palaestra_trainer.webots.simulation import Actuator, Stepper
 from palaestra_trainer.webots.supervisor import Supervisor
 from palaestra_trainer.webots.view_settings import MovieSettings, ViewLabel
@@ -68,6 +83,7 @@ __all__ = [
     "Display",
     "DistanceSensor",
     "Docker",
+    "EffortFeedback",
     "Emitter",
     "Force3DSensor",
     "ForceSensor",
@@ -84,6 +100,7 @@ __all__ = [
     "LightSensor",
     "Mode",
     "Motor",
+    "MotorLimits",
     "MovieSettings",
     "MujocoActuator",
     "MujocoSensor",
@@ -108,6 +125,7 @@ __all__ = [
     "Thing",
     "ThisMachine",
     "TouchSensor",
+    "VacuumGripper",
     "ViewLabel",
     "Webots",
     "ensure_node",

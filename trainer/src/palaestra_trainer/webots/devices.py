@@ -31,6 +31,7 @@ class Sensor:
         type_name: the type of the sensor's topic.
         decode: a function that returns the value in the bytes of a message.
         topic: the name of the sensor's topic, below the name of the device.
+        enabled_by: the name of the service that enables the sensor, below the name of the device.
 
     Attributes:
         robot: see above.
@@ -51,11 +52,12 @@ class Sensor:
         type_name: str,
         decode: Callable[[bytes | memoryview], Any] | None = None,
         topic: str = "value",
+        enabled_by: str = "enable",
     ) -> None:
         self.robot = robot
         self.device = device
         path = f"/{robot}/{topic_name(device)}"
-        self._enable = RosService(f"{path}/enable", "webots_ros/set_int", self.enable_deadline_s)
+        self._enable = RosService(f"{path}/{enabled_by}", "webots_ros/set_int", self.enable_deadline_s)
         self._values = RosSubscriber(f"{path}/{topic}", type_name, decode)
         self._value: Any = None
         self.late = False

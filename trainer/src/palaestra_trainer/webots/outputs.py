@@ -127,6 +127,29 @@ class Connector(OutputDevice):
         return bool(self._ask("is_locked", "get_bool"))
 
 
+class VacuumGripper(OutputDevice):
+    """A gripper that holds what it touches while it is on.
+
+    The stub and MuJoCo hold nothing, so they refuse to switch a gripper with a boundingObject on. Every
+    method may raise SimulatorDead, SimulatorHung or WrongData.
+    """
+
+    __slots__ = ()
+
+    def turn_on(self) -> None:
+        """Hold the object that touches the gripper."""
+        self._command("turn_on", "set_bool", value=True)
+
+    def turn_off(self) -> None:
+        """Release the object."""
+        self._command("turn_on", "set_bool", value=False)
+
+    @property
+    def on(self) -> bool:
+        """Whether the gripper is switched on."""
+        return bool(self._ask("is_on", "get_bool"))
+
+
 class Emitter(OutputDevice):
     """An emitter of texts to receivers on the same channel.
 
