@@ -202,7 +202,7 @@ class Call(http.server.BaseHTTPRequestHandler):
         self.wfile.write(text)
 
     def address_string(self):
-        """Return the client's address; a client of a Unix socket has none."""
+        """Return "unix", because a client of a Unix socket has no address."""
         return "unix"
 
     def log_message(self, *_):

@@ -119,7 +119,7 @@ def notebook_pod(namespace):
 
 
 def test_a_simulator_starts_in_a_pod_and_closing_leaves_nothing(place, tmp_path):
-    """The notebook drives a robot of its own world file, and nobody else may connect to the pod."""
+    """The notebook drives the robot of its own world file, and the NetworkPolicy admits only its pods."""
     world = tmp_path / "rover.wbt"
     world.write_bytes(builtin("arena").replace(b"--name=robotino", b"--name=rover"))
     running = place.notebook("rover", world)
@@ -217,5 +217,5 @@ def test_a_program_outside_of_the_cluster_is_refused(place):
 
     last = place.refusal()
 
-    assert f"there is no pod {NOTEBOOK} in namespace {place.namespace}, so this program does not" in last
+    assert f"namespace {place.namespace} has no pod {NOTEBOOK}, so this program does not run in the" in last
     assert place.all(JOBS) == []

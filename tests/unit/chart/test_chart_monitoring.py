@@ -127,7 +127,7 @@ def test_what_prometheus_takes_from_a_training_pod_is_bounded(one):
 
 
 def test_notebooks_may_start_simulators_only_if_the_release_says_so():
-    """The token is worth as much as the right to create pods, so the default has none."""
+    """A program with the token can create pods, so by default the server gets no token."""
     mode = {"jupyter": {"enabled": True, "tokenSecret": {"name": "notebooks"}}}
     without, with_token = (objects(merged(mode, {"jupyter": {"simulators": on}})) for on in (False, True))
 

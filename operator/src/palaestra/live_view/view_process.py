@@ -137,7 +137,7 @@ def _end(viewer: "subprocess.Popen[bytes]") -> None:
 
 
 def _first_line(viewer: "subprocess.Popen[bytes]", deadline_s: float) -> str:
-    """Return the first line of the view's output; empty if there is none in time."""
+    """Return the first line of the view's output; return "" if no line arrives within `deadline_s`."""
     if viewer.stdout is None:
         raise ValueError("the view was started without a pipe for its output")
     with selectors.DefaultSelector() as selector:

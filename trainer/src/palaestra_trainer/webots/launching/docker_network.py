@@ -39,7 +39,7 @@ class ContainerNetwork:
 
 
 def network_of(engine: Any, name: str) -> ContainerNetwork:
-    """Return how a container uses the network with this name; start a ROS master if none runs.
+    """Return the settings of a container in the network with this name. If no ROS master runs, start one.
 
     Raises:
         ConfigurationError: this machine and a container cannot reach each other in this network.

@@ -38,7 +38,7 @@ class NamespaceClient:
         namespace: the namespace of all objects.
 
     Raises:
-        ConfigurationError: there is no configuration of a cluster.
+        ConfigurationError: this program has neither a service account nor a kubeconfig.
     """
 
     def __init__(self, namespace: str | None = None) -> None:

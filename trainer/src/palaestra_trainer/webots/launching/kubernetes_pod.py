@@ -120,7 +120,7 @@ def _notebook(cluster: api.NamespaceClient) -> objects.Notebook:
     pod = cluster.get(api.PODS, name) if name else None
     if pod is None:
         raise ConfigurationError(
-            f"launcher kubernetes: there is no pod {name} in namespace {cluster.namespace}, so this program "
+            f"launcher kubernetes: namespace {cluster.namespace} has no pod {name}, so this program "
             f"does not run in the cluster; run it there, set {_OWN_POD} to the name of its pod, or use "
             'launcher="process"'
         )

@@ -28,7 +28,7 @@ def address_of(pod: Object | None) -> str | None:
 
 
 def failure_of(pod: Object | None, events: Iterable[Object]) -> str | None:
-    """Return why the pod will not run; None while it may still start.
+    """Return the reason why the pod cannot run; return None while the pod may still start.
 
     Args:
         pod: the pod; None if it does not exist yet.

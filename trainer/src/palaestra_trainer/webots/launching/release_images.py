@@ -24,7 +24,7 @@ def release_image(driver: str, launcher: str, beside: str = "") -> str:
     """
     if driver not in _SHIPPED:
         raise ConfigurationError(
-            f"launcher {launcher}: there is no image for driver {driver}; give "
+            f"launcher {launcher}: this release has no image for driver {driver}; give "
             f"{launcher.capitalize()}(image=...) an image with this simulator and palaestra-sidecar"
         )
     name = f"palaestra-{driver}"
