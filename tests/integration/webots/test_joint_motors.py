@@ -45,7 +45,7 @@ def test_a_motor_has_the_limits_of_the_world_and_takes_others(lever):
     lever.arm.set_available_effort(40.0)
 
     assert lever.arm.target() == 0.5
-    with pytest.raises(WrongData, match="arm.* available_torque"):
+    with pytest.raises(WrongData, match=r"arm.* available_torque"):
         lever.arm.set_available_effort(41.0)
 
 
