@@ -1,13 +1,17 @@
 """A stub simulator that a test starts as a notebook does."""
 
+import uuid
 from contextlib import ExitStack
 
 import pytest
 
+from palaestra_sim.world import builtin
 from palaestra_trainer.robots.robotino import Robotino
 from palaestra_trainer.robots.simulated import SimulatedScene
 from palaestra_trainer.webots import Mode, Webots
 from palaestra_trainer.webots.launching.local_simulator import ProcessLauncher
+
+DEADLINE_S = 60.0
 
 
 class Simulator:
@@ -99,3 +103,32 @@ def arena(standing):
 def own_arena(start):
     """Yield an included arena that runs only for this test; the test may stop it."""
     return start()
+
+
+@pytest.fixture
+def name():
+    """Return a ROS name that only this test uses, because all tests share a master."""
+    return f"rover_{uuid.uuid4().hex[:8]}"
+
+
+@pytest.fixture
+def world(master, tmp_path, name):
+    """Return the path of an arena whose robot has this ROS name."""
+    del master
+    path = tmp_path / "arena.wbt"
+    path.write_bytes(builtin("arena").replace(b"--name=robotino", f"--name={name}".encode()))
+    return path
+
+
+@pytest.fixture
+def make(world, name):
+    """Yield a function that creates facades of that world."""
+    made = []
+
+    def begin(world=world, **options):
+        made.append(Webots(name, world, start_deadline_s=DEADLINE_S, **options))
+        return made[-1]
+
+    yield begin
+    for webots in made:
+        webots.close()

@@ -4,16 +4,16 @@ The API server is real. A kubelet of the tests runs the pods (tests/pod_runner.p
 process of this machine, for which a pod object stands.
 """
 
-import itertools
 import os
 import subprocess
 import sys
 
 import pytest
 
-from palaestra.cluster import Resource, connect
-from palaestra.cluster.resources import CONFIG_MAPS, JOBS, NAMESPACES, NETWORK_POLICIES, PODS
+from palaestra.cluster import Resource
+from palaestra.cluster.resources import CONFIG_MAPS, JOBS, NETWORK_POLICIES, PODS
 from palaestra_sim.world import builtin
+from tests.integration.operator.cluster import Place
 from tests.pod_runner import PodRunner
 from tests.waiting import eventually
 
@@ -35,10 +35,18 @@ if sys.stdin.readline() == "close\\n":
     robot.close()
     webots.close()
 """
-numbers = itertools.count(1)
+NOTEBOOK_POD = {
+    "apiVersion": "v1",
+    "kind": "Pod",
+    "metadata": {"name": NOTEBOOK, "labels": {"app": "jupyter"}},
+    "spec": {
+        "containers": [{"name": "jupyter", "image": IMAGE}],
+        "imagePullSecrets": [{"name": "pulls"}],
+    },
+}
 
 
-class Place:
+class Notebooks(Place):
     """A namespace with the pod of a notebook and a kubelet; `notebook` runs a program in place of that pod.
 
     Args:
@@ -48,18 +56,14 @@ class Place:
     """
 
     def __init__(self, plane, api, folder):
-        self.api = api
-        self.namespace = f"notebooks-{next(numbers)}-{os.getpid()}"
-        api.create(
-            NAMESPACES, {"apiVersion": "v1", "kind": "Namespace", "metadata": {"name": self.namespace}}
-        )
-        api.create(PODS, notebook_pod(self.namespace))
-        self.kubelet = PodRunner(api, self.namespace, folder)
+        super().__init__(api, "notebooks")
+        self.create(PODS, NOTEBOOK_POD)
+        self.kubelet = PodRunner(api, self.name, folder)
         self._started = []
         others = {name: value for name, value in os.environ.items() if not name.startswith("ROS_")}
         self._environment = others | {
             "KUBECONFIG": str(plane.kubeconfig),
-            "PALAESTRA_NAMESPACE": self.namespace,
+            "PALAESTRA_NAMESPACE": self.name,
             "PALAESTRA_POD": NOTEBOOK,
             "ROS_MASTER_URI": "http://127.0.0.1:1",
         }
@@ -77,9 +81,9 @@ class Place:
         _, told = self.notebook(**options).communicate("\n", timeout=PATIENCE_S)
         return told.strip().splitlines()[-1]
 
-    def all(self, kind):
+    def of_simulators(self, resource):
         """Return all objects of a kind that belong to simulators."""
-        return self.api.list(kind, self.namespace, labels="palaestra.dev/session")
+        return self.api.list(resource, self.name, labels="palaestra.dev/session")
 
     def close(self):
         """End all processes."""
@@ -89,33 +93,12 @@ class Place:
         self.kubelet.close()
 
 
-@pytest.fixture(scope="module")
-def administrator(control_plane):
-    """Yield an administrator's client of the control plane."""
-    api = connect(str(control_plane.kubeconfig))
-    yield api
-    api.close()
-
-
 @pytest.fixture
-def place(control_plane, administrator, tmp_path):
+def place(control_plane, installed, tmp_path):
     """Yield a namespace with the pod of a notebook and a kubelet."""
-    one = Place(control_plane, administrator, tmp_path)
+    one = Notebooks(control_plane, installed, tmp_path)
     yield one
     one.close()
-
-
-def notebook_pod(namespace):
-    """Return the pod of a notebook server."""
-    return {
-        "apiVersion": "v1",
-        "kind": "Pod",
-        "metadata": {"name": NOTEBOOK, "namespace": namespace, "labels": {"app": "jupyter"}},
-        "spec": {
-            "containers": [{"name": "jupyter", "image": IMAGE}],
-            "imagePullSecrets": [{"name": "pulls"}],
-        },
-    }
 
 
 def test_a_simulator_starts_in_a_pod_and_closing_leaves_nothing(place, tmp_path):
@@ -124,7 +107,7 @@ def test_a_simulator_starts_in_a_pod_and_closing_leaves_nothing(place, tmp_path)
     world.write_bytes(builtin("arena").replace(b"--name=robotino", b"--name=rover"))
     running = place.notebook("rover", world)
     assert running.stdout.readline() == "rover 0.192\n"
-    ((job,), (policy,)) = place.all(JOBS), place.all(NETWORK_POLICIES)
+    ((job,), (policy,)) = place.of_simulators(JOBS), place.of_simulators(NETWORK_POLICIES)
 
     assert running.communicate("close\n", timeout=PATIENCE_S) == ("", "")
 
@@ -141,7 +124,7 @@ def test_a_simulator_starts_in_a_pod_and_closing_leaves_nothing(place, tmp_path)
         {"palaestra.dev/session": session},
     ]
     for kind in (JOBS, NETWORK_POLICIES, CONFIG_MAPS):
-        assert eventually(lambda kind=kind: place.all(kind) == [], PATIENCE_S)
+        assert eventually(lambda kind=kind: place.of_simulators(kind) == [], PATIENCE_S)
     assert eventually(lambda: place.kubelet.processes() == [], PATIENCE_S)
 
 
@@ -152,15 +135,15 @@ def test_a_notebook_that_ends_without_closing_takes_its_simulator_with_it(place)
 
     running.communicate("end\n", timeout=PATIENCE_S)
 
-    assert eventually(lambda: place.all(JOBS) == [], PATIENCE_S)
+    assert eventually(lambda: place.of_simulators(JOBS) == [], PATIENCE_S)
 
 
 def test_a_notebook_without_a_label_is_refused(place):
     """A selector without labels would admit every pod of the namespace."""
-    place.api.merge(PODS, place.namespace, NOTEBOOK, {"metadata": {"labels": None}})
+    place.api.merge(PODS, place.name, NOTEBOOK, {"metadata": {"labels": None}})
 
     assert f"pod {NOTEBOOK} has no label, so a NetworkPolicy cannot admit this pod alone" in place.refusal()
-    assert place.all(JOBS) == []
+    assert place.of_simulators(JOBS) == []
 
 
 def test_a_killed_notebook_leaves_no_simulator(place):
@@ -170,8 +153,8 @@ def test_a_killed_notebook_leaves_no_simulator(place):
 
     running.kill()
 
-    assert eventually(lambda: place.all(JOBS)[0]["status"].get("succeeded") == 1, PATIENCE_S)
-    assert place.all(JOBS)[0]["spec"]["ttlSecondsAfterFinished"] == 60
+    assert eventually(lambda: place.of_simulators(JOBS)[0]["status"].get("succeeded") == 1, PATIENCE_S)
+    assert place.of_simulators(JOBS)[0]["spec"]["ttlSecondsAfterFinished"] == 60
 
 
 @pytest.mark.parametrize(
@@ -192,7 +175,7 @@ def test_a_pod_that_does_not_run_is_an_error_with_its_reason(place, options, hel
     place.kubelet.held_up = held_up
 
     assert line in place.refusal(**options)
-    assert place.all(JOBS) == []
+    assert place.of_simulators(JOBS) == []
 
 
 def test_a_quota_that_forbids_the_pod_is_the_error(place):
@@ -200,22 +183,22 @@ def test_a_quota_that_forbids_the_pod_is_the_error(place):
     quota = {
         "apiVersion": "v1",
         "kind": "ResourceQuota",
-        "metadata": {"name": "small", "namespace": place.namespace},
+        "metadata": {"name": "small"},
         "spec": {"hard": {"requests.memory": "1Mi"}},
     }
-    place.api.create(QUOTAS, quota)
-    eventually(lambda: place.api.get(QUOTAS, place.namespace, "small").get("status", {}).get("hard"))
+    place.create(QUOTAS, quota)
+    eventually(lambda: place.get(QUOTAS, "small").get("status", {}).get("hard"))
 
     assert "exceeded quota: small, requested: requests.memory" in place.refusal()
-    assert place.all(JOBS) == []
+    assert place.of_simulators(JOBS) == []
 
 
 def test_a_program_outside_of_the_cluster_is_refused(place):
     """Its simulator could not be reached, and nothing would remove the simulator with the program."""
-    place.api.delete(PODS, place.namespace, NOTEBOOK)
-    eventually(lambda: not place.api.list(PODS, place.namespace))
+    place.api.delete(PODS, place.name, NOTEBOOK)
+    eventually(lambda: not place.all(PODS))
 
     last = place.refusal()
 
-    assert f"namespace {place.namespace} has no pod {NOTEBOOK}, so this program does not run in the" in last
-    assert place.all(JOBS) == []
+    assert f"namespace {place.name} has no pod {NOTEBOOK}, so this program does not run in the" in last
+    assert place.of_simulators(JOBS) == []

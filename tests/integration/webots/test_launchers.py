@@ -5,7 +5,6 @@ import signal
 import subprocess
 import sys
 import tempfile
-import uuid
 from importlib.metadata import version
 from pathlib import Path
 
@@ -51,34 +50,6 @@ def place(request, engine):
     return request.param
 
 
-@pytest.fixture
-def name():
-    """Return a ROS name that only this test uses, because all tests share a master."""
-    return f"rover_{uuid.uuid4().hex[:8]}"
-
-
-@pytest.fixture
-def world(tmp_path, name):
-    """Return the path of an arena whose robot has this ROS name."""
-    path = tmp_path / "arena.wbt"
-    path.write_bytes(builtin("arena").replace(b"--name=robotino", f"--name={name}".encode()))
-    return path
-
-
-@pytest.fixture
-def make(world, name):
-    """Yield a function that creates facades of that world."""
-    made = []
-
-    def begin(launcher, world=world, **options):
-        made.append(Webots(name, world, launcher=launcher, start_deadline_s=PATIENCE_S, **options))
-        return made[-1]
-
-    yield begin
-    for webots in made:
-        webots.close()
-
-
 def simulators():
     """Return the process ids of the stubs that this process or one of its containers started."""
     processes = below(os.getpid())
@@ -87,7 +58,7 @@ def simulators():
 
 def test_a_simulator_starts_steps_stops_and_starts_again(make, place, engine):
     """A notebook uses the same three calls in every place, and closing leaves nothing."""
-    webots = make(place)
+    webots = make(launcher=place)
 
     first = webots.run(webots.observer.time)
     webots.stop()
@@ -103,7 +74,7 @@ def test_a_simulator_starts_steps_stops_and_starts_again(make, place, engine):
 
 def test_a_simulator_that_was_killed_is_restarted(make, place):
     """The sidecar outlives its simulator in every place, so the facade can start the simulator again."""
-    webots = make(place)
+    webots = make(launcher=place)
     with webots:
         (pid,) = simulators()
         os.kill(pid, signal.SIGKILL)
@@ -116,12 +87,12 @@ def test_a_simulator_that_was_killed_is_restarted(make, place):
 
 def test_two_simulators_of_one_world_have_names_of_their_own(make, name, place):
     """The second facade chooses the next free name, also if both are in containers."""
-    assert [make(place).robot_name for _ in range(2)] == [name, f"{name}_2"]
+    assert [make(launcher=place).robot_name for _ in range(2)] == [name, f"{name}_2"]
 
 
 def test_places_may_be_mixed(make, name):
     """A simulator in a container and one on this machine share the ROS master, so they need two names."""
-    first, second = make("docker"), make(ThisMachine())
+    first, second = make(launcher="docker"), make(launcher=ThisMachine())
     with first, second:
         assert first.observer.time() >= 0
         assert second.observer.time() >= 0
@@ -159,7 +130,7 @@ def test_a_killed_program_leaves_no_simulator(place, name, world, engine):
 
 def test_the_container_has_what_the_settings_say(make, engine, world):
     """Docker's own words for each setting; the world's folder is read-only, and no right is left."""
-    make(Docker(shm_size="1g", gpus=2)).start()
+    make(launcher=Docker(shm_size="1g", gpus=2)).start()
     request = next(engine.created[name].request for name in engine.running())
 
     host = request["HostConfig"]
@@ -191,7 +162,7 @@ def test_a_path_may_be_relative(make, place, world, monkeypatch):
     (world.parent / "court").mkdir()
 
     Webots("burger", "court", launcher="docker").close()
-    assert make(place, world=Path(world.name)).robot_name.startswith("rover_")
+    assert make(launcher=place, world=Path(world.name)).robot_name.startswith("rover_")
 
 
 def test_a_project_of_webots_is_mounted_whole(engine, tmp_path, name):

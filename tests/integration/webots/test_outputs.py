@@ -47,24 +47,17 @@ def test_a_led_has_the_value_that_was_set(devices):
     assert devices[LED].value == 3
 
 
-def test_a_connector_is_locked_and_unlocked(devices):
-    """A locked connector without a partner counts as locked, as in Webots."""
-    connector = devices[Connector]
+@pytest.mark.parametrize(
+    ("kind", "commands", "state"),
+    [(Connector, ("lock", "unlock"), "locked"), (VacuumGripper, ("turn_on", "turn_off"), "on")],
+)
+def test_a_connector_and_a_gripper_have_the_state_of_the_last_command(devices, kind, commands, state):
+    """A locked connector without a partner counts as locked, as in Webots; this gripper can hold nothing."""
+    device = devices[kind]
     states = []
-    for command in (connector.lock, connector.unlock):
-        command()
-        states.append(connector.locked)
-
-    assert states == [True, False]
-
-
-def test_a_vacuum_gripper_is_switched_on_and_off(devices):
-    """It has no boundingObject, so it could hold nothing in Webots either."""
-    gripper = devices[VacuumGripper]
-    states = []
-    for command in (gripper.turn_on, gripper.turn_off):
-        command()
-        states.append(gripper.on)
+    for command in commands:
+        getattr(device, command)()
+        states.append(getattr(device, state))
 
     assert states == [True, False]
 

@@ -6,18 +6,16 @@ import socket
 import subprocess
 import sys
 import threading
-import uuid
 import xmlrpc.client
 
 import pytest
 
-from palaestra_sim.world import builtin
 from palaestra_trainer.errors import ConfigurationError, SimulatorDead
 from palaestra_trainer.robots import Movement, Pose
 from palaestra_trainer.robots.robotino import Robotino
 from palaestra_trainer.robots.simulated import SimulatedScene
 from palaestra_trainer.ros import Master
-from palaestra_trainer.webots import Attached, Webots
+from palaestra_trainer.webots import Attached
 from palaestra_trainer.webots.launching.local_simulator import ProcessLauncher
 from palaestra_trainer.webots.launching.ros_name_locks import Reservation
 
@@ -27,35 +25,6 @@ _OF_ANOTHER_MASTER = (
     b"HTTP/1.0 200 OK\r\n\r\n"
     + xmlrpc.client.dumps(([1, "", "http://localhost:1/"],), methodresponse=True).encode()
 )
-
-
-@pytest.fixture
-def name():
-    """Return a ROS name that only this test uses, because all tests share a master."""
-    return f"twin_{uuid.uuid4().hex[:8]}"
-
-
-@pytest.fixture
-def world(master, tmp_path, name):
-    """Return the path of an arena whose robot has this ROS name."""
-    del master
-    path = tmp_path / "arena.wbt"
-    path.write_bytes(builtin("arena").replace(b"--name=robotino", f"--name={name}".encode()))
-    return path
-
-
-@pytest.fixture
-def make(world, name):
-    """Yield a function that creates facades of that world."""
-    made = []
-
-    def begin(**options):
-        made.append(Webots(name, world, start_deadline_s=DEADLINE_S, **options))
-        return made[-1]
-
-    yield begin
-    for webots in made:
-        webots.close()
 
 
 def test_two_facades_of_one_world_drive_a_simulator_each(make, name):

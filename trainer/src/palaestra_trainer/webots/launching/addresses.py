@@ -1,4 +1,4 @@
-"""IP addresses in URLs, and addresses that only this machine can reach; pure."""
+"""Addresses that only this machine can reach; pure."""
 
 from __future__ import annotations
 
@@ -11,8 +11,3 @@ def is_loopback(host: str) -> bool:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
         return host == "localhost"
-
-
-def in_url(address: str) -> str:
-    """Return an IP address as URLs write it: IPv6 in brackets."""
-    return f"[{address}]" if ":" in address else address

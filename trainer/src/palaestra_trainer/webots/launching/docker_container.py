@@ -33,13 +33,10 @@ class DockerLauncher(OwnedSidecar):
     def __init__(self, container: Any, address: str, request: SimulatorRequest) -> None:
         super().__init__(address, Path(request.world).stem, request.suffix)
         self._container = container
-        self._open = True
 
     def _end(self) -> None:
-        if self._open:
-            self._open = False
-            ended(self._container)
-            self._container.client.close()
+        ended(self._container)
+        self._container.client.close()
 
 
 def start_container(settings: Docker, request: SimulatorRequest) -> DockerLauncher:

@@ -6,13 +6,12 @@ closes this input, the sidecar in the container ends, and the engine removes the
 
 from __future__ import annotations
 
-import importlib.util
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
-from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.webots.launching.launcher import Place
+from palaestra_trainer.webots.launching.optional_package import require_package
 from palaestra_trainer.webots.launching.owned_sidecar import OwnedSidecar
 from palaestra_trainer.webots.launching.release_images import release_image
 from palaestra_trainer.webots.launching.simulator_request import SimulatorRequest
@@ -49,11 +48,7 @@ class Docker(Place):
                 container, or the sidecar refused the world or the driver; the message has the remedy.
             SimulatorDead: the container printed nothing within 60 s.
         """
-        if importlib.util.find_spec("docker") is None:
-            raise ConfigurationError(
-                "launcher docker: the Python package docker is not installed; install "
-                "palaestra-trainer[docker]"
-            )
+        require_package("docker")
         from palaestra_trainer.webots.launching.docker_container import start_container
 
         return start_container(self, request)

@@ -10,13 +10,13 @@ import os
 from collections.abc import Mapping
 from http import HTTPStatus
 from pathlib import Path
-from typing import Any
 
 from kubernetes.client import ApiClient, Configuration
 from kubernetes.config import ConfigException, load_incluster_config, load_kube_config
 from urllib3.exceptions import HTTPError
 
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.webots.launching.kubernetes_objects import Object
 
 JOBS = "/apis/batch/v1/namespaces/{namespace}/jobs"
 PODS = "/api/v1/namespaces/{namespace}/pods"
@@ -28,20 +28,18 @@ _CALL_S = 20
 _NAMESPACE = Path("/var/run/secrets/kubernetes.io/serviceaccount/namespace")
 _RIGHTS = "set jupyter.simulators=true in the chart's values, or give the service account these rights"
 
-Object = dict[str, Any]
-
 
 class NamespaceClient:
-    """A client of the cluster in which this program runs, for one namespace.
+    """A client of the cluster in which this program runs, for the namespace of this program.
 
-    Args:
+    Attributes:
         namespace: the namespace of all objects.
 
     Raises:
         ConfigurationError: this program has neither a service account nor a kubeconfig.
     """
 
-    def __init__(self, namespace: str | None = None) -> None:
+    def __init__(self) -> None:
         configuration = Configuration()
         try:
             if _NAMESPACE.exists():
@@ -55,7 +53,7 @@ class NamespaceClient:
             ) from error
         configuration.retries = False
         self._client = ApiClient(configuration)
-        self.namespace = namespace or _own_namespace()
+        self.namespace = _own_namespace()
 
     def get(self, collection: str, name: str) -> Object | None:
         """Return an object; None if it does not exist."""

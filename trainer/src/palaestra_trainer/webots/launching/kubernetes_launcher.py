@@ -7,13 +7,13 @@ cluster removes it. The Job belongs to the pod of this program too, and goes wit
 
 from __future__ import annotations
 
-import importlib.util
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.webots.launching.launcher import Place
+from palaestra_trainer.webots.launching.optional_package import require_package
 from palaestra_trainer.webots.launching.owned_sidecar import OwnedSidecar
 from palaestra_trainer.webots.launching.simulator_request import SimulatorRequest
 
@@ -70,11 +70,7 @@ class Kubernetes(Place):
                 API server refuses an object; the pod does not run in time; the sidecar refused the world or
                 the driver. The message has the remedy or the events of the pod.
         """
-        if importlib.util.find_spec("kubernetes") is None:
-            raise ConfigurationError(
-                "launcher kubernetes: the Python package kubernetes is not installed; install "
-                "palaestra-trainer[kubernetes]"
-            )
+        require_package("kubernetes")
         from palaestra_trainer.webots.launching.kubernetes_pod import start_pod
 
         return start_pod(self, request)

@@ -12,12 +12,13 @@ from dataclasses import replace
 from pathlib import Path
 from urllib.parse import urlsplit
 
+from palaestra_protocol.http import Address
 from palaestra_trainer.errors import ConfigurationError, MasterLost, SimulatorFault, SimulatorHung
 from palaestra_trainer.ros import Master
 from palaestra_trainer.webots.launching import kubernetes_api as api
 from palaestra_trainer.webots.launching import kubernetes_objects as objects
 from palaestra_trainer.webots.launching import kubernetes_state as state
-from palaestra_trainer.webots.launching.addresses import in_url, is_loopback
+from palaestra_trainer.webots.launching.addresses import is_loopback
 from palaestra_trainer.webots.launching.kubernetes_launcher import Kubernetes
 from palaestra_trainer.webots.launching.owned_sidecar import OwnedSidecar
 from palaestra_trainer.webots.launching.pods_by_master import PodsByMaster
@@ -51,8 +52,9 @@ def start_pod(settings: Kubernetes, request: SimulatorRequest) -> KubernetesLaun
         address = _address(cluster, plan.name, settings.start_s)
         if plan.master_image:
             _use_master(address, plan.notebook.address)
+        launcher = KubernetesLauncher(cluster, plan, address, request)
         undo.pop_all()
-    return KubernetesLauncher(cluster, plan, address, request)
+    return launcher
 
 
 class KubernetesLauncher(OwnedSidecar):
@@ -72,7 +74,6 @@ class KubernetesLauncher(OwnedSidecar):
         super().__init__(url, Path(request.world).stem, request.suffix)
         self._cluster = cluster
         self._pod = plan.name
-        self._open = True
         self._closed = threading.Event()
         self._address = address
         _pods.add(address, str(urlsplit(os.environ["ROS_MASTER_URI"]).hostname), self._remove)
@@ -81,9 +82,6 @@ class KubernetesLauncher(OwnedSidecar):
         atexit.register(self._delete)
 
     def _end(self) -> None:
-        if not self._open:
-            return
-        self._open = False
         removals = _pods.close(self._address)
         if self._remove not in removals:  # another pod needs the ROS master in this one
             with suppress(SimulatorFault):  # the simulator may have ended
@@ -202,8 +200,7 @@ def _address(cluster: api.NamespaceClient, name: str, deadline_s: float) -> str:
     while True:
         pods = cluster.list(api.PODS, labelSelector=f"{objects.NAME_LABEL}={name}")
         pod = pods[0] if pods else None
-        events = _events(cluster, [name, *(each["metadata"]["name"] for each in pods)])
-        if failure := state.failure_of(pod, events):
+        if failure := state.failure_of(pod, [] if pods else _events(cluster, [name])):
             raise ConfigurationError(f"launcher kubernetes: {name}: {failure}")
         address, now = state.address_of(pod), time.monotonic()
         if address is not None:
@@ -216,6 +213,7 @@ def _address(cluster: api.NamespaceClient, name: str, deadline_s: float) -> str:
                     "in the network policies of the namespace"
                 )
         elif now - began > deadline_s:
+            events = _events(cluster, [name, *(each["metadata"]["name"] for each in pods)])
             raise ConfigurationError(
                 f"launcher kubernetes: {name}: the pod does not run after {deadline_s:g} s "
                 f"({state.told(events)}); free resources of the cluster, or give Kubernetes(start_s=...)"
@@ -223,7 +221,7 @@ def _address(cluster: api.NamespaceClient, name: str, deadline_s: float) -> str:
         time.sleep(_POLL_S)
 
 
-def _events(cluster: api.NamespaceClient, names: list[str]) -> list[api.Object]:
+def _events(cluster: api.NamespaceClient, names: list[str]) -> list[objects.Object]:
     return [
         event
         for name in names
@@ -240,12 +238,12 @@ def _responds(address: str) -> bool:
 
 
 def _url(address: str) -> str:
-    return f"http://{in_url(address)}:{objects.CONTROL_PORT}"
+    return f"http://{Address(address, objects.CONTROL_PORT)}"
 
 
 def _use_master(address: str, own_address: str) -> None:
     """Make the master in a pod the master of this process."""
-    os.environ["ROS_MASTER_URI"] = f"http://{in_url(address)}:{objects.MASTER_PORT}"
+    os.environ["ROS_MASTER_URI"] = f"http://{Address(address, objects.MASTER_PORT)}"
     if own_address:
         os.environ.pop("ROS_HOSTNAME", None)
         os.environ["ROS_IP"] = own_address

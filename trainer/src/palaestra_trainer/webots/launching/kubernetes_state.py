@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any
+
+from palaestra_trainer.webots.launching.kubernetes_objects import Object
 
 # The kubelet repeats these starts, but the cause is a mistake in the pod's text or in the image's name.
 _HOPELESS = frozenset(
@@ -16,8 +17,6 @@ _HOPELESS = frozenset(
 )
 _NOT_CREATED = "FailedCreate"
 _MOST_EVENTS = 3
-
-Object = dict[str, Any]
 
 
 def address_of(pod: Object | None) -> str | None:
@@ -32,7 +31,7 @@ def failure_of(pod: Object | None, events: Iterable[Object]) -> str | None:
 
     Args:
         pod: the pod; None if it does not exist yet.
-        events: the events of the Job and of the pod.
+        events: the events of the Job; only needed without a pod.
     """
     if pod is None:
         refused = (event["message"] for event in events if event.get("reason") == _NOT_CREATED)

@@ -20,6 +20,7 @@ class OwnedSidecar(Sidecar, ABC):
     def __init__(self, address: str, name: str, suffix: str = "") -> None:
         super().__init__(address, name)
         self.suffix = suffix
+        self._open = True
         self._reservation = Reservation()
 
     def reserve(self) -> bool:
@@ -32,9 +33,11 @@ class OwnedSidecar(Sidecar, ABC):
 
     def close(self) -> None:
         """End the sidecar and its simulator; further calls have no effect."""
-        self._end()
-        self._reservation.release()
+        if self._open:
+            self._open = False
+            self._end()
+            self._reservation.release()
 
     @abstractmethod
     def _end(self) -> None:
-        """End the sidecar and its simulator; further calls have no effect."""
+        """End the sidecar and its simulator; called once."""
