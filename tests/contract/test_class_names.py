@@ -16,7 +16,7 @@ ALLOWED_TWICE = {
     **dict.fromkeys(("MujocoSensor", "PositionSensor", "RangeFinder", "TouchSensor"), DEVICE),
     **dict.fromkeys(("Accelerometer", "Altimeter", "Compass", "Gyro", "InertialUnit", "LightSensor"), DEVICE),
     **dict.fromkeys(("Brake", "Connector", "Display", "Emitter", "Pen", "Speaker", "VacuumGripper"), DEVICE),
-    **dict.fromkeys(("Radar", "RadarTarget", "Receiver"), DEVICE),
+    **dict.fromkeys(("Device", "Radar", "RadarTarget", "Receiver", "Skin"), DEVICE),
     "Driver": "the driver of a simulator: as a job names it, and as the sidecar starts it",
     "Master": "a client of the ROS master: the trainer's, with deadlines, and the simulators', in their loop",
     "Mode": "the mode of a simulation, with Webots' numbers: for the facade, and for the simulator",

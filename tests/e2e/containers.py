@@ -36,7 +36,9 @@ def main() -> None:
     engine = docker.from_env()
 
     def left() -> list[str]:
-        return [container.name for container in engine.containers.list(all=True, ignore_removed=True, filters=OWN)]
+        return [
+            container.name for container in engine.containers.list(all=True, ignore_removed=True, filters=OWN)
+        ]
 
     seen = {"times": [_of_a_killed_program(network, left) for network in ("bridge", "host")]}
     with Webots("robotino", "arena", launcher="docker") as first:

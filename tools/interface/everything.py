@@ -57,8 +57,6 @@ _EVERYWHERE = frozenset(
         "skin/get_bone_position",
         "skin/set_bone_orientation",
         "skin/set_bone_position",
-        "speaker/set_engine",
-        "speaker/set_language",
         "supervisor/animation_start_recording",
         "supervisor/virtual_reality_headset_get_orientation",
         "supervisor/virtual_reality_headset_get_position",

@@ -1,4 +1,4 @@
-"""docs/reference/ros-interface.md: each service and topic, its type, md5, and the simulators that have it."""
+"""docs/reference/ros-interface.md: each service and topic with its type, md5, facade and simulators."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from palaestra.api.generated_sections import between_marks
 from palaestra_protocol.ros.rostypes import message_type, service_type
 from palaestra_sim.scene.devices import DEVICES
 from tools.interface.everything import FAILING, device_name, groups, offered
+from tools.interface.facades import facade
 
 PAGE = "docs/reference/ros-interface.md"
 BEGIN = "<!-- generated: services and topics -->"
@@ -26,7 +27,10 @@ _TITLES: Final = {
     "palaestra": "Services that Webots lacks",
     "": "Topics that are not below a robot",
 }
-_HEAD: Final = ("| path | type | md5 | stub | MuJoCo | Webots | tested by |", "|---|---|---|---|---|---|---|")
+_HEAD: Final = (
+    "| path | type | md5 | Python | stub | MuJoCo | Webots | tested by |",
+    "|---|---|---|---|---|---|---|---|",
+)
 
 
 def page(text: str) -> str:
@@ -60,7 +64,9 @@ def _row(group: str, path: str, type_name: str, md5: str) -> str:
     shown = path.replace(device_name(group), "<name>", 1) if group in DEVICES else path
     states = " | ".join(_state(simulator, path) for simulator in FAILING)
     webots = "no" if group in _OURS else "yes"
-    return f"| `{shown}` | {type_name} | `{md5}` | {states} | {webots} | {_TEST} |"
+    member = facade(group, path)
+    python = f"`{member}`" if member else ""
+    return f"| `{shown}` | {type_name} | `{md5}` | {python} | {states} | {webots} | {_TEST} |"
 
 
 def _state(simulator: str, path: str) -> str:

@@ -42,6 +42,8 @@ REQUESTS = {
     "_motor/set_velocity": {"value": 0.5},
     "/emitter/send": {"data": "hello"},
     "led/set_led": {"value": 1},
+    "speaker/set_engine": {"value": "pico"},
+    "speaker/set_language": {"value": "de-DE"},
     "display/attach_camera": {"value": "camera"},
     "display/image_paste": {"ir": "@display/image_new"},
     "display/image_delete": {"ir": "@display/image_new"},

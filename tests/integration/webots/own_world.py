@@ -17,7 +17,7 @@ class OwnRobot(SimulatedRobot):
 
 
 @contextmanager
-def running(text, folder, driver, kind=OwnRobot):
+def running(text, folder, driver, kind=OwnRobot, name="r"):
     """Yield facade and robot of a simulator that has this world, after one step.
 
     Args:
@@ -25,10 +25,11 @@ def running(text, folder, driver, kind=OwnRobot):
         folder: the folder for this file.
         driver: the name of the simulator.
         kind: the class of the robot.
+        name: the ROS name of the robot, which is the supervisor.
     """
     world = folder / "world.wbt"
     world.write_text(text)
-    webots = Webots("r", world, driver=driver, start_deadline_s=DEADLINE_S)
+    webots = Webots(name, world, driver=driver, start_deadline_s=DEADLINE_S)
     robot = kind(webots)
     try:
         with webots:

@@ -17,6 +17,7 @@ from palaestra_trainer.webots import (
     Radar,
     Receiver,
     RecognizedObjects,
+    SegmentedImage,
 )
 from tests.integration.webots.own_world import OwnRobot, running
 from tests.values.frames import frame, quaternion
@@ -219,7 +220,8 @@ def test_a_position_that_no_joystick_has_is_refused(detecting):
 
 PLATE = """TouchSensor { name "%s" type "%s" lookupTable [ ] translation %s 0 0.2
   boundingObject Box { size 0.2 0.2 0.02 } physics Physics { density -1 mass 2 } }"""
-CAMERA = """Camera { name "camera" width 80 height 60 fieldOfView 0.9 recognition Recognition { } }"""
+CAMERA = """Camera { name "camera" width 80 height 60 fieldOfView 0.9
+  recognition Recognition { segmentation TRUE } }"""
 BALL = frame((1.0, 0.2, 0.1), (0.0, 0.0, 1.0), 0.7)
 SEEN = f"""DEF BALL Solid {{ {BALL.fields} name "ball" model "ball" recognitionColors [ 1 0 0.5 ]
   children [ Shape {{ geometry Sphere {{ radius 0.1 }} }} ] }}"""
@@ -234,8 +236,8 @@ class Feeling(OwnRobot):
         """Add the devices."""
         name = self.node_name
         self.pressure, self.force = ForceSensor(name, "pressure"), Force3DSensor(name, "force")
-        self.objects = RecognizedObjects(name, "camera")
-        self.simulation.add([self.pressure, self.force, self.objects], [])
+        self.objects, self.segments = RecognizedObjects(name, "camera"), SegmentedImage(name, "camera")
+        self.simulation.add([self.pressure, self.force, self.objects, self.segments], [])
 
 
 def test_forces_and_objects_are_read_in_mujoco(master, tmp_path):
@@ -247,6 +249,7 @@ def test_forces_and_objects_are_read_in_mujoco(master, tmp_path):
         for _ in range(10):
             it.advance()
         (ball,) = it.objects.value
+        segments = it.segments.value.copy()
 
     assert it.force.value == pytest.approx((0.0, 0.0, -2.0 * 9.81), abs=1e-3)
     assert it.pressure.value == pytest.approx(0.0, abs=1e-3)
@@ -257,6 +260,9 @@ def test_forces_and_objects_are_read_in_mujoco(master, tmp_path):
     x, y = 40.0 - focal_px * 0.2, 30.0 - focal_px * 0.1
     assert ball.position_on_image == pytest.approx((x, y), abs=2.0)
     assert ball.size_on_image == pytest.approx((0.2 * focal_px, 0.2 * focal_px), abs=3.0)
+    assert segments[round(y), round(x)].tolist() == [128, 0, 255, 255]  # its color as BGRA
+    of_ball = (segments[..., :3] > 0).any(axis=-1)
+    assert of_ball.sum() == pytest.approx(math.pi * (0.1 * focal_px) ** 2, rel=0.1)
 
 
 def test_the_stub_refuses_a_camera_that_recognizes(master, tmp_path):
@@ -274,4 +280,21 @@ def test_the_stub_refuses_a_camera_that_recognizes(master, tmp_path):
         pytest.raises(WorldMisfit, match="a simulator that renders images"),
         running(text, tmp_path, "stub", Seeing),
     ):
+        pass
+
+
+def test_a_touch_sensor_of_another_type_is_a_wrong_world(master, tmp_path):
+    """Its messages have another type, so the sensor would seem to be a dead simulator."""
+    del master
+
+    class Pressed(OwnRobot):
+        definition = "R"
+
+        def equip(self):
+            self.simulation.add([ForceSensor(self.node_name, "plate")], [])
+
+    plate = """TouchSensor { name "plate" boundingObject Box { size 0.1 0.1 0.1 } }"""
+    text = Setting("stub").text(robot(plate))
+    refused = 'plate has the type "bumper", which TouchSensor reads'
+    with pytest.raises(WorldMisfit, match=refused), running(text, tmp_path, "stub", Pressed):
         pass

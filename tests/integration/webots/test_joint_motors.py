@@ -44,7 +44,7 @@ def test_a_motor_has_the_limits_of_the_world_and_takes_others(lever):
     lever.arm.set_acceleration(10.0)
     lever.arm.set_available_effort(40.0)
 
-    assert lever.arm.target() == 0.5
+    assert lever.arm.target_position == 0.5
     with pytest.raises(WrongData, match=r"arm.* available_torque"):
         lever.arm.set_available_effort(41.0)
 

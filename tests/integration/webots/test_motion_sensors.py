@@ -10,8 +10,11 @@ from palaestra_trainer.webots import (
     Accelerometer,
     Altimeter,
     Compass,
+    GPSSpeed,
+    GPSVelocity,
     Gyro,
     InertialUnit,
+    JointMotor,
     LightSensor,
 )
 from tests.integration.webots.own_world import OwnRobot, running
@@ -108,3 +111,38 @@ def test_the_light_sensor_reads_a_number(measured):
 
     assert isinstance(measuring.sensors["light sensor"].value, float)
     assert math.isfinite(measuring.sensors["light sensor"].value)
+
+
+SPEED_M_S = 0.2
+TURNED = frame((1.0, 2.0, 0.5), (0.0, 0.0, 1.0), 0.5)
+SLIDE = """SliderJoint { jointParameters JointParameters { axis 0 1 0 } device LinearMotor { name "slide" }
+  endPoint Solid { children [ GPS { name "gps" } ] physics Physics { density -1 mass 1 } } }"""
+
+
+class Sliding(OwnRobot):
+    """A robot that moves its GPS along its y axis."""
+
+    definition = "R"
+
+    def equip(self):
+        """Add the motor, and what the GPS measures of its motion."""
+        name = self.node_name
+        self.slide = JointMotor(name, "slide", "velocity")
+        self.speed, self.velocity = GPSSpeed(name, "gps"), GPSVelocity(name, "gps")
+        self.simulation.add([self.speed, self.velocity], [self.slide])
+
+
+@pytest.mark.parametrize("driver", PHYSICS)
+def test_a_gps_measures_the_velocity_in_the_axes_of_the_world(master, tmp_path, driver):
+    """The y axis of the robot is turned by 0.5 rad."""
+    del master
+    text = Setting(driver).text(robot(SLIDE, TURNED.fields), "gravity 0")
+    with running(text, tmp_path, driver, Sliding) as (_, sliding):
+        sliding.slide.set(SPEED_M_S)
+        for _ in range(10):
+            sliding.advance()
+        speed, velocity = sliding.speed.value, sliding.velocity.value
+
+    expected = [SPEED_M_S * -math.sin(0.5), SPEED_M_S * math.cos(0.5), 0.0]
+    assert speed == pytest.approx(SPEED_M_S, abs=1e-3)
+    assert velocity == pytest.approx(expected, abs=1e-3)

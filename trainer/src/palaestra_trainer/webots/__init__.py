@@ -8,20 +8,22 @@ from palaestra_trainer.ros import ensure_node
 from palaestra_trainer.webots.attached import Attached
 from palaestra_trainer.webots.cameras import (
     Camera,
+    LaserScan,
     Lidar,
     LidarPoints,
     RangeFinder,
     RecognizedObject,
     RecognizedObjects,
+    SegmentedImage,
 )
 from palaestra_trainer.webots.detectors import Radar, RadarTarget, RadioPacket, Receiver
+from palaestra_trainer.webots.device import Device, Fact
 from palaestra_trainer.webots.device_check import require_node
 from palaestra_trainer.webots.devices import (
     DistanceSensor,
     Motor,
     PositionSensor,
     Sensor,
-    TouchSensor,
     set_velocities,
 )
 from palaestra_trainer.webots.display import Display
@@ -31,7 +33,6 @@ from palaestra_trainer.webots.joint_motor import (
     Command,
     EffortFeedback,
     JointMotor,
-    MotorLimits,
     set_commands,
 )
 from palaestra_trainer.webots.launching.docker_launcher import Docker
@@ -39,17 +40,27 @@ from palaestra_trainer.webots.launching.kubernetes_launcher import Kubernetes
 from palaestra_trainer.webots.launching.launcher import Launcher, Place
 from palaestra_trainer.webots.launching.local_simulator import ThisMachine
 from palaestra_trainer.webots.launching.simulator_request import SimulatorRequest
+from palaestra_trainer.webots.lenses import (
+    CameraInfo,
+    FocusInfo,
+    LidarFrequency,
+    LidarInfo,
+    RangeFinderInfo,
+    ZoomInfo,
+)
 from palaestra_trainer.webots.motion_sensors import (
     GPS,
     Accelerometer,
     Altimeter,
+    BatterySensor,
     Compass,
-    Force3DSensor,
-    ForceSensor,
+    GPSSpeed,
+    GPSVelocity,
     Gyro,
     InertialUnit,
     LightSensor,
 )
+from palaestra_trainer.webots.motor_device import MotorLimits
 from palaestra_trainer.webots.mujoco import MujocoActuator, MujocoSensor
 from palaestra_trainer.webots.observer import Mode, NodeName, Observer
 from palaestra_trainer.webots.obstacles import FLOOR, Thing
@@ -57,15 +68,21 @@ from palaestra_trainer.webots.outputs import (
     LED,
     Brake,
     Connector,
+    ConnectorPresence,
     Emitter,
     OutputDevice,
     Pen,
     Speaker,
     VacuumGripper,
+    VacuumPresence,
 )
+from palaestra_trainer.webots.robot_controller import InputEvent, RobotController, RobotMode
 from palaestra_trainer.webots.simulation import Actuator, Stepper
+from palaestra_trainer.webots.skin import Skin
 from palaestra_trainer.webots.supervisor import Supervisor
+from palaestra_trainer.webots.touch_sensors import Force3DSensor, ForceSensor, TouchSensor
 from palaestra_trainer.webots.view_settings import MovieSettings, ViewLabel
+from palaestra_trainer.webots.world_node import FieldName, WorldNode
 
 __all__ = [
     "FLOOR",
@@ -75,27 +92,40 @@ __all__ = [
     "Actuator",
     "Altimeter",
     "Attached",
+    "BatterySensor",
     "Brake",
     "Camera",
+    "CameraInfo",
     "Command",
     "Compass",
     "Connector",
+    "ConnectorPresence",
+    "Device",
     "Display",
     "DistanceSensor",
     "Docker",
     "EffortFeedback",
     "Emitter",
+    "Fact",
+    "FieldName",
+    "FocusInfo",
     "Force3DSensor",
     "ForceSensor",
+    "GPSSpeed",
+    "GPSVelocity",
     "Gyro",
     "InertialUnit",
+    "InputEvent",
     "JointMotor",
     "Joystick",
     "JoystickState",
     "Keyboard",
     "Kubernetes",
+    "LaserScan",
     "Launcher",
     "Lidar",
+    "LidarFrequency",
+    "LidarInfo",
     "LidarPoints",
     "LightSensor",
     "Mode",
@@ -114,11 +144,16 @@ __all__ = [
     "RadarTarget",
     "RadioPacket",
     "RangeFinder",
+    "RangeFinderInfo",
     "Receiver",
     "RecognizedObject",
     "RecognizedObjects",
+    "RobotController",
+    "RobotMode",
+    "SegmentedImage",
     "Sensor",
     "SimulatorRequest",
+    "Skin",
     "Speaker",
     "Stepper",
     "Supervisor",
@@ -126,8 +161,11 @@ __all__ = [
     "ThisMachine",
     "TouchSensor",
     "VacuumGripper",
+    "VacuumPresence",
     "ViewLabel",
     "Webots",
+    "WorldNode",
+    "ZoomInfo",
     "ensure_node",
     "require_node",
     "set_commands",

@@ -7,11 +7,10 @@ from typing import NamedTuple
 from palaestra_protocol.ros.rostypes import message_type
 from palaestra_trainer.errors import SimulatorHung, WrongData
 from palaestra_trainer.ros import RosSubscriber
-from palaestra_trainer.webots.devices import Sensor, topic_name
-from palaestra_trainer.webots.message_decoding import NumberReading, PickedReading
-from palaestra_trainer.webots.services import Services
+from palaestra_trainer.webots.device import number_fact, whole_fact
+from palaestra_trainer.webots.devices import NodeSensor
+from palaestra_trainer.webots.message_decoding import INT8, NumberReading, PickedReading
 
-_COUNT = "b"  # webots_ros/Int8Stamped
 _TARGET = "dddd"  # webots_ros/RadarTarget
 
 
@@ -31,15 +30,19 @@ class RadarTarget(NamedTuple):
     azimuth_rad: float
 
 
-class Radar(Sensor):
+class Radar(NodeSensor):
     """A radar; `value` is a tuple with a `RadarTarget` for each target in range."""
 
     __slots__ = ("_targets", "_unread")
+    least_m = number_fact("get_min_range", "The least distance of a target, in meters.")
+    most_m = number_fact("get_max_range", "The greatest distance of a target, in meters.")
+    field_of_view_rad = number_fact("get_horizontal_fov", "The horizontal field of view, in rad.")
+    vertical_field_of_view_rad = number_fact("get_vertical_fov", "The vertical field of view, in rad.")
 
     def __init__(self, robot: str, device: str) -> None:
-        count = NumberReading(device, _COUNT)
+        count = NumberReading(device, INT8)
         super().__init__(robot, device, "webots_ros/Int8Stamped", count, "number_of_targets")
-        path = f"/{robot}/{topic_name(device)}/targets"
+        path = f"/{robot}/{self._path}/targets"
         reading = PickedReading(device, _TARGET, range(len(_TARGET)))
         self._targets = RosSubscriber(path, "webots_ros/RadarTarget", reading)
         self._unread = 0  # targets of a measurement whose reading was interrupted
@@ -114,7 +117,7 @@ class RadioPacket(NamedTuple):
     direction: tuple[float, float, float]
 
 
-class Receiver(Sensor):
+class Receiver(NodeSensor):
     """A receiver of texts that emitters send on the same channel.
 
     `value` is the text of the oldest packet in the queue, "" if the queue is empty. The simulator publishes
@@ -124,12 +127,12 @@ class Receiver(Sensor):
     Properties and methods may raise SimulatorDead, SimulatorHung or WrongData.
     """
 
-    __slots__ = ("_fresh", "_path", "_services")
+    __slots__ = ("_fresh",)
+    queue_length = whole_fact("get_queue_length", "The number of packets in the queue.")
+    channel = whole_fact("get_channel", "The channel; -1 means all channels.")
 
     def __init__(self, robot: str, device: str) -> None:
         super().__init__(robot, device, "webots_ros/StringStamped", _text, "data")
-        self._services = Services(robot)
-        self._path = topic_name(device)
         self._fresh = False
 
     def read(self) -> bool:
@@ -155,9 +158,7 @@ class Receiver(Sensor):
         size = int(self._ask("get_data_size", "get_int"))
         if size and not self.value:
             return None  # the packet arrived after the text of this step was published
-        x, y, z = self._services.get(f"{self._path}/get_emitter_direction", "receiver_get_emitter_direction")(
-            ask=True
-        ).direction
+        x, y, z = self.call("get_emitter_direction", "receiver_get_emitter_direction", ask=True).direction
         strength = float(self._ask("get_signal_strength", "get_float"))
         self._fresh = False
         self._ask("next_packet", "get_bool")
@@ -167,33 +168,17 @@ class Receiver(Sensor):
             raise WrongData(self.robot, f"{self.device} has received {size} bytes that are not a text")
         return RadioPacket(text, strength, (x, y, z))
 
-    @property
-    def queue_length(self) -> int:
-        """The number of packets in the queue."""
-        return int(self._ask("get_queue_length", "get_int"))
-
-    @property
-    def channel(self) -> int:
-        """The channel; -1 means all channels."""
-        return int(self._ask("get_channel", "get_int"))
-
     def set_channel(self, channel: int) -> None:
         """Set the channel; -1 receives on all channels.
 
         Raises:
             WrongData: also if the simulator ignores the channel.
         """
-        refused = f"{self.device} refuses the channel {channel}"
-        self._services.confirm(f"{self._path}/set_channel", "set_int", refused, value=channel)
-        self._services.require_kept(self.device, "channel", channel, self.channel)
+        self._command("set_channel", "set_int", value=channel)
+        self._require_kept("channel", channel, self.channel)
 
-    def close(self) -> None:
-        """Close the connections."""
-        super().close()
-        self._services.close()
-
-    def _ask(self, name: str, type_name: str) -> float:
-        answer: float = self._services.ask(f"{self._path}/{name}", type_name)
+    def _ask(self, service: str, type_name: str) -> float:
+        answer: float = self.call(service, type_name, ask=True).value
         return answer
 
 

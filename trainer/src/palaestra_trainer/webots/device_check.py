@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from palaestra_trainer.errors import WorldMisfit
-from palaestra_trainer.webots.devices import topic_name
+from palaestra_trainer.webots.device import topic_name
 from palaestra_trainer.webots.observer import Observer
 
 

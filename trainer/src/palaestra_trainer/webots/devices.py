@@ -4,25 +4,29 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Final
 
 from palaestra_trainer.errors import SimulatorHung, WrongData
 from palaestra_trainer.ros import RosService, RosSubscriber, call_together
 from palaestra_trainer.ros.service import DEADLINE_S
 from palaestra_trainer.waiting.greenlets import let_others
-from palaestra_trainer.webots.message_decoding import BOOL, FLOAT64, RANGE, NumberReading
-from palaestra_trainer.webots.services import Services
+from palaestra_trainer.webots.device import (
+    Device,
+    Fact,
+    JointDevice,
+    NodeDevice,
+    lookup_table_fact,
+    number_fact,
+    text_fact,
+)
+from palaestra_trainer.webots.message_decoding import FLOAT64, RANGE, NumberReading
+from palaestra_trainer.webots.motor_device import MotorDevice
 
-# Webots replaces only these characters when it converts a device's name to a path.
-_REPLACED = str.maketrans("-. ()", "_____")
+# By number. Source: webots/distance_sensor.h
+_TYPES: Final = ("generic", "infra-red", "sonar", "laser")
 
 
-def topic_name(device: str) -> str:
-    """Return the device's name as it is in ROS paths, e.g. touch_sensor for "touch sensor"."""
-    return device.translate(_REPLACED)
-
-
-class Sensor:
+class Sensor(Device):
     """A sensor that is enabled with a period, and then read once in each step.
 
     Args:
@@ -41,7 +45,7 @@ class Sensor:
         enable_deadline_s: the longest time that the simulator may take to enable the sensor.
     """
 
-    __slots__ = ("_enable", "_value", "_values", "device", "late", "robot")
+    __slots__ = ("_enable", "_period", "_value", "_values", "late")
     listed: ClassVar[bool] = True
     enable_deadline_s: ClassVar[float] = DEADLINE_S
 
@@ -54,10 +58,10 @@ class Sensor:
         topic: str = "value",
         enabled_by: str = "enable",
     ) -> None:
-        self.robot = robot
-        self.device = device
-        path = f"/{robot}/{topic_name(device)}"
+        super().__init__(robot, device)
+        path = f"/{robot}/{self._path}"
         self._enable = RosService(f"{path}/{enabled_by}", "webots_ros/set_int", self.enable_deadline_s)
+        self._period = f"{enabled_by.removesuffix('enable')}get_sampling_period"
         self._values = RosSubscriber(f"{path}/{topic}", type_name, decode)
         self._value: Any = None
         self.late = False
@@ -66,6 +70,15 @@ class Sensor:
     def value(self) -> Any:
         """The last reading; None before the first step."""
         return self._value
+
+    @property
+    def sampling_period_ms(self) -> int:
+        """The period with which the simulator samples the sensor, in ms of simulated time; 0: not at all.
+
+        Raises:
+            SimulatorDead, SimulatorHung, WrongData: as `RosService`.
+        """
+        return int(self.call(self._period, "get_int", ask=True).value)
 
     def enable(self, period_ms: int) -> None:
         """Make the sensor publish every `period_ms` of simulated time, and subscribe to its topic.
@@ -122,38 +135,48 @@ class Sensor:
 
     def close(self) -> None:
         """Close the connections."""
+        super().close()
         self._enable.close()
         self._values.close()
 
 
-class DistanceSensor(Sensor):
+class NodeSensor(Sensor, NodeDevice):
+    """A sensor that is a node of the world."""
+
+    __slots__ = ()
+
+
+class DistanceSensor(NodeSensor):
     """A distance sensor; `value` is the output of its lookup table, which is volts for a Robotino."""
 
     __slots__ = ()
+    lookup_table = lookup_table_fact()
+    min_value = number_fact("get_min_value", "The least output of the lookup table.")
+    max_value = number_fact("get_max_value", "The greatest output of the lookup table.")
+    aperture_rad = number_fact("get_aperture", "The opening angle of the cone of rays, in rad.")
+    sensor_type = Fact(
+        "get_type",
+        "get_int",
+        lambda response: _TYPES[response.value],
+        'The type of the sensor: "generic", "infra-red", "sonar" or "laser".',
+    )
 
     def __init__(self, robot: str, device: str) -> None:
         super().__init__(robot, device, "sensor_msgs/Range", NumberReading(device, RANGE))
 
 
-class TouchSensor(Sensor):
-    """A bumper; `value` is True while an object touches it."""
-
-    __slots__ = ()
-
-    def __init__(self, robot: str, device: str) -> None:
-        super().__init__(robot, device, "webots_ros/BoolStamped", NumberReading(device, BOOL))
-
-
-class PositionSensor(Sensor):
+class PositionSensor(NodeSensor, JointDevice):
     """A sensor for the position of a joint; `value` is in radians or meters."""
 
     __slots__ = ()
+    motor_name = text_fact("get_motor_name", 'The name of the motor on the same joint; "" without a motor.')
+    brake_name = text_fact("get_brake_name", 'The name of the brake on the same joint; "" without a brake.')
 
     def __init__(self, robot: str, device: str) -> None:
         super().__init__(robot, device, "webots_ros/Float64Stamped", NumberReading(device, FLOAT64))
 
 
-class Motor:
+class Motor(MotorDevice):
     """A motor under velocity control.
 
     Args:
@@ -167,17 +190,13 @@ class Motor:
         velocity_service: the service that sets the velocity.
     """
 
-    __slots__ = ("_position", "_services", "device", "robot", "velocity", "velocity_service")
+    __slots__ = ("_position", "velocity", "velocity_service")
 
     def __init__(self, robot: str, device: str) -> None:
-        services = Services(robot)
-        name = topic_name(device)
-        self.robot = robot
-        self.device = device
-        self._services = services
-        self._position = services.get(f"{name}/set_position", "set_float")
+        super().__init__(robot, device)
+        self._position = self._services.get(f"{self._path}/set_position", "set_float")
         self.velocity: float | None = None
-        self.velocity_service = services.get(f"{name}/set_velocity", "set_float")
+        self.velocity_service = self._services.get(f"{self._path}/set_velocity", "set_float")
 
     def set_velocity(self, velocity: float) -> None:
         """Turn at `velocity` rad/s from the next step on.
@@ -211,7 +230,7 @@ class Motor:
     def close(self) -> None:
         """Close the connections."""
         self.velocity = None
-        self._services.close()
+        super().close()
 
 
 def set_velocities(wanted: Iterable[tuple[Motor, float]]) -> None:

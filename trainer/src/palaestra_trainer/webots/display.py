@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palaestra_trainer.errors import ConfigurationError, WrongData
+from palaestra_trainer.webots.device import Fact
 from palaestra_trainer.webots.outputs import OutputDevice
 
 _FORMATS: Final = (3, 4)  # WB_IMAGE_RGB, WB_IMAGE_RGBA: also the number of channels. Source: webots/display.h
@@ -26,12 +27,12 @@ class Display(OutputDevice):
     """
 
     __slots__ = ()
-
-    @property
-    def size(self) -> tuple[int, int]:
-        """Width and height in pixels."""
-        info = self._services.get(f"{self._path}/get_info", "display_get_info")(ask=True)
-        return int(info.width), int(info.height)
+    size = Fact(
+        "get_info",
+        "display_get_info",
+        lambda it: (int(it.width), int(it.height)),
+        "Width and height in pixels.",
+    )
 
     def set_color(self, rgb: int) -> None:
         """Set the color of the next drawings, 0xRRGGBB."""
@@ -115,6 +116,18 @@ class Display(OutputDevice):
         """
         self._paste("image_load", at, blend=blend, filename=str(file))
 
+    def copy(self, corner: Point, size: tuple[int, int], to: Point, *, blend: bool = False) -> None:
+        """Copy a rectangle of the display to another place; see `draw_image`.
+
+        Args:
+            corner: the upper left corner of the rectangle.
+            size: its width and height in pixels.
+            to: the upper left corner of the copy.
+            blend: as in `draw_image`.
+        """
+        (x, y), (width, height) = corner, size
+        self._paste("image_copy", to, blend=blend, x=x, y=y, width=width, height=height)
+
     def save(self, file: str | Path) -> None:
         """Save the visible image as a PNG or JPEG file on the simulator's machine.
 
@@ -133,14 +146,14 @@ class Display(OutputDevice):
 
     def detach_camera(self) -> None:
         """Remove the image of the camera."""
-        self._ask("detach_camera", "get_bool")
+        self.call("detach_camera", "get_bool", ask=True)
 
     def _draw(self, shape: str, *, fill: bool, **numbers: Any) -> None:
         self._command(f"{'fill' if fill else 'draw'}_{shape}", f"display_draw_{shape}", **numbers)
 
     def _paste(self, make: str, at: Point, *, blend: bool, **request: Any) -> None:
         """Make an image in the simulator, draw it, and delete it."""
-        handle = self._services.get(f"{self._path}/{make}", f"display_{make}")(**request).ir
+        handle = self.call(make, f"display_{make}", **request).ir
         if not handle:
             of_file = "filename" in request
             given = request["filename"] if of_file else f"{request['width']} x {request['height']} pixels"

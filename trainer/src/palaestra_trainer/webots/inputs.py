@@ -12,23 +12,21 @@ from typing import Any, ClassVar, NamedTuple
 
 from palaestra_trainer.errors import SimulatorDead, WorldMisfit
 from palaestra_trainer.ros import RosSubscriber
+from palaestra_trainer.webots.device import flag_fact, text_fact, whole_fact
 from palaestra_trainer.webots.devices import Sensor
-from palaestra_trainer.webots.message_decoding import NumberReading
-from palaestra_trainer.webots.services import Services
+from palaestra_trainer.webots.message_decoding import INT8, INT32, NumberReading
 
 ALL = -1  # releases all keys or buttons
-_INT8, _INT32 = "b", "i"  # webots_ros/Int8Stamped, webots_ros/Int32Stamped
 
 
 class _Input(Sensor):
     """A device that publishes a message for each pressed key, and none while no key is pressed."""
 
-    __slots__ = ("_services",)
+    __slots__ = ()
     listed: ClassVar[bool] = False
 
     def __init__(self, robot: str, device: str, type_name: str, codes: str, topic: str) -> None:
         super().__init__(robot, device, type_name, NumberReading(device, codes), topic)
-        self._services = Services(robot)
 
     def read(self) -> bool:
         """Read the messages of the last step.
@@ -39,7 +37,7 @@ class _Input(Sensor):
         Raises:
             SimulatorDead, SimulatorHung, WrongData: as `RosService` and `RosSubscriber`.
         """
-        self._services.ask(f"{self.device}/get_sampling_period", "get_int")
+        _ = self.sampling_period_ms
         return self.read_arrived()
 
     def press(self, key: int) -> None:
@@ -60,11 +58,6 @@ class _Input(Sensor):
         """
         self._call_ours("release", "set_int", f"{self.device}: {key} is not pressed", value=key)
 
-    def close(self) -> None:
-        """Close the connections."""
-        super().close()
-        self._services.close()
-
     def _pressed(self) -> tuple[int, ...]:
         """Return the numbers that arrived, each once, in the order in which they arrived."""
         return tuple(dict.fromkeys(self._values.arrived()))
@@ -84,7 +77,7 @@ class Keyboard(_Input):
     __slots__ = ()
 
     def __init__(self, robot: str) -> None:
-        super().__init__(robot, "keyboard", "webots_ros/Int32Stamped", _INT32, "key")
+        super().__init__(robot, "keyboard", "webots_ros/Int32Stamped", INT32, "key")
 
     def read_arrived(self) -> bool:
         """Read the keys that have already arrived.
@@ -121,14 +114,23 @@ class Joystick(_Input):
     """
 
     __slots__ = ("_axes", "_positions", "_topics")
+    connected = flag_fact(
+        "is_connected",
+        "Whether a joystick is connected; in the stub and MuJoCo, pressing or moving it connects it.",
+    )
+    model = text_fact("get_model", 'The model of the joystick; "" until one is connected.')
+    number_of_axes = whole_fact("get_number_of_axes", "The number of axes; -1 until a joystick is connected.")
+    number_of_povs = whole_fact(
+        "get_number_of_povs", "The number of hat switches; -1 until a joystick is connected."
+    )
 
     def __init__(self, robot: str, axes: int = 2, povs: int = 0) -> None:
-        super().__init__(robot, "joystick", "webots_ros/Int8Stamped", _INT8, "pressed_button")
+        super().__init__(robot, "joystick", "webots_ros/Int8Stamped", INT8, "pressed_button")
         names = [*(f"axis{at}" for at in range(axes)), *(f"pov{at}" for at in range(povs))]
         self._axes = axes
         self._positions = [0] * len(names)
         self._topics = [
-            RosSubscriber(f"/{robot}/joystick/{name}", "webots_ros/Int8Stamped", NumberReading(name, _INT8))
+            RosSubscriber(f"/{robot}/joystick/{name}", "webots_ros/Int8Stamped", NumberReading(name, INT8))
             for name in names
         ]
 
@@ -152,7 +154,7 @@ class Joystick(_Input):
             WorldMisfit: the joystick has fewer axes.
             SimulatorDead, SimulatorHung, WrongData: as `RosService` and `RosSubscriber`.
         """
-        axes = int(self._services.ask("joystick/get_number_of_axes", "get_int"))
+        axes = self.number_of_axes
         if 0 <= axes < self._axes:
             raise WorldMisfit(self.robot, f"the joystick has {axes} axes; use Joystick(..., axes={axes})")
         for topic in self._topics:
@@ -184,10 +186,33 @@ class Joystick(_Input):
             refused = f"{self.device} refuses {name} with {list(positions)}"
             self._call_ours(name, "set_float_array", refused, values=list(positions))
 
-    @property
-    def connected(self) -> bool:
-        """Whether a joystick is connected; in the stub and MuJoCo, pressing or moving it connects it."""
-        return bool(self._services.ask("joystick/is_connected", "get_bool"))
+    def push(self, force: int, axis: int = 0, duration_s: float = 0.0) -> None:
+        """Push back with a force on an axis of a joystick with force feedback.
+
+        Args:
+            force: the level of the force, as the joystick's driver defines it; 0 ends the push.
+            axis: the number of the axis.
+            duration_s: the duration in seconds; 0 means until the next call.
+
+        Raises:
+            SimulatorDead, SimulatorHung, WrongData: as `RosService`.
+        """
+        self._command("set_force_axis", "set_int", value=axis)
+        self._command("set_constant_force_duration", "set_float", value=duration_s)
+        self._command("set_constant_force", "set_int", value=force)
+
+    def resist(self, resistance: float, centering: float = 0.0) -> None:
+        """Set the gains of a joystick with force feedback.
+
+        Args:
+            resistance: the gain against motion.
+            centering: the gain toward the center.
+
+        Raises:
+            SimulatorDead, SimulatorHung, WrongData: as `RosService`.
+        """
+        self._command("set_resistance_gain", "set_float", value=resistance)
+        self._command("set_auto_centering_gain", "set_float", value=centering)
 
     def close(self) -> None:
         """Close the connections."""

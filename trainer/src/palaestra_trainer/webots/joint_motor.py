@@ -4,39 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import Literal
 
 from palaestra_trainer.ros import call_together
 from palaestra_trainer.waiting.greenlets import let_others
-from palaestra_trainer.webots.devices import Sensor, topic_name
+from palaestra_trainer.webots.devices import NodeSensor
 from palaestra_trainer.webots.message_decoding import FLOAT64, NumberReading
-from palaestra_trainer.webots.services import Services
+from palaestra_trainer.webots.motor_device import MotorDevice
 
 Command = Literal["position", "velocity", "force", "torque", "control"]
 
 
-_ROTATIONAL = 0  # the type of a motor; 1 is linear. Source: webots/motor.h
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MotorLimits:
-    """The limits of a motor in the world, in rad and N m, or in m and N for a linear motor.
-
-    Attributes:
-        min_position: the least position; equal to `max_position` without a limit.
-        max_position: the greatest position.
-        max_velocity: the greatest velocity, in units per second.
-        max_effort: the greatest torque or force.
-    """
-
-    min_position: float
-    max_position: float
-    max_velocity: float
-    max_effort: float
-
-
-class JointMotor:
+class JointMotor(MotorDevice):
     """A motor with one type of command.
 
     Args:
@@ -51,15 +30,12 @@ class JointMotor:
         service: the service that sets the command.
     """
 
-    __slots__ = ("_path", "_position", "_ready", "_services", "device", "robot", "service")
+    __slots__ = ("_position", "_ready", "service")
 
     def __init__(self, robot: str, device: str, command: Command) -> None:
-        self._services = Services(robot)
-        name = self._path = topic_name(device)
-        self.robot = robot
-        self.device = device
-        self.service = self._services.get(f"{name}/set_{command}", "set_float")
-        self._position = self._services.get(f"{name}/set_position", "set_float")
+        super().__init__(robot, device)
+        self.service = self._services.get(f"{self._path}/set_{command}", "set_float")
+        self._position = self._services.get(f"{self._path}/set_position", "set_float")
         self._ready = False
 
     def set(self, value: float) -> None:
@@ -81,55 +57,6 @@ class JointMotor:
             self._position(value=math.inf)
         self._ready = True
 
-    def limits(self) -> MotorLimits:
-        """Return the limits of the motor.
-
-        Raises:
-            SimulatorDead, SimulatorHung, WrongData: as `RosService`.
-        """
-        numbers = {
-            name: self._number(f"get_{name}") for name in ("min_position", "max_position", "max_velocity")
-        }
-        return MotorLimits(**numbers, max_effort=self._number(f"get_max_{self._effort()}"))
-
-    def target(self) -> float:
-        """Return the target position, in rad or m.
-
-        Raises:
-            SimulatorDead, SimulatorHung, WrongData: as `RosService`.
-        """
-        return self._number("get_target_position")
-
-    def set_acceleration(self, acceleration: float) -> None:
-        """Set the greatest acceleration under position and velocity control; -1 means without a limit.
-
-        Raises:
-            SimulatorDead, SimulatorHung, WrongData: as `RosService`.
-        """
-        self._set("acceleration", acceleration)
-
-    def set_available_effort(self, effort: float) -> None:
-        """Set the torque or force that the motor may use, from 0 to `limits().max_effort`.
-
-        Raises:
-            SimulatorDead, SimulatorHung: as `RosService`.
-            WrongData: also if the simulator ignores the value.
-        """
-        name = f"available_{self._effort()}"
-        self._set(name, effort)
-        self._services.require_kept(self.device, name, effort, self._number(f"get_{name}"))
-
-    def _effort(self) -> str:
-        rotational = self._services.ask(f"{self._path}/get_type", "get_int") == _ROTATIONAL
-        return "torque" if rotational else "force"
-
-    def _number(self, name: str) -> float:
-        return float(self._services.ask(f"{self._path}/{name}", "get_float"))
-
-    def _set(self, name: str, value: float) -> None:
-        refused = f"{self.device} refuses the {name} {value:g}"
-        self._services.confirm(f"{self._path}/set_{name}", "set_float", refused, value=value)
-
     def release(self) -> None:
         """Send no command, so that the motor keeps the state that the simulator's reset has set.
 
@@ -141,7 +68,7 @@ class JointMotor:
     def close(self) -> None:
         """Close the connections."""
         self._ready = False
-        self._services.close()
+        super().close()
 
 
 def set_commands(wanted: Iterable[tuple[JointMotor, float]]) -> None:
@@ -156,7 +83,7 @@ def set_commands(wanted: Iterable[tuple[JointMotor, float]]) -> None:
     call_together([(motor.service, {"value": value}) for motor, value in commands], meanwhile=let_others)
 
 
-class EffortFeedback(Sensor):
+class EffortFeedback(NodeSensor):
     """The torque or force that a motor uses now; `value` is in N m or N. The stub simulates no forces.
 
     Args:

@@ -15,6 +15,8 @@ from typing import Any
 # The numbers after the header, as codes of `struct`; the last number is the reading.
 RANGE = "Bffff"  # sensor_msgs/Range: type, field of view, least, most
 BOOL = "?"
+INT8 = "b"
+INT32 = "i"
 FLOAT64 = "d"
 POINT = "ddd"  # geometry_msgs/PointStamped: x, y, z
 

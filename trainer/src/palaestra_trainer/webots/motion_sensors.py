@@ -1,4 +1,4 @@
-"""Sensors that measure position, motion, forces and the environment of a robot, as numbers."""
+"""Sensors that measure position, motion and the environment of a robot, as numbers."""
 
 from __future__ import annotations
 
@@ -6,18 +6,19 @@ import math
 from typing import ClassVar, Final
 
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.webots.devices import Sensor
+from palaestra_trainer.webots.device import Fact, lookup_table_fact, number_fact
+from palaestra_trainer.webots.devices import NodeSensor, Sensor
 from palaestra_trainer.webots.message_decoding import FLOAT64, POINT, NumberReading, PickedReading
 
 AXES: Final = "xyz"
 _IMU: Final = "37d"  # sensor_msgs/Imu: orientation, turning rate and acceleration, each with a covariance
 _FIELD: Final = "12d"  # sensor_msgs/MagneticField: x, y, z, and a covariance
 _ILLUMINANCE: Final = "2d"  # sensor_msgs/Illuminance: the reading, and a variance
-_WRENCH: Final = "6d"  # geometry_msgs/WrenchStamped: force and torque
+_WGS84: Final = 1  # the number of the coordinate system; 0 is the world's own. Source: webots/gps.h
 _ORIENTATION, _RATE, _ACCELERATION = 0, 13, 25  # positions of the first numbers in sensor_msgs/Imu
 
 
-class _AxesSensor(Sensor):
+class _AxesSensor(NodeSensor):
     """A sensor with one number for each axis.
 
     Args:
@@ -31,6 +32,7 @@ class _AxesSensor(Sensor):
     """
 
     __slots__ = ()
+    lookup_table = lookup_table_fact()
     type_name: ClassVar[str]
     codes: ClassVar[str]
     first: ClassVar[int] = 0
@@ -73,7 +75,7 @@ class Accelerometer(_AxesSensor):
     first = _ACCELERATION
 
 
-class GPS(Sensor):
+class GPS(NodeSensor):
     """A GPS; `value` is its position: x, y, z in meters in the axes of the world.
 
     In a world with `gpsCoordinateSystem "WGS84"`, `value` is latitude and longitude in degrees, and altitude
@@ -81,16 +83,57 @@ class GPS(Sensor):
     """
 
     __slots__ = ()
+    geographic = Fact(
+        "get_coordinate_system",
+        "get_int",
+        lambda response: response.value == _WGS84,
+        "Whether `value` is latitude, longitude and altitude.",
+    )
 
     def __init__(self, robot: str, device: str) -> None:
         reading = PickedReading(device, POINT, (0, 1, 2))
         super().__init__(robot, device, "geometry_msgs/PointStamped", reading, "values")
 
+    def degrees_minutes_seconds(self, angle_deg: float) -> str:
+        """Return an angle, such as a latitude, as text with degrees, minutes and seconds.
 
-class InertialUnit(Sensor):
+        The simulator rounds toward zero, and computes with the precision of float32.
+
+        Raises:
+            SimulatorDead, SimulatorHung, WrongData: as `RosService`.
+        """
+        name = "decimal_degrees_to_degrees_minutes_seconds"
+        return str(self.call(name, f"gps_{name}", decimalDegrees=angle_deg).degreesMinutesSeconds)
+
+
+class GPSSpeed(NodeSensor):
+    """The speed that a GPS measures; `value` is in m/s. This sensor also enables the GPS."""
+
+    __slots__ = ()
+
+    def __init__(self, robot: str, device: str) -> None:
+        reading = NumberReading(device, FLOAT64)
+        super().__init__(robot, device, "webots_ros/Float64Stamped", reading, "speed")
+
+
+class GPSVelocity(NodeSensor):
+    """The velocity of a GPS; `value` is x, y, z in m/s in the axes of the world.
+
+    This sensor also enables the GPS.
+    """
+
+    __slots__ = ()
+
+    def __init__(self, robot: str, device: str) -> None:
+        reading = PickedReading(device, POINT, (0, 1, 2))
+        super().__init__(robot, device, "geometry_msgs/PointStamped", reading, "speed_vector")
+
+
+class InertialUnit(NodeSensor):
     """An inertial unit; `value` is the rotation of the sensor in the world as a quaternion: x, y, z, w."""
 
     __slots__ = ()
+    noise_rad = number_fact("get_noise", "The standard deviation of the noise on each angle, in rad.")
 
     def __init__(self, robot: str, device: str) -> None:
         picked = tuple(range(_ORIENTATION, _ORIENTATION + 4))
@@ -113,7 +156,7 @@ class InertialUnit(Sensor):
         )
 
 
-class Altimeter(Sensor):
+class Altimeter(NodeSensor):
     """An altimeter; `value` is the height of the sensor in the world, in meters."""
 
     __slots__ = ()
@@ -122,36 +165,27 @@ class Altimeter(Sensor):
         super().__init__(robot, device, "webots_ros/Float64Stamped", NumberReading(device, FLOAT64))
 
 
-class LightSensor(Sensor):
+class LightSensor(NodeSensor):
     """A light sensor; `value` is the output of its lookup table, or W/m2 if the table is empty."""
 
     __slots__ = ()
+    lookup_table = lookup_table_fact()
 
     def __init__(self, robot: str, device: str) -> None:
         reading = PickedReading(device, _ILLUMINANCE, (0,))
         super().__init__(robot, device, "sensor_msgs/Illuminance", lambda message: reading(message)[0])
 
 
-class ForceSensor(Sensor):
-    """A TouchSensor of type `force`; `value` is the output of its lookup table for the pressure along x.
+class BatterySensor(Sensor):
+    """The battery of a robot, without a node in the world; `value` is its energy in J.
 
-    With an empty table, `value` is the pressure in N.
+    Args:
+        robot: the ROS name of the robot's controller.
     """
 
     __slots__ = ()
+    listed = False
 
-    def __init__(self, robot: str, device: str) -> None:
-        super().__init__(robot, device, "webots_ros/Float64Stamped", NumberReading(device, FLOAT64))
-
-
-class Force3DSensor(Sensor):
-    """A TouchSensor of type `force-3d`; `value` is the output of its lookup table for x, y and z.
-
-    With an empty table, `value` is the force in N along the axes of the sensor.
-    """
-
-    __slots__ = ()
-
-    def __init__(self, robot: str, device: str) -> None:
-        reading = PickedReading(device, _WRENCH, (0, 1, 2))
-        super().__init__(robot, device, "geometry_msgs/WrenchStamped", reading, "values")
+    def __init__(self, robot: str) -> None:
+        reading = NumberReading("battery_sensor", FLOAT64)
+        super().__init__(robot, "battery_sensor", "webots_ros/Float64Stamped", reading)

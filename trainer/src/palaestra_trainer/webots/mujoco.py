@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palaestra_protocol.ros.rostypes import message_type
-from palaestra_trainer.webots.devices import Sensor
+from palaestra_trainer.webots.devices import NodeSensor
 from palaestra_trainer.webots.joint_motor import JointMotor
 
 _FOLDER: Final = "mujoco/"
@@ -21,7 +21,7 @@ _TYPE: Final = "std_msgs/Float64MultiArray"
 _decode: Final = message_type(_TYPE).codec.decode
 
 
-class MujocoSensor(Sensor):
+class MujocoSensor(NodeSensor):
     """A sensor of several numbers; `value` has MuJoCo's order and units: shape (numbers,), float64.
 
     Args:

@@ -12,15 +12,14 @@ from palaestra_trainer.errors import WrongData
 from palaestra_trainer.ros import RosService, is_served
 from palaestra_trainer.webots.obstacles import ObstacleReader, Thing
 from palaestra_trainer.webots.services import Services
-
-Vector = tuple[float, float, float]
-Quaternion = tuple[float, float, float, float]
+from palaestra_trainer.webots.world_node import Quaternion, Vector, WorldNode
 
 _Data = TypeVar("_Data", VisibleScene, SceneState)
 
 _SCENE: Final = "palaestra/scene"
 _SCENE_STATE: Final = "palaestra/scene_state"
-_NODE_TYPES: Final = (0x09, 0x19)  # the types of SFNode and MFNode. Source: WbFieldType of Webots
+_HEADSET: Final = "supervisor/virtual_reality_headset"
+_HEADSET_TYPE: Final = "supervisor_virtual_reality_headset"
 
 
 class Mode(enum.IntEnum):
@@ -132,8 +131,7 @@ class Observer:
 
     def type_name(self, name: str) -> str:
         """Return the type of the node with DEF `name`, such as Solid, or the name of its PROTO."""
-        service = self._services.get("supervisor/node/get_type_name", "node_get_name")
-        return str(service(node=self.node(name)).name)
+        return self.find(name).type_name
 
     def text(self, name: str) -> str:
         """Return the node with DEF `name` as text of a world file, with its current fields."""
@@ -146,9 +144,7 @@ class Observer:
         Raises:
             WrongData: also if the supervisor's robot has no such device.
         """
-        service = self._services.get("supervisor/get_from_device", "supervisor_get_from_string")
-        node = self._known(service(value=device).node, f"the robot has no device {device}")
-        return self._pose_of(node, device)
+        return self._pose_of(self.find_device(device).handle, device)
 
     def center_of_mass(self, name: str) -> Vector:
         """Return the center of mass, in meters in the world, of the Solid with DEF `name` and its parts."""
@@ -173,17 +169,51 @@ class Observer:
         Raises:
             WrongData: also if the field does not hold nodes.
         """
-        if self.field_type(name, field) not in _NODE_TYPES:
-            raise WrongData(self.node_name, f"{name}.{field} holds values; read it with get_field")
-        handle = self.field(name, field)
-        count = self.length(name, field)
-        service = self._services.get("supervisor/field/get_node", "field_get_node")
-        found = [service(field=handle, index=index).node for index in range(abs(count))]
-        return tuple(
-            NodeName(self._name_of(node, "get_def"), self._name_of(node, "get_type_name"))
-            for node in found
-            if node
+        found = self.find(name).nodes(field)
+        return tuple(NodeName(node.definition, node.type_name) for node in found)
+
+    def find(self, name: str) -> WorldNode:
+        """Return the node with DEF `name`; "" stands for the node that contains the whole world."""
+        return WorldNode(self._services, self.node(name))
+
+    def find_device(self, device: str) -> WorldNode:
+        """Return the node of a device of the supervisor's robot.
+
+        Raises:
+            WrongData: also if the robot has no such device.
+        """
+        service = self._services.get("supervisor/get_from_device", "supervisor_get_from_string")
+        return self._found(service(value=device).node, f"the robot has no device {device}")
+
+    def with_id(self, number: int) -> WorldNode:
+        """Return the node with this `id`.
+
+        Raises:
+            WrongData: also if no node has it.
+        """
+        service = self._services.get("supervisor/get_from_id", "supervisor_get_from_id")
+        return self._found(service(id=number).node, f"no node has the id {number}")
+
+    def own_node(self) -> WorldNode:
+        """Return the node of the supervisor's robot."""
+        return self._found(self._services.ask("supervisor/get_self", "get_uint64"), "the robot has no node")
+
+    def selected(self) -> WorldNode | None:
+        """Return the node that is selected in the window of Webots; None if no node is selected."""
+        handle = self._services.ask("supervisor/get_selected", "get_uint64")
+        return WorldNode(self._services, int(handle)) if handle else None
+
+    def headset_pose(self) -> tuple[Vector, Quaternion] | None:
+        """Return the pose, in the world, of a virtual-reality headset; None if none is used."""
+        if not self._services.ask(f"{_HEADSET}_is_used", "get_bool"):
+            return None
+        at, turn = (
+            getattr(self._services.get(f"{_HEADSET}_get_{it}", f"{_HEADSET_TYPE}_get_{it}")(ask=True), it)
+            for it in ("position", "orientation")
         )
+        numbers = at.x, at.y, at.z, turn.x, turn.y, turn.z, turn.w
+        self._services.require_finite("the pose of the headset", *numbers)
+        return numbers[:3], numbers[3:]
 
     def translation(self, name: str) -> tuple[float, float, float]:
         """Return the translation field, in meters, of the node with DEF `name`."""
@@ -268,15 +298,15 @@ class Observer:
         self._services.require_finite(f"the pose of {name}", *position, *rotation)
         return position, rotation
 
-    def _name_of(self, node: int, kind: str) -> str:
-        return str(self._services.get(f"supervisor/node/{kind}", "node_get_name")(node=node).name)
-
     def _read(self, kind: type[_Data], path: str, most_bytes: int) -> _Data:
         text = self._services.ask(path, "get_string")
         try:
             return kind.from_json(decoded(text.encode(), most_bytes))
         except ProtocolError as error:
             raise WrongData(self.node_name, f"sent an invalid response to {path}: {error}") from error
+
+    def _found(self, handle: Any, fact: str) -> WorldNode:
+        return WorldNode(self._services, self._known(handle, fact))
 
     def _known(self, handle: Any, fact: str) -> int:
         if not handle:

@@ -5,50 +5,29 @@ A command takes effect in the next step, as in Webots.
 
 from __future__ import annotations
 
-from typing import Any
-
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.webots.devices import topic_name
-from palaestra_trainer.webots.services import Services
+from palaestra_trainer.webots.device import (
+    JointDevice,
+    NodeDevice,
+    flag_fact,
+    number_fact,
+    text_fact,
+    whole_fact,
+)
+from palaestra_trainer.webots.devices import NodeSensor
+from palaestra_trainer.webots.message_decoding import BOOL, INT8, NumberReading
 
 
-class OutputDevice:
+class OutputDevice(NodeDevice):
     """A device that takes commands; add it to a simulation like a motor, so that its absence is an error.
 
     A reset of the simulation restores the device, and no command is repeated.
-
-    Args:
-        robot: the ROS name of the robot's controller.
-        device: the device's name in the world.
-
-    Attributes:
-        robot: see above.
-        device: see above.
     """
 
-    __slots__ = ("_path", "_services", "device", "robot")
-
-    def __init__(self, robot: str, device: str) -> None:
-        self.robot = robot
-        self.device = device
-        self._services = Services(robot)
-        self._path = topic_name(device)
+    __slots__ = ()
 
     def release(self) -> None:
         """Keep the state that the simulator's reset has set."""
-
-    def close(self) -> None:
-        """Close the connections."""
-        self._services.close()
-
-    def _command(self, name: str, type_name: str, **request: Any) -> None:
-        """Call a service of the device that only confirms; see `Services.confirm`."""
-        given = ", ".join(f"{field} {value!r}" for field, value in request.items())
-        refused = f"{self.device} refuses {name} with {given}"
-        self._services.confirm(f"{self._path}/{name}", type_name, refused, **request)
-
-    def _ask(self, name: str, type_name: str) -> Any:
-        return self._services.ask(f"{self._path}/{name}", type_name)
 
 
 class LED(OutputDevice):
@@ -58,24 +37,24 @@ class LED(OutputDevice):
     """
 
     __slots__ = ()
+    value = whole_fact("get_led", "The value that was set last.")
 
     def set(self, value: int) -> None:
         """Switch the LED: 0 is off; other values are the number of a color, or RGB if the LED is gradual."""
         self._command("set_led", "set_int", value=value)
 
-    @property
-    def value(self) -> int:
-        """The value that was set last."""
-        return int(self._ask("get_led", "get_int"))
 
-
-class Brake(OutputDevice):
+class Brake(OutputDevice, JointDevice):
     """The brake of a joint.
 
     Every method may raise SimulatorDead, SimulatorHung or WrongData.
     """
 
     __slots__ = ()
+    motor_name = text_fact("get_motor_name", 'The name of the motor on the same joint; "" without a motor.')
+    position_sensor_name = text_fact(
+        "get_position_sensor_name", 'The name of the position sensor on the same joint; "" without one.'
+    )
 
     def set_damping(self, constant: float) -> None:
         """Set the damping constant of the joint, in N m s/rad or N s/m; 0 releases the brake.
@@ -112,6 +91,7 @@ class Connector(OutputDevice):
     """
 
     __slots__ = ()
+    locked = flag_fact("is_locked", "Whether the connector is locked, with or without a partner.")
 
     def lock(self) -> None:
         """Lock to the connector in front; if the world sets `autoLock`, also to one that comes later."""
@@ -121,10 +101,20 @@ class Connector(OutputDevice):
         """Release the other connector."""
         self._command("lock", "set_bool", value=False)
 
-    @property
-    def locked(self) -> bool:
-        """Whether the connector is locked, with or without a partner."""
-        return bool(self._ask("is_locked", "get_bool"))
+
+class ConnectorPresence(NodeSensor):
+    """The sensor in a connector; `value` is 1 if another connector can be locked, else 0.
+
+    A passive connector cannot detect another one; its `value` is -1.
+    """
+
+    __slots__ = ()
+
+    def __init__(self, robot: str, device: str) -> None:
+        reading = NumberReading(device, INT8)
+        super().__init__(
+            robot, device, "webots_ros/Int8Stamped", reading, "presence", "presence_sensor/enable"
+        )
 
 
 class VacuumGripper(OutputDevice):
@@ -135,6 +125,7 @@ class VacuumGripper(OutputDevice):
     """
 
     __slots__ = ()
+    on = flag_fact("is_on", "Whether the gripper is switched on.")
 
     def turn_on(self) -> None:
         """Hold the object that touches the gripper."""
@@ -144,10 +135,17 @@ class VacuumGripper(OutputDevice):
         """Release the object."""
         self._command("turn_on", "set_bool", value=False)
 
-    @property
-    def on(self) -> bool:
-        """Whether the gripper is switched on."""
-        return bool(self._ask("is_on", "get_bool"))
+
+class VacuumPresence(NodeSensor):
+    """The sensor in a vacuum gripper; `value` is True if an object is in reach."""
+
+    __slots__ = ()
+
+    def __init__(self, robot: str, device: str) -> None:
+        reading = NumberReading(device, BOOL)
+        super().__init__(
+            robot, device, "webots_ros/BoolStamped", reading, "presence", "presence_sensor/enable"
+        )
 
 
 class Emitter(OutputDevice):
@@ -157,6 +155,9 @@ class Emitter(OutputDevice):
     """
 
     __slots__ = ()
+    channel = whole_fact("get_channel", "The channel.")
+    range_m = number_fact("get_range", "The range in meters; -1 means without a limit.")
+    buffer_bytes = whole_fact("get_buffer_size", "The size of the buffer in bytes; -1 means without a limit.")
 
     def send(self, text: str) -> None:
         """Send a text to all receivers in range; as in Webots, a text larger than the buffer is lost."""
@@ -169,7 +170,7 @@ class Emitter(OutputDevice):
             WrongData: also if the simulator ignores the channel.
         """
         self._command("set_channel", "set_int", value=channel)
-        self._services.require_kept(self.device, "channel", channel, self.channel)
+        self._require_kept("channel", channel, self.channel)
 
     def set_range(self, range_m: float) -> None:
         """Set the range in meters; -1 means without a limit.
@@ -178,22 +179,7 @@ class Emitter(OutputDevice):
             WrongData: also if the range is larger than the emitter's maxRange.
         """
         self._command("set_range", "set_float", value=range_m)
-        self._services.require_kept(self.device, "range", range_m, self.range_m)
-
-    @property
-    def channel(self) -> int:
-        """The channel."""
-        return int(self._ask("get_channel", "get_int"))
-
-    @property
-    def range_m(self) -> float:
-        """The range in meters; -1 means without a limit."""
-        return float(self._ask("get_range", "get_float"))
-
-    @property
-    def buffer_bytes(self) -> int:
-        """The size of the buffer in bytes; -1 means without a limit."""
-        return int(self._ask("get_buffer_size", "get_int"))
+        self._require_kept("range", range_m, self.range_m)
 
 
 class Speaker(OutputDevice):
@@ -203,6 +189,9 @@ class Speaker(OutputDevice):
     """
 
     __slots__ = ()
+    engine = text_fact("get_engine", 'The program that speaks: "pico" or "microsoft".')
+    language = text_fact("get_language", 'The language in which it speaks, such as "en-US".')
+    speaking = flag_fact("is_speaking", "Whether the loudspeaker speaks.")
 
     def play(
         self, file: str, *, volume: float = 1.0, pitch: float = 1.0, balance: float = 0.0, loop: bool = False
@@ -232,14 +221,24 @@ class Speaker(OutputDevice):
 
     def plays(self, file: str = "") -> bool:
         """Return whether a sound file is playing; for "", whether any sound file is playing."""
-        service = self._services.get(f"{self._path}/is_sound_playing", "speaker_is_sound_playing")
-        return bool(service(sound=file).value)
+        return bool(self.call("is_sound_playing", "speaker_is_sound_playing", sound=file).value)
+
+    def set_engine(self, engine: str) -> None:
+        """Choose the program that speaks: "pico" or "microsoft".
+
+        Raises:
+            WrongData: also if the simulator does not know the program.
+        """
+        self._command("set_engine", "set_string", value=engine)
+
+    def set_language(self, language: str) -> None:
+        """Choose the language, such as "en-US".
+
+        Raises:
+            WrongData: also if the program that speaks does not know the language.
+        """
+        self._command("set_language", "set_string", value=language)
 
     def speak(self, text: str, *, volume: float = 1.0) -> None:
         """Speak a text with a volume from 0 to 1."""
         self._command("speak", "speaker_speak", text=text, volume=volume)
-
-    @property
-    def speaking(self) -> bool:
-        """Whether the loudspeaker speaks."""
-        return bool(self._ask("is_speaking", "get_bool"))

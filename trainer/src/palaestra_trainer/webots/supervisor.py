@@ -8,12 +8,12 @@ from pathlib import Path
 from palaestra_trainer.errors import SimulatorDead, WrongData
 from palaestra_trainer.ros import call_together
 from palaestra_trainer.webots.fields import Value, encoded, kind_of, turn_about_z
-from palaestra_trainer.webots.observer import Mode, Observer, Vector
-from palaestra_trainer.webots.services import Services
-from palaestra_trainer.webots.view_settings import MovieSettings, ViewLabel
+from palaestra_trainer.webots.observer import Mode, Observer
+from palaestra_trainer.webots.supervised_view import SupervisedView
+from palaestra_trainer.webots.world_node import Vector
 
 
-class Supervisor:
+class Supervisor(SupervisedView):
     """Changes the simulation through the supervisor's controller.
 
     Every method may raise SimulatorDead, SimulatorHung or WrongData. The stub and MuJoCo refuse a call that
@@ -29,11 +29,9 @@ class Supervisor:
     """
 
     def __init__(self, node_name: str, observer: Observer) -> None:
-        self.node_name = node_name
+        super().__init__(node_name, observer)
         self.paused = False
         self._inserted = False
-        self._observer = observer
-        self._services = Services(node_name)
 
     def set_mode(self, mode: Mode) -> None:
         """Set the mode of simulated time.
@@ -52,6 +50,10 @@ class Supervisor:
         if self._inserted:  # a reset removes inserted nodes, so their handles become invalid
             self._inserted = False
             self._observer.forget_handles()
+
+    def reset_physics(self) -> None:
+        """Stop all motion in the world."""
+        self._services.ask("supervisor/simulation_reset_physics", "get_bool")
 
     def reload(self) -> None:
         """Reload the world; controllers restart, so all connections must be opened again."""
@@ -77,6 +79,14 @@ class Supervisor:
                 raise WrongData(self.node_name, f"refuses world_load for {path}")
         self._observer.close()
         self._services.close()
+
+    def save_world(self, path: str | Path) -> None:
+        """Save the world, as it is now, as a file on the simulator's machine; only Webots can do this.
+
+        Args:
+            path: the file, whose name ends in .wbt; an absolute path.
+        """
+        self._confirm("world_save", "set_string", path, value=str(path))
 
     def quit(self, status: int = 0) -> None:
         """End the simulator with an exit status."""
@@ -117,6 +127,22 @@ class Supervisor:
         """Stop all motion of the node with DEF `name` and of its child nodes."""
         service = self._services.get("supervisor/node/reset_physics", "node_reset_functions")
         service(node=self._observer.node(name))
+
+    def restart_controller(self, name: str) -> None:
+        """Restart the controller of the robot with DEF `name`; its connections must be opened again."""
+        self._confirm("node/restart_controller", "node_reset_functions", name, node=self._observer.node(name))
+
+    def track_field(self, name: str, field: str, period_ms: int) -> None:
+        """Make Webots send a field of one value every `period_ms`, so that reading it takes less time.
+
+        0 ends this. The stub and MuJoCo confirm the call, and are as fast without it.
+        """
+        where, handle = f"{name}.{field}", self._observer.field(name, field)
+        if period_ms:
+            wanted = {"field": handle, "sampling_period": period_ms}
+            self._confirm("field/enable_sf_tracking", "field_enable_sf_tracking", where, **wanted)
+        else:
+            self._confirm("field/disable_sf_tracking", "field_disable_sf_tracking", where, field=handle)
 
     def get_field(self, name: str, field: str, index: int = 0) -> Value:
         """Return the value of a field of the node with DEF `name`, in the type of the field.
@@ -272,73 +298,6 @@ class Supervisor:
         self._confirm("node/remove", "node_remove", name, node=self._observer.node(name))
         self._observer.forget_handles()
 
-    def save_image(self, path: str | Path, quality: int = 90) -> None:
-        """Save the view of the world as a PNG or JPEG file on the simulator's machine.
-
-        Args:
-            path: the file; an absolute path.
-            quality: 1 to 100, for JPEG.
-
-        Raises:
-            WrongData: also if the simulator cannot render, as the stub cannot, or cannot write the file.
-        """
-        self._confirm("export_image", "save_image", path, filename=str(path), quality=quality)
-
-    def start_movie(self, path: str | Path, settings: MovieSettings | None = None) -> None:
-        """Record the view of the world from the next step on, as a video file on the simulator's machine.
-
-        Args:
-            path: the file; an absolute path.
-            settings: size, quality and speed; None: the defaults of `MovieSettings`.
-
-        Raises:
-            WrongData: also if the simulator does not render, as the stub.
-        """
-        wanted = settings or MovieSettings()
-        width, height = wanted.size
-        self._confirm(
-            "movie_start_recording",
-            "supervisor_movie_start_recording",
-            path,
-            filename=str(path),
-            width=width,
-            height=height,
-            codec=0,
-            quality=wanted.quality,
-            acceleration=wanted.acceleration,
-            caption=wanted.caption,
-        )
-
-    def stop_movie(self) -> None:
-        """End the recording; the file is complete when `movie_is_ready` returns True."""
-        self._services.ask("supervisor/movie_stop_recording", "get_bool")
-
-    def movie_is_ready(self) -> bool:
-        """Return whether no movie is being recorded or written."""
-        service = self._services.get("supervisor/movie_is_ready", "node_get_status")
-        return bool(service(ask=True).status)
-
-    def movie_failed(self) -> bool:
-        """Return whether the last recording failed."""
-        service = self._services.get("supervisor/movie_failed", "node_get_status")
-        return bool(service(ask=True).status)
-
-    def set_label(self, label: ViewLabel) -> None:
-        """Show a text over the view of the world; a label of the same number is replaced."""
-        self._confirm(
-            "set_label",
-            "supervisor_set_label",
-            repr(label.text),
-            id=label.number,
-            label=label.text,
-            xpos=label.at[0],
-            ypos=label.at[1],
-            size=label.size,
-            color=label.rgb,
-            transparency=label.transparency,
-            font=label.font,
-        )
-
     def close(self) -> None:
         """Close the connections and reset `paused`."""
         self.paused = False
@@ -354,11 +313,6 @@ class Supervisor:
         kind = kind_of(self._observer.field_type(name, field), where)
         wire = encoded(kind, where, value)
         return kind.name, {"field": self._observer.field(name, field), "value": wire}
-
-    def _confirm(self, path: str, type_name: str, subject: object, **request: object) -> None:
-        """Call a service that only confirms; `subject` is the object of the call, for the message."""
-        refused = f"refuses {path.rpartition('/')[2]} for {subject}"
-        self._services.confirm(f"supervisor/{path}", type_name, refused, **request)
 
 
 def _xyz(vector: Vector) -> dict[str, float]:

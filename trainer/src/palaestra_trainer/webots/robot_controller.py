@@ -1,0 +1,115 @@
+"""What the controller of a robot knows about the robot, and its data, window and inputs."""
+
+from __future__ import annotations
+
+import enum
+from typing import Final
+
+from palaestra_trainer.ros import RosService
+from palaestra_trainer.ros.service import DEADLINE_S
+from palaestra_trainer.webots.device import Device, Fact, flag_fact, text_fact
+
+_MS_PER_S: Final = 1000.0
+
+
+class RobotMode(enum.IntEnum):
+    """What a controller drives. Source: webots/robot.h."""
+
+    SIMULATION = 0
+    CROSS_COMPILATION = 1
+    REMOTE_CONTROL = 2
+
+
+class InputEvent(enum.IntFlag):
+    """What a person does in Webots. Source: webots/robot.h."""
+
+    NONE = 0
+    MOUSE_CLICK = 1
+    MOUSE_MOVE = 2
+    KEYBOARD = 4
+    JOYSTICK_BUTTON = 8
+    JOYSTICK_AXIS = 16
+    JOYSTICK_POV = 32
+
+
+class RobotController(Device):
+    """The controller of one robot.
+
+    Every method may raise SimulatorDead, SimulatorHung or WrongData. `Observer` reads time and world.
+
+    Args:
+        robot: the ROS name of the robot's controller.
+    """
+
+    __slots__ = ()
+    model = text_fact("get_model", "The field `model` of the robot.")
+    supervises = flag_fact("get_supervisor", "Whether the robot is a supervisor.")
+    synchronizes = flag_fact(
+        "get_synchronization", "Whether the simulation waits for the robot's controller."
+    )
+    project_path = text_fact(
+        "get_project_path", "The folder of the world's project on the simulator's machine."
+    )
+    custom_data = text_fact("get_custom_data", "The field `customData` of the robot.")
+    data = text_fact("get_data", "The same as `custom_data`, by the older service.")
+    mode = Fact("get_mode", "get_int", lambda it: RobotMode(it.value), "What the controller drives.")
+
+    def __init__(self, robot: str) -> None:
+        super().__init__(robot, "robot")
+
+    def set_custom_data(self, text: str) -> None:
+        """Set the field `customData`, which other robots and the supervisor can read."""
+        self._command("set_custom_data", "set_string", value=text)
+
+    def set_data(self, text: str) -> None:
+        """Set the same field by the older service."""
+        self._command("set_data", "set_string", value=text)
+
+    def set_mode(self, mode: RobotMode, argument: str = "") -> None:
+        """Choose what the controller drives; the stub and MuJoCo know the simulation only.
+
+        Args:
+            mode: the mode.
+            argument: the argument of the robot's remote control, such as an address.
+        """
+        self._command("set_mode", "robot_set_mode", mode=int(mode), arg=list(argument.encode()))
+
+    def urdf(self, prefix: str = "") -> str:
+        """Return the robot as URDF, whose names begin with `prefix`; the stub and MuJoCo write no URDF."""
+        return str(self.call("get_urdf", "get_urdf", prefix=prefix).value)
+
+    def wait_for_input(self, events: InputEvent, timeout_s: float) -> InputEvent:
+        """Wait until a person uses mouse, keyboard or joystick in Webots; return the event.
+
+        In the stub and in MuJoCo nobody can, so they return `InputEvent.NONE` at once.
+
+        Args:
+            events: the events that end the wait.
+            timeout_s: the longest wait in seconds of real time.
+        """
+        name = "wait_for_user_input_event"
+        path, type_name = f"/{self.robot}/robot/{name}", f"webots_ros/robot_{name}"
+        service = RosService(path, type_name, timeout_s + DEADLINE_S)
+        try:
+            answer = service(eventType=int(events), timeout=round(timeout_s * _MS_PER_S))
+        finally:
+            service.close()
+        return InputEvent(answer.event)
+
+    def send_to_window(self, text: str) -> None:
+        """Send a text to the robot's window in Webots; in the stub and in MuJoCo nobody reads it."""
+        self._command("wwi_send_text", "set_string", value=text)
+
+    def receive_from_window(self) -> str:
+        """Return the oldest unread text that the robot's window has sent; "" without one."""
+        return str(self.call("wwi_receive_text", "get_string", ask=True).value)
+
+    def send_as_window(self, text: str) -> None:
+        """Send a text as the robot's window does, in the stub or MuJoCo.
+
+        Raises:
+            WrongData: also if too many texts are unread.
+            SimulatorDead: also in Webots, which does not have this service.
+        """
+        refused = f"the window of {self.robot} has too many unread texts; receive some first"
+        self._services.confirm("palaestra/window/send_text", "set_string", refused, value=text)
