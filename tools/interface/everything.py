@@ -20,7 +20,7 @@ from palaestra_sim.stub.physics import StubPhysics
 ROBOT = "everything"
 _SETTINGS = {
     "Camera": "focus Focus { } zoom Zoom { } recognition Recognition { segmentation TRUE }",
-    "Lidar": "numberOfLayers 2",
+    "Lidar": "numberOfLayers 1",
     "Radar": "minRadialSpeed 0 maxRadialSpeed 0 verticalFieldOfView 1",
 }
 

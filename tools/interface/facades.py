@@ -8,8 +8,17 @@ from typing import Final
 from palaestra_sim.scene.devices import DEVICES
 from tools.interface.everything import device_name
 
-# Programs use these with ROS's own tools.
-WITHOUT: Final = frozenset(("get_loggers", "set_logger_level", "/rosout", "/model_name", "/clock"))
+# These are for ROS's own tools, or do the same as another path.
+WITHOUT: Final = frozenset(
+    (
+        *("get_loggers", "set_logger_level", "/rosout", "/model_name", "/clock"),
+        *("robot/get_data", "robot/set_data"),  # the older names of get_custom_data and set_custom_data
+        "supervisor/simulation_revert",  # the older name of world_reload
+        "supervisor/field/remove_node",  # field/remove removes nodes too
+        "lidar/laser_scan/layer0",  # the older name of laser_scan, which Webots no longer has
+    )
+)
+_NAME: Final = "get_name"  # of a device; a facade is made with this name
 
 # The class of each type of device whose class has another name.
 _CLASSES: Final = {
@@ -22,7 +31,6 @@ _CLASSES: Final = {
 # The members that every class has, by the last part of the path.
 _COMMON: Final = {
     "get_model": "model",
-    "get_name": "device",
     "get_node_type": "node_type",
     "enable": "enable",
     "get_sampling_period": "sampling_period_ms",
@@ -35,11 +43,12 @@ _COMMON: Final = {
     "get_type": "slides",
 }
 _TYPES: Final = ("bool", "int32", "float", "vec2f", "vec3f", "rotation", "color", "string")
+_SHAPES: Final = ("pixel", "line", "rectangle", "oval", "polygon", "text")
 _VERBS: Final = {"get": "get_field", "set": "set_field", "insert": "insert_value"}
 
 _ROBOT: Final = {
     "time_step": "Stepper.step",
-    "get_mode": "RobotController.mode",
+    "get_mode": "RobotController.control_mode",
     "get_supervisor": "RobotController.supervises",
     "get_synchronization": "RobotController.synchronizes",
     "get_model": "RobotController.model",
@@ -52,9 +61,7 @@ _ROBOT: Final = {
     "get_urdf": "RobotController.urdf",
     "get_custom_data": "RobotController.custom_data",
     "set_custom_data": "RobotController.set_custom_data",
-    "get_data": "RobotController.data",
-    "set_data": "RobotController.set_data",
-    "set_mode": "RobotController.set_mode",
+    "set_mode": "RobotController.set_control_mode",
     "wwi_send_text": "RobotController.send_to_window",
     "wwi_receive_text": "RobotController.receive_from_window",
     "get_device_list": "Observer.devices",
@@ -73,7 +80,6 @@ _OURS: Final = {
 _SUPERVISOR: Final = {
     "simulation_quit": "Supervisor.quit",
     "simulation_reset": "Supervisor.reset",
-    "simulation_revert": "Supervisor.reload",
     "simulation_reset_physics": "Supervisor.reset_physics",
     "simulation_get_mode": "Observer.mode",
     "simulation_set_mode": "Supervisor.set_mode",
@@ -106,19 +112,19 @@ _NODE: Final = {
     "get_base_type_name": "WorldNode.base_type_name",
     "get_parent_node": "WorldNode.parent",
     "is_proto": "WorldNode.is_proto",
-    "get_field": "Observer.field",
+    "get_field": "WorldNode.value",
     "get_field_by_index": "WorldNode.fields",
     "get_number_of_fields": "WorldNode.fields",
-    "export_string": "Observer.text",
-    "get_position": "Observer.full_pose",
-    "get_orientation": "Observer.full_pose",
+    "export_string": "WorldNode.text",
+    "get_position": "WorldNode.pose",
+    "get_orientation": "WorldNode.pose",
     "get_pose": "WorldNode.pose_in",
     "enable_pose_tracking": "WorldNode.track_pose",
     "disable_pose_tracking": "WorldNode.track_pose",
     "get_velocity": "Supervisor.velocity",
     "get_center_of_mass": "Observer.center_of_mass",
     "get_static_balance": "Observer.is_balanced",
-    "get_contact_points": "Observer.contact_points",
+    "get_contact_points": "WorldNode.contact_points",
     "enable_contact_points_tracking": "WorldNode.track_contacts",
     "disable_contact_points_tracking": "WorldNode.track_contacts",
     "set_velocity": "Supervisor.set_velocity",
@@ -136,39 +142,38 @@ _NODE: Final = {
 }
 _FIELD: Final = {
     "get_name": "WorldNode.fields",
-    "get_type": "Observer.field_type",
+    "get_type": "WorldNode.value",
     "get_type_name": "WorldNode.fields",
     "get_count": "Observer.length",
     "get_node": "WorldNode.nodes",
     "remove": "Supervisor.remove_value",
     "import_node_from_string": "Supervisor.insert_node",
-    "remove_node": "Supervisor.remove_value",
     "enable_sf_tracking": "Supervisor.track_field",
     "disable_sf_tracking": "Supervisor.track_field",
     **{f"{verb}_{kind}": f"Supervisor.{member}" for verb, member in _VERBS.items() for kind in _TYPES},
 }
-_MOTOR: Final = {
-    **dict.fromkeys(("set_position", "set_velocity", "set_torque", "set_force"), "JointMotor.set"),
-    "set_acceleration": "JointMotor.set_acceleration",
-    "set_control_pid": "JointMotor.set_gains",
-    "get_target_position": "JointMotor.target_position",
-    "get_velocity": "JointMotor.target_velocity",
-    "get_acceleration": "JointMotor.acceleration",
-    "get_multiplier": "JointMotor.multiplier",
-    **dict.fromkeys(("get_min_position", "get_max_position", "get_max_velocity"), "JointMotor.limits"),
-    **dict.fromkeys(("get_max_torque", "get_max_force"), "JointMotor.limits"),
-    **dict.fromkeys(("set_available_torque", "set_available_force"), "JointMotor.set_available_effort"),
-    **dict.fromkeys(("get_available_torque", "get_available_force"), "JointMotor.available_effort"),
-    **{
-        f"{effort}_feedback{path}": f"EffortFeedback.{member}"
-        for effort in ("torque", "force")
-        for path, member in (
-            ("_sensor/enable", "enable"),
-            ("_sensor/get_sampling_period", "sampling_period_ms"),
-            ("", "value"),
-        )
-    },
-}
+
+
+def _motor(effort: str) -> Mapping[str, str]:
+    """Return the members for the paths of a motor; `effort` is "torque" or "force"."""
+    return {
+        **dict.fromkeys(("set_position", "set_velocity", f"set_{effort}"), "JointMotor.set"),
+        "set_acceleration": "JointMotor.set_acceleration",
+        "set_control_pid": "JointMotor.set_gains",
+        "get_target_position": "JointMotor.target_position",
+        "get_velocity": "JointMotor.target_velocity",
+        "get_acceleration": "JointMotor.acceleration",
+        "get_multiplier": "JointMotor.multiplier",
+        **dict.fromkeys(("get_min_position", "get_max_position", "get_max_velocity"), "JointMotor.limits"),
+        f"get_max_{effort}": "JointMotor.limits",
+        f"set_available_{effort}": "JointMotor.set_available_effort",
+        f"get_available_{effort}": "JointMotor.available_effort",
+        f"{effort}_feedback_sensor/enable": "EffortFeedback.enable",
+        f"{effort}_feedback_sensor/get_sampling_period": "EffortFeedback.sampling_period_ms",
+        f"{effort}_feedback": "EffortFeedback.value",
+    }
+
+
 _DEVICES: Final[Mapping[str, Mapping[str, str]]] = {
     "DistanceSensor": {
         "get_min_value": "DistanceSensor.min_value",
@@ -177,15 +182,15 @@ _DEVICES: Final[Mapping[str, Mapping[str, str]]] = {
         "get_type": "DistanceSensor.sensor_type",
     },
     "TouchSensor": {"get_type": "TouchSensor.sensor_type"},
-    "RotationalMotor": _MOTOR,
-    "LinearMotor": _MOTOR,
+    "RotationalMotor": _motor("torque"),
+    "LinearMotor": _motor("force"),
     "GPS": {
         "get_coordinate_system": "GPS.geographic",
         "decimal_degrees_to_degrees_minutes_seconds": "GPS.degrees_minutes_seconds",
         "speed": "GPSSpeed.value",
         "speed_vector": "GPSVelocity.value",
     },
-    "InertialUnit": {"get_noise": "InertialUnit.noise_rad", "quaternion": "InertialUnit.value"},
+    "InertialUnit": {"get_noise": "InertialUnit.noise", "quaternion": "InertialUnit.value"},
     "LED": {"set_led": "LED.set", "get_led": "LED.value"},
     "Brake": {"set_damping_constant": "Brake.set_damping"},
     "Camera": {
@@ -206,6 +211,7 @@ _DEVICES: Final[Mapping[str, Mapping[str, str]]] = {
         "recognition_enable": "RecognizedObjects.enable",
         "recognition_get_sampling_period": "RecognizedObjects.sampling_period_ms",
         "image": "Camera.value",
+        "camera_info": "CameraMatrix.value",
         "recognition_objects": "RecognizedObjects.value",
         "recognition_segmentation_image": "SegmentedImage.value",
     },
@@ -213,10 +219,11 @@ _DEVICES: Final[Mapping[str, Mapping[str, str]]] = {
         "get_info": "RangeFinder.info",
         "save_image": "RangeFinder.save_image",
         "range_image": "RangeFinder.value",
+        "camera_info": "CameraMatrix.value",
     },
     "Radar": {
-        "get_min_range": "Radar.least_m",
-        "get_max_range": "Radar.most_m",
+        "get_min_range": "Radar.min_range_m",
+        "get_max_range": "Radar.max_range_m",
         "get_vertical_fov": "Radar.vertical_field_of_view_rad",
         "get_horizontal_fov": "Radar.field_of_view_rad",
         "targets": "Radar.value",
@@ -275,8 +282,7 @@ _DEVICES: Final[Mapping[str, Mapping[str, str]]] = {
         "get_layer_range_image": "Lidar.layer",
         "get_layer_point_cloud": "LidarPoints.layer",
         "range_image": "Lidar.value",
-        "laser_scan/layer0": "LaserScan.value",
-        "laser_scan/layer1": "LaserScan.value",
+        "laser_scan": "LaserScan.value",
         "point_cloud": "LidarPoints.value",
     },
     "Display": {
@@ -287,11 +293,8 @@ _DEVICES: Final[Mapping[str, Mapping[str, str]]] = {
         "set_color": "Display.set_color",
         "set_alpha": "Display.set_alpha",
         "set_opacity": "Display.set_opacity",
-        **{
-            f"{verb}_{shape}": f"Display.draw_{shape}"
-            for verb in ("draw", "fill")
-            for shape in ("pixel", "line", "rectangle", "oval", "polygon", "text")
-        },
+        **{f"draw_{shape}": f"Display.draw_{shape}" for shape in _SHAPES},
+        **{f"fill_{shape}": f"Display.draw_{shape}" for shape in ("rectangle", "oval", "polygon")},
         "image_new": "Display.draw_image",
         "image_copy": "Display.copy",
         "image_paste": "Display.draw_image",
@@ -331,7 +334,7 @@ _PARTS: Final = {
 
 
 def facade(group: str, path: str) -> str:
-    """Return the member for a path of the world with every device, such as "Camera.info".
+    """Return the member for a path of the world with every device, such as "Camera.info"; "" without one.
 
     Args:
         group: the owner of the path, as `groups` names it.
@@ -340,7 +343,7 @@ def facade(group: str, path: str) -> str:
     Raises:
         KeyError: the path has no facade, and `WITHOUT` does not have it.
     """
-    if path in WITHOUT:
+    if path in WITHOUT or (group in DEVICES and path.endswith(f"/{_NAME}")):
         return ""
     if group in _PARTS:
         return _PARTS[group][path.removeprefix(f"{group}/")]

@@ -15,6 +15,7 @@ PAGE = "docs/reference/ros-interface.md"
 BEGIN = "<!-- generated: services and topics -->"
 _TEST: Final = "test_ros_interface.py"
 _OURS: Final = frozenset(("palaestra",))
+_NOT_IN_WEBOTS: Final = frozenset(("lidar/laser_scan/layer0",))
 _TITLES: Final = {
     "node": "Every node",
     "robot": "Robot",
@@ -63,7 +64,7 @@ def _section(group: str, services: Mapping[str, str], topics: Mapping[str, str])
 def _row(group: str, path: str, type_name: str, md5: str) -> str:
     shown = path.replace(device_name(group), "<name>", 1) if group in DEVICES else path
     states = " | ".join(_state(simulator, path) for simulator in FAILING)
-    webots = "no" if group in _OURS else "yes"
+    webots = "no" if group in _OURS or path in _NOT_IN_WEBOTS else "yes"
     member = facade(group, path)
     python = f"`{member}`" if member else ""
     return f"| `{shown}` | {type_name} | `{md5}` | {python} | {states} | {webots} | {_TEST} |"

@@ -14,7 +14,7 @@ from palaestra_trainer.ros import RosService, RosSubscriber
 from palaestra_trainer.webots import InputEvent, JointMotor, RobotMode, ViewLabel
 from tests.integration.webots.own_world import OwnRobot
 from tools.interface.everything import FAILING, ROBOT, device_name, groups, offered, world
-from tools.interface.facades import WITHOUT, facade
+from tools.interface.facades import facade
 
 STEP_MS = 32
 MOUTH = """DEF MOUTH Robot { name "mouth" controller "ros" translation 0 1 0
@@ -22,12 +22,7 @@ MOUTH = """DEF MOUTH Robot { name "mouth" controller "ros" translation 0 1 0
 DEF PAINTED Pose { children [ DEF SHADED Shape { appearance DEF PAINT PBRAppearance { name "red" }
   geometry DEF ROUND Cylinder { } } Shape { geometry DEF FLAT Plane { size 3 2 } } ] }
 """
-WORLD = world() + MOUTH
-# These paths do the same as others, or only name what a program knows already.
-SAME = {
-    "supervisor/simulation_revert": "supervisor/world_reload",
-    "supervisor/field/remove_node": "supervisor/field/remove",
-}
+WORLD = world() + "Viewpoint { }\n" + MOUTH
 # These calls end or restart a controller, so a separate test makes them.
 ENDING = (
     "supervisor/world_reload",
@@ -50,7 +45,7 @@ SENSORS = (
     *("Lidar", "LidarPoints", "LightSensor", "PositionSensor", "Radar", "Receiver", "TouchSensor"),
     *("ConnectorPresence", "VacuumPresence", "GPSSpeed", "GPSVelocity"),
 )
-RENDERED = ("Camera", "RangeFinder", "RecognizedObjects", "SegmentedImage")
+RENDERED = ("Camera", "CameraMatrix", "RangeFinder", "RecognizedObjects", "SegmentedImage")
 EFFORTS = {"RotationalMotor": "torque", "LinearMotor": "force"}
 NODES = {
     "LaserScan": "Lidar",
@@ -59,6 +54,7 @@ NODES = {
     "VacuumPresence": "VacuumGripper",
     "GPSSpeed": "GPS",
     "GPSVelocity": "GPS",
+    "CameraMatrix": "Camera",
     "RecognizedObjects": "Camera",
     "SegmentedImage": "Camera",
 }
@@ -79,15 +75,15 @@ class EveryDevice(OwnRobot):
         for kind in ("BatterySensor", "Keyboard"):
             self.of[kind] = getattr(facades, kind)(name)
         self.of["Joystick"] = facades.Joystick(name, axes=6, povs=1)
-        self.second = facades.LaserScan(name, "lidar", layer=1)
+        self.depth_matrix = facades.CameraMatrix(name, "range_finder")
         self.feedback, self.motors = {}, {}
         for node, effort in EFFORTS.items():
             self.feedback[node] = facades.EffortFeedback(name, device_name(node), effort)
             for command in ("position", "velocity", effort):
                 self.motors[node, command] = JointMotor(name, device_name(node), command)
-        sensors = [*(it for kind, it in self.of.items() if kind not in RENDERED), self.second]
+        sensors = [it for kind, it in self.of.items() if kind not in RENDERED]
         if self.renders:
-            sensors += [*(self.of[kind] for kind in RENDERED), *self.feedback.values()]
+            sensors += [*(self.of[kind] for kind in RENDERED), self.depth_matrix, *self.feedback.values()]
         outputs = (
             "Brake",
             "Connector",
@@ -159,14 +155,14 @@ class Everything:
         call = CALLS.get(path) or CALLS.get(member)
         if call is not None:
             return call(self)
-        found = getattr(self._facade(kind, group, path), name)
+        found = getattr(self._facade(kind, group), name)
         return found() if callable(found) else found
 
     def begin(self, group, path):
         """Use a path that fails; for `use`, a sensor was enabled when the robot connected."""
         kind, _, name = facade(group, path).partition(".")
         if name == "enable":
-            return self._facade(kind, group, path).enable(STEP_MS)
+            return self._facade(kind, group).enable(STEP_MS)
         return self.use(group, path)
 
     def uses(self, path):
@@ -176,7 +172,7 @@ class Everything:
 
     def close(self):
         """Close the facades that do not belong to the robot."""
-        rendered = [self.robot.of[kind] for kind in RENDERED]
+        rendered = [*(self.robot.of[kind] for kind in RENDERED), self.robot.depth_matrix]
         for each in (self.controller, *self.robot.feedback.values(), *rendered):
             each.close()
 
@@ -184,13 +180,11 @@ class Everything:
         """Return the path of a file that a simulator writes."""
         return self.folder / name
 
-    def _facade(self, kind, group, path):
+    def _facade(self, kind, group):
         if kind == "EffortFeedback":
             return self.robot.feedback[group]
         if kind == "JointMotor":
             return self.robot.motors[group, "position"]
-        if path.endswith("layer1"):
-            return self.robot.second
         return self.others.get(kind) or self.robot.of[kind]
 
 
@@ -202,7 +196,7 @@ def rows(simulator):
         for paths in (survey.services, survey.topics)
         for group, found in groups(paths).items()
         for path in found
-        if path not in {*WITHOUT, *ENDING, *SAME, *FAILING[simulator]} and not path.endswith("/get_name")
+        if facade(group, path) and path not in {*ENDING, *FAILING[simulator]}
     ]
 
 
@@ -279,31 +273,24 @@ def image_of_segments(it):
     """Disable and enable the image of the recognized objects."""
     sensor = it.robot.of["SegmentedImage"]
     sensor.disable()
-    if not it.robot.renders:
-        return
-    it.robot.of["Camera"].enable(STEP_MS)
-    sensor.enable(STEP_MS)
+    if it.robot.renders:
+        sensor.enable(STEP_MS)
 
 
 CALLS = {
     "Stepper.step": lambda it: it.robot.advance(),
     "RobotController.wait_for_input": lambda it: it.controller.wait_for_input(InputEvent.KEYBOARD, 0.1),
     "RobotController.set_custom_data": lambda it: it.controller.set_custom_data("seven"),
-    "RobotController.set_data": lambda it: it.controller.set_data("eight"),
-    "RobotController.set_mode": lambda it: it.controller.set_mode(RobotMode.SIMULATION),
+    "RobotController.set_control_mode": lambda it: it.controller.set_control_mode(RobotMode.SIMULATION),
     "RobotController.send_to_window": lambda it: it.controller.send_to_window("here"),
     "RobotController.send_as_window": lambda it: it.controller.send_as_window("there"),
     "Observer.find": lambda it: (it.observer.forget_handles(), it.observer.find("BOX"), it.observer.find("")),
     "Observer.with_id": lambda it: it.observer.with_id(it.box.id),
     "Observer.find_device": lambda it: it.observer.find_device("gps"),
-    "Observer.field": lambda it: it.observer.find("").nodes(),
-    "Observer.field_type": lambda it: it.observer.find("").nodes(),
+    "WorldNode.value": lambda it: it.box.value("translation"),
     "Observer.length": lambda it: it.observer.length("", "children"),
-    "Observer.text": lambda it: it.observer.text("BOX"),
-    "Observer.full_pose": lambda it: it.observer.full_pose("BOX"),
     "Observer.center_of_mass": lambda it: it.observer.center_of_mass("BOX"),
     "Observer.is_balanced": lambda it: it.observer.is_balanced("BOX"),
-    "Observer.contact_points": lambda it: it.observer.contact_points("BOX"),
     "WorldNode.nodes": lambda it: it.observer.find("").nodes(),
     "WorldNode.pose_in": lambda it: it.box.pose_in(it.own),
     "WorldNode.track_pose": lambda it: (it.box.track_pose(it.own, STEP_MS), it.box.track_pose(it.own, 0)),
@@ -317,7 +304,7 @@ CALLS = {
     ),
     "Supervisor.add_torque": supervisor("add_torque", "ROBOT", (0.0, 0.0, 0.0)),
     "Supervisor.look_at": supervisor("look_at", "BOX"),
-    "Supervisor.set_visible": supervisor("set_visible", "BOX", "ROBOT", visible=False),
+    "Supervisor.set_visible": supervisor("set_visible", "BOX", visible=False),
     "Supervisor.remove_node": removed,
     "Supervisor.stop_inertia": supervisor("stop_inertia", "BOX"),
     "Supervisor.save_state": supervisor("save_state", "BOX", "there"),

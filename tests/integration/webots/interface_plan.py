@@ -111,7 +111,7 @@ ANSWERS = {
     "camera/recognition_is_segmentation_enabled": {"value": False},
     "range_finder/get_info": {"width": 64, "height": 64, "Fov": 0.7854, "minRange": 0.01, "maxRange": 1.0},
     "radar/get_max_range": {"value": 50.0},
-    "lidar/get_info": {"horizontalResolution": 512, "numberOfLayers": 2, "minRange": 0.01, "maxRange": 1.0},
+    "lidar/get_info": {"horizontalResolution": 512, "numberOfLayers": 1, "minRange": 0.01, "maxRange": 1.0},
     "lidar/get_frequency_info": {"frequency": 10.0, "minFrequency": 1.0, "maxFrequency": 25.0},
     "emitter/get_channel": {"value": 0},
     "emitter/get_range": {"value": 0.0},

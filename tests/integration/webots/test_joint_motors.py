@@ -2,7 +2,7 @@
 
 import pytest
 
-from palaestra_trainer.errors import WrongData
+from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.webots import EffortFeedback, JointMotor, MotorLimits
 from tests.integration.webots.own_world import OwnRobot, running
 from tests.values.worlds import PHYSICS, Setting, robot
@@ -37,7 +37,7 @@ def lever(request, master, tmp_path):
 
 def test_a_motor_has_the_limits_of_the_world_and_takes_others(lever):
     """A controller scales its commands with them."""
-    assert lever.arm.limits() == MotorLimits(
+    assert lever.arm.limits == MotorLimits(
         min_position=-1.0, max_position=2.0, max_velocity=3.0, max_effort=40.0
     )
     lever.arm.set(0.5)
@@ -45,7 +45,7 @@ def test_a_motor_has_the_limits_of_the_world_and_takes_others(lever):
     lever.arm.set_available_effort(40.0)
 
     assert lever.arm.target_position == 0.5
-    with pytest.raises(WrongData, match=r"arm.* available_torque"):
+    with pytest.raises(ConfigurationError, match="arm: the torque 41 is refused; use 0 to 40"):
         lever.arm.set_available_effort(41.0)
 
 

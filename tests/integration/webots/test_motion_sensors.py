@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.errors import ConfigurationError, WorldMisfit
 from palaestra_trainer.webots import (
     GPS,
     Accelerometer,
@@ -15,6 +15,7 @@ from palaestra_trainer.webots import (
     Gyro,
     InertialUnit,
     JointMotor,
+    LaserScan,
     LightSensor,
 )
 from tests.integration.webots.own_world import OwnRobot, running
@@ -146,3 +147,37 @@ def test_a_gps_measures_the_velocity_in_the_axes_of_the_world(master, tmp_path, 
     expected = [SPEED_M_S * -math.sin(0.5), SPEED_M_S * math.cos(0.5), 0.0]
     assert speed == pytest.approx(SPEED_M_S, abs=1e-3)
     assert velocity == pytest.approx(expected, abs=1e-3)
+
+
+GLOBE = 'gpsCoordinateSystem "WGS84" gpsReference 46.5 6.5 400'
+
+
+class Located(OwnRobot):
+    """A robot with a GPS, and with a lidar of several layers that a test adds later."""
+
+    definition = "R"
+
+    def equip(self):
+        """Add the GPS."""
+        self.gps = GPS(self.node_name, "gps")
+        self.simulation.add([self.gps], [])
+
+
+@pytest.mark.parametrize("driver", PHYSICS)
+def test_a_gps_on_the_globe_is_read_in_degrees(master, tmp_path, driver):
+    """In such a world, Webots publishes another type of message. At the origin, the reference is read."""
+    del master
+    text = Setting(driver).text(robot('GPS { name "gps" } Lidar { name "lidar" numberOfLayers 2 }'), GLOBE)
+    with running(text, tmp_path, driver, Located) as (_, located):
+        located.advance()
+        geographic, (latitude, longitude, altitude) = located.gps.geographic, located.gps.value
+        scan = LaserScan(located.node_name, "lidar")
+        with pytest.raises(WorldMisfit, match="lidar has 2 layers, and only a lidar with one layer"):
+            located.simulation.use(scan)
+        located.connect()  # a second time, as after a restart
+        located.advance()
+
+    assert geographic
+    assert (latitude, longitude) == pytest.approx((46.5, 6.5), abs=1e-6)
+    assert altitude == pytest.approx(400.0)
+    assert located.gps.value[0] == pytest.approx(46.5, abs=1e-6)

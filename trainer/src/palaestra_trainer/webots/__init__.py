@@ -8,9 +8,7 @@ from palaestra_trainer.ros import ensure_node
 from palaestra_trainer.webots.attached import Attached
 from palaestra_trainer.webots.cameras import (
     Camera,
-    LaserScan,
-    Lidar,
-    LidarPoints,
+    CameraMatrix,
     RangeFinder,
     RecognizedObject,
     RecognizedObjects,
@@ -31,6 +29,7 @@ from palaestra_trainer.webots.facade import Webots
 from palaestra_trainer.webots.inputs import Joystick, JoystickState, Keyboard
 from palaestra_trainer.webots.joint_motor import (
     Command,
+    CommandedDevice,
     EffortFeedback,
     JointMotor,
     set_commands,
@@ -48,6 +47,7 @@ from palaestra_trainer.webots.lenses import (
     RangeFinderInfo,
     ZoomInfo,
 )
+from palaestra_trainer.webots.lidars import LaserScan, Lidar, LidarPoints
 from palaestra_trainer.webots.motion_sensors import (
     GPS,
     Accelerometer,
@@ -96,7 +96,9 @@ __all__ = [
     "Brake",
     "Camera",
     "CameraInfo",
+    "CameraMatrix",
     "Command",
+    "CommandedDevice",
     "Compass",
     "Connector",
     "ConnectorPresence",

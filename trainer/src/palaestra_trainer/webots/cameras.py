@@ -1,4 +1,4 @@
-"""The sensors of a robot whose readings are arrays: cameras, depth cameras and lidars.
+"""Cameras and depth cameras: their images as arrays, and the objects in them.
 
 An array is valid until the next step, which writes the next array into the same memory; see `image_decoding`.
 """
@@ -6,24 +6,24 @@ An array is valid until the next step, which writes the next array into the same
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from palaestra_protocol.ros.rostypes import message_type
-from palaestra_trainer.errors import NoReading, WorldMisfit, WrongData
-from palaestra_trainer.webots.device import Fact, flag_fact, number_fact
+from palaestra_trainer.errors import ConfigurationError, NoReading, SimulatorFault, WorldMisfit, WrongData
+from palaestra_trainer.webots.device import flag_fact, number_fact
 from palaestra_trainer.webots.devices import NodeSensor
-from palaestra_trainer.webots.image_decoding import ImageReading, PointsReading, RangesReading
+from palaestra_trainer.webots.image_decoding import ImageReading, RangesReading
 from palaestra_trainer.webots.lenses import (
     CAMERA_INFO,
     FOCUS_INFO,
-    LIDAR_FREQUENCY,
-    LIDAR_INFO,
     RANGE_FINDER_INFO,
     ZOOM_INFO,
 )
+
+_BEST_QUALITY: Final = 100
 
 
 class _Rendered(NodeSensor):
@@ -41,6 +41,12 @@ class _Rendered(NodeSensor):
         )
 
     def _save(self, service: str, path: str | Path, quality: int) -> None:
+        if not 1 <= quality <= _BEST_QUALITY:
+            raise ConfigurationError(f"{self.device}: quality {quality} is refused; use 1 to {_BEST_QUALITY}")
+        if not self.sampling_period_ms:
+            raise NoReading(
+                f"{self.device} is not enabled, so it has no image; add it to the simulation first"
+            )
         self._command(service, "save_image", filename=str(path), quality=quality)
 
     def _array(self) -> NDArray[Any]:
@@ -57,6 +63,7 @@ class Camera(_Rendered):
     """
 
     __slots__ = ()
+    nodes = ("Camera",)
     info = CAMERA_INFO
     focus = FOCUS_INFO
     zoom = ZOOM_INFO
@@ -95,7 +102,13 @@ class Camera(_Rendered):
         self._require_kept("focal distance", distance_m, self.focus.distance_m)
 
     def set_exposure(self, exposure: float) -> None:
-        """Set the exposure, in J/m2; the stub and MuJoCo keep it, but their images do not depend on it."""
+        """Set the exposure, in J/m2; the stub and MuJoCo keep it, but their images do not depend on it.
+
+        Raises:
+            ConfigurationError: it is negative; Webots would ignore it.
+        """
+        if not exposure >= 0.0:
+            raise ConfigurationError(f"{self.device}: the exposure {exposure:g} is refused; use 0 or more")
         self._command("set_exposure", "set_float", value=exposure)
 
     def save_image(self, path: str | Path, quality: int = 90) -> None:
@@ -106,7 +119,9 @@ class Camera(_Rendered):
             quality: 1 to 100, for JPEG.
 
         Raises:
-            WrongData: also if the camera is not enabled, or the simulator cannot write the file.
+            NoReading: the camera is not enabled.
+            ConfigurationError: the quality is out of range.
+            WrongData: also if the simulator cannot write the file.
         """
         self._save("save_image", path, quality)
 
@@ -135,6 +150,7 @@ class _Recognition(_Rendered):
     """Something that a camera with a Recognition node publishes."""
 
     __slots__ = ()
+    nodes = ("Camera",)
     recognizes = flag_fact("has_recognition", "Whether the camera has a Recognition node.")
 
     def enable(self, period_ms: int) -> None:
@@ -145,12 +161,22 @@ class _Recognition(_Rendered):
             WrongData, SimulatorDead, SimulatorHung: as `Sensor.enable`.
         """
         if not self.recognizes:
-            raise WorldMisfit(self.robot, f"{self.device} has no Recognition node; add one in the world")
+            raise self._without_recognition()
         if not self._enable(value=period_ms).success:
             raise self._refused(period_ms)
         self._recognize(period_ms)
         self._values.connect()  # only now, because Webots advertises the topic after `recognition_enable`
         self.late = False
+
+    def explained(self, fault: SimulatorFault) -> SimulatorFault:
+        """Return the reason of a fault: the world may have no Recognition node, or no camera."""
+        reason = super().explained(fault)
+        if reason is not fault or fault.__class__ is WorldMisfit or self.recognizes:
+            return reason
+        return self._without_recognition()
+
+    def _without_recognition(self) -> WorldMisfit:
+        return WorldMisfit(self.robot, f"{self.device} has no Recognition node; add one in the world")
 
     def _recognize(self, period_ms: int) -> None:
         refused = f"{self.device} refuses recognition"
@@ -168,6 +194,11 @@ class RecognizedObjects(_Recognition):
     def __init__(self, robot: str, device: str) -> None:
         super().__init__(robot, device, "webots_ros/RecognitionObjects", _objects, "recognition_objects")
         self._period = "recognition_get_sampling_period"
+
+    def disable(self) -> None:
+        """Disable the recognition, but not the camera, and unsubscribe."""
+        self._recognize(0)
+        self.close()
 
 
 class SegmentedImage(_Recognition):
@@ -188,9 +219,9 @@ class SegmentedImage(_Recognition):
         self._period = "recognition_get_sampling_period"
 
     def disable(self) -> None:
-        """Disable the segmentation and the camera, and unsubscribe."""
+        """Disable the segmentation, but neither recognition nor camera, and unsubscribe."""
         self.call("recognition_disable_segmentation", "get_bool", ask=True)
-        super().disable()
+        self.close()
 
     def save_image(self, path: str | Path, quality: int = 90) -> None:
         """Save the last image as a file; see `Camera.save_image`."""
@@ -224,6 +255,33 @@ def _xyz(vector: Any) -> tuple[float, float, float]:
     return vector.x, vector.y, vector.z
 
 
+class CameraMatrix(_Rendered):
+    """The projection of a camera or depth camera; `value` is its read-only matrix: shape (3, 3), float64.
+
+    The matrix has the focal lengths and the image center in pixels, as ROS's tools use them. This sensor also
+    enables the camera.
+    """
+
+    __slots__ = ()
+    nodes = ("Camera", "RangeFinder")
+
+    def __init__(self, robot: str, device: str) -> None:
+        super().__init__(robot, device, "sensor_msgs/CameraInfo", _matrix, "camera_info")
+
+
+def _matrix(message: bytes | memoryview) -> NDArray[np.float64]:
+    """Return the matrix of a sensor_msgs/CameraInfo.
+
+    Raises:
+        ValueError: a number is not finite.
+    """
+    matrix = np.array(message_type("sensor_msgs/CameraInfo").codec.decode(message).K, np.float64)
+    if not np.isfinite(matrix).all():
+        raise ValueError(f"{matrix} in a camera's matrix")
+    matrix.flags.writeable = False
+    return matrix.reshape(3, 3)
+
+
 class RangeFinder(_Rendered):
     """A depth camera; `value` is a read-only array of meters: shape (height, width), float32.
 
@@ -231,6 +289,7 @@ class RangeFinder(_Rendered):
     """
 
     __slots__ = ()
+    nodes = ("RangeFinder",)
     info = RANGE_FINDER_INFO
 
     def __init__(self, robot: str, device: str) -> None:
@@ -252,115 +311,3 @@ class RangeFinder(_Rendered):
             NoReading: before the first step.
         """
         return self._array()
-
-
-class _LidarSensor(NodeSensor):
-    """Something that a lidar publishes; every method may raise SimulatorDead, SimulatorHung or WrongData."""
-
-    __slots__ = ()
-    info = LIDAR_INFO
-    frequency = LIDAR_FREQUENCY
-
-    def set_frequency(self, frequency_hz: float) -> None:
-        """Set the rotations per second of the head, within the limits of `frequency`.
-
-        Raises:
-            WrongData: also if the simulator ignores the value.
-        """
-        self._command("set_frequency", "set_float", value=frequency_hz)
-        self._require_kept("frequency", frequency_hz, self.frequency.frequency_hz)
-
-
-class Lidar(_LidarSensor):
-    """A lidar; `value` is a read-only array of meters: shape (layers, rays), float32.
-
-    An infinite value means that no object is in range. The layers are ordered from the top down. The rays of
-    a layer are ordered from left to right.
-    """
-
-    __slots__ = ()
-
-    def __init__(self, robot: str, device: str) -> None:
-        super().__init__(robot, device, "sensor_msgs/Image", RangesReading(device), "range_image")
-
-    def layer(self, number: int) -> NDArray[np.float32]:
-        """Request the distances of one layer: shape (rays,), float32, in meters.
-
-        Raises:
-            WrongData: also if the lidar has no such layer.
-        """
-        image = self.call("get_layer_range_image", "lidar_get_layer_range_image", layer=number).image
-        return np.frombuffer(bytes(image.data), "<f4")
-
-
-class LaserScan(_LidarSensor):
-    """One layer of a lidar; `value` is a read-only array of meters: shape (rays,), float32.
-
-    This sensor reads a sensor_msgs/LaserScan, as ROS's tools do. Its rays are ordered as those of `Lidar`. It
-    also enables the lidar.
-
-    Args:
-        robot: the ROS name of the robot's controller.
-        device: the lidar's name in the world.
-        layer: the number of the layer; 0 is the highest one.
-    """
-
-    __slots__ = ()
-
-    def __init__(self, robot: str, device: str, layer: int = 0) -> None:
-        super().__init__(robot, device, "sensor_msgs/LaserScan", _ranges, f"laser_scan/layer{layer}")
-
-
-def _ranges(message: bytes | memoryview) -> NDArray[np.float32]:
-    """Return the distances of a sensor_msgs/LaserScan.
-
-    Raises:
-        ValueError: a distance is negative or NaN.
-    """
-    ranges = np.array(message_type("sensor_msgs/LaserScan").codec.decode(message).ranges, np.float32)
-    if not (ranges >= 0.0).all():  # this form of the comparison refuses NaN too
-        raise ValueError("a distance that is negative or NaN")
-    ranges.flags.writeable = False
-    return ranges
-
-
-class LidarPoints(_LidarSensor):
-    """The point cloud of a lidar; this sensor also enables the lidar.
-
-    A robot may have a `Lidar` of the same device in addition. `value` is a read-only array: shape (layers *
-    rays, 3), float32, with x, y and z in meters in the lidar's frame. The values of a ray without a hit are
-    infinite.
-    """
-
-    __slots__ = ()
-    enabled = Fact(
-        "is_point_cloud_enabled",
-        "node_get_status",
-        lambda response: bool(response.status),
-        "Whether the lidar sends its point cloud.",
-    )
-
-    def __init__(self, robot: str, device: str) -> None:
-        super().__init__(robot, device, "sensor_msgs/PointCloud2", PointsReading(device), "point_cloud")
-
-    def enable(self, period_ms: int) -> None:
-        """Enable the lidar and its point cloud.
-
-        Raises:
-            WrongData: the period is not a multiple of the step.
-            SimulatorDead, SimulatorHung: as `RosService`.
-        """
-        super().enable(period_ms)
-        if not self.call("enable_point_cloud", "set_bool", value=True).success:
-            raise WrongData(
-                self.robot, f"{self.device} refuses to send a point cloud; use its ranges instead"
-            )
-
-    def layer(self, number: int) -> NDArray[np.float32]:
-        """Request the points of one layer: shape (rays, 3), float32; see `value`.
-
-        Raises:
-            WrongData: also if the lidar has no such layer, or is not enabled.
-        """
-        cloud = self.call("get_layer_point_cloud", "lidar_get_layer_point_cloud", layer=number).pointCloud
-        return np.array([(point.x, point.y, point.z) for point in cloud.points], np.float32).reshape(-1, 3)

@@ -34,8 +34,9 @@ class Radar(NodeSensor):
     """A radar; `value` is a tuple with a `RadarTarget` for each target in range."""
 
     __slots__ = ("_targets", "_unread")
-    least_m = number_fact("get_min_range", "The least distance of a target, in meters.")
-    most_m = number_fact("get_max_range", "The greatest distance of a target, in meters.")
+    nodes = ("Radar",)
+    min_range_m = number_fact("get_min_range", "The least distance of a target, in meters.")
+    max_range_m = number_fact("get_max_range", "The greatest distance of a target, in meters.")
     field_of_view_rad = number_fact("get_horizontal_fov", "The horizontal field of view, in rad.")
     vertical_field_of_view_rad = number_fact("get_vertical_fov", "The vertical field of view, in rad.")
 
@@ -128,6 +129,7 @@ class Receiver(NodeSensor):
     """
 
     __slots__ = ("_fresh",)
+    nodes = ("Receiver",)
     queue_length = whole_fact("get_queue_length", "The number of packets in the queue.")
     channel = whole_fact("get_channel", "The channel; -1 means all channels.")
 

@@ -1,13 +1,15 @@
-"""What all devices of a robot share: their services, and the facts that the robot's controller returns.
+"""Devices of a robot: their services, and the facts that the robot's controller returns.
 
 A fact is declared in one line: the name of a service, and the meaning of the value with its unit.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, Generic, Never, Self, TypeVar, overload
+from collections.abc import Callable, Sequence
+from typing import Any, ClassVar, Generic, Never, Self, TypeVar, overload
 
+from palaestra_trainer.errors import SimulatorDead, SimulatorFault, WorldMisfit
+from palaestra_trainer.webots.node_types import NODE_TYPES
 from palaestra_trainer.webots.services import Services
 
 Value = TypeVar("Value")
@@ -31,9 +33,11 @@ class Device:
     Attributes:
         robot: see above.
         device: see above.
+        nodes: the types of nodes that the class is for; empty if it is not for nodes of Webots.
     """
 
     __slots__ = ("_path", "_services", "device", "robot")
+    nodes: ClassVar[tuple[str, ...]] = ()
 
     def __init__(self, robot: str, device: str) -> None:
         self.robot = robot
@@ -54,15 +58,55 @@ class Device:
             request: the fields of the request.
 
         Raises:
+            WorldMisfit: the device is another type of node in the world.
             SimulatorDead, SimulatorHung, WrongData: as `RosService`.
         """
-        return self._services.get(f"{self._path}/{service}", type_name)(**request)
+        try:
+            return self._services.get(f"{self._path}/{service}", type_name)(**request)
+        except SimulatorDead as error:
+            raise self.explained(error) from None
+
+    def ask_once(self, service: str, type_name: str) -> Any:
+        """Call a service without arguments as `call` does, without a connection that stays open."""
+        try:
+            return self._services.call_once(f"{self._path}/{service}", type_name, ask=True)
+        except SimulatorDead as error:
+            raise self.explained(error) from None
+
+    def explained(self, fault: SimulatorFault) -> SimulatorFault:
+        """Return the reason of a fault: a `WorldMisfit` if the device is another node in the world.
+
+        Such a device lacks some of the services, which otherwise looks like a simulator that has died.
+        """
+        found = self._node_in_world() if self.nodes else ""
+        if not found or found in self._wanted_nodes():
+            return fault
+        wanted = " or ".join(self._wanted_nodes())
+        return WorldMisfit(
+            self.robot,
+            f"{self.device} is a {found} in the world, and {type(self).__name__} is for a {wanted};"
+            f" use the class for a {found}, or name another device",
+        )
+
+    def _wanted_nodes(self) -> tuple[str, ...]:
+        return self.nodes
+
+    def _node_in_world(self) -> str:
+        """Return the type of the device's node; "" if it is not known."""
+        try:
+            answer = self._services.call_once(f"{self._path}/get_node_type", "get_int", ask=True)
+        except SimulatorFault:
+            return ""
+        return NODE_TYPES.get(int(answer.value), "")
 
     def _command(self, service: str, type_name: str, **request: Any) -> None:
         """Call a service of the device that only confirms; see `Services.confirm`."""
         given = ", ".join(f"{field} {value!r}" for field, value in request.items())
         refused = f"{self.device} refuses {service} with {given}"
-        self._services.confirm(f"{self._path}/{service}", type_name, refused, **request)
+        try:
+            self._services.confirm(f"{self._path}/{service}", type_name, refused, **request)
+        except SimulatorDead as error:
+            raise self.explained(error) from None
 
     def _require_kept(self, what: str, wanted: float, actual: float) -> None:
         """Check that the simulator has set a value that it confirmed; see `Services.require_kept`."""
@@ -72,7 +116,8 @@ class Device:
 class Fact(Generic[Value]):
     """An attribute of a device whose value the controller returns; each use sends one request.
 
-    Using it may raise SimulatorDead, SimulatorHung or WrongData, as `RosService`.
+    No connection stays open. Using it may raise WorldMisfit, SimulatorDead, SimulatorHung or WrongData, as
+    `Device.call`.
 
     Args:
         service: the name of the service, below the name of the device.
@@ -86,9 +131,14 @@ class Fact(Generic[Value]):
 
     def __init__(self, service: str, type_name: str, read: Callable[[Any], Value], doc: str) -> None:
         self.service = service
+        self._name = service
         self._type_name = type_name
         self._read = read
         self.__doc__ = doc
+
+    def __set_name__(self, owner: type[Device], name: str) -> None:
+        """Note the name of the attribute for errors."""
+        self._name = name
 
     @overload
     def __get__(self, device: None, owner: type[Device]) -> Self: ...
@@ -100,13 +150,11 @@ class Fact(Generic[Value]):
         """Return the value; on a class, return this declaration."""
         if device is None:
             return self
-        return self._read(device.call(self.service, self._type_name, ask=True))
+        return self._read(device.ask_once(self.service, self._type_name))
 
     def __set__(self, device: Device, value: Never) -> None:
         """Refuse: the value belongs to the simulator."""
-        raise AttributeError(
-            f"{self.service} of {device.device} cannot be set; the class has methods that set"
-        )
+        raise AttributeError(f"{self._name} of {device.device} is read-only")
 
 
 def number_fact(service: str, doc: str) -> Fact[float]:
@@ -137,6 +185,16 @@ def lookup_table_fact() -> Fact[tuple[tuple[float, float, float], ...]]:
         _rows,
         "The rows of the lookup table: a measured value, the output for it, and the noise. Empty: no table.",
     )
+
+
+def named(service: str, names: Sequence[str], doc: str) -> Fact[str]:
+    """Declare a fact whose number, of the type webots_ros/get_int, is the place of a name."""
+
+    def name_of(response: Any) -> str:
+        number = int(response.value)
+        return names[number] if 0 <= number < len(names) else f"unknown type {number}"
+
+    return Fact(service, "get_int", name_of, doc)
 
 
 def _rows(response: Any) -> tuple[tuple[float, float, float], ...]:

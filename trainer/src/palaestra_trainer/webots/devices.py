@@ -12,10 +12,10 @@ from palaestra_trainer.ros.service import DEADLINE_S
 from palaestra_trainer.waiting.greenlets import let_others
 from palaestra_trainer.webots.device import (
     Device,
-    Fact,
     JointDevice,
     NodeDevice,
     lookup_table_fact,
+    named,
     number_fact,
     text_fact,
 )
@@ -125,7 +125,7 @@ class Sensor(Device):
         return not self.late
 
     def disable(self) -> None:
-        """Disable the sensor and unsubscribe.
+        """Disable the sensor and unsubscribe; this ends other sensors of the same device too.
 
         Raises:
             SimulatorDead, SimulatorHung, WrongData: as `RosService`; the subscription then stays.
@@ -154,11 +154,9 @@ class DistanceSensor(NodeSensor):
     min_value = number_fact("get_min_value", "The least output of the lookup table.")
     max_value = number_fact("get_max_value", "The greatest output of the lookup table.")
     aperture_rad = number_fact("get_aperture", "The opening angle of the cone of rays, in rad.")
-    sensor_type = Fact(
-        "get_type",
-        "get_int",
-        lambda response: _TYPES[response.value],
-        'The type of the sensor: "generic", "infra-red", "sonar" or "laser".',
+    nodes = ("DistanceSensor",)
+    sensor_type = named(
+        "get_type", _TYPES, 'The type of the sensor: "generic", "infra-red", "sonar" or "laser".'
     )
 
     def __init__(self, robot: str, device: str) -> None:
@@ -169,6 +167,7 @@ class PositionSensor(NodeSensor, JointDevice):
     """A sensor for the position of a joint; `value` is in radians or meters."""
 
     __slots__ = ()
+    nodes = ("PositionSensor",)
     motor_name = text_fact("get_motor_name", 'The name of the motor on the same joint; "" without a motor.')
     brake_name = text_fact("get_brake_name", 'The name of the brake on the same joint; "" without a brake.')
 
@@ -177,7 +176,7 @@ class PositionSensor(NodeSensor, JointDevice):
 
 
 class Motor(MotorDevice):
-    """A motor under velocity control.
+    """A motor under velocity control, such as that of a wheel.
 
     Args:
         robot: the ROS name of the robot's controller.

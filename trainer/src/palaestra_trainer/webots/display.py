@@ -27,6 +27,7 @@ class Display(OutputDevice):
     """
 
     __slots__ = ()
+    nodes = ("Display",)
     size = Fact(
         "get_info",
         "display_get_info",

@@ -59,6 +59,20 @@ def turn_about_z(heading_rad: float) -> dict[str, float]:
     return _quaternion((0.0, 0.0, 1.0, heading_rad))
 
 
+def applied_quaternion(x: float, y: float, z: float, w: float) -> dict[str, float]:
+    """Return a quaternion of any length as a unit quaternion, in a form that Webots applies even for 0.
+
+    Raises:
+        ConfigurationError: all of its numbers are 0, or one is not finite.
+    """
+    length = math.hypot(x, y, z, w)
+    if not (length > 0.0 and math.isfinite(length)):
+        raise ConfigurationError(f"({x:g}, {y:g}, {z:g}, {w:g}) is no rotation; give a quaternion x, y, z, w")
+    sine = math.hypot(x, y, z) / length
+    axis = (x, y, z) if sine else (0.0, 0.0, 1.0)
+    return _quaternion((*axis, 2.0 * math.atan2(sine, w / length)))
+
+
 def _exactly(*types: type) -> Callable[[Any], Any]:
     """Return a check that accepts only these exact types, because a bool must not count as a number."""
 

@@ -154,9 +154,13 @@ class Joystick(_Input):
             WorldMisfit: the joystick has fewer axes.
             SimulatorDead, SimulatorHung, WrongData: as `RosService` and `RosSubscriber`.
         """
-        axes = self.number_of_axes
+        axes = int(self.call("get_number_of_axes", "get_int", ask=True).value)
         if 0 <= axes < self._axes:
             raise WorldMisfit(self.robot, f"the joystick has {axes} axes; use Joystick(..., axes={axes})")
+        povs = self.number_of_povs if len(self._topics) > self._axes else axes
+        if 0 <= povs < len(self._topics) - self._axes:
+            fact = f"the joystick has {povs} hat switches; use Joystick(..., povs={povs})"
+            raise WorldMisfit(self.robot, fact)
         for topic in self._topics:
             if axes >= 0 and not topic.connected:
                 topic.connect()

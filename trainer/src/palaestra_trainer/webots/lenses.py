@@ -1,4 +1,4 @@
-"""What cameras, depth cameras and lidars return about their optics."""
+"""The optics of cameras, depth cameras and lidars."""
 
 from __future__ import annotations
 
@@ -29,21 +29,21 @@ class FocusInfo(NamedTuple):
     Attributes:
         focal_length_m: focal length in meters.
         distance_m: the distance at which objects are sharp, in meters.
-        most_m: the greatest such distance.
-        least_m: the least such distance.
+        min_distance_m: the least such distance.
+        max_distance_m: the greatest such distance.
     """
 
     focal_length_m: float
     distance_m: float
-    most_m: float
-    least_m: float
+    min_distance_m: float
+    max_distance_m: float
 
 
 class ZoomInfo(NamedTuple):
     """The fields of view that a camera can have, in rad; both are the present one without a Zoom node."""
 
-    least_rad: float
-    most_rad: float
+    min_rad: float
+    max_rad: float
 
 
 class RangeFinderInfo(NamedTuple):
@@ -53,15 +53,15 @@ class RangeFinderInfo(NamedTuple):
         width: width in pixels.
         height: height in pixels.
         field_of_view_rad: horizontal field of view, in rad.
-        least_m: the least distance that is measured, in meters.
-        most_m: the greatest distance that is measured, in meters.
+        min_range_m: the least distance that is measured, in meters.
+        max_range_m: the greatest distance that is measured, in meters.
     """
 
     width: int
     height: int
     field_of_view_rad: float
-    least_m: float
-    most_m: float
+    min_range_m: float
+    max_range_m: float
 
 
 class LidarInfo(NamedTuple):
@@ -72,61 +72,68 @@ class LidarInfo(NamedTuple):
         layers: the number of layers.
         field_of_view_rad: horizontal field of view, in rad.
         vertical_field_of_view_rad: vertical field of view, in rad.
-        least_m: the least distance that is measured, in meters.
-        most_m: the greatest distance that is measured, in meters.
+        min_range_m: the least distance that is measured, in meters.
+        max_range_m: the greatest distance that is measured, in meters.
     """
 
     rays: int
     layers: int
     field_of_view_rad: float
     vertical_field_of_view_rad: float
-    least_m: float
-    most_m: float
+    min_range_m: float
+    max_range_m: float
 
 
 class LidarFrequency(NamedTuple):
     """The rotations per second of a lidar's head: now, and the least and the greatest possible number."""
 
     frequency_hz: float
-    least_hz: float
-    most_hz: float
+    min_hz: float
+    max_hz: float
 
 
 CAMERA_INFO: Final = Fact(
     "get_info",
     "camera_get_info",
-    lambda it: CameraInfo(it.width, it.height, it.Fov, it.nearRange),
+    lambda info: CameraInfo(info.width, info.height, info.Fov, info.nearRange),
     "The size and field of view of the image: a `CameraInfo`.",
 )
 FOCUS_INFO: Final = Fact(
     "get_focus_info",
     "camera_get_focus_info",
-    lambda it: FocusInfo(it.focalLength, it.focalDistance, it.maxFocalDistance, it.minFocalDistance),
+    lambda info: FocusInfo(
+        info.focalLength, info.focalDistance, info.minFocalDistance, info.maxFocalDistance
+    ),
     "The focus and its limits: a `FocusInfo`.",
 )
 ZOOM_INFO: Final = Fact(
     "get_zoom_info",
     "camera_get_zoom_info",
-    lambda it: ZoomInfo(it.minFov, it.maxFov),
+    lambda info: ZoomInfo(info.minFov, info.maxFov),
     "The limits of the field of view: a `ZoomInfo`.",
 )
 RANGE_FINDER_INFO: Final = Fact(
     "get_info",
     "range_finder_get_info",
-    lambda it: RangeFinderInfo(it.width, it.height, it.Fov, it.minRange, it.maxRange),
+    lambda info: RangeFinderInfo(info.width, info.height, info.Fov, info.minRange, info.maxRange),
     "The size, field of view and range of the image: a `RangeFinderInfo`.",
 )
 LIDAR_INFO: Final = Fact(
     "get_info",
     "lidar_get_info",
-    lambda it: LidarInfo(
-        it.horizontalResolution, it.numberOfLayers, it.fov, it.verticalFov, it.minRange, it.maxRange
+    lambda info: LidarInfo(
+        info.horizontalResolution,
+        info.numberOfLayers,
+        info.fov,
+        info.verticalFov,
+        info.minRange,
+        info.maxRange,
     ),
     "The number of rays, the fields of view and the range: a `LidarInfo`.",
 )
 LIDAR_FREQUENCY: Final = Fact(
     "get_frequency_info",
     "lidar_get_frequency_info",
-    lambda it: LidarFrequency(it.frequency, it.minFrequency, it.maxFrequency),
+    lambda info: LidarFrequency(info.frequency, info.minFrequency, info.maxFrequency),
     "The rotations per second of the head: a `LidarFrequency`.",
 )

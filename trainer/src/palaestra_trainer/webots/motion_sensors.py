@@ -6,6 +6,7 @@ import math
 from typing import ClassVar, Final
 
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.ros import RosSubscriber
 from palaestra_trainer.webots.device import Fact, lookup_table_fact, number_fact
 from palaestra_trainer.webots.devices import NodeSensor, Sensor
 from palaestra_trainer.webots.message_decoding import FLOAT64, POINT, NumberReading, PickedReading
@@ -14,6 +15,8 @@ AXES: Final = "xyz"
 _IMU: Final = "37d"  # sensor_msgs/Imu: orientation, turning rate and acceleration, each with a covariance
 _FIELD: Final = "12d"  # sensor_msgs/MagneticField: x, y, z, and a covariance
 _ILLUMINANCE: Final = "2d"  # sensor_msgs/Illuminance: the reading, and a variance
+# sensor_msgs/NavSatFix: status, service, latitude, longitude, altitude, a covariance and its type
+_NAV_SAT_FIX: Final = "bH12dB"
 _WGS84: Final = 1  # the number of the coordinate system; 0 is the world's own. Source: webots/gps.h
 _ORIENTATION, _RATE, _ACCELERATION = 0, 13, 25  # positions of the first numbers in sensor_msgs/Imu
 
@@ -50,6 +53,7 @@ class Compass(_AxesSensor):
     """A compass; `value` is the direction of north in the sensor's axes: x, y, z of a unit vector."""
 
     __slots__ = ()
+    nodes = ("Compass",)
     type_name = "sensor_msgs/MagneticField"
     codes = _FIELD
 
@@ -58,6 +62,7 @@ class Gyro(_AxesSensor):
     """A gyro; `value` is the turning rate about the sensor's axes in rad/s: x, y, z."""
 
     __slots__ = ()
+    nodes = ("Gyro",)
     type_name = "sensor_msgs/Imu"
     codes = _IMU
     first = _RATE
@@ -70,6 +75,7 @@ class Accelerometer(_AxesSensor):
     """
 
     __slots__ = ()
+    nodes = ("Accelerometer",)
     type_name = "sensor_msgs/Imu"
     codes = _IMU
     first = _ACCELERATION
@@ -82,7 +88,8 @@ class GPS(NodeSensor):
     in meters.
     """
 
-    __slots__ = ()
+    __slots__ = ("_fix",)
+    nodes = ("GPS",)
     geographic = Fact(
         "get_coordinate_system",
         "get_int",
@@ -93,6 +100,20 @@ class GPS(NodeSensor):
     def __init__(self, robot: str, device: str) -> None:
         reading = PickedReading(device, POINT, (0, 1, 2))
         super().__init__(robot, device, "geometry_msgs/PointStamped", reading, "values")
+        self._fix = False
+
+    def enable(self, period_ms: int) -> None:
+        """Make the GPS publish every `period_ms` of simulated time, and subscribe to its topic.
+
+        Raises:
+            WrongData, SimulatorDead, SimulatorHung: as `Sensor.enable`.
+        """
+        if self.geographic and not self._fix:
+            # In such a world, the topic has another type.
+            reading = PickedReading(self.device, _NAV_SAT_FIX, (2, 3, 4))
+            self._values = RosSubscriber(self._values.name, "sensor_msgs/NavSatFix", reading)
+            self._fix = True
+        super().enable(period_ms)
 
     def degrees_minutes_seconds(self, angle_deg: float) -> str:
         """Return an angle, such as a latitude, as text with degrees, minutes and seconds.
@@ -100,8 +121,11 @@ class GPS(NodeSensor):
         The simulator rounds toward zero, and computes with the precision of float32.
 
         Raises:
+            ConfigurationError: the angle is not finite.
             SimulatorDead, SimulatorHung, WrongData: as `RosService`.
         """
+        if not math.isfinite(angle_deg):
+            raise ConfigurationError(f"{self.device}: {angle_deg:g} is no angle; give degrees")
         name = "decimal_degrees_to_degrees_minutes_seconds"
         return str(self.call(name, f"gps_{name}", decimalDegrees=angle_deg).degreesMinutesSeconds)
 
@@ -110,6 +134,7 @@ class GPSSpeed(NodeSensor):
     """The speed that a GPS measures; `value` is in m/s. This sensor also enables the GPS."""
 
     __slots__ = ()
+    nodes = ("GPS",)
 
     def __init__(self, robot: str, device: str) -> None:
         reading = NumberReading(device, FLOAT64)
@@ -123,6 +148,7 @@ class GPSVelocity(NodeSensor):
     """
 
     __slots__ = ()
+    nodes = ("GPS",)
 
     def __init__(self, robot: str, device: str) -> None:
         reading = PickedReading(device, POINT, (0, 1, 2))
@@ -133,7 +159,10 @@ class InertialUnit(NodeSensor):
     """An inertial unit; `value` is the rotation of the sensor in the world as a quaternion: x, y, z, w."""
 
     __slots__ = ()
-    noise_rad = number_fact("get_noise", "The standard deviation of the noise on each angle, in rad.")
+    nodes = ("InertialUnit",)
+    noise = number_fact(
+        "get_noise", "The standard deviation of the noise about each axis, as a fraction of pi."
+    )
 
     def __init__(self, robot: str, device: str) -> None:
         picked = tuple(range(_ORIENTATION, _ORIENTATION + 4))
@@ -160,6 +189,7 @@ class Altimeter(NodeSensor):
     """An altimeter; `value` is the height of the sensor in the world, in meters."""
 
     __slots__ = ()
+    nodes = ("Altimeter",)
 
     def __init__(self, robot: str, device: str) -> None:
         super().__init__(robot, device, "webots_ros/Float64Stamped", NumberReading(device, FLOAT64))
@@ -169,6 +199,7 @@ class LightSensor(NodeSensor):
     """A light sensor; `value` is the output of its lookup table, or W/m2 if the table is empty."""
 
     __slots__ = ()
+    nodes = ("LightSensor",)
     lookup_table = lookup_table_fact()
 
     def __init__(self, robot: str, device: str) -> None:
@@ -177,7 +208,7 @@ class LightSensor(NodeSensor):
 
 
 class BatterySensor(Sensor):
-    """The battery of a robot, without a node in the world; `value` is its energy in J.
+    """The battery of a robot; `value` is its energy in J, or -1 for a robot without a battery.
 
     Args:
         robot: the ROS name of the robot's controller.

@@ -1,10 +1,14 @@
-"""What every motor has besides its commands: limits, settings, and the state that its controller returns."""
+"""The limits and settings of motors, and the state that their controller returns."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
+from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.webots.device import JointDevice, number_fact, text_fact
+
+NO_LIMIT = -1.0  # of an acceleration
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,6 +35,7 @@ class MotorDevice(JointDevice):
     """
 
     __slots__ = ()
+    nodes = ("RotationalMotor", "LinearMotor")
     target_position = number_fact("get_target_position", "The position that was set last, in rad or m.")
     target_velocity = number_fact("get_velocity", "The velocity that was set last, in rad/s or m/s.")
     acceleration = number_fact(
@@ -47,8 +52,9 @@ class MotorDevice(JointDevice):
         """The torque or force that the motor may use, in N m or N."""
         return self._number(f"get_available_{self._effort()}")
 
+    @property
     def limits(self) -> MotorLimits:
-        """Return the limits of the motor."""
+        """The limits of the motor."""
         return MotorLimits(
             min_position=self._number("get_min_position"),
             max_position=self._number("get_max_position"),
@@ -57,21 +63,47 @@ class MotorDevice(JointDevice):
         )
 
     def set_acceleration(self, acceleration: float) -> None:
-        """Set the greatest acceleration under position and velocity control; -1 means without a limit."""
+        """Set the greatest acceleration under position and velocity control; -1 means without a limit.
+
+        Raises:
+            ConfigurationError: it is neither -1 nor 0 or more; Webots would ignore it.
+        """
+        if not (math.isfinite(acceleration) and (acceleration >= 0.0 or acceleration == NO_LIMIT)):
+            raise ConfigurationError(
+                f"{self.device}: the acceleration {acceleration:g} is refused; use 0 or more, or -1 for no"
+                " limit"
+            )
         self._command("set_acceleration", "set_float", value=acceleration)
 
     def set_available_effort(self, effort: float) -> None:
-        """Set the torque or force that the motor may use, from 0 to `limits().max_effort`.
+        """Set the torque or force that the motor may use, from 0 to `limits.max_effort`.
 
         Raises:
-            WrongData: also if the simulator ignores the value.
+            ConfigurationError: it is outside of this range; Webots would use the limit instead.
+            WrongData: also in the stub, if it is neither 0 nor the limit.
         """
-        name = f"available_{self._effort()}"
+        effort_name = self._effort()
+        most = self._number(f"get_max_{effort_name}")
+        if not 0.0 <= effort <= most:
+            raise ConfigurationError(
+                f"{self.device}: the {effort_name} {effort:g} is refused; use 0 to {most:g}"
+            )
+        name = f"available_{effort_name}"
         self._command(f"set_{name}", "set_float", value=effort)
         self._require_kept(name, effort, self._number(f"get_{name}"))
 
     def set_gains(self, proportional: float, integral: float = 0.0, derivative: float = 0.0) -> None:
-        """Set the gains of the position control, which turns an error of position into a velocity."""
+        """Set the gains of the position control, which turns an error of position into a velocity.
+
+        Raises:
+            ConfigurationError: the first gain is not positive, or another one is negative; Webots would
+                ignore them.
+        """
+        if not (proportional > 0.0 and integral >= 0.0 and derivative >= 0.0):
+            raise ConfigurationError(
+                f"{self.device}: the gains {proportional:g}, {integral:g}, {derivative:g} are refused; use a"
+                " positive first gain, and 0 or more for the others"
+            )
         gains = {"controlp": proportional, "controli": integral, "controld": derivative}
         self._command("set_control_pid", "motor_set_control_pid", **gains)
 
@@ -79,4 +111,4 @@ class MotorDevice(JointDevice):
         return "force" if self.slides else "torque"
 
     def _number(self, service: str) -> float:
-        return float(self.call(service, "get_float", ask=True).value)
+        return float(self.ask_once(service, "get_float").value)

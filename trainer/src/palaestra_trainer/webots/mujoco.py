@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from palaestra_protocol.ros.rostypes import message_type
 from palaestra_trainer.webots.devices import NodeSensor
-from palaestra_trainer.webots.joint_motor import JointMotor
+from palaestra_trainer.webots.joint_motor import CommandedDevice
 
 _FOLDER: Final = "mujoco/"
 _TYPE: Final = "std_msgs/Float64MultiArray"
@@ -35,7 +35,7 @@ class MujocoSensor(NodeSensor):
         super().__init__(robot, f"{_FOLDER}{sensor}", _TYPE, read_numbers)
 
 
-class MujocoActuator(JointMotor):
+class MujocoActuator(CommandedDevice):
     """An actuator without an equivalent motor in Webots, such as a muscle; `set` takes MuJoCo's control.
 
     The simulator clips the control to the actuator's `ctrlrange`.

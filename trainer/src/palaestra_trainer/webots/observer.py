@@ -117,7 +117,7 @@ class Observer:
 
         The position is x, y, z in meters. The rotation is a quaternion: x, y, z, w.
         """
-        return self._pose_of(self.node(name), name)
+        return self.find(name).pose()
 
     def contact_points(self, name: str) -> tuple[Vector, ...]:
         """Return the points at which the node with DEF `name`, or a part of it, touches other objects.
@@ -125,9 +125,7 @@ class Observer:
         The points are x, y, z in meters, in the world. The stub and MuJoCo report no points on a floor. The
         stub reports only the points of robots.
         """
-        service = self._services.get("supervisor/node/get_contact_points", "node_get_contact_points")
-        found = service(node=self.node(name), include_descendants=True).contact_points
-        return tuple((it.point.x, it.point.y, it.point.z) for it in found)
+        return self.find(name).contact_points()
 
     def type_name(self, name: str) -> str:
         """Return the type of the node with DEF `name`, such as Solid, or the name of its PROTO."""
@@ -135,8 +133,7 @@ class Observer:
 
     def text(self, name: str) -> str:
         """Return the node with DEF `name` as text of a world file, with its current fields."""
-        service = self._services.get("supervisor/node/export_string", "node_get_string")
-        return str(service(node=self.node(name)).value)
+        return self.find(name).text()
 
     def device_pose(self, device: str) -> tuple[Vector, Quaternion]:
         """Return position and rotation, in the world, of a device of the supervisor; see `full_pose`.
@@ -144,7 +141,7 @@ class Observer:
         Raises:
             WrongData: also if the supervisor's robot has no such device.
         """
-        return self._pose_of(self.find_device(device).handle, device)
+        return self.find_device(device).pose()
 
     def center_of_mass(self, name: str) -> Vector:
         """Return the center of mass, in meters in the world, of the Solid with DEF `name` and its parts."""
@@ -290,13 +287,6 @@ class Observer:
             self._services.get("supervisor/node/get_position", "node_get_position"),
             self._services.get("supervisor/node/get_orientation", "node_get_orientation"),
         )
-
-    def _pose_of(self, node: int, name: str) -> tuple[Vector, Quaternion]:
-        at, turn = (service(node=node) for service in self._pose_services())
-        position = at.position.x, at.position.y, at.position.z
-        rotation = turn.orientation.x, turn.orientation.y, turn.orientation.z, turn.orientation.w
-        self._services.require_finite(f"the pose of {name}", *position, *rotation)
-        return position, rotation
 
     def _read(self, kind: type[_Data], path: str, most_bytes: int) -> _Data:
         text = self._services.ask(path, "get_string")

@@ -37,6 +37,7 @@ class LED(OutputDevice):
     """
 
     __slots__ = ()
+    nodes = ("LED",)
     value = whole_fact("get_led", "The value that was set last.")
 
     def set(self, value: int) -> None:
@@ -51,6 +52,7 @@ class Brake(OutputDevice, JointDevice):
     """
 
     __slots__ = ()
+    nodes = ("Brake",)
     motor_name = text_fact("get_motor_name", 'The name of the motor on the same joint; "" without a motor.')
     position_sensor_name = text_fact(
         "get_position_sensor_name", 'The name of the position sensor on the same joint; "" without one.'
@@ -74,6 +76,7 @@ class Pen(OutputDevice):
     """
 
     __slots__ = ()
+    nodes = ("Pen",)
 
     def write(self, *, on: bool) -> None:
         """Lower the pen if `on`, else lift it."""
@@ -91,6 +94,7 @@ class Connector(OutputDevice):
     """
 
     __slots__ = ()
+    nodes = ("Connector",)
     locked = flag_fact("is_locked", "Whether the connector is locked, with or without a partner.")
 
     def lock(self) -> None:
@@ -109,6 +113,7 @@ class ConnectorPresence(NodeSensor):
     """
 
     __slots__ = ()
+    nodes = ("Connector",)
 
     def __init__(self, robot: str, device: str) -> None:
         reading = NumberReading(device, INT8)
@@ -125,6 +130,7 @@ class VacuumGripper(OutputDevice):
     """
 
     __slots__ = ()
+    nodes = ("VacuumGripper",)
     on = flag_fact("is_on", "Whether the gripper is switched on.")
 
     def turn_on(self) -> None:
@@ -140,6 +146,7 @@ class VacuumPresence(NodeSensor):
     """The sensor in a vacuum gripper; `value` is True if an object is in reach."""
 
     __slots__ = ()
+    nodes = ("VacuumGripper",)
 
     def __init__(self, robot: str, device: str) -> None:
         reading = NumberReading(device, BOOL)
@@ -155,6 +162,7 @@ class Emitter(OutputDevice):
     """
 
     __slots__ = ()
+    nodes = ("Emitter",)
     channel = whole_fact("get_channel", "The channel.")
     range_m = number_fact("get_range", "The range in meters; -1 means without a limit.")
     buffer_bytes = whole_fact("get_buffer_size", "The size of the buffer in bytes; -1 means without a limit.")
@@ -189,6 +197,7 @@ class Speaker(OutputDevice):
     """
 
     __slots__ = ()
+    nodes = ("Speaker",)
     engine = text_fact("get_engine", 'The program that speaks: "pico" or "microsoft".')
     language = text_fact("get_language", 'The language in which it speaks, such as "en-US".')
     speaking = flag_fact("is_speaking", "Whether the loudspeaker speaks.")

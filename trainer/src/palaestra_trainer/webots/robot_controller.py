@@ -1,19 +1,21 @@
-"""What the controller of a robot knows about the robot, and its data, window and inputs."""
+"""The controller of a robot: facts about the robot, its data, window and inputs."""
 
 from __future__ import annotations
 
 import enum
 from typing import Final
 
+from palaestra_trainer.errors import ConfigurationError, SimulatorDead
 from palaestra_trainer.ros import RosService
 from palaestra_trainer.ros.service import DEADLINE_S
 from palaestra_trainer.webots.device import Device, Fact, flag_fact, text_fact
 
 _MS_PER_S: Final = 1000.0
+_LONGEST_WAIT_S: Final = 3600.0
 
 
 class RobotMode(enum.IntEnum):
-    """What a controller drives. Source: webots/robot.h."""
+    """The robot that a controller controls: simulated or real. Source: webots/robot.h."""
 
     SIMULATION = 0
     CROSS_COMPILATION = 1
@@ -21,7 +23,7 @@ class RobotMode(enum.IntEnum):
 
 
 class InputEvent(enum.IntFlag):
-    """What a person does in Webots. Source: webots/robot.h."""
+    """Inputs of a person in Webots. Source: webots/robot.h."""
 
     NONE = 0
     MOUSE_CLICK = 1
@@ -50,9 +52,13 @@ class RobotController(Device):
     project_path = text_fact(
         "get_project_path", "The folder of the world's project on the simulator's machine."
     )
-    custom_data = text_fact("get_custom_data", "The field `customData` of the robot.")
-    data = text_fact("get_data", "The same as `custom_data`, by the older service.")
-    mode = Fact("get_mode", "get_int", lambda it: RobotMode(it.value), "What the controller drives.")
+    custom_data = text_fact(
+        "get_custom_data",
+        "The field `customData` of the robot; a reset of an environment writes its seed to the supervisor's.",
+    )
+    control_mode = Fact(
+        "get_mode", "get_int", lambda response: RobotMode(response.value), "The robot that is controlled."
+    )
 
     def __init__(self, robot: str) -> None:
         super().__init__(robot, "robot")
@@ -61,12 +67,8 @@ class RobotController(Device):
         """Set the field `customData`, which other robots and the supervisor can read."""
         self._command("set_custom_data", "set_string", value=text)
 
-    def set_data(self, text: str) -> None:
-        """Set the same field by the older service."""
-        self._command("set_data", "set_string", value=text)
-
-    def set_mode(self, mode: RobotMode, argument: str = "") -> None:
-        """Choose what the controller drives; the stub and MuJoCo know the simulation only.
+    def set_control_mode(self, mode: RobotMode, argument: str = "") -> None:
+        """Choose the robot that is controlled; the stub and MuJoCo have the simulated robot only.
 
         Args:
             mode: the mode.
@@ -85,8 +87,14 @@ class RobotController(Device):
 
         Args:
             events: the events that end the wait.
-            timeout_s: the longest wait in seconds of real time.
+            timeout_s: the longest wait in seconds of real time, at most an hour.
+
+        Raises:
+            ConfigurationError: the timeout is negative or longer.
+            SimulatorDead: also if Webots ends during the wait.
         """
+        if not 0.0 <= timeout_s <= _LONGEST_WAIT_S:
+            raise ConfigurationError(f"a timeout of {timeout_s:g} s; use 0 to {_LONGEST_WAIT_S:g} s")
         name = "wait_for_user_input_event"
         path, type_name = f"/{self.robot}/robot/{name}", f"webots_ros/robot_{name}"
         service = RosService(path, type_name, timeout_s + DEADLINE_S)
@@ -94,6 +102,8 @@ class RobotController(Device):
             answer = service(eventType=int(events), timeout=round(timeout_s * _MS_PER_S))
         finally:
             service.close()
+        if answer.event < 0:
+            raise SimulatorDead(self.robot, "Webots ends")
         return InputEvent(answer.event)
 
     def send_to_window(self, text: str) -> None:

@@ -32,6 +32,14 @@ class Services:
         """Call a service without arguments, and return the `value` of its response."""
         return self.get(path, type_name)(ask=True).value
 
+    def call_once(self, path: str, type_name: str, **request: Any) -> Any:
+        """Call a service and return its response, without a connection that stays open."""
+        service = RosService(f"/{self.node_name}/{path}", f"webots_ros/{type_name}")
+        try:
+            return service(**request)
+        finally:
+            service.close()
+
     def confirm(self, path: str, type_name: str, refused: str, **request: Any) -> None:
         """Call a service whose response only confirms the request.
 

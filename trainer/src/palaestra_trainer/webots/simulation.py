@@ -96,7 +96,7 @@ class Stepper:
         if self._connected:
             try:
                 require_devices(sensor.robot, [sensor.device] if sensor.listed else [])
-                sensor.enable(self.period_ms)
+                self._enable(sensor)
             except SimulatorFault:
                 sensor.close()
                 raise
@@ -148,7 +148,7 @@ class Stepper:
         self._require_all()
         self._tracked = dict.fromkeys(self._tracked)
         for sensor in self._sensors:
-            sensor.enable(self.period_ms)
+            self._enable(sensor)
         self._release_motors()
         self._connected = True
 
@@ -193,6 +193,12 @@ class Stepper:
         parts: tuple[RosService | Sensor | Actuator, ...] = (*self._steps, *self._sensors, *self._motors)
         for part in parts:
             part.close()
+
+    def _enable(self, sensor: Sensor) -> None:
+        try:
+            sensor.enable(self.period_ms)
+        except SimulatorFault as fault:
+            raise sensor.explained(fault) from fault
 
     def _require_all(self) -> None:
         wanted: dict[str, list[str]] = {}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from palaestra_trainer.webots.device import whole_fact
+from palaestra_trainer.webots.fields import applied_quaternion
 from palaestra_trainer.webots.outputs import OutputDevice
 
 Vector = tuple[float, float, float]
@@ -16,6 +17,7 @@ class Skin(OutputDevice):
     """
 
     __slots__ = ()
+    nodes = ("Skin",)
     bone_count = whole_fact("get_bone_count", "The number of bones.")
 
     def bone_name(self, bone: int) -> str:
@@ -42,8 +44,8 @@ class Skin(OutputDevice):
         )
 
     def set_bone_orientation(self, bone: int, rotation: Quaternion, *, absolute: bool = False) -> None:
-        """Turn a bone to a quaternion x, y, z, w; see `bone_pose`."""
-        wanted = dict(zip("xyzw", rotation, strict=True))
+        """Turn a bone to a quaternion x, y, z, w of any length; see `bone_pose`."""
+        wanted = applied_quaternion(*rotation)
         self._command(
             "set_bone_orientation",
             "skin_set_bone_orientation",

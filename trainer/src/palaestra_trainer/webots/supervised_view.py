@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Final
 
-from palaestra_trainer.errors import WrongData
+from palaestra_trainer.errors import ConfigurationError, WrongData
 from palaestra_trainer.webots.observer import Observer
 from palaestra_trainer.webots.services import Services
 from palaestra_trainer.webots.view_settings import MovieSettings, ViewLabel
+
+_VIEWERS: Final = ("Viewpoint", "Camera", "Lidar", "RangeFinder")
 
 
 class SupervisedView:
@@ -30,8 +33,14 @@ class SupervisedView:
             name: the DEF name of the node.
             viewer: the DEF name of a Viewpoint, Camera, Lidar or RangeFinder; "": the world's Viewpoint.
             visible: whether the viewer shows the node.
+
+        Raises:
+            ConfigurationError: the viewer is another node.
         """
         source = self._observer.node(viewer) if viewer else self._viewpoint()
+        kind = self._observer.find(viewer).base_type_name if viewer else "Viewpoint"
+        if kind not in _VIEWERS:
+            raise ConfigurationError(f"{viewer} is a {kind}; give the DEF name of a {', '.join(_VIEWERS)}")
         wanted = {"node": self._observer.node(name), "from": source, "visible": visible}
         self._confirm("node/set_visibility", "node_set_visibility", name, **wanted)
 

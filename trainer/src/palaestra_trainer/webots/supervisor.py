@@ -10,7 +10,7 @@ from palaestra_trainer.ros import call_together
 from palaestra_trainer.webots.fields import Value, encoded, kind_of, turn_about_z
 from palaestra_trainer.webots.observer import Mode, Observer
 from palaestra_trainer.webots.supervised_view import SupervisedView
-from palaestra_trainer.webots.world_node import Vector
+from palaestra_trainer.webots.world_node import Vector, tracks
 
 
 class Supervisor(SupervisedView):
@@ -138,7 +138,7 @@ class Supervisor(SupervisedView):
         0 ends this. The stub and MuJoCo confirm the call, and are as fast without it.
         """
         where, handle = f"{name}.{field}", self._observer.field(name, field)
-        if period_ms:
+        if tracks(period_ms):
             wanted = {"field": handle, "sampling_period": period_ms}
             self._confirm("field/enable_sf_tracking", "field_enable_sf_tracking", where, **wanted)
         else:

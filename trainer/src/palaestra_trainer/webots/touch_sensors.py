@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar, Final
 
 from palaestra_trainer.errors import WorldMisfit
-from palaestra_trainer.webots.device import Fact, lookup_table_fact
+from palaestra_trainer.webots.device import lookup_table_fact, named
 from palaestra_trainer.webots.devices import NodeSensor
 from palaestra_trainer.webots.message_decoding import BOOL, FLOAT64, NumberReading, PickedReading
 
@@ -18,11 +18,9 @@ class _TouchSensor(NodeSensor):
 
     __slots__ = ()
     lookup_table = lookup_table_fact()
-    sensor_type = Fact(
-        "get_type",
-        "get_int",
-        lambda response: _TYPES[response.value],
-        'The type of the sensor in the world: "bumper", "force" or "force-3d".',
+    nodes = ("TouchSensor",)
+    sensor_type = named(
+        "get_type", _TYPES, 'The type of the sensor in the world: "bumper", "force" or "force-3d".'
     )
     reads: ClassVar[str]
 
@@ -35,11 +33,12 @@ class _TouchSensor(NodeSensor):
         """
         found = self.sensor_type
         if found != self.reads:
-            raise WorldMisfit(
+            misfit = WorldMisfit(
                 self.robot,
-                f'{self.device} has the type "{found}", which {_CLASSES[found]} reads; use that class, or'
-                f' set the type "{self.reads}" in the world',
+                f'{self.device} has the type "{found}", which {_CLASSES.get(found, "no class")} reads; use'
+                f' that class, or set the type "{self.reads}" in the world',
             )
+            raise self.explained(misfit)
         super().enable(period_ms)
 
 

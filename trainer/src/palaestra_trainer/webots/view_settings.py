@@ -1,4 +1,4 @@
-"""What a supervisor shows over the view of a world, and how it records the view."""
+"""Labels over the view of a world, and the settings of its recordings."""
 
 from __future__ import annotations
 

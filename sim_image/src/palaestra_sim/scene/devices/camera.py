@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from palaestra_sim.ros_interfaces import Fields, Handler, Row
 from palaestra_sim.scene.camera_interface import CameraInterface, Lens
-from palaestra_sim.scene.devices.camera_common import picture_topic, read_lens, saver
+from palaestra_sim.scene.devices.camera_common import picture_topic, projection_topic, read_lens, saver
 from palaestra_sim.scene.devices.device_type import Carrier, DevicePart, DeviceTopic, DeviceType, Stream
 from palaestra_sim.scene.devices.recognition import (
     Recognition,
@@ -180,7 +180,7 @@ def _exposure_setter(camera: Camera) -> Handler:
 
 
 def _topics(camera: Camera) -> tuple[DeviceTopic, ...]:
-    return (picture_topic("image", camera, camera.lens, "bgra8"),)
+    return picture_topic("image", camera, camera.lens, "bgra8"), projection_topic(camera.lens)
 
 
 CAMERA: Final = DeviceType(

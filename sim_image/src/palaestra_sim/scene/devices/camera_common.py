@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, Final
 
 from palaestra_sim.ros_interfaces import Fields, Handler
@@ -40,6 +42,36 @@ def picture_topic(
         constants=constants,
         reading="data",
         many=many,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Projection:
+    """The projection of a lens; `value` has the fields of sensor_msgs/CameraInfo.
+
+    Source: RosRangeFinder.cpp of Webots.
+    """
+
+    lens: Lens
+
+    @property
+    def value(self) -> Fields:
+        width, height = self.lens.size
+        focal = width / (2.0 * math.tan(self.lens.field_of_view_rad / 2.0))
+        center_x, center_y = (width + 1.0) / 2.0, (height + 1.0) / 2.0
+        return {
+            "height": height,
+            "width": width,
+            "K": (focal, 0.0, center_x, 0.0, focal, center_y, 0.0, 0.0, 1.0),
+            "R": (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0),
+            "P": (focal, 0.0, center_x, 0.0, 0.0, focal, center_y, 0.0, 0.0, 0.0, 1.0, 0.0),
+        }
+
+
+def projection_topic(lens: Lens) -> DeviceTopic:
+    """Return the topic of the projection, which ROS's tools for images need."""
+    return DeviceTopic(
+        name="camera_info", type_name="sensor_msgs/CameraInfo", source=_Projection(lens), whole=True
     )
 
 

@@ -21,6 +21,7 @@ from palaestra_sim.scene.geometry import Vector
 from palaestra_sim.scene.utm import UtmZone
 
 _LOCAL, _WGS84 = 0, 1  # the values that `get_coordinate_system` returns
+_GPS_SERVICE = 1  # SERVICE_GPS of sensor_msgs/NavSatStatus
 _NOWHERE: Final = (math.nan, math.nan, math.nan)
 _MOST_LATITUDE, _MOST_LONGITUDE = 84.0, 180.0  # in degrees; the zones of UTM end at these values
 
@@ -177,12 +178,32 @@ def _in_degrees_minutes_seconds(request: Any) -> dict[str, Any]:
     return {"degreesMinutesSeconds": f"{degrees}° {minutes}\u2032 {seconds}\u2033"}
 
 
+@dataclass(frozen=True, slots=True)
+class _Fix:
+    """The position of a GPS in degrees; `value` has the fields of sensor_msgs/NavSatFix."""
+
+    gps: Gps
+
+    @property
+    def value(self) -> Fields:
+        latitude, longitude, altitude = self.gps.value
+        return {
+            "status": {"service": _GPS_SERVICE},
+            "latitude": latitude,
+            "longitude": longitude,
+            "altitude": altitude,
+        }
+
+
 def _topics(gps: Gps) -> tuple[DeviceTopic, ...]:
     point = "geometry_msgs/PointStamped"
+    values = DeviceTopic(name="values", type_name=point, source=gps)
+    if gps.globe is not None:
+        values = DeviceTopic(name="values", type_name="sensor_msgs/NavSatFix", source=_Fix(gps), whole=True)
     # Webots leaves the frame_id of the speed empty.
     no_frame: Fields = {"header": {}}
     return (
-        DeviceTopic(name="values", type_name=point, source=gps),
+        values,
         DeviceTopic(
             name="speed", type_name="webots_ros/Float64Stamped", source=gps.speed, constants=no_frame
         ),

@@ -11,7 +11,7 @@ from typing import Final
 
 from palaestra_sim.ros_interfaces import Fields, Row
 from palaestra_sim.scene.camera_interface import CameraInterface, Lens
-from palaestra_sim.scene.devices.camera_common import picture_topic, read_lens, saver
+from palaestra_sim.scene.devices.camera_common import picture_topic, projection_topic, read_lens, saver
 from palaestra_sim.scene.devices.device_type import Carrier, DevicePart, DeviceTopic, DeviceType
 from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.old_axes import looking
@@ -106,7 +106,7 @@ def _services(finder: RangeFinder) -> tuple[Row, ...]:
 
 
 def _topics(finder: RangeFinder) -> tuple[DeviceTopic, ...]:
-    return (picture_topic("range_image", finder, finder.lens, "32FC1"),)
+    return picture_topic("range_image", finder, finder.lens, "32FC1"), projection_topic(finder.lens)
 
 
 RANGE_FINDER: Final = DeviceType(
