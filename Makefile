@@ -33,7 +33,7 @@ endif
 .venv/ready: requirements.lock $(PACKAGES:%=%/pyproject.toml) tools/setup.sh $(WEBOTS_ROS)
 	@tools/setup.sh
 
-test-packages: .venv/test-packages ## install what only tests need from the distribution: ROS, a compiler, OpenGL
+test-packages: .venv/test-packages ## install what only tests need from the distribution: ROS, a compiler, OpenGL, a browser
 
 .venv/test-packages: .venv/ready tools/test-packages.sh
 	@tools/test-packages.sh

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import itertools
 import json
-import shutil
 import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 from urllib.request import urlopen
 
 from websocket import WebSocket, create_connection
@@ -17,13 +16,15 @@ from websocket import WebSocket, create_connection
 from tests.waiting import eventually
 
 DEADLINE_S = 60.0
-PROGRAM = next((found for name in ("chromium", "google-chrome") if (found := shutil.which(name))), None)
+PROGRAM: Final = "chromium"
 # The browser must not contact update servers, accounts or any other host.
 QUIET = (
-    *("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"),
+    *("--headless", "--no-sandbox", "--disable-quic", "--no-first-run"),
     *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
     *("--remote-debugging-port=0", "--remote-allow-origins=*", "about:blank"),
 )
+FLAT: Final = ("--disable-gpu",)
+DRAWING: Final = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")  # WebGL on the processor
 
 
 class Page:
@@ -55,8 +56,12 @@ class Page:
 
     def open(self, path: Path) -> None:
         """Open a file and wait until it is loaded."""
+        self.open_address(path.as_uri())
+
+    def open_address(self, address: str) -> None:
+        """Open an address and wait until it is loaded."""
         self._loaded = False
-        self.ask("Page.navigate", url=path.as_uri())
+        self.ask("Page.navigate", url=address)
         while not self._loaded:
             self._receive()
 
@@ -93,11 +98,12 @@ class Page:
 
 
 @contextmanager
-def browser(folder: Path) -> Iterator[Page]:
-    """Start a browser with a new profile in `folder`, and yield its page."""
-    assert PROGRAM
+def browser(folder: Path, graphics: tuple[str, ...] = FLAT) -> Iterator[Page]:
+    """Start a browser with a new profile in `folder`, and yield its page; `DRAWING` gives it WebGL."""
     process = subprocess.Popen(
-        [PROGRAM, *QUIET, f"--user-data-dir={folder}"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        [PROGRAM, *QUIET, *graphics, f"--user-data-dir={folder}"],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
     )
     try:
         socket = create_connection(_address(folder, process), timeout=DEADLINE_S)

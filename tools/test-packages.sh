@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Install what only the tests and measurements need, on a Debian 12 or 13 machine: ROS, a compiler and OpenGL
-# from the distribution. You can repeat this script safely: a failed run leaves no .venv/test-packages behind.
+# Install what only the tests and measurements need, on a Debian 12 or 13 machine: ROS, a compiler, OpenGL and a
+# browser from the distribution. You can repeat this script safely: a failed run leaves no .venv/test-packages behind.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -14,12 +14,15 @@ packages+=(ros-nav-msgs ros-std-srvs)
 packages+=(g++ libroscpp-dev libsensor-msgs-dev python3-gencpp)
 # MuJoCo's cameras draw with OpenGL on the processor.
 packages+=(libegl1 libgl1-mesa-dri libopengl0)
+# A test looks at the report of a run in a browser.
+packages+=(chromium)
 
 all_installed() {
   local libraries modules
   libraries=$(/sbin/ldconfig -p)
   modules='netifaces, rosmaster, rosmsg, rospy, rosservice, rostopic, sensor_msgs, gencpp'
   /usr/bin/python3 -c "import $modules" 2>/dev/null && command -v g++ >/dev/null &&
+    command -v chromium >/dev/null &&
     [[ -d /usr/share/sensor_msgs/msg && -d /usr/share/nav_msgs/msg && -d /usr/share/std_srvs/srv ]] &&
     [[ -f /usr/include/ros/ros.h && -f /usr/include/sensor_msgs/Imu.h ]] &&
     [[ $libraries == *libEGL.so.1* && $libraries == *libOpenGL.so.0* ]]

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import pytest
-
 from palaestra_trainer.reporting.page import page
 from palaestra_trainer.reporting.run_data import Evaluated, Replay, ReportedFault, RunData
-from tests.browser import PROGRAM, browser
+from tests.browser import browser
 
 LONG = "a_message_without_a_single_blank_" * 6
 
@@ -56,7 +54,6 @@ def run(name):
     )
 
 
-@pytest.mark.skipif(PROGRAM is None, reason="chromium is not installed (apt-get install chromium)")
 def test_a_report_is_shown_without_an_error_or_a_request_and_fits_a_phone(tmp_path):
     """Only a browser can show how a page renders.
 

@@ -190,6 +190,18 @@ def test_a_simulator_that_restarts_is_told_and_shown_again(page, simulator):
 
     simulator.failing = False
     eventually(lambda: "episode 7" in page._text.content)
+    assert "stepped again after" in page._text.content
+
+
+def test_the_first_start_of_a_simulator_is_not_shown_as_a_restart(page, simulator, request):
+    """A run without a fault would otherwise seem to have had one."""
+    simulator.failing = True
+    request.getfixturevalue("browser")
+    eventually(lambda: "does not run" in page._text.content)
+
+    simulator.failing = False
+    eventually(lambda: "episode 7" in page._text.content)
+    assert "stepped again" not in page._text.content
 
 
 def buttons(page):
