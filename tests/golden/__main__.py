@@ -7,6 +7,7 @@
 - `docs/reference/metrics.md`: every metric that the programs declare
 - `docs/reference/simulators.md`: the devices of the stub
 - `docs/reference/ros-interface.md`: the services and topics of a robot
+- `trainer/src/palaestra_trainer/conformance/interface.json`: the claims of that page as data
 - `docs/explain/judging.md`: the checks on a replica, in their order
 - `llms.txt`: the pages that docs/README.md links to
 - `charts/palaestra/README.md`: from the chart's values.yaml
@@ -46,6 +47,7 @@ def recorded() -> Iterator[tuple[Path, str]]:
     yield ROOT / metrics.PAGE, metrics.page((ROOT / metrics.PAGE).read_text())
     yield ROOT / judging.PAGE, judging.page((ROOT / judging.PAGE).read_text())
     yield ROOT / interface.PAGE, interface.page((ROOT / interface.PAGE).read_text())
+    yield ROOT / interface.INTERFACE, interface.interface_file()
     yield ROOT / devices.PAGE, devices.page((ROOT / devices.PAGE).read_text())
     yield ROOT / llms.PAGE, llms.page(ROOT)
     for name, text in dashboards.generated_files().items():

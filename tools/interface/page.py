@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from typing import Final
 
 from palaestra.api.generated_sections import between_marks
 from palaestra_protocol.ros.rostypes import message_type, service_type
 from palaestra_sim.scene.devices import DEVICES
-from tools.interface.everything import FAILING, device_name, groups, offered
+from tools.interface import plan
+from tools.interface.everything import FAILING, NOT_IN_WEBOTS, device_name, groups, offered
 from tools.interface.facades import facade
 
 PAGE = "docs/reference/ros-interface.md"
+INTERFACE = "trainer/src/palaestra_trainer/conformance/interface.json"
 BEGIN = "<!-- generated: services and topics -->"
 _TEST: Final = "test_ros_interface.py"
 _OURS: Final = frozenset(("palaestra",))
-_NOT_IN_WEBOTS: Final = frozenset(("lidar/laser_scan/layer0",))
 _TITLES: Final = {
     "node": "Every node",
     "robot": "Robot",
@@ -64,7 +66,7 @@ def _section(group: str, services: Mapping[str, str], topics: Mapping[str, str])
 def _row(group: str, path: str, type_name: str, md5: str) -> str:
     shown = path.replace(device_name(group), "<name>", 1) if group in DEVICES else path
     states = " | ".join(_state(simulator, path) for simulator in FAILING)
-    webots = "no" if group in _OURS or path in _NOT_IN_WEBOTS else "yes"
+    webots = "no" if group in _OURS or path in NOT_IN_WEBOTS else "yes"
     member = facade(group, path)
     python = f"`{member}`" if member else ""
     return f"| `{shown}` | {type_name} | `{md5}` | {python} | {states} | {webots} | {_TEST} |"
@@ -76,3 +78,8 @@ def _state(simulator: str, path: str) -> str:
     if path not in survey.services and path not in survey.topics:
         return "no"
     return "fails" if path in FAILING[simulator] else "yes"
+
+
+def interface_file() -> str:
+    """Return the content of `INTERFACE`."""
+    return json.dumps(plan.interface(), indent=1) + "\n"

@@ -5,7 +5,7 @@ from io import BytesIO
 
 import roslib.message
 
-from tests.integration.webots.interface_player import plain, request_of
+from tests.integration.webots.genpy_messages import plain, request_of
 
 
 class RoscppClient:

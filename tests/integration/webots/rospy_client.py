@@ -1,4 +1,4 @@
-"""The client with rospy: it reads a plan as JSON from standard input, and prints the results.
+"""The client with rospy: `python -m tests.integration.webots.rospy_client SIMULATOR FILES` prints results.
 
 It is a separate process, because rospy can have only one node per process.
 """
@@ -9,7 +9,10 @@ import sys
 import roslib.message
 import rospy
 
-from tests.integration.webots.interface_player import DEADLINE_S, plain, play, request_of
+from palaestra_trainer.conformance.claims import claims
+from palaestra_trainer.conformance.player import DEADLINE_S
+from tests.integration.webots.genpy_messages import plain, request_of
+from tests.integration.webots.playing import play
 
 
 class RospyClient:
@@ -39,4 +42,4 @@ class RospyClient:
 
 
 answers, sys.stdout = sys.stdout, sys.stderr  # rospy prints to stdout when it waits for a service
-json.dump(play(json.load(sys.stdin), RospyClient()), answers)
+json.dump(play(claims(sys.argv[1]), RospyClient(), sys.argv[2]), answers)

@@ -11,12 +11,13 @@ from pathlib import Path
 import pytest
 
 from palaestra_sim.scene.png import encode
-from tests.integration.webots.interface_plan import ANSWERS, FIELDS, QUIT_STATUS, absolute, plan
-from tests.integration.webots.interface_player import play
+from palaestra_trainer.conformance.claims import claims
+from tests.integration.webots.playing import play
 from tests.integration.webots.roscpp_build import build
 from tests.integration.webots.roscpp_client import RoscppClient
 from tests.tables import for_each
 from tools.interface.everything import FAILING, offered, world
+from tools.interface.plan import ANSWERS, FIELDS, QUIT_STATUS
 
 DEADLINE_S = 120.0  # seconds on an idle machine
 ROOT = Path(__file__).parents[3]
@@ -30,12 +31,11 @@ def cases(paths):
     return lambda: [(simulator, path) for simulator in FAILING for path in sorted(paths(simulator))]
 
 
-def of_rospy(plan_, environment, _folder):
+def of_rospy(simulator, environment, folder):
     """Return the results of the client with rospy, which runs in a separate process."""
     client = subprocess.run(
-        [sys.executable, "-m", "tests.integration.webots.rospy_client"],
+        [sys.executable, "-m", "tests.integration.webots.rospy_client", simulator, folder],
         cwd=ROOT,
-        input=json.dumps(plan_),
         env=environment,
         stdout=subprocess.PIPE,
         text=True,
@@ -45,10 +45,10 @@ def of_rospy(plan_, environment, _folder):
     return json.loads(client.stdout)
 
 
-def of_roscpp(plan_, environment, folder):
+def of_roscpp(simulator, environment, folder):
     """Return the results of the client with roscpp, and the md5 sums of its types."""
     with RoscppClient(program(folder.parent / "roscpp"), environment, folder / "errors.log") as client:
-        return {**play(plan_, client), "digests": client.digests}
+        return {**play(claims(simulator), client, str(folder)), "digests": client.digests}
 
 
 @cache
@@ -83,7 +83,7 @@ def observed(simulator, client, environment, folder):
     command = [sys.executable, "-c", RUN.format(simulator), path]
     with subprocess.Popen(command, env=environment, stderr=subprocess.DEVNULL) as running:
         try:
-            found = client(plan(path, simulator), environment, folder)
+            found = client(simulator, environment, folder)
             running.wait(timeout=DEADLINE_S)
         finally:
             running.kill()
@@ -142,7 +142,7 @@ def test_a_field_of_every_type_is_read_as_it_was_written(outcomes, simulator, ty
 @for_each("simulator, path", cases(lambda it: offered(it).topics))
 def test_a_topic_of_the_page_is_heard(outcomes, simulator, path):
     """The client can decode the message, and its stamp is the time of the measurement."""
-    message = outcomes(simulator)["heard"][absolute(path)]
+    message = outcomes(simulator)["heard"][path]
 
     assert message.get("header", {"stamp": 1.0})["stamp"] > 0.0
 
@@ -153,7 +153,7 @@ def test_a_topic_of_the_page_is_heard(outcomes, simulator, path):
 )
 def test_a_picture_arrives_whole(outcomes, topic, encoding):
     """The image has four bytes for each of 64 x 64 pixels, in an encoding that cv_bridge supports."""
-    image = outcomes("mujoco")["heard"][absolute(topic)]
+    image = outcomes("mujoco")["heard"][topic]
 
     assert (image["width"], image["height"], image["encoding"]) == (64, 64, encoding)
     assert image["height"] * image["step"] == len(image["data"]) == 4 * 64 * 64

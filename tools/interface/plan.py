@@ -1,16 +1,24 @@
-"""The requests that the clients with rospy and roscpp send to a simulator, and the expected responses.
+"""The requests of the conformance program, and the expected responses.
 
 A service without an entry in `REQUESTS` gets an empty request. The keys of `REQUESTS` are the ends of
 services' paths. Every service must succeed. `ANSWERS` contains the responses that are known in advance, such
 as a value that an earlier request has set.
 """
 
-from tools.interface.everything import ROBOT, offered
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from tools.interface.everything import FAILING, NOT_IN_WEBOTS, offered, world
+
+FILES = "$FILES"  # stands for the folder of the world
+
+Request = Mapping[str, Any]
+Call = tuple[str, str, str, Request]  # name, path, type, request
 
 STEP_MS = 32
 QUIT_STATUS = 3
-STEP = (f"/{ROBOT}/robot/time_step", "webots_ros/set_int", {"value": STEP_MS})
-REFUSED = (f"/{ROBOT}/robot/get_urdf", "webots_ros/get_urdf", {})  # the simulator logs it to /rosout
 DRAWN = """DEF DRAWN Pose { children [ DEF SHADED Shape { castShadows FALSE
   appearance DEF PAINT PBRAppearance { roughness 0.25 baseColor 1 0.5 0.25 name "red" }
   geometry DEF ROUND Cylinder { subdivision 24 } } Shape { geometry DEF FLAT Plane { size 3 2 } } ] }"""
@@ -23,7 +31,7 @@ ENDING = (
     "world_load",
     "simulation_quit",
 )
-FIELDS = {
+FIELDS: Mapping[str, tuple[str, str, Any]] = {
     "bool": ("SHADED", "castShadows", 1),
     "int32": ("ROUND", "subdivision", 12),
     "float": ("PAINT", "roughness", 0.5),
@@ -33,7 +41,7 @@ FIELDS = {
     "color": ("PAINT", "baseColor", {"r": 0.5, "g": 0.25, "b": 1.0, "a": 1.0}),
     "string": ("PAINT", "name", "blue"),
 }
-REQUESTS = {
+REQUESTS: Mapping[str, Request] = {
     "set_logger_level": {"logger": "ros", "level": "debug"},
     "/enable": {"value": STEP_MS},
     "_enable": {"value": STEP_MS},
@@ -76,7 +84,7 @@ REQUESTS = {
     "display/image_new": {"width": 1, "height": 1, "format": 3, "data": [1, 2, 3]},
     "lidar/get_layer_point_cloud": {"layer": 0},
 }
-ANSWERS = {
+ANSWERS: Mapping[str, Request] = {
     "robot/get_model": {"value": ""},
     "robot/get_mode": {"value": 0},
     "robot/get_basic_time_step": {"value": 32.0},
@@ -151,36 +159,54 @@ LATE = ("camera/recognition_enable_segmentation",)  # at the end, because the se
 HANDLES = ("BOX", "LINEARMOTOR_JOINT", "SHADED", "PAINT", "ROUND", "FLAT")
 
 
-def plan(world_path, simulator):
-    """Return the plan that a client executes.
+def interface() -> dict[str, Any]:
+    """Return the content of the conformance program's interface.json, which has the claims as data."""
+    surveys = {simulator: offered(simulator) for simulator in FAILING}
+    services = {path: it for survey in surveys.values() for path, it in survey.services.items()}
+    topics = {path: it for survey in surveys.values() for path, it in survey.topics.items()}
+    calls, last = _calls(services, FILES)
+    known = services | topics
+    absent = {
+        simulator: sorted(known.keys() - survey.services.keys() - survey.topics.keys())
+        for simulator, survey in surveys.items()
+    }
+    absent["webots"] = sorted(
+        path for path in known if path.startswith("palaestra/") or path in NOT_IN_WEBOTS
+    )
+    fails = {simulator: sorted(paths) for simulator, paths in FAILING.items()}
+    return {
+        "release": "R2023b",
+        "step_ms": STEP_MS,
+        "world": world(),
+        "calls": calls,
+        "topics": topics,
+        "last": last,
+        "expected": ANSWERS,
+        "fails": {**fails, "webots": []},
+        "absent": absent,
+    }
 
-    Calls that return handles have names of their own; the name of any other call is its path.
-    """
-    survey = offered(simulator)
-    typed = {**survey.services}
+
+def _calls(typed: Mapping[str, str], files: str) -> tuple[list[Call], list[Call]]:
+    """Return the calls in their order, and those that end a controller or the simulator."""
+    last: list[Call] = []
     calls = [_call(typed, name, path, request) for name, path, request in _opening()]
-    last = []
+    named = {name for name, *_ in calls}
     for path in typed:
         if path.endswith(ENDING):
-            last.append(_call(typed, path, path, _request(path, world_path)))
-        elif path != "robot/time_step" and path not in {name for name, *_ in calls}:
-            calls.append(_call(typed, path, path, _request(path, world_path)))
+            last.append(_call(typed, path, path, _request(path, files)))
+        elif path != "robot/time_step" and path not in named:
+            calls.append(_call(typed, path, path, _request(path, files)))
     calls.sort(key=lambda call: call[0] in LATE)
     last.sort(key=lambda call: [call[0].endswith(end) for end in ENDING], reverse=True)
-    topics = {absolute(path): type_name for path, type_name in survey.topics.items()}
-    return {"calls": calls, "topics": topics, "rounds": [STEP, REFUSED], "last": last}
+    return calls, last
 
 
-def absolute(path):
-    """Return the ROS name of a path below the robot's name."""
-    return path if path.startswith("/") else f"/{ROBOT}/{path}"
+def _call(typed: Mapping[str, str], name: str, path: str, request: Request) -> Call:
+    return name, path, typed[path], request
 
 
-def _call(typed, name, path, request):
-    return name, absolute(path), typed[path], request
-
-
-def _opening():
+def _opening() -> Iterator[tuple[str, str, Request]]:
     """Yield the first calls: for handles, and for one field of each type, which is written and read."""
     get_field, from_def = "supervisor/node/get_field", "supervisor/get_from_def"
     for name, text in (("data", "eight"), ("custom_data", "seven")):
@@ -206,8 +232,8 @@ def _opening():
             yield path, path, {"field": f"@FIELD {type_name}", "index": 0, **given}
 
 
-def _request(path, world_path):
-    found = _of_files(path, world_path)
+def _request(path: str, files: str) -> Request:
+    found = _of_files(path, files)
     if found is not None:
         return found
     request = next((it for end, it in REQUESTS.items() if path.endswith(end)), {})
@@ -218,15 +244,15 @@ def _request(path, world_path):
     return request
 
 
-def _of_files(path, world_path):
+def _of_files(path: str, files: str) -> Request | None:
     """Return the request to a service that reads or writes a file, or None for any other service."""
     if path == "supervisor/world_load":
-        return {"value": str(world_path)}
+        return {"value": f"{files}/everything.wbt"}
     if path == "display/image_load":
-        return {"filename": str(world_path.with_name("logo.png"))}
+        return {"filename": f"{files}/logo.png"}
     if path == "supervisor/movie_start_recording":
-        movie = {"filename": str(world_path.with_name("movie.mp4")), "quality": 90, "acceleration": 1}
+        movie = {"filename": f"{files}/movie.mp4", "quality": 90, "acceleration": 1}
         return {**movie, "width": 64, "height": 48}
     if path.endswith(("/image_save", "/save_image", "/export_image", "_save_segmentation_image")):
-        return {"filename": str(world_path.with_name("picture.png"))}
+        return {"filename": f"{files}/picture.png"}
     return None

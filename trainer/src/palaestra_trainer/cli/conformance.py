@@ -1,0 +1,127 @@
+"""`palaestra-conformance` compares a running simulator with the documented ROS interface."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+import sys
+from collections.abc import Sequence
+from importlib.metadata import version
+from pathlib import Path
+
+from palaestra_protocol.pod.enums import ExitCode
+from palaestra_trainer.conformance import report
+from palaestra_trainer.conformance.claims import Claims, ClaimVerdict, claims, simulators, verdicts
+from palaestra_trainer.conformance.player import Player
+from palaestra_trainer.conformance.wire_client import WireClient
+from palaestra_trainer.errors import ConfigurationError, TrainerError
+from palaestra_trainer.ros import ensure_node, is_served
+
+CONFORMANCE = """\
+Call every service of a running simulator, subscribe to every topic, and compare responses and messages with
+docs/reference/ros-interface.md. The simulator must have loaded the world that --world writes.
+
+reads:
+  the ROS master; services and topics of the robot
+writes:
+  a line for each difference to standard output; with --report a file with a line for each claim. The
+  simulator writes pictures into the folder of --files.
+"""
+EXIT_CODES = """\
+exit codes:
+  0   every claim holds
+  1   some claims do not hold
+  2   an option is wrong, no master responds, or the robot has no services; nothing was called
+"""
+DIFFERENT = 1
+ROBOT = "everything"
+WORLD, PICTURE = "everything.wbt", "logo.png"
+# A PNG of one pixel.
+_PNG = bytes.fromhex(
+    "89504e470d0a1a0a0000000d49484452000000010000000108020000009077"
+    "53de0000000c4944415408d763f8cfc0000003010100c9fe92ef0000000049454e44ae426082"
+)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run `palaestra-conformance`; return its exit code."""
+    chosen = _parser().parse_args(arguments)
+    asked = claims(chosen.claims)
+    if chosen.world:
+        return _write_world(asked, chosen.files)
+    if chosen.master:
+        os.environ["ROS_MASTER_URI"] = chosen.master
+    try:
+        ensure_node("palaestra_conformance")
+        if not is_served(f"/{chosen.name}/robot/time_step"):
+            raise ConfigurationError(
+                f"the robot {chosen.name} has no services; start a simulator with the world that --world"
+                " writes, and give the robot's ROS name with --name"
+            )
+    except TrainerError as error:
+        sys.stderr.write(f"{error}\n")
+        return ExitCode.CONFIGURATION
+    return _reported(_played(asked, chosen), chosen)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="palaestra-conformance",
+        description=CONFORMANCE,
+        epilog=EXIT_CODES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    add = parser.add_argument
+    add("--master", metavar="URI", help="address of the ROS master (default: $ROS_MASTER_URI)")
+    add("--name", default=ROBOT, metavar="ROBOT", help=f"ROS name of the robot (default: {ROBOT})")
+    add("--claims", choices=simulators(), default="webots", help="the column of the page (default: webots)")
+    add(
+        "--files", type=Path, default=Path(), metavar="DIR", help="folder of the world (default: this folder)"
+    )
+    add("--world", action="store_true", help=f"write {WORLD} and {PICTURE} into the folder, and end")
+    add("--all", action="store_true", help="also make the calls that restart and end the simulator")
+    add("--report", type=Path, metavar="FILE", help="write a report in Markdown")
+    return parser
+
+
+def _write_world(asked: Claims, folder: Path) -> int:
+    try:
+        (folder / PICTURE).write_bytes(_PNG)
+        (folder / WORLD).write_text(asked.world)
+    except OSError as error:
+        sys.stderr.write(f"--files: {error}; use a folder in which you can write\n")
+        return ExitCode.CONFIGURATION
+    sys.stdout.write(f"{folder / WORLD}\n")
+    return 0
+
+
+def _played(asked: Claims, chosen: argparse.Namespace) -> list[ClaimVerdict]:
+    client = WireClient()
+    try:
+        player = Player(client, chosen.name, asked.step_ms, str(chosen.files.absolute()))
+        answers, heard = player.play(asked, ending=chosen.all)
+    finally:
+        client.close()
+    return verdicts(asked, answers, heard)
+
+
+def _reported(found: Sequence[ClaimVerdict], chosen: argparse.Namespace) -> int:
+    sys.stdout.writelines(f"{line}\n" for line in (*report.differences(found), report.summary(found)))
+    if chosen.report:
+        facts = {
+            "claims": chosen.claims,
+            "palaestra-trainer": version("palaestra-trainer"),
+            "system": f"{platform.system()} {platform.machine()}",
+            "calls that restart and end the simulator": "made" if chosen.all else "left out",
+        }
+        try:
+            chosen.report.write_text(report.markdown(found, facts))
+        except OSError as error:
+            sys.stderr.write(f"--report: {error}; name a file that can be written\n")
+            return ExitCode.CONFIGURATION
+    return DIFFERENT if any(verdict.problem for verdict in found) else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

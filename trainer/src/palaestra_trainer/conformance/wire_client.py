@@ -1,0 +1,58 @@
+"""The client of the conformance program: each call and topic with a deadline, without an installed ROS."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+from palaestra_trainer.conformance.claims import FAILED, Answer
+from palaestra_trainer.conformance.player import plain
+from palaestra_trainer.errors import SimulatorFault
+from palaestra_trainer.ros import RosService, RosSubscriber
+
+_DEADLINE_S: Final = 30.0  # the first camera makes a simulator load OpenGL
+
+
+class WireClient:
+    """Calls services and subscribes to topics; `close` ends all connections."""
+
+    def __init__(self) -> None:
+        self._topics: dict[str, RosSubscriber] = {}
+        self._heard: dict[str, Any] = {}
+
+    def call(self, path: str, type_name: str, request: Mapping[str, Any]) -> Answer:
+        """Call a service with a connection of its own; return the response, or the reason of the failure."""
+        service = RosService(path, type_name, _DEADLINE_S)
+        try:
+            answer: Answer = plain(service(**request))
+        except SimulatorFault as fault:
+            return {FAILED: str(fault)}
+        finally:
+            service.close()
+        return answer
+
+    def listen(self, topic: str, type_name: str) -> None:
+        """Subscribe to a topic, if a node publishes it now."""
+        subscriber = RosSubscriber(topic, type_name)
+        try:
+            subscriber.connect()
+        except SimulatorFault:
+            subscriber.close()
+            return
+        self._topics[topic] = subscriber
+
+    def heard(self) -> Mapping[str, Any]:
+        """Return the first message of each topic that has sent one."""
+        for topic, subscriber in self._topics.items():
+            try:
+                messages = subscriber.arrived()
+            except SimulatorFault:
+                continue
+            if messages:
+                self._heard.setdefault(topic, plain(messages[0]))
+        return dict(self._heard)
+
+    def close(self) -> None:
+        """Close all connections."""
+        for subscriber in self._topics.values():
+            subscriber.close()
