@@ -19,7 +19,7 @@ PACKAGES = (
     "python3-rospy python3-rosmaster python3-netifaces "
     "python3-rosmsg python3-rosservice python3-rostopic python3-sensor-msgs ros-sensor-msgs "
     "ros-nav-msgs ros-std-srvs "
-    "g++ libroscpp-dev libsensor-msgs-dev python3-gencpp libegl1 libgl1-mesa-dri libopengl0"
+    "g++ libroscpp-dev libsensor-msgs-dev python3-gencpp libegl1 libgl1-mesa-dri libopengl0 chromium"
 )
 NOBODY = ("setpriv", "--reuid", "65534", "--clear-groups")
 
