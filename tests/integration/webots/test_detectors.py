@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from palaestra_trainer.errors import WorldMisfit, WrongData
+from palaestra_trainer.errors import SimulatorDead, WorldMisfit, WrongData
 from palaestra_trainer.ros import RosSubscriber
 from palaestra_trainer.webots import (
     Emitter,
@@ -281,6 +281,17 @@ def test_the_stub_refuses_a_camera_that_recognizes(master, tmp_path):
         running(text, tmp_path, "stub", Seeing),
     ):
         pass
+
+
+def test_a_recognition_of_a_simulator_that_does_not_run_is_a_dead_simulator(master):
+    """The explanation of a fault asks the simulator again, and must end if the simulator is dead."""
+    del master
+    objects = RecognizedObjects("absent", "camera")
+
+    with pytest.raises(SimulatorDead):
+        _ = objects.recognizes
+    with pytest.raises(SimulatorDead):
+        objects.enable(32)
 
 
 def test_a_touch_sensor_of_another_type_is_a_wrong_world(master, tmp_path):

@@ -171,9 +171,20 @@ class _Recognition(_Rendered):
     def explained(self, fault: SimulatorFault) -> SimulatorFault:
         """Return the reason of a fault: the world may have no Recognition node, or no camera."""
         reason = super().explained(fault)
-        if reason is not fault or fault.__class__ is WorldMisfit or self.recognizes:
+        if reason is not fault or isinstance(fault, WorldMisfit) or not self._lacks_recognition():
             return reason
         return self._without_recognition()
+
+    def _lacks_recognition(self) -> bool:
+        """Return whether the simulator responds that the camera has no Recognition node.
+
+        The fact `recognizes` would call `explained` again if the simulator is dead.
+        """
+        try:
+            answer = self._services.call_once(f"{self._path}/has_recognition", "get_bool", ask=True)
+        except SimulatorFault:
+            return False
+        return not answer.value
 
     def _without_recognition(self) -> WorldMisfit:
         return WorldMisfit(self.robot, f"{self.device} has no Recognition node; add one in the world")
