@@ -10,9 +10,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from palaestra_trainer.conformance.player import FILES
 from tools.interface.everything import FAILING, NOT_IN_WEBOTS, offered, world
-
-FILES = "$FILES"  # stands for the folder of the world
 
 Request = Mapping[str, Any]
 Call = tuple[str, str, str, Request]  # name, path, type, request
@@ -164,7 +163,7 @@ def interface() -> dict[str, Any]:
     surveys = {simulator: offered(simulator) for simulator in FAILING}
     services = {path: it for survey in surveys.values() for path, it in survey.services.items()}
     topics = {path: it for survey in surveys.values() for path, it in survey.topics.items()}
-    calls, last = _calls(services, FILES)
+    calls, last = _calls(services)
     known = services | topics
     absent = {
         simulator: sorted(known.keys() - survey.services.keys() - survey.topics.keys())
@@ -175,7 +174,6 @@ def interface() -> dict[str, Any]:
     )
     fails = {simulator: sorted(paths) for simulator, paths in FAILING.items()}
     return {
-        "release": "R2023b",
         "step_ms": STEP_MS,
         "world": world(),
         "calls": calls,
@@ -187,16 +185,16 @@ def interface() -> dict[str, Any]:
     }
 
 
-def _calls(typed: Mapping[str, str], files: str) -> tuple[list[Call], list[Call]]:
+def _calls(typed: Mapping[str, str]) -> tuple[list[Call], list[Call]]:
     """Return the calls in their order, and those that end a controller or the simulator."""
     last: list[Call] = []
     calls = [_call(typed, name, path, request) for name, path, request in _opening()]
     named = {name for name, *_ in calls}
     for path in typed:
         if path.endswith(ENDING):
-            last.append(_call(typed, path, path, _request(path, files)))
+            last.append(_call(typed, path, path, _request(path)))
         elif path != "robot/time_step" and path not in named:
-            calls.append(_call(typed, path, path, _request(path, files)))
+            calls.append(_call(typed, path, path, _request(path)))
     calls.sort(key=lambda call: call[0] in LATE)
     last.sort(key=lambda call: [call[0].endswith(end) for end in ENDING], reverse=True)
     return calls, last
@@ -232,8 +230,8 @@ def _opening() -> Iterator[tuple[str, str, Request]]:
             yield path, path, {"field": f"@FIELD {type_name}", "index": 0, **given}
 
 
-def _request(path: str, files: str) -> Request:
-    found = _of_files(path, files)
+def _request(path: str) -> Request:
+    found = _of_files(path)
     if found is not None:
         return found
     request = next((it for end, it in REQUESTS.items() if path.endswith(end)), {})
@@ -244,15 +242,15 @@ def _request(path: str, files: str) -> Request:
     return request
 
 
-def _of_files(path: str, files: str) -> Request | None:
+def _of_files(path: str) -> Request | None:
     """Return the request to a service that reads or writes a file, or None for any other service."""
     if path == "supervisor/world_load":
-        return {"value": f"{files}/everything.wbt"}
+        return {"value": f"{FILES}/everything.wbt"}
     if path == "display/image_load":
-        return {"filename": f"{files}/logo.png"}
+        return {"filename": f"{FILES}/logo.png"}
     if path == "supervisor/movie_start_recording":
-        movie = {"filename": f"{files}/movie.mp4", "quality": 90, "acceleration": 1}
+        movie = {"filename": f"{FILES}/movie.mp4", "quality": 90, "acceleration": 1}
         return {**movie, "width": 64, "height": 48}
     if path.endswith(("/image_save", "/save_image", "/export_image", "_save_segmentation_image")):
-        return {"filename": f"{files}/picture.png"}
+        return {"filename": f"{FILES}/picture.png"}
     return None

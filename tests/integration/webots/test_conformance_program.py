@@ -17,7 +17,7 @@ DEADLINE_S = 120.0
 
 
 def conformance(folder, *options, **environment):
-    """Run the program in a folder, and return what it printed and its exit code."""
+    """Run the program in a folder, and return the completed process."""
     return subprocess.run(
         [PROGRAM, *options],
         cwd=folder,
@@ -65,14 +65,14 @@ def test_a_stub_keeps_every_claim_of_its_column_and_not_those_of_webots(master, 
 @pytest.mark.parametrize(
     ("options", "problem"),
     [
-        (("--name", "nobody"), "the robot nobody has no services"),
+        (("--name", "absent"), "the robot absent has no services"),
         (("--master", "http://127.0.0.1:9"), "127.0.0.1:9"),
         (("--claims", "gazebo"), "invalid choice: 'gazebo'"),
         (("--world", "--files", "/dev/null"), "use a folder in which you can write"),
     ],
 )
 def test_a_mistake_ends_the_program_with_one_sentence(master, tmp_path, options, problem):
-    """Nothing was called, so no claim is said to fail."""
+    """The program makes no call, so it reports no claim as wrong."""
     ended = conformance(tmp_path, *options, ROS_MASTER_URI=master)
 
     assert ended.returncode == 2

@@ -173,7 +173,7 @@ def test_the_data_of_a_robot_are_those_that_were_set(everything):
 
 
 def test_texts_of_the_window_arrive_in_their_order(everything):
-    """An empty text means that there is none."""
+    """Without an unread text, `receive_from_window` returns an empty text."""
     it = everything.controller
     while it.receive_from_window():
         pass

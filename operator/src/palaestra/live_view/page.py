@@ -120,7 +120,7 @@ class ViewPage:
     def _show(self) -> None:
         source = self._sources[self._shown]
         state = source.state()
-        if self._away_since is not None and self._looked:  # the first start is no fault
+        if self._away_since is not None and self._looked:  # a restart, not the first start
             self._note = f"stepped again after {time.monotonic() - self._away_since:.1f} s"
         self._away_since = None
         if state.revision != self._stage.revision:

@@ -7,7 +7,6 @@ from palaestra_trainer.conformance.report import differences, markdown, summary
 
 PATHS = ("led/get_led", "led/set_led", "skin/get_bone_name", "supervisor/field/insert_bool")
 ASKED = Claims(
-    release="R2023b",
     world="",
     calls=[(path, path, "webots_ros/get_int", {}) for path in PATHS],
     topics={"gps/values": "geometry_msgs/PointStamped"},
@@ -52,7 +51,7 @@ def test_right_responses_keep_every_claim():
     ],
 )
 def test_a_wrong_response_is_named(path, answer, expected):
-    """A person must see what to mend."""
+    """The line has the path and the difference from its claim."""
     assert problem(path, answer).startswith(expected)
 
 

@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from importlib import resources
 from typing import Any, Final
 
@@ -15,7 +16,7 @@ Call = tuple[str, str, str, Mapping[str, Any]]  # name, path, type, request
 FAILED: Final = "failed"  # the key of the reason in the answer of a call that failed
 _FILE: Final = "interface.json"
 _INSERT: Final = "supervisor/field/insert_"
-_DIGITS: Final = 6  # to which two numbers are compared
+_TOLERANCE: Final = 1e-6  # relative and absolute, of two numbers that are equal
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -23,7 +24,6 @@ class Claims:
     """The interface of one kind of simulator.
 
     Attributes:
-        release: the release of Webots whose names and types these are.
         world: the text of the world file with every device.
         calls: the calls in their order. A call that returns a handle has a name of its own; the name of any
             other call is its path.
@@ -34,7 +34,6 @@ class Claims:
         step_ms: the period of a step of the world, in ms of simulated time.
     """
 
-    release: str
     world: str
     calls: Sequence[Call]
     topics: Mapping[str, str]
@@ -73,7 +72,6 @@ def claims(simulator: str) -> Claims:
     data = _read()
     absent = set(data["absent"][simulator])
     return Claims(
-        release=data["release"],
         world=data["world"],
         calls=[
             (name, path, kind, request) for name, path, kind, request in data["calls"] if path not in absent
@@ -133,9 +131,10 @@ def _equal(found: Any, wanted: Any) -> bool:
     if isinstance(wanted, list):
         return len(found) == len(wanted) and all(map(_equal, found, wanted))
     if isinstance(wanted, float):
-        return math.isclose(float(found), wanted, rel_tol=10**-_DIGITS, abs_tol=10**-_DIGITS)
+        return math.isclose(float(found), wanted, rel_tol=_TOLERANCE, abs_tol=_TOLERANCE)
     return bool(found == wanted)
 
 
+@cache
 def _read() -> Any:
     return json.loads(resources.files("palaestra_trainer.conformance").joinpath(_FILE).read_text())

@@ -5,7 +5,8 @@ A fact is declared in one line: the name of a service, and the meaning of the va
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any, ClassVar, Generic, Never, Self, TypeVar, overload
 
 from palaestra_trainer.errors import SimulatorDead, SimulatorFault, WorldMisfit
@@ -14,6 +15,7 @@ from palaestra_trainer.webots.services import Services
 
 Value = TypeVar("Value")
 
+_LINEAR = 1  # the type of a device of a sliding joint; 0 is a turning joint. Source: webots/motor.h
 # Webots replaces only these characters when it converts a device's name to a path.
 _REPLACED = str.maketrans("-. ()", "_____")
 
@@ -61,17 +63,13 @@ class Device:
             WorldMisfit: the device is another type of node in the world.
             SimulatorDead, SimulatorHung, WrongData: as `RosService`.
         """
-        try:
+        with self._explaining():
             return self._services.get(f"{self._path}/{service}", type_name)(**request)
-        except SimulatorDead as error:
-            raise self.explained(error) from None
 
     def ask_once(self, service: str, type_name: str) -> Any:
         """Call a service without arguments as `call` does, without a connection that stays open."""
-        try:
+        with self._explaining():
             return self._services.call_once(f"{self._path}/{service}", type_name, ask=True)
-        except SimulatorDead as error:
-            raise self.explained(error) from None
 
     def explained(self, fault: SimulatorFault) -> SimulatorFault:
         """Return the reason of a fault: a `WorldMisfit` if the device is another node in the world.
@@ -88,6 +86,14 @@ class Device:
             f" use the class for a {found}, or name another device",
         )
 
+    @contextmanager
+    def _explaining(self) -> Iterator[None]:
+        """Replace a `SimulatorDead` by its reason; see `explained`."""
+        try:
+            yield
+        except SimulatorDead as error:
+            raise self.explained(error) from None
+
     def _wanted_nodes(self) -> tuple[str, ...]:
         return self.nodes
 
@@ -103,10 +109,8 @@ class Device:
         """Call a service of the device that only confirms; see `Services.confirm`."""
         given = ", ".join(f"{field} {value!r}" for field, value in request.items())
         refused = f"{self.device} refuses {service} with {given}"
-        try:
+        with self._explaining():
             self._services.confirm(f"{self._path}/{service}", type_name, refused, **request)
-        except SimulatorDead as error:
-            raise self.explained(error) from None
 
     def _require_kept(self, what: str, wanted: float, actual: float) -> None:
         """Check that the simulator has set a value that it confirmed; see `Services.require_kept`."""
@@ -220,6 +224,3 @@ class JointDevice(NodeDevice):
         lambda response: response.value == _LINEAR,
         "Whether the joint slides, so that its positions are in m, or it turns, with positions in rad.",
     )
-
-
-_LINEAR = 1  # the type of a device of a sliding joint; 0 is a turning joint. Source: webots/motor.h

@@ -67,7 +67,9 @@ def applied_quaternion(x: float, y: float, z: float, w: float) -> dict[str, floa
     """
     length = math.hypot(x, y, z, w)
     if not (length > 0.0 and math.isfinite(length)):
-        raise ConfigurationError(f"({x:g}, {y:g}, {z:g}, {w:g}) is no rotation; give a quaternion x, y, z, w")
+        raise ConfigurationError(
+            f"({x:g}, {y:g}, {z:g}, {w:g}) is not a rotation; give a quaternion x, y, z, w"
+        )
     sine = math.hypot(x, y, z) / length
     axis = (x, y, z) if sine else (0.0, 0.0, 1.0)
     return _quaternion((*axis, 2.0 * math.atan2(sine, w / length)))

@@ -154,10 +154,10 @@ class Joystick(_Input):
             WorldMisfit: the joystick has fewer axes.
             SimulatorDead, SimulatorHung, WrongData: as `RosService` and `RosSubscriber`.
         """
-        axes = int(self.call("get_number_of_axes", "get_int", ask=True).value)
+        axes = self._count("axes")
         if 0 <= axes < self._axes:
             raise WorldMisfit(self.robot, f"the joystick has {axes} axes; use Joystick(..., axes={axes})")
-        povs = self.number_of_povs if len(self._topics) > self._axes else axes
+        povs = self._count("povs") if len(self._topics) > self._axes else axes
         if 0 <= povs < len(self._topics) - self._axes:
             fact = f"the joystick has {povs} hat switches; use Joystick(..., povs={povs})"
             raise WorldMisfit(self.robot, fact)
@@ -165,6 +165,10 @@ class Joystick(_Input):
             if axes >= 0 and not topic.connected:
                 topic.connect()
         return self.read_arrived()
+
+    def _count(self, what: str) -> int:
+        """Return the number of axes or hat switches, with a connection that stays open for the next step."""
+        return int(self.call(f"get_number_of_{what}", "get_int", ask=True).value)
 
     def read_arrived(self) -> bool:
         """Read the buttons and positions that have already arrived.

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable
 from typing import Final, Literal
 
-from palaestra_trainer.errors import SimulatorDead, WorldMisfit, WrongData
+from palaestra_trainer.errors import WorldMisfit, WrongData
 from palaestra_trainer.ros import call_together
 from palaestra_trainer.waiting.greenlets import let_others
 from palaestra_trainer.webots.device import NodeDevice
@@ -48,11 +48,9 @@ class CommandedDevice(NodeDevice):
         Raises:
             SimulatorDead, SimulatorHung, WrongData: as `RosService`.
         """
-        try:
+        with self._explaining():
             self.prepare()
             self.service(value=value)
-        except SimulatorDead as error:
-            raise self.explained(error) from None
 
     def prepare(self) -> None:
         """Prepare the motor for commands of `service`, before the first command after a reset.

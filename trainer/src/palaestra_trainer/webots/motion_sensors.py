@@ -125,7 +125,9 @@ class GPS(NodeSensor):
             SimulatorDead, SimulatorHung, WrongData: as `RosService`.
         """
         if not math.isfinite(angle_deg):
-            raise ConfigurationError(f"{self.device}: {angle_deg:g} is no angle; give degrees")
+            raise ConfigurationError(
+                f"{self.device}: {angle_deg:g} is not an angle; give a finite number of degrees"
+            )
         name = "decimal_degrees_to_degrees_minutes_seconds"
         return str(self.call(name, f"gps_{name}", decimalDegrees=angle_deg).degreesMinutesSeconds)
 

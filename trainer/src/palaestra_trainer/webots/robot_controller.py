@@ -83,7 +83,7 @@ class RobotController(Device):
     def wait_for_input(self, events: InputEvent, timeout_s: float) -> InputEvent:
         """Wait until a person uses mouse, keyboard or joystick in Webots; return the event.
 
-        In the stub and in MuJoCo nobody can, so they return `InputEvent.NONE` at once.
+        The stub and MuJoCo have no window, so they return `InputEvent.NONE` at once.
 
         Args:
             events: the events that end the wait.
@@ -107,7 +107,7 @@ class RobotController(Device):
         return InputEvent(answer.event)
 
     def send_to_window(self, text: str) -> None:
-        """Send a text to the robot's window in Webots; in the stub and in MuJoCo nobody reads it."""
+        """Send a text to the robot's window in Webots; the stub and MuJoCo discard the text."""
         self._command("wwi_send_text", "set_string", value=text)
 
     def receive_from_window(self) -> str:

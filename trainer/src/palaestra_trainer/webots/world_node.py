@@ -97,10 +97,10 @@ class WorldNode:
         Raises:
             WrongData: also if the node has no such other field, or the field does not hold nodes.
         """
-        handle = self._ask("get_field", "node_get_field", fieldName=field).field
+        handle = self._ask_for_field(field)
         if not handle and field == "children":
             return ()
-        handle = handle or self._handle_of(field)
+        self._require_field(field, handle)
         if self._of_field("get_type", handle).type not in _NODE_TYPES:
             fact = f"{self._name()}.{field} holds values; read it with get_field"
             raise WrongData(self._services.node_name, fact)
@@ -189,10 +189,16 @@ class WorldNode:
             raise WrongData(self._services.node_name, f"refuses {service} for {self._name()}")
 
     def _handle_of(self, field: str) -> int:
-        handle = self._ask("get_field", "node_get_field", fieldName=field).field
+        handle = self._ask_for_field(field)
+        self._require_field(field, handle)
+        return handle
+
+    def _ask_for_field(self, field: str) -> int:
+        return int(self._ask("get_field", "node_get_field", fieldName=field).field)
+
+    def _require_field(self, field: str, handle: int) -> None:
         if not handle:
             raise WrongData(self._services.node_name, f"{self._name()} has no field {field}")
-        return int(handle)
 
     def _finite(self, at: Any, turn: Any) -> tuple[Vector, Quaternion]:
         numbers = at.x, at.y, at.z, turn.x, turn.y, turn.z, turn.w
