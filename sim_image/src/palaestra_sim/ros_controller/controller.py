@@ -21,86 +21,54 @@ sends the messages of the previous step first.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from functools import partial
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from palaestra_sim.ros.node import LATER
-from palaestra_sim.ros_controller.backend import Backend
-from palaestra_sim.ros_controller.handles import Handles
-from palaestra_sim.ros_controller.host import Host
-from palaestra_sim.ros_controller.inputs import inputs
-from palaestra_sim.ros_controller.services.devices import (
-    Outlet,
-    device_services,
-    services_below,
-    stream_outlet,
-)
+from palaestra_sim.ros_controller.options import FrontOptions
+from palaestra_sim.ros_controller.served_robot import ServedDevice, ServedRobot
+from palaestra_sim.ros_controller.services.devices import Outlet, services_below, stream_outlet
 from palaestra_sim.ros_controller.services.logs import NodeLog
-from palaestra_sim.ros_controller.services.robot import RobotServices
-from palaestra_sim.ros_controller.services.scene_fields import FieldServices
-from palaestra_sim.ros_controller.services.scene_nodes import NodeServices
-from palaestra_sim.ros_controller.services.supervisor import SupervisorServices
-from palaestra_sim.ros_interfaces import (
-    NodeInterface,
-    PublisherInterface,
-    Service,
-    UnsimulatedError,
-    topic_name,
-)
-from palaestra_sim.scene.arguments import ControllerArguments
+from palaestra_sim.ros_interfaces import NodeInterface, PublisherInterface, Service, UnsimulatedError
 from palaestra_sim.scene.mode import Mode
-from palaestra_sim.scene.robot import Robot
-from palaestra_sim.scene.stepping import Stepping
 
 _MODEL_NAME = "/model_name"
 _CLOCK = "/clock"
-_CAMERA = "Camera"
 
 
 class RosController:
     """The controller of one robot, from `start` to `close`.
+
+    Args:
+        robot: the robot to serve.
+        node: the ROS node whose services and topics the controller uses.
+        options: the timing to imitate.
+        clock: returns seconds of real time, from any origin.
 
     Attributes:
         blocked: whether a step is pending; then all other requests have to wait.
     """
 
     def __init__(
-        self, host: Host, stepping: Stepping, handles: Handles, robot: Robot, node: NodeInterface
+        self, robot: ServedRobot, node: NodeInterface, options: FrontOptions, clock: Callable[[], float]
     ) -> None:
-        self._host = host
-        self.simulation: Backend = handles.simulation
-        self._handles = handles
-        self.robot = robot
         self.node = node
         self.blocked = False
-        self._arguments: ControllerArguments = host.arguments(robot)
-        self._options = host.options
-        self._host_clock = host.clock
-        self._stepping = stepping
-        self._outlets = {
-            name: Outlet(
-                node,
-                name,
-                topics,
-                kind.accepts(device),
-                partial(kind.enabled, device),
-                kind.sensor and f"{kind.sensor}/",
-            )
-            for name, (kind, device) in robot.parts.devices.rows.items()
-            if (topics := kind.topics(device))
-        }
+        self._robot = robot
+        self._options = options
+        self._host_clock = clock
+        self._steps = robot.steps
+        self._world = robot.world
+        self._outlets = {it: _outlet(node, it) for it in (*robot.devices, *robot.inputs) if it.topics}
         self._streams = tuple(
-            stream_outlet(node, name, stream)
-            for name, (kind, device) in robot.parts.devices.rows.items()
-            for stream in kind.streams(device)
+            stream_outlet(node, device.path, stream) for device in robot.devices for stream in device.streams
         )
-        self._inputs = {it: Outlet(node, it.name, it.topics, it.enable) for it in inputs(robot)}
-        outlets = (*self._outlets.values(), *self._streams, *self._inputs.values())
-        self._feeds = tuple(feed for outlet in outlets for feed in outlet.feeds)
+        self._feeds = tuple(
+            feed for outlet in (*self._outlets.values(), *self._streams) for feed in outlet.feeds
+        )
         self._log = NodeLog(node)
         self._clock: PublisherInterface | None = None
-        self._basic_ms = self.simulation.basic_step_ms
+        self._basic_ms = robot.basic_step_ms
         self._step_ms = self._basic_ms  # the step of the last accepted time_step
         self._count = 0
         self._call: object | None = None
@@ -118,8 +86,8 @@ class RosController:
         self.node.blocked = lambda: self.blocked
         with self.node.together():
             self._advertise()
-        if self.robot.parts.node.flag("synchronization", True):
-            self._stepping.join(self.robot)
+        if self._robot.synchronized:
+            self._steps.join()
 
     def _advertise(self) -> None:
         node = self.node
@@ -127,36 +95,31 @@ class RosController:
         self._serve(*self._log.table())
         model_name = node.advertise(_MODEL_NAME, "std_msgs/String", latched=True)
         model_name.send({"data": node.name})
-        if self._arguments.clock:
+        if self._robot.clock:
             self._clock = node.advertise(_CLOCK, "rosgraph_msgs/Clock")
-        services = RobotServices(self._host, self.simulation, self.robot)
         self._serve(Service("robot/time_step", "webots_ros/set_int", self._time_step))
-        self._serve(*services.table())
-        if self.robot.parts.node.flag("supervisor", False):
-            self._serve(*SupervisorServices(self._host, self._handles, self.robot).table())
-            self._serve(*NodeServices(self._host, self._handles).table())
-            self._serve(*FieldServices(self._handles).table())
+        self._serve(*self._robot.services)
         self._serve_devices()
-        if self._arguments.auto_publish:
+        if self._robot.auto_publish:
             self._enable_all()
-        self._serve(services.device_list())
+        self._serve(self._robot.device_list)
 
     def pictures(self) -> Iterator[tuple[str, tuple[int, int], bytes | memoryview]]:
         """Yield the name, the size and the newest picture of each camera that has sent a picture.
 
         The size is width and height in pixels. A pixel has four bytes: blue, green, red, alpha.
         """
-        for name, (kind, _) in self.robot.parts.devices.rows.items():
-            if kind.node == _CAMERA:
-                image = self._outlets[name].feeds[0]
-                if image.newest is not None:
-                    yield name, (image.constants["width"], image.constants["height"]), image.newest
+        for device, outlet in self._outlets.items():
+            image = outlet.feeds[0]
+            if device.camera and image.newest is not None:
+                size = (image.constants["width"], image.constants["height"])
+                yield device.camera, size, image.newest
 
     def close(self) -> None:
         """Stop waiting for this robot in steps, and remove its services and topics from ROS."""
         self._closed = True
         self._publish_due = False
-        self._stepping.leave(self.robot)
+        self._steps.leave()
         self.node.close()
 
     def publish(self) -> None:
@@ -165,7 +128,7 @@ class RosController:
             return
         self._publish_due = False
         if self._clock is not None:
-            seconds, rest_ms = divmod(self.simulation.time_ms, 1000)
+            seconds, rest_ms = divmod(self._world.time_ms, 1000)
             self._clock.send({"clock": {"secs": seconds, "nsecs": rest_ms * 1_000_000}})
         elapsed_ms = self._count * self._step_ms
         for feed in self._feeds:
@@ -176,27 +139,27 @@ class RosController:
 
     def _enable_all(self) -> None:
         """Enable every device; if a device cannot be enabled, log the reason."""
-        for name, outlet in self._outlets.items():
+        for device in self._robot.devices:
+            outlet = self._outlets.get(device)
+            if outlet is None:
+                continue
             try:
                 outlet.enable(self._basic_ms, self._basic_ms)
             except UnsimulatedError as error:
-                self._log.error(f"{topic_name(name)}/enable: {error}")
+                self._log.error(f"{device.path}/enable: {error}")
 
     def _serve(self, *services: Service) -> None:
         for path, type_name, handler in services:
             self.node.serve(path, type_name, self._log.reporting(path, handler))
 
     def _serve_devices(self) -> None:
-        for name, (kind, device) in self.robot.parts.devices.rows.items():
-            self._serve(*device_services(kind, device, self.robot.parts.devices.shafts.get(name)))
-            if name in self._outlets:
-                self._serve_outlet(self._outlets[name])
+        for device in (*self._robot.devices, *self._robot.inputs):
+            self._serve(*services_below(device.path, device.rows))
+            self._serve(*services_below(f"palaestra/{device.path}", device.own_rows))
+            if device in self._outlets:
+                self._serve_outlet(self._outlets[device])
         for outlet in self._streams:
             self._serve_outlet(outlet)
-        for it, outlet in self._inputs.items():
-            self._serve_outlet(outlet)
-            self._serve(*services_below(it.name, it.rows))
-            self._serve(*services_below(f"palaestra/{it.name}", it.own_rows))
 
     def _serve_outlet(self, outlet: Outlet) -> None:
         self._serve(*outlet.services(lambda: self._step_ms))
@@ -211,7 +174,7 @@ class RosController:
         self._answer = LATER
         self.blocked = self._asking = True
         self._asked_ms = step_ms or self._basic_ms
-        self._stepping.ask(self.robot, self._asked_ms, self._stepped)
+        self._steps.ask(self._asked_ms, self._stepped)
         self._step_ms = step_ms or self._step_ms
         self._asking = False
         return self._answer
@@ -227,7 +190,7 @@ class RosController:
         busy = self._host_clock() - self._published_s < self._options.publish_delay_s
         return not (self._publish_due or busy)
 
-    def _stepped(self, done: bool) -> None:  # noqa: FBT001 - the caller `Stepping` passes it by position
+    def _stepped(self, done: bool) -> None:  # noqa: FBT001 - `Steps` passes it by position
         """Respond to a step that has ended, but not before its minimum real time has passed."""
         delay_s = self._delay_s() if done else 0.0
         if delay_s > 0.0:
@@ -248,10 +211,14 @@ class RosController:
     def _delay_s(self) -> float:
         """Return the real time in seconds for which the response to the step has to wait."""
         delay_s = self._options.step_sleep_s
-        if self.simulation.mode is Mode.REAL_TIME:
+        if self._world.mode is Mode.REAL_TIME:
             now_s = self._host_clock()
             # After a long pause of the client, the simulation may catch up by only one basic step.
             owed_s = now_s - self._basic_ms / 1000.0
             self._paced_until_s = max(self._paced_until_s, owed_s) + self._asked_ms / 1000.0
             delay_s = max(delay_s, self._paced_until_s - now_s)
         return delay_s
+
+
+def _outlet(node: NodeInterface, device: ServedDevice) -> Outlet:
+    return Outlet(node, device.path, device.topics, device.accepts, device.enabled, device.prefix)

@@ -1,16 +1,14 @@
-"""The interface through which a controller and its services use the running simulator.
+"""The interface through which the services of a robot use the running simulator.
 
-The module of the simulator imports the controllers, because the simulator starts and ends the controllers. To
-avoid an import cycle, the controllers import only this Protocol.
+The module of the simulator imports the services, because the simulator starts and ends the controllers. To
+avoid an import cycle, the services import only this Protocol.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol
 
-from palaestra_sim.ros_controller.options import FrontOptions
 from palaestra_sim.scene.arguments import ControllerArguments
 from palaestra_sim.scene.mode import Mode
 from palaestra_sim.scene.robot import Robot
@@ -21,13 +19,9 @@ class Host(Protocol):
 
     Attributes:
         world_path: the path of the loaded world.
-        options: the timing of the imitated controllers.
-        clock: returns seconds of real time, from any origin.
     """
 
     world_path: Path
-    options: FrontOptions
-    clock: Callable[[], float]
 
     def arguments(self, robot: Robot) -> ControllerArguments:
         """Return the controllerArgs of a robot whose controller is "ros"."""

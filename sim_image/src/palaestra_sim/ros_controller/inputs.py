@@ -11,8 +11,9 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, Final
 
+from palaestra_sim.ros_controller.served_robot import ServedDevice
 from palaestra_sim.ros_interfaces import Fields, Handler, Row
-from palaestra_sim.scene.devices.device_type import DeviceTopic, Enable, whole_steps
+from palaestra_sim.scene.devices.device_type import DeviceTopic
 from palaestra_sim.scene.robot import Robot
 
 _MOST_KEYS: Final = 7  # Webots reports at most this many keys at once
@@ -22,29 +23,10 @@ _POVS: Final = 1
 _BYTE: Final = (-128, 127)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Input:
-    """A device that is not a node of the world.
-
-    Attributes:
-        name: the first part of the paths of the device's topics and services.
-        topics: the topics of the device.
-        enable: returns whether the device accepts a sampling period.
-        rows: the services of the device besides `enable` and `get_sampling_period`.
-        own_rows: the services that Webots does not have; their paths begin with `palaestra/`.
-    """
-
-    name: str
-    topics: tuple[DeviceTopic, ...] = ()
-    enable: Enable = whole_steps
-    rows: tuple[Row, ...] = ()
-    own_rows: tuple[Row, ...] = ()
-
-
-def inputs(robot: Robot) -> tuple[Input, ...]:
+def inputs(robot: Robot) -> tuple[ServedDevice, ...]:
     """Return the battery, the keyboard and the joystick of a robot."""
     battery = DeviceTopic(name="value", type_name="webots_ros/Float64Stamped", source=robot.battery)
-    return Input(name="battery_sensor", topics=(battery,)), _keyboard(), _joystick()
+    return ServedDevice(path="battery_sensor", topics=(battery,)), _keyboard(), _joystick()
 
 
 @dataclass(slots=True, eq=False)
@@ -82,10 +64,10 @@ class _Pressed:
         )
 
 
-def _keyboard() -> Input:
+def _keyboard() -> ServedDevice:
     keys = _Pressed(_MOST_KEYS, _GREATEST_KEY)
     key = DeviceTopic(name="key", type_name="webots_ros/Int32Stamped", source=keys, many=True)
-    return Input(name="keyboard", topics=(key,), own_rows=keys.rows())
+    return ServedDevice(path="keyboard", topics=(key,), own_rows=keys.rows())
 
 
 @dataclass(slots=True, eq=False)
@@ -126,11 +108,11 @@ class _Part:
         return [self.parts[self.index]] if self.joystick.connected else []
 
 
-def _joystick() -> Input:
+def _joystick() -> ServedDevice:
     joystick = _Joystick()
     topic = partial(DeviceTopic, type_name="webots_ros/Int8Stamped", many=True)
-    return Input(
-        name="joystick",
+    return ServedDevice(
+        path="joystick",
         topics=(
             topic(name="pressed_button", source=joystick.buttons),
             *(topic(name=f"axis{i}", source=_Part(joystick, joystick.axes, i)) for i in range(_AXES)),

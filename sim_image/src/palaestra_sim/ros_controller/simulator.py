@@ -17,6 +17,7 @@ from palaestra_sim.ros_controller.backend import Backend
 from palaestra_sim.ros_controller.controller import RosController
 from palaestra_sim.ros_controller.handles import Handles
 from palaestra_sim.ros_controller.options import FrontOptions
+from palaestra_sim.ros_controller.scene_robot import served
 from palaestra_sim.ros_interfaces import NodeInterface
 from palaestra_sim.scene.arguments import ControllerArguments
 from palaestra_sim.scene.mode import Mode
@@ -144,7 +145,8 @@ class RunningSimulator:
 
     def _start_controller(self, robot: Robot) -> None:
         node = self._make_node(self._arguments[robot].name)
-        controller = RosController(self, self._stepping, self._handles, robot, node)
+        served_robot = served(self, self._stepping, self._handles, robot)
+        controller = RosController(served_robot, node, self.options, self.clock)
         self.controllers[node.name] = controller
         controller.start()
 

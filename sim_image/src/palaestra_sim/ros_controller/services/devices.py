@@ -6,20 +6,15 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
-from palaestra_sim.ros_interfaces import Fields, NodeInterface, PublisherInterface, Row, Service, topic_name
+from palaestra_sim.ros_interfaces import Fields, NodeInterface, PublisherInterface, Row, Service
 from palaestra_sim.scene.devices.device_type import (
-    ROLES,
-    Device,
     DeviceTopic,
-    DeviceType,
     Enable,
-    Shaft,
     Stream,
     ValueSource,
     never,
     whole_steps,
 )
-from palaestra_sim.scene.nodes.types import type_number
 
 
 @dataclass(slots=True, eq=False)
@@ -101,7 +96,7 @@ class Outlet:
 
     Args:
         node: the ROS node that publishes the topics.
-        device_name: the name of the device in the world.
+        path: the first part of the paths, made from the name of the device.
         topics: the topics of the device.
         accepts: returns whether the device accepts a period.
         enabled: called after each change with the sampling period in ms; 0 means that the device is off.
@@ -114,13 +109,12 @@ class Outlet:
     def __init__(
         self,
         node: NodeInterface,
-        device_name: str,
+        path: str,
         topics: Iterable[DeviceTopic],
         accepts: Enable,
         enabled: Callable[[int], None] = lambda _period_ms: None,
         prefix: str = "",
     ) -> None:
-        path = topic_name(device_name)
         header = {"header": {"frame_id": f"{node.name}/{path}"}}
         self.feeds = tuple(
             Feed(
@@ -182,39 +176,14 @@ class Outlet:
         )
 
 
-def stream_outlet(node: NodeInterface, device_name: str, stream: Stream) -> Outlet:
+def stream_outlet(node: NodeInterface, path: str, stream: Stream) -> Outlet:
     """Return the outlet of those topics of a device that have a separate `enable` service."""
     accepts = never if stream.silent else whole_steps
-    return Outlet(node, device_name, stream.topics, accepts, stream.enabled, stream.prefix)
-
-
-def device_services(kind: DeviceType[Any], device: Device, shaft: Shaft | None = None) -> tuple[Service, ...]:
-    """Return the services of a device, without `enable` and `get_sampling_period`.
-
-    `shaft` is the joint of the device, if it has one.
-    """
-    rows: tuple[Row, ...] = (
-        ("get_model", "get_string", lambda _: {"value": device.model}),
-        ("get_name", "get_string", lambda _: {"value": device.name}),
-        ("get_node_type", "get_int", lambda _: {"value": type_number(kind.node)}),
-    )
-    return services_below(topic_name(device.name), (*rows, *kind.services(device), *_neighbors(kind, shaft)))
+    return Outlet(node, path, stream.topics, accepts, stream.enabled, stream.prefix)
 
 
 def services_below(path: str, rows: Iterable[Row]) -> tuple[Service, ...]:
     """Return the services in `rows`, with paths below `path`."""
     return tuple(
         Service(f"{path}/{name}", f"webots_ros/{type_name}", handler) for name, type_name, handler in rows
-    )
-
-
-def _neighbors(kind: DeviceType[Any], shaft: Shaft | None) -> tuple[Row, ...]:
-    """Return the services that report the names of the other devices of a joint."""
-    if shaft is None:
-        return ()
-    names = shaft.names
-    return tuple(
-        (f"get_{role}_name", "get_string", lambda _, role=role: {"value": names.get(role, "")})
-        for role in ROLES
-        if role != kind.role
     )
