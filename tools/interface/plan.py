@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from palaestra_trainer.conformance.player import FILES
-from tools.interface.everything import FAILING, NOT_IN_WEBOTS, offered, world
+from tools.interface.everything import FAILING, NOT_IN_WEBOTS, UNCHECKED_IN_WEBOTS, offered, world
 
 Request = Mapping[str, Any]
 Call = tuple[str, str, str, Request]  # name, path, type, request
@@ -69,6 +69,10 @@ REQUESTS: Mapping[str, Request] = {
     "supervisor/set_label": {"label": "here"},
     "node/get_field": {"node": "@BOX", "fieldName": "translation"},
     "node/get_pose": {"node": "@BOX", "from_node": "@supervisor/get_self"},
+    # Webots' controller reads a null pointer if the second node of these requests is 0.
+    "enable_pose_tracking": {"node": "@BOX", "sampling_period": STEP_MS, "from_node": "@supervisor/get_self"},
+    "disable_pose_tracking": {"node": "@BOX", "from_node": "@supervisor/get_self"},
+    "node/set_visibility": {"node": "@BOX", "from": "@VIEWPOINT", "visible": 1},
     "node/set_joint_position": {"node": "@LINEARMOTOR_JOINT", "position": 0.0, "index": 1},
     "node/save_state": {"node": "@BOX", "state_name": "there"},
     "node/load_state": {"node": "@BOX", "state_name": "there"},
@@ -139,7 +143,6 @@ ANSWERS: Mapping[str, Request] = {
     "supervisor/movie_is_ready": {"status": 1},
     "supervisor/movie_stop_recording": {"value": True},
     "supervisor/virtual_reality_headset_is_used": {"value": False},
-    "supervisor/animation_stop_recording": {"value": False},
     "supervisor/node/get_type": {"type": 80},
     "supervisor/node/get_type_name": {"name": "Solid"},
     "supervisor/node/get_base_type_name": {"name": "Solid"},
@@ -155,7 +158,7 @@ ANSWERS: Mapping[str, Request] = {
 
 LATE = ("camera/recognition_enable_segmentation",)  # at the end, because the service ends its topic
 
-HANDLES = ("BOX", "LINEARMOTOR_JOINT", "SHADED", "PAINT", "ROUND", "FLAT")
+HANDLES = ("BOX", "VIEWPOINT", "LINEARMOTOR_JOINT", "SHADED", "PAINT", "ROUND", "FLAT")
 
 
 def interface() -> dict[str, Any]:
@@ -170,7 +173,7 @@ def interface() -> dict[str, Any]:
         for simulator, survey in surveys.items()
     }
     absent["webots"] = sorted(
-        path for path in known if path.startswith("palaestra/") or path in NOT_IN_WEBOTS
+        path for path in known if path.startswith("palaestra/") or path in NOT_IN_WEBOTS | UNCHECKED_IN_WEBOTS
     )
     fails = {simulator: sorted(paths) for simulator, paths in FAILING.items()}
     return {
@@ -242,15 +245,23 @@ def _request(path: str) -> Request:
     return request
 
 
+_NAMED_FILES: Mapping[str, Request] = {
+    "supervisor/world_load": {"value": f"{FILES}/everything.wbt"},
+    "supervisor/world_save": {"value": f"{FILES}/saved.wbt"},
+    "supervisor/animation_start_recording": {"value": f"{FILES}/film.html"},
+    "display/image_load": {"filename": f"{FILES}/logo.png"},
+    "supervisor/movie_start_recording": {
+        "filename": f"{FILES}/movie.mp4",
+        "quality": 90,
+        "acceleration": 1,
+        "width": 64,
+        "height": 48,
+    },
+}
+
+
 def _of_files(path: str) -> Request | None:
     """Return the request to a service that reads or writes a file, or None for any other service."""
-    if path == "supervisor/world_load":
-        return {"value": f"{FILES}/everything.wbt"}
-    if path == "display/image_load":
-        return {"filename": f"{FILES}/logo.png"}
-    if path == "supervisor/movie_start_recording":
-        movie = {"filename": f"{FILES}/movie.mp4", "quality": 90, "acceleration": 1}
-        return {**movie, "width": 64, "height": 48}
     if path.endswith(("/image_save", "/save_image", "/export_image", "_save_segmentation_image")):
         return {"filename": f"{FILES}/picture.png"}
-    return None
+    return _NAMED_FILES.get(path)

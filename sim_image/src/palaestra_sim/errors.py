@@ -11,6 +11,9 @@
     ├── FaultError              the description of a fault is wrong (faults.parser)
     ├── NoSuchHandleError       the loaded world has no node or field for a handle (ros_controller.handles)
     ├── NoValueError            a field has no value of that type or index (scene.tree)
+    ├── LibraryError            libController is missing, or lacks a function (webots.library)
+    ├── OptionError             the controllerArgs of a robot in Webots are wrong (webots.options)
+    ├── UnknownHandleError      no service has returned the handle of a node or field (webots.services)
     ├── MissingLibraryError     a simulator needs a package that is not installed (mujoco.library)
     └── UnsimulatedError        Webots supports the request, this simulator does not (ros_interfaces)
 

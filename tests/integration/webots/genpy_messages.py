@@ -1,5 +1,7 @@
 """Requests and messages of genpy's classes as JSON data."""
 
+import keyword
+
 import genpy
 import genpy.message
 
@@ -7,7 +9,8 @@ import genpy.message
 def request_of(service, fields):
     """Return a request of a genpy class with these fields; the other fields have their defaults."""
     message = service._request_class()
-    genpy.message.fill_message_args(message, [fields])
+    named = {f"{name}_" if keyword.iskeyword(name) else name: value for name, value in fields.items()}
+    genpy.message.fill_message_args(message, [named])
     return message
 
 

@@ -162,7 +162,7 @@ class RosController:
             self._serve_outlet(outlet)
 
     def _serve_outlet(self, outlet: Outlet) -> None:
-        self._serve(*outlet.services(lambda: self._step_ms))
+        self._serve(*outlet.services(lambda: self._step_ms, self._log.warning))
 
     def _time_step(self, request: Any) -> Any:
         step_ms = request.value
@@ -190,7 +190,7 @@ class RosController:
         busy = self._host_clock() - self._published_s < self._options.publish_delay_s
         return not (self._publish_due or busy)
 
-    def _stepped(self, done: bool) -> None:  # noqa: FBT001 - `Steps` passes it by position
+    def _stepped(self, done: bool) -> None:  # noqa: FBT001 - the caller `Steps` passes it by position
         """Respond to a step that has ended, but not before its minimum real time has passed."""
         delay_s = self._delay_s() if done else 0.0
         if delay_s > 0.0:

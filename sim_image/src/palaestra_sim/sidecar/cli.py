@@ -20,13 +20,14 @@ from palaestra_protocol.control import LEFT_OUT_FILE, VIEW_SOCKET, SidecarState,
 from palaestra_protocol.temporary_folder import temporary_folder
 from palaestra_sim.errors import SidecarError, SimError
 from palaestra_sim.sidecar import metrics, process, project, signals, world_files
-from palaestra_sim.sidecar.drivers import SHOWN, Driver, Launch, command
+from palaestra_sim.sidecar.drivers import SHOWN, Driver, Launch, command, webots_port
 from palaestra_sim.sidecar.last_request import LastRequest
-from palaestra_sim.sidecar.options import EXIT_WRONG, parse
+from palaestra_sim.sidecar.options import EXIT_WRONG, OWN_CONTROLLER, parse
 from palaestra_sim.sidecar.output import LineHandler
 from palaestra_sim.sidecar.server import bound, control_routes, health_routes
 from palaestra_sim.sidecar.simulator import SupervisedSimulator
 from palaestra_sim.sidecar.viewing import Viewing
+from palaestra_sim.webots_project import extra_projects, write_project
 from palaestra_sim.world import RunIdentity
 
 log = logging.getLogger(__name__)
@@ -44,10 +45,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def work_folder(given: argparse.Namespace) -> Iterator[None]:
     """Set `given.work` to a temporary folder for the block, if a folder is needed and --work is not given.
 
-    The generated world of --suffix needs a folder, and so does the socket for viewers. The sidecar makes
-    the folder itself, because its parent process may be killed.
+    The generated world of --suffix needs a folder, and so do the socket for viewers and the controller for
+    Webots. The sidecar makes the folder itself, because its parent process may be killed.
     """
-    needed = given.suffix or Driver(given.driver) in SHOWN
+    needed = given.suffix or Driver(given.driver) in SHOWN or _has_own_controller(given)
     if not needed or given.job is not None or given.work is not None:
         yield
         return
@@ -127,11 +128,12 @@ def _simulator(given: argparse.Namespace, driver: Driver, slot: str) -> Supervis
     robots = world_files.described(world_files.read(world), str(world))
     unchanged = world == Path(given.world).absolute()
     root = given.root if unchanged else world_files.root_of_model(given.world, given.root)
-    launch = Launch(world=world, root=root, options=given.option, program=given.program)
+    launch = Launch(world=world, root=root, options=_options(given, driver, world), program=given.program)
     left_out = _left_out(given, world)
     own = {"PALAESTRA_SIMULATOR_SLOT": slot} | ({LEFT_OUT_FILE: str(left_out)} if left_out else {})
     view = _view_socket(given, driver, world)
     own |= {VIEW_SOCKET: str(view)} if view else {}
+    own |= _controller_project(given) if _has_own_controller(given) else {}
     started = command(driver, launch, os.environ | own)
     return SupervisedSimulator(
         replace(started, mark=f"{slot}: ") if given.standby else started,
@@ -182,6 +184,41 @@ def _world(given: argparse.Namespace, slot: str) -> Path:
     )
     clock = given.clock and slot == world_files.SLOTS[0]
     return world_files.named(given.world, work, identity, clock=clock, as_project=as_project, root=given.root)
+
+
+def _has_own_controller(given: argparse.Namespace) -> bool:
+    """Return whether Webots uses the controller of Palaestra for robots whose controller is "ros"."""
+    return Driver(given.driver) is Driver.WEBOTS and given.webots_controller == OWN_CONTROLLER
+
+
+def _controller_project(given: argparse.Namespace) -> dict[str, str]:
+    """Write the project with our controller into the work folder; return the variable that names it.
+
+    Raises:
+        SidecarError: the folder cannot be written.
+    """
+    folder = Path(given.work).absolute() / "webots"
+    try:
+        write_project(folder)
+    except OSError as error:
+        raise SidecarError(
+            f"--work: {folder}: {error.strerror}; give a writable folder with space"
+        ) from error
+    return extra_projects(folder, os.environ)
+
+
+def _options(given: argparse.Namespace, driver: Driver, world: Path) -> list[str]:
+    """Return the options for the simulator; each Webots of a job gets a port of its own.
+
+    The containers of a pod share their ports. Webots uses the port also in the paths of camera images.
+    """
+    if (
+        driver is not Driver.WEBOTS
+        or given.job is None
+        or any(it.startswith("--port") for it in given.option)
+    ):
+        return list(given.option)
+    return [*given.option, f"--port={webots_port(world.stem)}"]
 
 
 def _left_out(given: argparse.Namespace, world: Path) -> Path | None:

@@ -3,6 +3,7 @@
 import os
 import shutil
 import sys
+import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -14,6 +15,8 @@ from palaestra_sim.sidecar.process import CommandLine
 WORLD = "{world}"  # represents the path of the world in the arguments of a program
 _NOT_ROOT = "palaestra"
 _MESA_THREADS = "LP_NUM_THREADS"
+
+_FIRST_PORT, _PORTS = 10_000, 20_000  # below the range from which Linux gives out ports
 
 # Source: Webots' guide, "Command Line Arguments". --batch prevents dialogs that wait for a click.
 # With --minimize but without --mode, Webots would start in fast mode.
@@ -58,6 +61,11 @@ def command(driver: Driver, launch: Launch, environment: Mapping[str, str]) -> C
     arguments = _ARGUMENTS[driver](launch)
     own = {**environment, **_ENVIRONMENT[driver](environment)}
     return CommandLine(arguments=(_found(driver, arguments[0], environment), *arguments[1:]), environment=own)
+
+
+def webots_port(name: str) -> int:
+    """Return the TCP port of the Webots whose world has this name; different names seldom share a port."""
+    return _FIRST_PORT + zlib.crc32(name.encode()) % _PORTS
 
 
 def _stub(launch: Launch) -> list[str]:

@@ -11,13 +11,15 @@ from palaestra_sim.sidecar.drivers import Driver
 from palaestra_sim.sidecar.world_files import located
 
 EXIT_WRONG = 2
+OWN_CONTROLLER, STOCK_CONTROLLER = "palaestra", "webots"
 
 EPILOG = """
 This program does not start the simulator by itself. A client starts it with POST /start on the control port;
 see palaestra_protocol.control. The simulator inherits the environment, with ROS_MASTER_URI and ROS_HOSTNAME.
 
 reads   the world; with --job it writes a copy, GROUP-INDEX.wbt, with other ROS names to the --work folder;
-        for Webots the copy is in a project, with links to the controllers and PROTOs around the world
+        for Webots the copy is in a project, with links to the controllers and PROTOs around the world; the
+        project `webots` in that folder has the controller ros
 prints  first the two addresses; then its own lines, as "palaestra-sidecar: ...", and the simulator's
 serves  control: /start /ready /stop /state; health: /healthz /state /metrics; both: /scene /watch /camera
 
@@ -69,6 +71,13 @@ def _add_simulator(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument(
         "--option", action="append", default=[], metavar="X", help="option for the simulator; repeatable"
+    )
+    group.add_argument(
+        "--webots-controller",
+        choices=(OWN_CONTROLLER, STOCK_CONTROLLER),
+        default=OWN_CONTROLLER,
+        help="for driver webots, the controller `ros`: of Palaestra, or of Webots up to R2023b "
+        "(default: %(default)s)",
     )
     group.add_argument(
         "program", nargs="*", help="for driver command, after --; {world} stands for the world's path"

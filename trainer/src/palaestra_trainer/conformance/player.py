@@ -85,8 +85,8 @@ class Player:
         heard: dict[str, Any] = {}
         while topics.keys() - heard.keys() and time.monotonic() < end:
             self._client.call(step, "webots_ros/set_int", {"value": self._step_ms})
-            # A request that fails is logged to /rosout.
-            self._client.call(self._full("robot/get_urdf"), "webots_ros/get_urdf", {})
+            # A refused sampling period is logged to /rosout.
+            self._client.call(self._full("battery_sensor/enable"), "webots_ros/set_int", {"value": 1})
             found = self._client.heard()
             heard = {topic: found[self._full(topic)] for topic in topics if self._full(topic) in found}
         return heard
@@ -101,7 +101,8 @@ class Player:
         if not isinstance(value, str):
             return value
         if value.startswith("@"):
-            return next(iter(self._answers[value[1:]].values()), 0)
+            answer = self._answers[value[1:]]
+            return 0 if FAILED in answer else next(iter(answer.values()), 0)
         return value.replace(FILES, self._files)
 
 

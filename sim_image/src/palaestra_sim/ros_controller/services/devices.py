@@ -158,14 +158,22 @@ class Outlet:
             feed.begin(self._node, period_ms)
         return True
 
-    def services(self, step_ms: Callable[[], int]) -> tuple[Service, ...]:
+    def services(self, step_ms: Callable[[], int], warn: Callable[[str], None]) -> tuple[Service, ...]:
         """Return the services `enable` and `get_sampling_period`.
 
-        `step_ms` returns the duration of the controller's last step.
+        Args:
+            step_ms: returns the duration of the controller's last step.
+            warn: called with a sentence if a sampling period is refused.
         """
 
         def enable(request: Any) -> dict[str, Any]:
-            return {"success": self.enable(request.value, step_ms())}
+            success = self.enable(request.value, step_ms())
+            if not success:
+                warn(
+                    f"{self._path}enable: refused the period {request.value} ms; use a multiple of the step, "
+                    f"{step_ms()} ms, for a device that this simulator can enable"
+                )
+            return {"success": success}
 
         def get_sampling_period(_request: Any) -> dict[str, Any]:
             return {"value": min(self._periods_ms, default=0)}

@@ -1,7 +1,7 @@
 """The ROS log of a controller: the topic `/rosout`, and the services with which tools set the log level.
 
 Every roscpp node has this topic and these services; rqt_logger_level uses them. The simulator logs only the
-requests that it refuses. The other messages of roscpp's log are about roscpp itself.
+requests and the sampling periods that it refuses. The other messages of roscpp's log are about roscpp itself.
 """
 
 from __future__ import annotations
@@ -45,14 +45,21 @@ class NodeLog:
 
     def error(self, text: str) -> None:
         """Publish an error, unless the log level is above `error`."""
-        if self._publisher is None or _LEVELS[self._levels[_LOGGER]] > _LEVELS["error"]:
+        self._publish("error", text)
+
+    def warning(self, text: str) -> None:
+        """Publish a warning, unless the log level is above `warn`."""
+        self._publish("warn", text)
+
+    def _publish(self, level: str, text: str) -> None:
+        if self._publisher is None or _LEVELS[self._levels[_LOGGER]] > _LEVELS[level]:
             return
         seconds, rest_s = divmod(self._clock(), 1.0)
         stamp = {"secs": int(seconds), "nsecs": int(rest_s * 1e9)}
         self._publisher.send(
             {
                 "header": {"stamp": stamp},
-                "level": _LEVELS["error"],
+                "level": _LEVELS[level],
                 "name": f"/{self._node.name}",
                 "msg": text,
             }

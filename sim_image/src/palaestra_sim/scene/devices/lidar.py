@@ -31,7 +31,7 @@ _MOST_RAYS: Final = 1_000_000
 _ROUNDING: Final = 1e-6  # tolerance, so that a turn by exactly the angle of one ray includes that ray
 _POINT: Final = struct.Struct("<fffif")  # x, y, z, layer, time
 _FLOAT32, _INT32 = 7, 5  # the numbers of these types in sensor_msgs/PointField
-_POINT_FIELDS: Final = [
+POINT_FIELDS: Final = [
     {"name": name, "offset": offset, "datatype": datatype, "count": 1}
     for name, offset, datatype in (
         ("x", 0, _FLOAT32),
@@ -317,7 +317,7 @@ def _cloud(lidar: Lidar) -> DeviceTopic:
     constants = {
         "height": 1,
         "width": count,
-        "fields": _POINT_FIELDS,
+        "fields": POINT_FIELDS,
         "point_step": _POINT.size,
         "row_step": _POINT.size * count,
     }

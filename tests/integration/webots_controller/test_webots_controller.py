@@ -1,0 +1,150 @@
+"""The controller for Webots: its robots step, pause, reload and end as those of Webots' own controller."""
+
+import os
+import signal
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from palaestra_trainer.ros import is_served
+from tests.waiting import eventually
+
+DEADLINE_S = 60.0
+STEP_MS = 32
+ROBOT = """DEF R{index} Robot {{
+  translation {index} 0 0 name "r{index}" controller "ros" supervisor {supervisor}
+  controllerArgs [ "--name={prefix}_{index}" "--synchronize" ]
+  children [ GPS {{ }} ]
+}}
+"""
+
+
+def world(prefix, *supervisors):
+    """Return a world with a robot for each item, which says whether the robot is a supervisor."""
+    robots = (
+        ROBOT.format(index=index, prefix=prefix, supervisor=str(supervisor).upper())
+        for index, supervisor in enumerate(supervisors)
+    )
+    return f"#VRML_SIM R2023b utf8\nWorldInfo {{ basicTimeStep {STEP_MS} }}\n{''.join(robots)}"
+
+
+@pytest.fixture
+def ask(client, prefix):
+    """Return a function that calls a service of a robot."""
+
+    def call(index, path, type_name, **request):
+        return client.call(f"/{prefix}_{index}/{path}", f"webots_ros/{type_name}", request)
+
+    return call
+
+
+@pytest.fixture
+def step(ask):
+    """Return a function that requests a step of a robot."""
+    return lambda index, step_ms=STEP_MS: ask(index, "robot/time_step", "set_int", value=step_ms)
+
+
+def test_two_robots_step_together(webots, prefix, ask, step):
+    """The world waits for both, so that neither misses an observation."""
+    webots(world(prefix, True, False), f"{prefix}_0", f"{prefix}_1")
+
+    with ThreadPoolExecutor() as pool:
+        first = pool.submit(step, 0)
+        assert not first.done()
+        assert step(1) == {"success": True}
+        assert first.result(DEADLINE_S) == {"success": True}
+
+    times = {ask(index, "robot/get_time", "get_float")["value"] for index in range(2)}
+    assert times == {STEP_MS / 1000.0}
+
+
+def test_a_step_that_is_no_multiple_of_the_basic_step_is_refused(webots, prefix, ask, step):
+    """The stub and Webots' own controller refuse it, too."""
+    webots(world(prefix, True), f"{prefix}_0")
+
+    assert [step(0, step_ms) for step_ms in (STEP_MS + 1, -STEP_MS)] == [{"success": False}] * 2
+    assert ask(0, "robot/get_time", "get_float") == {"value": 0.0}
+
+
+def test_services_respond_in_a_pause_and_a_step_waits_for_its_end(webots, prefix, ask, step):
+    """A trainer pauses a simulator that it does not need; before that, it reads the world."""
+    webots(world(prefix, True, True), f"{prefix}_0", f"{prefix}_1", mode="pause")
+
+    assert ask(0, "supervisor/simulation_get_mode", "get_int") == {"value": 0}
+    with ThreadPoolExecutor() as pool:
+        waiting = pool.submit(step, 0)
+        assert ask(1, "robot/get_basic_time_step", "get_float") == {"value": float(STEP_MS)}
+        assert ask(1, "supervisor/simulation_set_mode", "set_int", value=2) == {"success": True}
+        assert step(1) == {"success": True}
+        assert waiting.result(DEADLINE_S) == {"success": True}
+
+
+@pytest.mark.parametrize("paused", [False, True])
+def test_a_reload_ends_both_controllers_and_starts_them_again(webots, prefix, ask, paused):
+    """All names disappear and come back, also those of the robot that is no supervisor."""
+    process = webots(
+        world(prefix, True, False), f"{prefix}_0", f"{prefix}_1", mode="pause" if paused else "fast"
+    )
+    before = children(process.pid)
+
+    assert ask(0, "supervisor/world_reload", "get_bool") == {"value": True}
+
+    eventually(lambda: len(now := children(process.pid)) == 2 and not now & before, DEADLINE_S)
+    for index in range(2):
+        eventually(lambda index=index: is_served(f"/{prefix}_{index}/robot/get_device_list"), DEADLINE_S)
+    assert ask(1, "robot/get_time", "get_float") == {"value": 0.0}
+
+
+def test_the_world_goes_on_without_a_controller_that_was_killed(webots, prefix, step):
+    """Webots does not wait for a dead process; the trainer's other robots must not hang."""
+    process = webots(world(prefix, True, False), f"{prefix}_0", f"{prefix}_1")
+    [killed] = [pid for pid in children(process.pid) if f"--name={prefix}_1" in arguments(pid)]
+
+    with ThreadPoolExecutor() as pool:
+        waiting = pool.submit(step, 0)
+        os.kill(killed, signal.SIGKILL)
+        assert waiting.result(DEADLINE_S) == {"success": True}
+
+
+def test_quitting_ends_with_the_status_and_leaves_no_name(webots, prefix, ask):
+    """A sidecar reads the exit code; a name that stays would lead the next simulator's clients astray."""
+    process = webots(world(prefix, True), f"{prefix}_0")
+
+    assert ask(0, "supervisor/simulation_quit", "set_int", value=3) == {"success": True}
+
+    assert process.wait(DEADLINE_S) == 3
+    assert not is_served(f"/{prefix}_0/robot/time_step")
+
+
+def test_sigterm_unregisters_the_names_also_during_a_step(webots, prefix, step):
+    """In a pause, Webots terminates a controller that waits in a step."""
+    process = webots(world(prefix, True), f"{prefix}_0", mode="pause")
+    [pid] = children(process.pid)
+    with ThreadPoolExecutor() as pool:
+        waiting = pool.submit(step, 0)
+        os.kill(pid, signal.SIGTERM)
+        assert "failed" in waiting.result(DEADLINE_S)
+
+    eventually(lambda: not is_served(f"/{prefix}_0/robot/time_step"), DEADLINE_S)
+
+
+def test_a_refused_argument_is_one_line_in_the_console(webots, prefix):
+    """A person who forgot an argument reads the remedy in Webots' console."""
+    process = webots(world(prefix, True).replace('"--synchronize"', ""))
+
+    lines = iter(process.stdout.readline, "")
+    assert next(lines) == (
+        "ros: controllerArgs has no --synchronize; add it, because this controller steps only on request\n"
+    )
+    assert next(lines) == "WARNING: 'r0' controller exited with status: 2.\n"
+
+
+def children(pid):
+    """Return the ids of the processes that a process has started."""
+    return set(map(int, Path(f"/proc/{pid}/task/{pid}/children").read_text().split()))
+
+
+def arguments(pid):
+    """Return the arguments of a process."""
+    return Path(f"/proc/{pid}/cmdline").read_text().split("\0")
