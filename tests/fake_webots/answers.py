@@ -175,7 +175,7 @@ class Answers:
         self.window = []
         self.devices = list(served.devices)
         self.rows = {row.path: (row.type_name.partition("/")[2], row.handler) for row in served.services}
-        self.keys, self.pressed = [], []
+        self.keys = []
         if os.environ.get("FAKE_WEBOTS_PRESSED"):
             self._press()
         self.animation = None
@@ -195,8 +195,8 @@ class Answers:
             row[2](request_of(row[1], [65 if device.path == "keyboard" else 1]))
 
     def begin_step(self):
-        """Make the keys and buttons that are pressed readable once more."""
-        self.keys, self.pressed = [list(self.served.inputs[at].topics[0].source.value) for at in (1, 2)]
+        """Make the keys that are pressed readable once more."""
+        self.keys = list(self.served.inputs[1].topics[0].source.value)
 
     def _answer(self, name, arguments):
         own = getattr(self, f"_{name}", None)
@@ -261,7 +261,7 @@ class Answers:
         pass
 
     def _joystick_get_pressed_button(self):
-        return self.pressed.pop(0) if self.pressed else -1
+        return self.served.inputs[2].topics[0].source.value
 
     def _joystick_get_axis_value(self, index):
         return self.served.inputs[2].topics[1 + index].source.value[0]

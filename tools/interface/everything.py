@@ -71,7 +71,6 @@ UNCHECKED_IN_WEBOTS: Final = frozenset(
         "joystick/get_number_of_axes",
         "joystick/is_connected",
         "joystick/pov0",
-        "joystick/pressed_button",
         *(f"joystick/axis{axis}" for axis in range(6)),
         "keyboard/key",
         "skin/get_bone_name",

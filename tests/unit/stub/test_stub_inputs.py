@@ -47,10 +47,11 @@ def test_a_joystick_is_not_connected_until_somebody_moves_it(robot):
 
 
 def test_a_moved_joystick_publishes_axes_points_of_view_and_pressed_buttons(robot):
-    """As with the real controller, an axis has a message at each step, a button only while it is pressed."""
+    """As with the real controller, a step has one message for the buttons: the first that is pressed."""
     assert robot.get("palaestra/joystick/set_axes", values=[100.0, -128.0]) is True
     assert robot.get("palaestra/joystick/set_povs", values=[1.0]) is True
     assert robot.get("palaestra/joystick/press", value=3) is True
+    assert robot.get("palaestra/joystick/press", value=1) is True
     topics = "axis0", "axis1", "axis2", "pov0", "pressed_button"
     sent = stepped(robot, *(f"joystick/{topic}" for topic in topics))
 
@@ -59,6 +60,11 @@ def test_a_moved_joystick_publishes_axes_points_of_view_and_pressed_buttons(robo
     assert robot.get("joystick/get_number_of_axes") == 6
     assert robot.get("joystick/get_number_of_povs") == 1
     assert robot.get("joystick/get_model") == "palaestra"
+
+
+def test_no_pressed_button_is_a_message_too(robot):
+    """A client that keeps the newest message learns that the button was released."""
+    assert stepped(robot, "joystick/pressed_button") == [[-1]]
 
 
 @pytest.mark.parametrize("values", [[1.0] * 7, [128.0], [float("nan")]])

@@ -21,6 +21,7 @@ _GREATEST_KEY: Final = 2**31 - 1  # the greatest number in the message of a key
 _AXES: Final = 6  # the simulated gamepad has two sticks with two axes each, and two triggers
 _POVS: Final = 1
 _BYTE: Final = (-128, 127)
+_NO_BUTTON: Final = -1
 
 
 def inputs(robot: Robot) -> tuple[ServedDevice, ...]:
@@ -108,15 +109,32 @@ class _Part:
         return [self.parts[self.index]] if self.joystick.connected else []
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _FirstButton:
+    """The button that was pressed first, or -1; as in Webots, a step has one message for all buttons."""
+
+    buttons: _Pressed
+
+    @property
+    def value(self) -> int:
+        return self.buttons.value[0] if self.buttons.value else _NO_BUTTON
+
+
 def _joystick() -> ServedDevice:
     joystick = _Joystick()
-    topic = partial(DeviceTopic, type_name="webots_ros/Int8Stamped", many=True)
+    topic = partial(DeviceTopic, type_name="webots_ros/Int32Stamped")
     return ServedDevice(
         path="joystick",
         topics=(
-            topic(name="pressed_button", source=joystick.buttons),
-            *(topic(name=f"axis{i}", source=_Part(joystick, joystick.axes, i)) for i in range(_AXES)),
-            *(topic(name=f"pov{i}", source=_Part(joystick, joystick.povs, i)) for i in range(_POVS)),
+            topic(name="pressed_button", source=_FirstButton(joystick.buttons)),
+            *(
+                topic(name=f"axis{i}", source=_Part(joystick, joystick.axes, i), many=True)
+                for i in range(_AXES)
+            ),
+            *(
+                topic(name=f"pov{i}", source=_Part(joystick, joystick.povs, i), many=True)
+                for i in range(_POVS)
+            ),
         ),
         rows=(*_joystick_answers(joystick), *_force_feedback()),
         own_rows=tuple(_connecting(joystick, row) for row in _joystick_moves(joystick)),

@@ -14,13 +14,13 @@ from palaestra_trainer.errors import SimulatorDead, WorldMisfit
 from palaestra_trainer.ros import RosSubscriber
 from palaestra_trainer.webots.device import flag_fact, text_fact, whole_fact
 from palaestra_trainer.webots.devices import Sensor
-from palaestra_trainer.webots.message_decoding import INT8, INT32, NumberReading
+from palaestra_trainer.webots.message_decoding import INT32, NumberReading
 
 ALL = -1  # releases all keys or buttons
 
 
 class _Input(Sensor):
-    """A device that publishes a message for each pressed key, and none while no key is pressed."""
+    """A device that publishes the keys or buttons that are pressed."""
 
     __slots__ = ()
     listed: ClassVar[bool] = False
@@ -59,8 +59,11 @@ class _Input(Sensor):
         self._call_ours("release", "set_int", f"{self.device}: {key} is not pressed", value=key)
 
     def _pressed(self) -> tuple[int, ...]:
-        """Return the numbers that arrived, each once, in the order in which they arrived."""
-        return tuple(dict.fromkeys(self._values.arrived()))
+        """Return the numbers that arrived, each once, in the order in which they arrived.
+
+        A joystick sends -1 if no button is pressed.
+        """
+        return tuple(dict.fromkeys(number for number in self._values.arrived() if number >= 0))
 
     def _call_ours(self, name: str, type_name: str, refused: str, **request: Any) -> None:
         """Call a service that Webots does not have."""
@@ -94,7 +97,8 @@ class JoystickState(NamedTuple):
     """The state of a joystick.
 
     Attributes:
-        buttons: the numbers of the buttons that were pressed in the last step.
+        buttons: the number of the button that was pressed in the last step. If several buttons are pressed,
+            a simulator sends only the first one.
         axes: the position of each axis, -128 to 127; 0 until a joystick is connected.
         povs: the direction of each hat switch (point of view); 0 until a joystick is connected.
     """
@@ -125,12 +129,12 @@ class Joystick(_Input):
     )
 
     def __init__(self, robot: str, axes: int = 2, povs: int = 0) -> None:
-        super().__init__(robot, "joystick", "webots_ros/Int8Stamped", INT8, "pressed_button")
+        super().__init__(robot, "joystick", "webots_ros/Int32Stamped", INT32, "pressed_button")
         names = [*(f"axis{at}" for at in range(axes)), *(f"pov{at}" for at in range(povs))]
         self._axes = axes
         self._positions = [0] * len(names)
         self._topics = [
-            RosSubscriber(f"/{robot}/joystick/{name}", "webots_ros/Int8Stamped", NumberReading(name, INT8))
+            RosSubscriber(f"/{robot}/joystick/{name}", "webots_ros/Int32Stamped", NumberReading(name, INT32))
             for name in names
         ]
 

@@ -15,8 +15,7 @@ from palaestra_sim.webots.library import Library
 _NO_KEY: Final = -1
 _AXES: Final = 6  # as many topics as the simulators of this package have
 _POVS: Final = 1
-_KEY: Final = "webots_ros/Int32Stamped"
-_PART: Final = "webots_ros/Int8Stamped"
+_NUMBER: Final = "webots_ros/Int32Stamped"
 
 
 def inputs(library: Library) -> tuple[ServedDevice, ...]:
@@ -38,21 +37,22 @@ def _battery(library: Library) -> ServedDevice:
 
 
 def _keyboard(library: Library) -> ServedDevice:
-    keys = Reading(lambda: _until_none(library.keyboard_get_key))
+    # libController returns the pressed keys one by one, and -1 at the end.
+    keys = Reading(lambda: list(iter(library.keyboard_get_key, _NO_KEY)))
     return ServedDevice(
         path="keyboard",
-        topics=(DeviceTopic(name="key", type_name=_KEY, source=keys, many=True),),
+        topics=(DeviceTopic(name="key", type_name=_NUMBER, source=keys, many=True),),
         enabled=_switch(library.keyboard_enable, library.keyboard_disable),
     )
 
 
 def _joystick(library: Library) -> ServedDevice:
     axes, povs = library.joystick_get_number_of_axes, library.joystick_get_number_of_povs
-    buttons = Reading(lambda: _until_none(library.joystick_get_pressed_button))
+    button = Reading(library.joystick_get_pressed_button)  # -1 without a button; one message for each step
     return ServedDevice(
         path="joystick",
         topics=(
-            DeviceTopic(name="pressed_button", type_name=_PART, source=buttons, many=True),
+            DeviceTopic(name="pressed_button", type_name=_NUMBER, source=button),
             *(_part(f"axis{i}", axes, library.joystick_get_axis_value, i) for i in range(_AXES)),
             *(_part(f"pov{i}", povs, library.joystick_get_pov_value, i) for i in range(_POVS)),
         ),
@@ -89,12 +89,7 @@ def _command(function: Callable[[Any], Any], request: Any) -> Fields:
 def _part(name: str, count: Callable[[], int], read: Callable[[int], int], index: int) -> DeviceTopic:
     """Return the topic of an axis or a point of view; it has no message if the joystick lacks this part."""
     source = Reading(lambda: [read(index)] if index < count() else [])
-    return DeviceTopic(name=name, type_name=_PART, source=source, many=True)
-
-
-def _until_none(read: Callable[[], int]) -> list[int]:
-    """Return all keys that are pressed; libController returns them one by one, and -1 at the end."""
-    return list(iter(read, _NO_KEY))
+    return DeviceTopic(name=name, type_name=_NUMBER, source=source, many=True)
 
 
 def _switch(enable: Callable[[int], Any], disable: Callable[[], Any]) -> Callable[[int], None]:
