@@ -20,11 +20,12 @@ EXTRA_PROJECTS: Final = "WEBOTS_EXTRA_PROJECT_PATH"
 """The environment variable of Webots with a list of project folders, in the format of PATH."""
 
 # Webots reads the first line itself, and starts the controller with this interpreter.
-_CONTROLLER: Final = """\
-#!{interpreter}
+_IMPORT: Final = "from palaestra_sim.webots.cli import run"
+_CONTROLLER: Final = f"""\
+#!{{interpreter}}
 \"\"\"The controller `ros` of Palaestra; palaestra writes this file, so changes are lost.\"\"\"
 
-from palaestra_sim.webots.cli import run
+{_IMPORT}
 
 run()
 """
@@ -34,6 +35,15 @@ def extra_projects(folder: Path, environment: Mapping[str, str]) -> dict[str, st
     """Return the environment variable that makes Webots search `folder` before all other extra projects."""
     others = environment.get(EXTRA_PROJECTS, "")
     return {EXTRA_PROJECTS: f"{folder}{os.pathsep}{others}" if others else str(folder)}
+
+
+def foreign_controller(folder: Path) -> Path | None:
+    """Return a file of another controller `ros` in the project `folder`; None if there is no such file."""
+    for path in sorted(_controller(folder).parent.glob("*")):
+        ours = path.name == "__pycache__" or (path.name == "ros.py" and _IMPORT in path.read_text())
+        if not ours:
+            return path
+    return None
 
 
 def write_project(folder: Path, interpreter: str = sys.executable) -> Path:
@@ -46,7 +56,11 @@ def write_project(folder: Path, interpreter: str = sys.executable) -> Path:
     Raises:
         OSError: the file cannot be written; no partial file is left.
     """
-    controller = folder / "controllers" / "ros" / "ros.py"
+    controller = _controller(folder)
     controller.parent.mkdir(parents=True, exist_ok=True)
     write_whole(controller, _CONTROLLER.format(interpreter=interpreter).encode())
     return controller
+
+
+def _controller(folder: Path) -> Path:
+    return folder / "controllers" / "ros" / "ros.py"

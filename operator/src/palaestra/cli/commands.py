@@ -34,6 +34,7 @@ COMMANDS: Mapping[str, Command] = MappingProxyType(
         "explain": Command("explain", "show what a field of a job means"),
         "plan": Command("offline_commands", "print the objects that a job needs"),
         "world": Command("offline_commands", "print one simulator's own world"),
+        "webots-project": Command("webots_project", "write the controller `ros` for Webots on a desktop"),
         "crd": Command("offline_commands", "print the CustomResourceDefinition"),
         "operator": Command("operator", "reconcile the jobs of a cluster"),
         "get": Command("read_commands", "list jobs"),

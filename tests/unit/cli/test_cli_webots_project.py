@@ -1,0 +1,44 @@
+"""`palaestra webots-project`: the controller for Webots on a desktop."""
+
+import subprocess
+import sys
+
+import pytest
+
+from palaestra.cli import main
+
+
+def test_the_project_starts_the_controller_with_this_python(tmp_path, capsys):
+    """Webots reads the interpreter from the first line; another one would not have the package."""
+    folder = tmp_path / "new" / "project"
+
+    assert main(["webots-project", str(folder)]) == 0
+    assert main(["webots-project", str(folder)]) == 0  # a second time it renews its own file
+
+    controller = folder / "controllers" / "ros" / "ros.py"
+    first = controller.read_text().partition("\n")[0]
+    ended = subprocess.run(
+        [first.removeprefix("#!"), controller], capture_output=True, text=True, check=False
+    )
+    assert first == f"#!{sys.executable}"
+    assert (ended.returncode, ended.stderr.startswith("ros: controllerArgs has no --name=")) == (2, True)
+    assert capsys.readouterr().out == f"export WEBOTS_EXTRA_PROJECT_PATH={folder}\n" * 2
+
+
+@pytest.mark.parametrize(("name", "text"), [("ros", ""), ("ros.py", "print('mine')"), ("helper.py", "")])
+def test_a_controller_of_the_user_is_kept(tmp_path, capsys, name, text):
+    """A binary beside our file would be started instead of it; a changed file would be lost."""
+    file = tmp_path / "controllers" / "ros" / name
+    file.parent.mkdir(parents=True)
+    file.write_text(text)
+
+    assert main(["webots-project", str(tmp_path)]) == 2
+
+    assert f"{file} belongs to another controller `ros`; give another folder" in capsys.readouterr().err
+    assert file.read_text() == text
+
+
+def test_a_folder_that_cannot_be_written_is_named(capsys):
+    """The reason is one sentence, and nothing was written."""
+    assert main(["webots-project", "/proc/project"]) == 2
+    assert capsys.readouterr().err.endswith("give a folder in which you can write\n")
