@@ -8,6 +8,7 @@ import pytest
 
 from palaestra_protocol.control import SidecarState
 from palaestra_sim.world import RunIdentity, robots, ros_name
+from tests.fake_webots.home import make_home
 from tests.integration.sidecar.conftest import PROGRAM
 
 WORLD = """#VRML_SIM R2023b utf8
@@ -110,3 +111,31 @@ def test_a_world_for_ros_gets_the_name_and_the_option_that_it_lacks(webots) -> N
     name = ros_name(RunIdentity(job="j", uid="u", replica=0, group="collect", index=0), "robotino")
     assert (robot.ros_name, robot.synchronize) == (name, True)
     assert [found.ros_name for found in state.robots] == [name]
+
+
+@pytest.mark.parametrize(
+    ("option", "line"),
+    [
+        ((), "ros: no ROS master at"),
+        (("--webots-controller=webots",), "the controller of Webots was started"),
+    ],
+)
+def test_the_controller_of_webots_is_replaced_unless_an_option_keeps_it(run_sidecar, tmp_path, option, line):
+    """Webots R2023b has a controller of that name, and prefers a program to a script."""
+    home = make_home(tmp_path, "R2023b")
+    it = run_sidecar(
+        [
+            *(
+                "env",
+                f"WEBOTS_HOME={home}",
+                f"PATH={home}:{os.environ['PATH']}",
+                "ROS_MASTER_URI=http://127.0.0.1:9",
+            ),
+            *(PROGRAM, "--driver=webots", "--world=arena", f"--work={tmp_path}/work", "--job=j"),
+            *("--control=127.0.0.1:0", "--health=127.0.0.1:0", *option),
+        ]
+    )
+
+    it.request("/start")
+
+    it.until_said(line)
