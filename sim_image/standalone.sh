@@ -1,6 +1,6 @@
 #!/bin/sh
-# Make a folder with the sidecar and all that it needs except a shell: Python, Python's libraries, the C library.
-# Users copy the folder into their own simulator images. It works in every Linux image for the same processor type.
+# Make a folder with the sidecar, the controller for Webots, and all that they need except a shell: Python, Python's
+# libraries, the C library. Users copy the folder into their own simulator images. It works in every Linux image for the same processor type.
 # Run this script inside the stub's image, after the packages are installed.
 # Arguments: the folder; optionally the folder in which the packages are installed.
 set -eu
@@ -18,7 +18,7 @@ rm -rf EXTERNALLY-MANAGED config-* ensurepip idlelib lib2to3 pydoc_data sitecust
 rm -f lib-dynload/_curses* lib-dynload/_dbm* lib-dynload/_sqlite3* lib-dynload/readline*
 
 cp -a "$installed"/prometheus_client* "$installed"/palaestra_protocol "$installed"/palaestra_sim* "$own/"
-rm -rf "$own/palaestra_sim/stub" "$own/palaestra_sim/mujoco" "$own/palaestra_sim/message_package" "$own/palaestra_protocol/ros"
+rm -rf "$own/palaestra_sim/stub" "$own/palaestra_sim/mujoco" "$own/palaestra_sim/message_package"
 
 for program in "$target/lib/$name.program" lib-dynload/*.so; do
   ldd "$program"

@@ -1,8 +1,8 @@
-"""Build a user's own image from one of the release's images: python -m tests.e2e.own_image FOLDER NAME.
+"""Build a user's own image from one of the release's: python -m tests.e2e.own_image FOLDER NAME [BASE].
 
-FOLDER contains the Dockerfile. The program writes an archive next to FOLDER and prints the path of the
-archive. Tests run the program as a process of its own, because the lock of the image store works only in a
-main thread.
+BASE is the release's image from which the Dockerfile begins, by default "trainer". FOLDER contains the
+Dockerfile. The program writes an archive next to FOLDER and prints the path of the archive. Tests run the
+program as a process of its own, because the lock of the image store works only in a main thread.
 """
 
 import os
@@ -19,12 +19,12 @@ LOCK_DEADLINE_S = 300
 
 def main() -> None:
     """Build the image; the command line is in the module's docstring."""
-    context, name = Path(sys.argv[1]), sys.argv[2]
+    context, name, base = Path(sys.argv[1]), sys.argv[2], (*sys.argv[3:], "trainer")[0]
     archive = context.with_name(f"{context.name}.tar")
     store = cache.folder() / "images"
     with cache.locked(cache.folder() / "locks" / "images", LOCK_DEADLINE_S):
         engine = Docker.here() or Buildah.here(store, ROOT)
-        engine.load(archives()["trainer"], archive.with_name("load.log"))
+        engine.load(archives()[base], archive.with_name("load.log"))
         engine.build(
             Order(
                 reference=f"docker.io/library/{name}",

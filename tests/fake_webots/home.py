@@ -9,15 +9,18 @@ from tests.fake_webots.wire import FOLDER
 RELEASES = ("R2023b", "R2025a")
 REPOSITORY = FOLDER.parents[1]
 _STOCK = '#!/bin/sh\necho "the controller of Webots was started"\nexec sleep 1000\n'
-_COMMAND = f"""#!/bin/sh
-PYTHONPATH={REPOSITORY} exec {sys.executable} -m tests.fake_webots.program "$@"
-"""
 
 
-def make_home(folder, release="R2025a"):
+def make_home(folder, release="R2025a", python=sys.executable, repository=REPOSITORY):
     """Write a WEBOTS_HOME into a folder, and return its path.
 
     The release R2023b has a controller `ros` of its own, which is a program; R2025a has none.
+
+    Args:
+        folder: the folder in which the home is made.
+        release: the release of Webots, which is also the name of the home.
+        python: the Python that runs the command `webots`.
+        repository: the folder that has the package `tests`, where the command runs.
     """
     home = Path(folder) / release
     library = home / "lib" / "controller" / "libController.so"
@@ -35,7 +38,8 @@ def make_home(folder, release="R2025a"):
         stock = home / "projects" / "default" / "controllers" / "ros" / "ros"
         stock.parent.mkdir(parents=True)
         _write_program(stock, _STOCK)
-    _write_program(home / "webots", _COMMAND)
+    command = f'PYTHONPATH={repository} exec {python} -m tests.fake_webots.program "$@"'
+    _write_program(home / "webots", f"#!/bin/sh\n{command}\n")
     return home
 
 

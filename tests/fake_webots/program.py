@@ -10,9 +10,9 @@ import subprocess
 import sys
 import tempfile
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 
-from palaestra_sim.mujoco.physics import MujocoPhysics
 from palaestra_sim.ros.loop import Loop
 from palaestra_sim.ros_controller.handles import Handles
 from palaestra_sim.ros_controller.scene_robot import served
@@ -27,7 +27,6 @@ from tests.fake_webots.wire import read_request, write_result
 
 GRACE_S = 1.0  # Webots waits so long for a controller to end, before it sends SIGTERM
 MODES = {"pause": Mode.PAUSE, "realtime": Mode.REAL_TIME, "fast": Mode.FAST}
-PHYSICS = {"stub": StubPhysics, "mujoco": MujocoPhysics}
 QUIT = -1
 _POLL_S = 0.02  # interval of the looks at the controllers' processes
 
@@ -79,8 +78,7 @@ class Webots:
     def load_world(self):
         """Load the world file, and start the controller of each robot, in the order of the file."""
         self.ending = False
-        physics = PHYSICS[os.environ.get("FAKE_WEBOTS_PHYSICS", "stub")]
-        load = Loader(physics=physics, leave_out=LeaveOut(names=True))
+        load = Loader(physics=_physics(), leave_out=LeaveOut(names=True))
         self.simulation = load(self.world_path, self.mode)
         self.stepping = Stepping(self.simulation)
         self.handles = Handles(self.simulation)
@@ -237,6 +235,13 @@ class Controller:
         if self.runs:
             self.process.kill()
             self.process.wait()
+
+
+def _physics():
+    """Return the physics of the world: the stub's, or MuJoCo's, which draws pictures."""
+    if os.environ.get("FAKE_WEBOTS_PHYSICS") == "mujoco":
+        return import_module("palaestra_sim.mujoco.physics").MujocoPhysics
+    return StubPhysics
 
 
 def interpreter(script):

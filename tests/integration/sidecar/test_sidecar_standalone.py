@@ -1,5 +1,6 @@
 """The folder with the sidecar for a user's own image contains only Python code and prometheus_client."""
 
+import os
 import shutil
 import subprocess
 import tomllib
@@ -9,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from palaestra_protocol.control import SidecarState
+from tests.fake_webots.home import make_home
 
 SIM_IMAGE = Path(__file__).parents[3] / "sim_image"
 
@@ -40,8 +42,29 @@ def test_the_sidecar_runs_from_a_copied_folder(standalone, sidecar, waits, tmp_p
     assert it.end() == 0
 
 
-def test_the_folder_has_nothing_that_speaks_ros(standalone) -> None:
-    """A sidecar only starts and stops a process, and other code would only enlarge every image."""
+def test_webots_starts_the_controller_with_the_python_of_the_folder(
+    standalone, run_sidecar, tmp_path
+) -> None:
+    """The image of a Webots may have no Python, or one that is too old."""
+    moved, home = standalone.rename(tmp_path / "moved"), make_home(tmp_path, "R2025a")
+    it = run_sidecar(
+        [
+            *("env", "-i", f"PATH={home}:{os.environ['PATH']}", f"WEBOTS_HOME={home}"),
+            *("ROS_MASTER_URI=http://127.0.0.1:9", moved / "palaestra-sidecar", "--driver=webots"),
+            *("--world=arena", "--job=j", f"--work={tmp_path}/work"),
+            *("--control=127.0.0.1:0", "--health=127.0.0.1:0"),
+        ]
+    )
+
+    it.request("/start")
+
+    it.until_said("ros: no ROS master at http://127.0.0.1:9")  # the last step before the services
+    controller = tmp_path / "work/webots/controllers/ros/ros.py"
+    assert controller.read_text().startswith(f"#!{moved}/bin/python3\n")
+
+
+def test_the_folder_has_no_simulator(standalone) -> None:
+    """The image has a simulator of its own, and other code would only enlarge it."""
     packages = standalone / "lib/python3/dist-packages"
 
     assert {path.name.partition("-")[0] for path in packages.iterdir()} == {
@@ -49,5 +72,5 @@ def test_the_folder_has_nothing_that_speaks_ros(standalone) -> None:
         "palaestra_sim",
         "prometheus_client",
     }
-    assert not (packages / "palaestra_protocol/ros").exists()
     assert not (packages / "palaestra_sim/stub").exists()
+    assert not (packages / "palaestra_sim/mujoco").exists()
