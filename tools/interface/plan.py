@@ -11,7 +11,15 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from palaestra_trainer.conformance.player import FILES
-from tools.interface.everything import FAILING, NOT_IN_WEBOTS, UNCHECKED_IN_WEBOTS, offered, world
+from tools.interface import training
+from tools.interface.everything import (
+    FAILING,
+    NOT_IN_WEBOTS,
+    ROBOT,
+    UNCHECKED_IN_WEBOTS,
+    offered,
+    world,
+)
 
 Request = Mapping[str, Any]
 Call = tuple[str, str, str, Request]  # name, path, type, request
@@ -177,6 +185,7 @@ def interface() -> dict[str, Any]:
     )
     fails = {simulator: sorted(paths) for simulator, paths in FAILING.items()}
     return {
+        "robot": ROBOT,
         "step_ms": STEP_MS,
         "world": world(),
         "calls": calls,
@@ -185,6 +194,7 @@ def interface() -> dict[str, Any]:
         "expected": ANSWERS,
         "fails": {**fails, "webots": []},
         "absent": absent,
+        "training": training.claims(),
     }
 
 

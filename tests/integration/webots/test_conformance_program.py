@@ -13,6 +13,7 @@ from tests.waiting import eventually
 
 PROGRAM = Path(sys.executable).with_name("palaestra-conformance")
 STUB = Path(sys.executable).with_name("palaestra-stub")
+OWN = Path(__file__).parents[3] / "examples/simulators/cart_simulator.py"
 DEADLINE_S = 120.0
 
 
@@ -30,11 +31,11 @@ def conformance(folder, *options, **environment):
 
 
 @contextmanager
-def stub(world):
-    """Run a stub until the end of the block, and wait for its last service."""
-    with subprocess.Popen([STUB, world], stderr=subprocess.DEVNULL) as process:
+def running(world, *program):
+    """Run a simulator until the end of the block, and wait for its last service."""
+    with subprocess.Popen([*(program or [STUB]), world], stderr=subprocess.DEVNULL) as process:
         try:
-            eventually(lambda: is_served("/everything/robot/get_device_list"), DEADLINE_S)
+            eventually(lambda: is_served(f"/{world.stem}/robot/get_device_list"), DEADLINE_S)
             yield process
         finally:
             process.terminate()  # it unregisters its services
@@ -44,9 +45,9 @@ def stub(world):
 def test_a_stub_keeps_every_claim_of_its_column_and_not_those_of_webots(master, tmp_path):
     """A person reads which claims do not hold, and finds the same in the report."""
     written = conformance(tmp_path, "--world")
-    with stub(tmp_path / "everything.wbt"):
+    with running(tmp_path / "everything.wbt"):
         for_webots = conformance(tmp_path, "--master", master, "--report", "webots.md")
-    with stub(tmp_path / "everything.wbt") as process:  # the calls have changed the world
+    with running(tmp_path / "everything.wbt") as process:  # the calls have changed the world
         own = conformance(tmp_path, "--master", master, "--claims", "stub", "--all", "--report", "stub.md")
         process.wait(DEADLINE_S)
 
@@ -62,10 +63,27 @@ def test_a_stub_keeps_every_claim_of_its_column_and_not_those_of_webots(master, 
     assert "| `gps/values` | geometry_msgs/PointStamped | holds |" in (tmp_path / "stub.md").read_text()
 
 
+@pytest.mark.parametrize("program", [(), (sys.executable, OWN)], ids=["stub", "example"])
+def test_a_simulator_that_serves_what_a_training_needs_keeps_these_claims(master, tmp_path, program):
+    """The author of another simulator learns from these claims whether a job can train in it."""
+    training = ("--claims", "training")
+    written = conformance(tmp_path, "--world", *training)
+    with running(tmp_path / "cart.wbt", *program) as process:
+        tested = conformance(tmp_path, "--master", master, "--all", "--report", "report.md", *training)
+        code = process.wait(DEADLINE_S)
+
+    assert (written.returncode, written.stdout) == (0, "cart.wbt\n")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["cart.wbt", "report.md"]
+    assert (tested.returncode, tested.stdout, tested.stderr) == (0, "31 of 31 claims hold\n", "")
+    assert "| `a step lasts its period` |  | holds |" in (tmp_path / "report.md").read_text()
+    assert code == 0
+
+
 @pytest.mark.parametrize(
     ("options", "problem"),
     [
         (("--name", "absent"), "the robot absent has no services"),
+        (("--claims", "training"), "the robot cart has no services"),
         (("--master", "http://127.0.0.1:9"), "127.0.0.1:9"),
         (("--claims", "gazebo"), "invalid choice: 'gazebo'"),
         (("--world", "--files", "/dev/null"), "use a folder in which you can write"),

@@ -2,11 +2,12 @@
 
 import pytest
 
-from palaestra_trainer.conformance.claims import Claims, claims, simulators, verdicts
+from palaestra_trainer.conformance.claims import Claims, claims, subjects, verdicts
 from palaestra_trainer.conformance.report import differences, markdown, summary
 
 PATHS = ("led/get_led", "led/set_led", "skin/get_bone_name", "supervisor/field/insert_bool")
 ASKED = Claims(
+    robot="robot",
     world="",
     calls=[(path, path, "webots_ros/get_int", {}) for path in PATHS],
     topics={"gps/values": "geometry_msgs/PointStamped"},
@@ -70,7 +71,7 @@ def test_only_our_simulators_have_our_services():
     """A client of Webots would otherwise be told that Webots is wrong."""
     of_webots = {path for _, path, _, _ in claims("webots").calls}
 
-    assert simulators() == ("stub", "mujoco", "webots")
+    assert subjects() == ("stub", "mujoco", "webots", "training")
     assert not any(path.startswith("palaestra/") for path in of_webots)
     assert any(path.startswith("palaestra/") for _, path, _, _ in claims("stub").calls)
     assert claims("webots").fails == frozenset()

@@ -12,15 +12,18 @@ from pathlib import Path
 
 from palaestra_protocol.pod.enums import ExitCode
 from palaestra_trainer.conformance import report
-from palaestra_trainer.conformance.claims import Claims, ClaimVerdict, claims, simulators, verdicts
+from palaestra_trainer.conformance.claims import TRAINING, Claims, ClaimVerdict, claims, subjects, verdicts
 from palaestra_trainer.conformance.player import Player
+from palaestra_trainer.conformance.rehearsal import rehearsed
 from palaestra_trainer.conformance.wire_client import WireClient
 from palaestra_trainer.errors import ConfigurationError, TrainerError
 from palaestra_trainer.ros import ensure_node, is_served
 
 CONFORMANCE = """\
 Call every service of a running simulator, subscribe to every topic, and compare responses and messages with
-docs/reference/ros-interface.md. The simulator must have loaded the world that --world writes.
+docs/reference/ros-interface.md. The simulator must have loaded the world that --world writes for these
+claims. With --claims training, the program calls only the services that a training needs, and drives the
+robot as a training does.
 
 reads:
   the ROS master; services and topics of the robot
@@ -35,8 +38,7 @@ exit codes:
   2   an option is wrong, no master responds, or the robot has no services; nothing was called
 """
 DIFFERENT = 1
-ROBOT = "everything"
-WORLD, PICTURE = "everything.wbt", "logo.png"
+PICTURE = "logo.png"
 # A PNG of one pixel.
 _PNG = bytes.fromhex(
     "89504e470d0a1a0a0000000d49484452000000010000000108020000009077"
@@ -48,21 +50,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run `palaestra-conformance`; return its exit code."""
     chosen = _parser().parse_args(arguments)
     asked = claims(chosen.claims)
+    robot = chosen.name or asked.robot
     if chosen.world:
-        return _write_world(asked, chosen.files)
+        return _write_world(asked, chosen.files, picture=chosen.claims != TRAINING)
     if chosen.master:
         os.environ["ROS_MASTER_URI"] = chosen.master
     try:
         ensure_node("palaestra_conformance")
-        if not is_served(f"/{chosen.name}/robot/time_step"):
+        if not is_served(f"/{robot}/robot/time_step"):
             raise ConfigurationError(
-                f"the robot {chosen.name} has no services; start a simulator with the world that --world"
+                f"the robot {robot} has no services; start a simulator with the world that --world"
                 " writes, and give the robot's ROS name with --name"
             )
     except TrainerError as error:
         sys.stderr.write(f"{error}\n")
         return ExitCode.CONFIGURATION
-    return _reported(_played(asked, chosen), chosen)
+    return _reported(_played(asked, robot, chosen), chosen)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -74,36 +77,44 @@ def _parser() -> argparse.ArgumentParser:
     )
     add = parser.add_argument
     add("--master", metavar="URI", help="address of the ROS master (default: $ROS_MASTER_URI)")
-    add("--name", default=ROBOT, metavar="ROBOT", help=f"ROS name of the robot (default: {ROBOT})")
-    add("--claims", choices=simulators(), default="webots", help="the column of the page (default: webots)")
+    add("--name", metavar="ROBOT", help="ROS name of the robot (default: that in the world of --world)")
+    add(
+        "--claims",
+        choices=subjects(),
+        default="webots",
+        help="the column of the page, or what a training needs (default: webots)",
+    )
     add(
         "--files", type=Path, default=Path(), metavar="DIR", help="folder of the world (default: this folder)"
     )
-    add("--world", action="store_true", help=f"write {WORLD} and {PICTURE} into the folder, and end")
+    add("--world", action="store_true", help="write the world of these claims into the folder, and end")
     add("--all", action="store_true", help="also make the calls that restart and end the simulator")
     add("--report", type=Path, metavar="FILE", help="write a report in Markdown")
     return parser
 
 
-def _write_world(asked: Claims, folder: Path) -> int:
+def _write_world(asked: Claims, folder: Path, *, picture: bool) -> int:
+    world = folder / f"{asked.robot}.wbt"
     try:
-        (folder / PICTURE).write_bytes(_PNG)
-        (folder / WORLD).write_text(asked.world)
+        if picture:
+            (folder / PICTURE).write_bytes(_PNG)
+        world.write_text(asked.world)
     except OSError as error:
         sys.stderr.write(f"--files: {error}; use a folder in which you can write\n")
         return ExitCode.CONFIGURATION
-    sys.stdout.write(f"{folder / WORLD}\n")
+    sys.stdout.write(f"{world}\n")
     return 0
 
 
-def _played(asked: Claims, chosen: argparse.Namespace) -> list[ClaimVerdict]:
+def _played(asked: Claims, robot: str, chosen: argparse.Namespace) -> list[ClaimVerdict]:
     client = WireClient()
     try:
-        player = Player(client, chosen.name, asked.step_ms, str(chosen.files.absolute()))
+        driven = rehearsed(client, asked, robot) if chosen.claims == TRAINING else []
+        player = Player(client, robot, asked.step_ms, str(chosen.files.absolute()))
         answers, heard = player.play(asked, ending=chosen.all)
     finally:
         client.close()
-    return verdicts(asked, answers, heard)
+    return [*driven, *verdicts(asked, answers, heard)]
 
 
 def _reported(found: Sequence[ClaimVerdict], chosen: argparse.Namespace) -> int:

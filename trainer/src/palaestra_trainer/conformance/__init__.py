@@ -2,5 +2,5 @@
 
 `interface.json` has the claims; `make golden` writes this file from tools/interface. `claims` reads it and
 judges responses, `player` makes the calls with any client, `wire_client` is the client, and `report` writes
-the results.
+the results. `rehearsal` checks time, steps and resets for the claims of a training.
 """

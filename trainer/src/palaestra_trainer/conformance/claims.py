@@ -14,6 +14,7 @@ Answer = Mapping[str, Any]
 Call = tuple[str, str, str, Mapping[str, Any]]  # name, path, type, request
 
 FAILED: Final = "failed"  # the key of the reason in the answer of a call that failed
+TRAINING: Final = "training"  # the claims that a simulator must keep so that a job can train in it
 _FILE: Final = "interface.json"
 _INSERT: Final = "supervisor/field/insert_"
 _TOLERANCE: Final = 1e-6  # relative and absolute, of two numbers that are equal
@@ -21,9 +22,10 @@ _TOLERANCE: Final = 1e-6  # relative and absolute, of two numbers that are equal
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Claims:
-    """The interface of one kind of simulator.
+    """The interface of one kind of simulator, or the part of it that a training needs.
 
     Attributes:
+        robot: the ROS name of the robot in the world.
         world: the text of the world file with every device.
         calls: the calls in their order. A call that returns a handle has a name of its own; the name of any
             other call is its path.
@@ -34,6 +36,7 @@ class Claims:
         step_ms: the period of a step of the world, in ms of simulated time.
     """
 
+    robot: str
     world: str
     calls: Sequence[Call]
     topics: Mapping[str, str]
@@ -58,20 +61,23 @@ class ClaimVerdict:
     problem: str = ""
 
 
-def simulators() -> tuple[str, ...]:
-    """Return the kinds of simulators that the page has claims about."""
-    return tuple(_read()["fails"])
+def subjects() -> tuple[str, ...]:
+    """Return the subjects of claims: the kinds of simulators on the page, and `TRAINING`."""
+    return (*_read()["fails"], TRAINING)
 
 
 def claims(simulator: str) -> Claims:
-    """Return the claims about a kind of simulator.
+    """Return the claims about a kind of simulator, or those of `TRAINING`.
 
     Raises:
-        KeyError: the page has no claims about such a simulator.
+        KeyError: no claims have this subject.
     """
     data = _read()
+    if simulator == TRAINING:
+        return Claims(**data[TRAINING], expected={}, fails=frozenset())
     absent = set(data["absent"][simulator])
     return Claims(
+        robot=data["robot"],
         world=data["world"],
         calls=[
             (name, path, kind, request) for name, path, kind, request in data["calls"] if path not in absent

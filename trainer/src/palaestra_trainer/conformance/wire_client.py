@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from palaestra_trainer.conformance.claims import FAILED, Answer
@@ -32,7 +32,9 @@ class WireClient:
         return answer
 
     def listen(self, topic: str, type_name: str) -> None:
-        """Subscribe to a topic, if a node publishes it now."""
+        """Subscribe to a topic, unless it is subscribed already or no node publishes it now."""
+        if topic in self._topics:
+            return
         subscriber = RosSubscriber(topic, type_name)
         try:
             subscriber.connect()
@@ -40,6 +42,15 @@ class WireClient:
             subscriber.close()
             return
         self._topics[topic] = subscriber
+
+    def messages(self, topic: str) -> Sequence[Any]:
+        """Return the messages of a topic that have arrived since the last call.
+
+        Raises:
+            SimulatorFault: the connection was lost, or a message cannot be read.
+        """
+        subscriber = self._topics.get(topic)
+        return [] if subscriber is None else [plain(message) for message in subscriber.arrived()]
 
     def heard(self) -> Mapping[str, Any]:
         """Return the first message of each topic that has sent one."""
