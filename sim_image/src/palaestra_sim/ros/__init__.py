@@ -9,6 +9,8 @@ each robot, and fast responses. So this package implements the protocols itself:
 - `topics`: topics and their publishers
 - `node`: names and services
 - `local_socket`: a Unix socket in the same loop, for the sidecar
+
+Simulators of users have such nodes too; docs/howto/bring-a-simulator.md has an example.
 """
 
 from palaestra_sim.ros.local_socket import LocalSocket
