@@ -10,6 +10,7 @@ import pytest
 from palaestra_trainer.cli.conformance import main
 from palaestra_trainer.conformance.claims import FAILED, claims, verdicts
 from palaestra_trainer.conformance.player import Player
+from palaestra_trainer.conformance.rehearsal import CLAIMS, rehearsed
 from palaestra_trainer.conformance.wire_client import WireClient
 from palaestra_trainer.ros import is_served
 from tests.waiting import eventually
@@ -48,6 +49,17 @@ def test_every_claim_about_webots_holds(webots, played, tmp_path, release):
     answers, heard = played(asked, ending=True)
 
     assert [it for it in verdicts(asked, answers, heard) if it.problem] == []
+
+
+def test_a_training_can_drive_a_robot_in_webots(webots):
+    """The claims of a training are also about time, steps and resets, which single calls cannot show."""
+    asked = claims("training")
+    webots(asked.world, asked.robot, FAKE_WEBOTS_PHYSICS="mujoco")
+
+    with closing(WireClient()) as client:
+        found = rehearsed(client, asked, asked.robot)
+
+    assert {it.path: it.problem for it in found} == dict.fromkeys(CLAIMS, "")
 
 
 def test_each_service_responds_as_in_the_stub(webots, played, client, tmp_path):
