@@ -78,6 +78,8 @@ def fill(folder: Path, root: Path, recipe: Recipe, inside: Contents, *, wheels: 
     shutil.copy(_uv(), folder / "uv")
     for file in recipe.files:
         shutil.copy(root / file, folder)
+    for name, path in recipe.given.items():
+        shutil.copy(path, folder / name)
     for package in recipe.packages:
         _make_wheel(root / package, folder / "packages")
 

@@ -29,7 +29,8 @@ class Recipe:
     `packages` are the folders of our packages in the image, and `extras` names the optional dependencies of
     these packages. `files` are other files that the Dockerfile runs or copies. `without` names locked
     packages that the image leaves out. `extra` is an additional lock, whose packages the image has too.
-    `arguments` are the arguments of the Dockerfile.
+    `arguments` are the arguments of the Dockerfile. `given` has files of the person who builds the image, by
+    their names in the build context; an argument of the Dockerfile must have the digest of each file.
     """
 
     name: str
@@ -40,6 +41,7 @@ class Recipe:
     without: tuple[str, ...] = ()
     extra: str | None = None
     arguments: Mapping[str, str] = field(default_factory=dict)
+    given: Mapping[str, Path] = field(default_factory=dict)
 
     def reference(self, tag: str) -> str:
         """Return the image's full name."""

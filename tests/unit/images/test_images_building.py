@@ -98,6 +98,19 @@ def test_a_changed_file_makes_another_archive(workshop, root, engine, changed):
     assert len(engine.orders) == 2
 
 
+def test_a_file_of_the_builder_s_own_is_in_the_context(workshop, engine, tmp_path):
+    """The Dockerfile of Webots reads an archive that is not in the checkout."""
+    given = tmp_path / "download.zip"
+    given.write_text("given")
+    found = []
+    build, engine.build = engine.build, lambda order: found.append((order.context / "own.zip").read_text())
+
+    workshop.build(replace(OPERATOR, given={"own.zip": given}))
+    engine.build = build
+
+    assert found == ["given"]
+
+
 def test_a_changed_lock_of_its_own_makes_another_archive(workshop, root, engine):
     """Besides the lock file of all images, an image may have a lock file of its own."""
     recipe = replace(OPERATOR, extra="extra.lock")

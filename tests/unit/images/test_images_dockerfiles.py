@@ -9,11 +9,13 @@ from pathlib import Path
 import pytest
 import yaml
 
+from tools.images import webots
 from tools.images.lock import PYTHON
 from tools.images.recipes import recipes
 
 ROOT = Path(__file__).parents[3]
-RECIPES = tuple(recipes("debian").values())
+KNOWN = {**recipes("debian"), "webots": webots.RECIPE}
+RECIPES = tuple(KNOWN.values())
 HADOLINT = Path(sys.executable).with_name("hadolint")
 EXCUSES = ROOT / ".hadolint.yaml"
 
@@ -94,10 +96,10 @@ def test_code_is_compiled_in_the_build_and_not_at_run_time(instructions):
     assert all("--compile-bytecode" in run for run in values(instructions, "RUN") if "uv pip" in run)
 
 
-@pytest.mark.parametrize("name", ["stub", "mujoco", "trainer", "notebook"])
+@pytest.mark.parametrize("name", ["stub", "mujoco", "webots", "trainer", "notebook"])
 def test_an_image_with_ros_has_the_package_webots_ros(name):
     """Users' programs import this package. Palaestra's own code does not need it."""
-    runs = values(parsed(recipes("debian")[name]), "RUN")
+    runs = values(parsed(KNOWN[name]), "RUN")
 
     distribution, *_ = [run for run in runs if "apt-get" in run]
     [ours] = [run for run in runs if "/context/packages/" in run]
@@ -130,12 +132,30 @@ def test_the_notebook_begins_with_the_layers_of_the_trainer():
     assert notebook[:shared] == trainer[:shared]
 
 
-def test_mujoco_begins_with_the_layers_of_the_stub():
+@pytest.mark.parametrize("name", ["mujoco", "webots"])
+def test_a_simulator_begins_with_the_layers_of_the_stub(name):
     """A node that runs both images pulls Python and the ROS messages once."""
-    stub, mujoco = (parsed(recipes("debian")[name]) for name in ("stub", "mujoco"))
+    stub, other = (parsed(KNOWN[each]) for each in ("stub", name))
     shared = stub.index(("ENV", "PYTHONDONTWRITEBYTECODE=1")) + 1
 
-    assert mujoco[:shared] == stub[:shared]
+    assert other[:shared] == stub[:shared]
+
+
+def test_webots_is_installed_from_the_archive_with_the_checked_digest():
+    """The archive comes from a person, so the build checks its digest and its release."""
+    instructions = parsed(KNOWN["webots"])
+    [install] = [run for run in values(instructions, "RUN") if "/context/install.sh" in run]
+
+    assert 'webots.tar.bz2 "${WEBOTS_SHA256}" "${WEBOTS}" "${WEBOTS_HOME}"' in install
+    assert "WEBOTS=R2025a" in values(instructions, "ARG")
+    assert {"WEBOTS_SHA256", "ASSETS_SHA256"} <= set(values(instructions, "ARG"))
+
+
+def test_webots_image_has_an_x_server_and_opengl():
+    """Webots needs an X server without a screen, and Mesa renders on the processor."""
+    [install] = [run for run in values(parsed(KNOWN["webots"]), "RUN") if "xvfb" in run]
+
+    assert {"libgl1-mesa-dri", "libegl1", "libxcb-cursor0", "bzip2"} <= set(install.split())
 
 
 def test_mujoco_s_image_can_draw():
