@@ -79,7 +79,7 @@ def _parser() -> argparse.ArgumentParser:
         "--webots",
         type=Path,
         metavar="ARCHIVE",
-        help="build the image of Webots from this archive of a release, which you have downloaded, and the NAMEs",
+        help="build the image of Webots from the downloaded archive of a release, and the NAMEs",
     )
     add("--webots-assets", type=Path, metavar="ZIP", help="archive of the release's assets, for use offline")
     add("--webots-sha256", metavar="HEX", help="refuse an archive of Webots with another SHA-256")

@@ -28,8 +28,8 @@ def of_archive(archive: Path, assets: Path | None, expected: str | None, machine
     `expected` is the SHA-256 that the archive of Webots must have; None accepts every archive.
 
     Raises:
-        ImagesError: an archive cannot be read, has another digest or an unknown name, or there is no Webots for
-            the `machine`.
+        ImagesError: an archive cannot be read, has another digest or an unknown name, or no Webots exists
+            for the `machine`.
     """
     release = _NAME.fullmatch(archive.name)
     if release is None:

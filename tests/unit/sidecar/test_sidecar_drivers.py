@@ -77,6 +77,25 @@ def test_webots_starts_paused_without_a_screen_and_prints(path) -> None:
     )
 
 
+@pytest.mark.parametrize(
+    ("options", "view"),
+    [
+        ([], "--minimize --no-rendering "),
+        (["--stream"], "--minimize --no-rendering "),
+        (["--stream=mjpeg"], ""),
+    ],
+)
+def test_the_main_view_of_webots_is_rendered_only_for_its_pictures(path, options, view) -> None:
+    """Cameras are rendered in any case; the stream mjpeg and movies are pictures of the main view."""
+    folder = path("webots")
+
+    started = command(Driver.WEBOTS, Launch(world=WORLD, options=options), {"PATH": folder})
+
+    assert " ".join(started.arguments) == " ".join(
+        [f"{folder}/webots --batch --mode=pause --stdout --stderr {view}{WORLD}", *options]
+    )
+
+
 @pytest.mark.parametrize(("given", "user"), [({}, "palaestra"), ({"USER": "maria"}, "maria")])
 def test_webots_always_has_a_user(path, given, user) -> None:
     """Webots names its temporary folder after the variable `USER`, which a container does not set."""

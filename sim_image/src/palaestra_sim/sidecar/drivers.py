@@ -20,7 +20,12 @@ _FIRST_PORT, _PORTS = 10_000, 20_000  # below the range from which Linux gives o
 
 # Source: Webots' guide, "Command Line Arguments". --batch prevents dialogs that wait for a click.
 # With --minimize but without --mode, Webots would start in fast mode.
-_WEBOTS = ("--batch", "--mode=pause", "--stdout", "--stderr", "--minimize", "--no-rendering")
+_WEBOTS = ("--batch", "--mode=pause", "--stdout", "--stderr")
+# --no-rendering turns off only the main 3D view: Webots renders cameras in each step, whatever the view does
+# (WbSimulationWorld::step). Movies, the stream mjpeg and, in R2023b, exported images show the main 3D view.
+# Webots' simulation_server.py leaves out both options for the stream mjpeg.
+_WITHOUT_VIEW = ("--minimize", "--no-rendering")
+_SHOWS_VIEW = "--stream=mjpeg"
 
 
 class Driver(StrEnum):
@@ -78,7 +83,8 @@ def _mujoco(launch: Launch) -> list[str]:
 
 
 def _webots(launch: Launch) -> list[str]:
-    return ["webots", *_WEBOTS, str(launch.world), *launch.options]
+    view = () if _SHOWS_VIEW in launch.options else _WITHOUT_VIEW
+    return ["webots", *_WEBOTS, *view, str(launch.world), *launch.options]
 
 
 def _command(launch: Launch) -> list[str]:
