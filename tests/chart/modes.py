@@ -22,6 +22,7 @@ MODES: dict[str, Values] = {
         "images": {
             "registry": "registry.example.com:5000/robots",
             **{part: {"digest": DIGEST} for part in PARTS},
+            "webots": {"repository": "palaestra-webots", "digest": DIGEST},
         },
         "imagePullSecrets": [{"name": "registry"}],
         "tensorboard": {"enabled": True, "existingClaim": "runs"},

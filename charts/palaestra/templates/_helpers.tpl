@@ -24,10 +24,13 @@ app.kubernetes.io/component: {{ .component }}
 {{- if $image.digest }}@{{ $image.digest }}{{ else }}:{{ $image.tag | default .root.Chart.AppVersion }}{{ end -}}
 {{- end }}
 
-{{/* The image of a container of jobs, or nothing if it equals the operator's own default. Takes the root and the name. */}}
+{{/* The image of a container of jobs, or nothing if it equals the operator's own default. The operator has no default
+     image of Webots. Takes the root and the name. */}}
 {{- define "palaestra.jobImage" -}}
 {{- $image := include "palaestra.image" . -}}
-{{- if ne $image (printf "palaestra-%s:%s" .name .root.Chart.AppVersion) }}{{ $image }}{{ end -}}
+{{- if eq .name "webots" }}
+{{- if .root.Values.images.webots.repository }}{{ $image }}{{ end -}}
+{{- else if ne $image (printf "palaestra-%s:%s" .name .root.Chart.AppVersion) }}{{ $image }}{{ end -}}
 {{- end }}
 
 {{/* Pod settings that *restricted* Pod Security requires, and the user of all our images unless the cluster chooses one. */}}

@@ -197,9 +197,26 @@ def test_the_operator_s_defaults_are_those_of_its_release(one):
         release.trainer,
         release.stub,
         release.mujoco,
-        release.webots,
+        None,
     )
     assert (chosen.workers, chosen.resync) == (4, 600)
+
+
+@pytest.mark.parametrize(
+    ("image", "chosen"),
+    [
+        ({"tag": "1.2", "digest": DIGEST}, None),
+        ({"repository": "palaestra-webots", "tag": "1.2"}, "palaestra-webots:1.2"),
+        ({"repository": "palaestra-webots", "digest": DIGEST}, f"palaestra-webots@{DIGEST}"),
+        ({"repository": "palaestra-webots"}, f"palaestra-webots:{version('palaestra')}"),
+    ],
+    ids=str,
+)
+def test_the_image_of_webots_has_no_default(made, image, chosen):  # noqa: ARG001 - skips without Helm
+    """Palaestra publishes no such image, so the operator must not plan pods that never start."""
+    [deployment] = [each for each in objects({"images": {"webots": image}}) if each["kind"] == "Deployment"]
+
+    assert options(deployment).webots_image == chosen
 
 
 def test_every_image_comes_from_the_registry_by_its_digest(made, one):

@@ -138,6 +138,49 @@ def test_a_job_is_held_with_a_reason_and_creates_nothing(make_scene, spec, there
     assert (stalled.type, stalled.reason, stalled.message) == ("Stalled", reason, message)
 
 
+WEBOTS = [{"name": "own", "role": "Collect"}, {"name": "wild", "role": "Evaluate", "driver": "webots"}]
+
+
+def test_a_job_with_webots_needs_an_image_of_it(make_scene):
+    """Palaestra publishes no image of Webots.
+
+    Otherwise the pods would wait for an image that no registry has.
+    """
+    scene = make_scene(simulators=WEBOTS)
+    scene.layout = replace(scene.layout, has_webots_image=False)
+
+    decision = scene.settle()
+
+    message = (
+        "spec.simulators[1].image: is missing, and this installation has no image of Webots; set the chart's "
+        "value images.webots.repository, or create a new TrainingJob with an image in spec.simulators[].image"
+    )
+    assert held(scene) == ("NoImage", message)
+    assert decision.actions == ()
+
+
+@pytest.mark.parametrize("own", [True, False], ids=["of the job", "of the installation"])
+def test_a_job_with_an_image_of_webots_is_planned(make_scene, own):
+    """The job or the installation may name the image."""
+    scene = make_scene(simulators=[WEBOTS[0], WEBOTS[1] | ({"image": "webots:1"} if own else {})])
+    scene.layout = replace(scene.layout, has_webots_image=not own)
+
+    scene.settle()
+
+    assert scene.status.conditions[0].status.value == "True"
+
+
+def test_an_accepted_job_keeps_its_image_of_webots(make_scene):
+    """An administrator may remove the chart's value while jobs run."""
+    scene = make_scene(simulators=WEBOTS)
+    scene.settle()
+    scene.layout = replace(scene.layout, has_webots_image=False)
+
+    scene.settle()
+
+    assert scene.status.conditions[0].status.value == "True"
+
+
 @pytest.mark.parametrize(
     ("spec", "kind", "name"),
     [

@@ -60,7 +60,7 @@ def test_a_sidecar_that_became_an_ordinary_container_is_wrong():
 DIGEST = f"@sha256:{'0' * 64}"
 
 
-PINNED = {part: part + DIGEST for part in ("operator", "trainer", "stub", "mujoco")}
+PINNED = {part: part + DIGEST for part in ("operator", "trainer", "stub", "mujoco", "webots")}
 
 
 def operator(**images):
@@ -91,6 +91,7 @@ def test_images_of_an_operator_that_is_given_none_are_the_releases():
     assert found.fact.startswith("palaestra-trainer:")
     assert ", palaestra-stub:" in found.fact
     assert ", palaestra-mujoco:" in found.fact
+    assert "webots" not in found.fact  # an operator without the option has no image of Webots
 
 
 def test_a_definition_with_more_in_it_is_the_same():

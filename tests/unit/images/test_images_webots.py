@@ -1,4 +1,4 @@
-"""The image of Webots is built from its user's archive; in these tests, from an archive of the same layout."""
+"""The image of Webots is built from the archive that its user has; here, from one of the same layout."""
 
 import hashlib
 import os

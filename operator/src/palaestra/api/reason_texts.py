@@ -114,6 +114,12 @@ ROWS: dict[Reason, ReasonText] = {
         "the job names a queue, but the cluster has no Kueue to admit it",
         "install Kueue, or create a new TrainingJob without `queueName`",
     ),
+    Reason.NO_IMAGE: ReasonText(
+        "{field}: is missing, and this installation has no image of Webots; set the chart's value "
+        "images.webots.repository, or create a new TrainingJob with an image in spec.simulators[].image",
+        "a simulator has the driver `webots` but no image, and the installation has no image of Webots",
+        "set the chart's value `images.webots`, or create a new TrainingJob with `spec.simulators[].image`",
+    ),
     Reason.NAME_TAKEN: ReasonText(
         "Job {name} belongs to another owner{deleting}; delete it or rename this TrainingJob",
         "a Job of another owner has the name that a replica's Job needs",

@@ -24,6 +24,7 @@ class Reason(StrEnum):
     POD_METADATA_NOT_ALLOWED = "PodMetadataNotAllowed"
     SCHEDULING_NOT_ALLOWED = "SchedulingNotAllowed"
     NO_KUEUE = "NoKueue"
+    NO_IMAGE = "NoImage"
     NAME_TAKEN = "NameTaken"
     OLD_POD_TERMINATING = "OldPodTerminating"
     RUN_LOST = "RunLost"
@@ -83,6 +84,7 @@ HELD = frozenset(
         Reason.POD_METADATA_NOT_ALLOWED,
         Reason.SCHEDULING_NOT_ALLOWED,
         Reason.NO_KUEUE,
+        Reason.NO_IMAGE,
         Reason.WORLD_MISSING,
         Reason.WORLD_INVALID,
         Reason.WORLD_TOO_COSTLY,

@@ -170,12 +170,14 @@ class SimulatorGroup(ApiModel):
     training continues without it, as long as that many are left. Absent: `count`."""
 
     image: Image | None = None
-    """Container image; absent: this release's image for the driver. `palaestra run` ignores it."""
+    """Container image; absent: this release's image for the driver, or for `webots` the image that the
+    installation names. `palaestra run` ignores it."""
 
     driver: Driver = Field(default=Driver.STUB, strict=False)
     """`stub`: Palaestra's own simulator, which simulates no masses and renders no pictures. `mujoco`: MuJoCo,
-    with the same worlds, options and ROS interface as the stub. `webots`: Webots; Palaestra has no image for
-    it yet, so set `image` to your own. `command`: any program with the same ROS interface."""
+    with the same worlds, options and ROS interface as the stub. `webots`: Webots; Palaestra publishes no
+    image of it, so set `image` if your cluster has no default. `command`: any program with the same ROS
+    interface."""
 
     command: Words = ()
     """Program and arguments, for driver `command` only."""

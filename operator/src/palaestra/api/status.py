@@ -298,7 +298,7 @@ class Release(StatusModel):
     """Image of the MuJoCo simulator."""
 
     webots: Image
-    """Image of Webots; Palaestra does not build this image yet."""
+    """Image of Webots; used only if the installation names an image of Webots."""
 
 
 class Status(StatusModel):

@@ -203,10 +203,16 @@ def _add_cluster(parser: argparse.ArgumentParser) -> None:
 
 def _add_images(parser: argparse.ArgumentParser) -> None:
     release = Images.of_release(version("palaestra"))
-    for name in ("trainer", "stub", "mujoco", "webots"):
+    for name in ("trainer", "stub", "mujoco"):
         image = getattr(release, name)
         meaning = f"image for jobs that do not name an image; default: {image}"
         parser.add_argument(f"--{name}-image", metavar="IMAGE", default=image, help=meaning)
+    parser.add_argument(
+        "--webots-image",
+        metavar="IMAGE",
+        help="image for simulators with driver webots and no image; without this option, a job with such a "
+        "simulator waits, because Palaestra publishes no image of Webots",
+    )
 
 
 def _operator(options: argparse.Namespace) -> int:
@@ -214,11 +220,12 @@ def _operator(options: argparse.Namespace) -> int:
         trainer=options.trainer_image,
         stub=options.stub_image,
         mujoco=options.mujoco_image,
-        webots=options.webots_image,
+        webots=options.webots_image or Images.of_release(version("palaestra")).webots,
     )
     return run(
         OperatorOptions(
             images=images,
+            has_webots_image=options.webots_image is not None,
             operator_namespace=options.operator_namespace,
             monitoring_namespace=options.monitoring_namespace,
             namespaces=tuple(dict.fromkeys(options.namespaces)),

@@ -8,7 +8,7 @@ import dataclasses
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
-from palaestra.api import TrainingJob, broken_guards
+from palaestra.api import Driver, TrainingJob, broken_guards
 from palaestra.api.reasons import Reason
 from palaestra.api.status import TERMINAL, LostPart, LostRun
 from palaestra.decide.allow_lists import not_allowed
@@ -108,7 +108,17 @@ def _held(job: TrainingJob, observed: Observed, layout: ClusterLayout) -> Hold |
 def _held_as_new(job: TrainingJob, layout: ClusterLayout) -> Hold | None:
     if problems := broken_guards(job):
         return held(Reason.INVALID_SPEC, final=True, problem="; ".join(problems))
-    return not_allowed(job, layout.allowed)
+    return webots_has_an_image(job, layout) or not_allowed(job, layout.allowed)
+
+
+def webots_has_an_image(job: TrainingJob, layout: ClusterLayout) -> Hold | None:
+    """Palaestra publishes no image of Webots, so a pod without such an image would never start."""
+    if layout.has_webots_image:
+        return None
+    for place, group in enumerate(job.spec.simulators):
+        if group.driver is Driver.WEBOTS and group.image is None:
+            return held(Reason.NO_IMAGE, field=f"spec.simulators[{place}].image")
+    return None
 
 
 def wants_whole(job: TrainingJob, observed: Observed, layout: ClusterLayout, lacks: Lacking | None) -> bool:

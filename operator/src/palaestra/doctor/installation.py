@@ -20,6 +20,7 @@ LOGS = "read `kubectl logs -n {namespace} deploy/{name}`"
 TRAINER_IMAGE = "--trainer-image="
 STUB_IMAGE = "--stub-image="
 MUJOCO_IMAGE = "--mujoco-image="
+WEBOTS_IMAGE = "--webots-image="
 DIGEST = "@sha256:"
 NOT_ELECTED = "--no-leader-elect"
 PORT_NAME = "metrics"
@@ -58,6 +59,7 @@ def judged_images(container: Object) -> CheckResult:
         _chosen(container, TRAINER_IMAGE, release.trainer),
         _chosen(container, STUB_IMAGE, release.stub),
         _chosen(container, MUJOCO_IMAGE, release.mujoco),
+        *filter(None, [_chosen(container, WEBOTS_IMAGE, "")]),  # without this option, there is no such image
     )
     tags = [image for image in named if DIGEST not in image]
     if not tags:

@@ -32,6 +32,8 @@ class OperatorOptions:
             namespace.
         allowed: the values that jobs may have in settings that affect other users of the cluster.
         resources: the resources of containers for which a job does not set resources.
+        has_webots_image: whether the installation has an image of Webots; if not, a job with driver webots
+            must name an image.
         fixed_user: whether training pods set their user ID; if not, the cluster chooses the user ID.
         kubeconfig: the kubeconfig file; None: kubectl's default, or the pod's own service account.
         context: the context of the kubeconfig; None: its current context.
@@ -49,6 +51,7 @@ class OperatorOptions:
     host_users: bool = True
     allowed: Allowed = field(default_factory=Allowed)
     resources: Defaults = NO_DEFAULTS
+    has_webots_image: bool = True
     fixed_user: bool = True
     kubeconfig: str | None = None
     context: str | None = None

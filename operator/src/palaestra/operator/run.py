@@ -209,6 +209,7 @@ def _layout(options: OperatorOptions) -> ClusterLayout:
         allowed=options.allowed,
         resources=options.resources,
         user=USER if options.fixed_user else None,
+        has_webots_image=options.has_webots_image,
     )
 
 

@@ -175,7 +175,11 @@ class Layout(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClusterLayout:
-    """The layout of a cluster: a pod has its own network and file system, so ports and paths are fixed."""
+    """The layout of a cluster: a pod has its own network and file system, so ports and paths are fixed.
+
+    `has_webots_image` is False if the installation names no image of Webots. The operator then accepts no job
+    that needs it.
+    """
 
     images: Images
     ports: Ports = Ports()
@@ -190,6 +194,7 @@ class ClusterLayout:
     allowed: Allowed = Allowed()
     resources: Defaults = NO_DEFAULTS
     user: int | None = USER
+    has_webots_image: bool = True
 
     def places(self, uid: str, replica: int, container: str) -> ContainerPaths:
         """Return the same paths for every container; the job's uid separates the runs on one volume."""
