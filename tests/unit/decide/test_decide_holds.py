@@ -152,8 +152,8 @@ def test_a_job_with_webots_needs_an_image_of_it(make_scene):
     decision = scene.settle()
 
     message = (
-        "spec.simulators[1].image: is missing, and this installation has no image of Webots; set the chart's "
-        "value images.webots.repository, or create a new TrainingJob with an image in spec.simulators[].image"
+        "spec.simulators[1].image: is missing, and the chart's value images.webots.repository is empty; set "
+        "one of them"
     )
     assert held(scene) == ("NoImage", message)
     assert decision.actions == ()

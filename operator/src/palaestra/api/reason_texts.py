@@ -1,7 +1,7 @@
 """The texts of all reasons.
 
-The message of a reason is a template with placeholders for facts. The complete message is a sentence for
-people with the fact and the remedy. `meaning` and `remedy` are columns of docs/reference/reasons.md.
+The message is a template for facts; the complete message is a sentence with the fact and the remedy.
+`meaning` and `remedy` are columns of docs/reference/reasons.md.
 """
 
 from dataclasses import dataclass
@@ -9,8 +9,7 @@ from dataclasses import dataclass
 from palaestra.api.reasons import LONGEST_MESSAGE, Reason
 from palaestra.api.text import flat, one_line
 
-# Limit in characters of a fact from another program, such as the scheduler, a registry or a trainer.
-LONGEST_FACT = 600
+LONGEST_FACT = 600  # limit in characters of a fact from another program, such as a scheduler or a registry
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,8 +114,7 @@ ROWS: dict[Reason, ReasonText] = {
         "install Kueue, or create a new TrainingJob without `queueName`",
     ),
     Reason.NO_IMAGE: ReasonText(
-        "{field}: is missing, and this installation has no image of Webots; set the chart's value "
-        "images.webots.repository, or create a new TrainingJob with an image in spec.simulators[].image",
+        "{field}: is missing, and the chart's value images.webots.repository is empty; set one of them",
         "a simulator has the driver `webots` but no image, and the installation has no image of Webots",
         "set the chart's value `images.webots`, or create a new TrainingJob with `spec.simulators[].image`",
     ),
@@ -390,8 +388,7 @@ ROWS: dict[Reason, ReasonText] = {
     ),
     Reason.EDITED: ReasonText(
         "{what} was edited by another field manager: {fact}",
-        "an object that the operator created was edited; the operator emits one event per edit "
-        "and does not restore the object",
+        "an object of the operator was edited; the operator emits an event, and does not restore the object",
         "if the edit was a mistake, undo it",
     ),
 }
