@@ -114,25 +114,21 @@ def test_a_world_for_ros_gets_the_name_and_the_option_that_it_lacks(webots) -> N
 
 
 @pytest.mark.parametrize(
-    ("option", "line"),
+    ("choice", "line"),
     [
-        ((), "ros: no ROS master at"),
-        (("--webots-controller=webots",), "the controller of Webots was started"),
+        ("palaestra", "ros: no ROS master at"),
+        ("webots", "the controller of Webots was started"),
     ],
 )
-def test_the_controller_of_webots_is_replaced_unless_an_option_keeps_it(run_sidecar, tmp_path, option, line):
+def test_the_controller_of_webots_is_replaced_unless_a_variable_keeps_it(run_sidecar, tmp_path, choice, line):
     """Webots R2023b has a controller of that name, and prefers a program to a script."""
     home = make_home(tmp_path, "R2023b")
     it = run_sidecar(
         [
-            *(
-                "env",
-                f"WEBOTS_HOME={home}",
-                f"PATH={home}:{os.environ['PATH']}",
-                "ROS_MASTER_URI=http://127.0.0.1:9",
-            ),
-            *(PROGRAM, "--driver=webots", "--world=arena", f"--work={tmp_path}/work", "--job=j"),
-            *("--control=127.0.0.1:0", "--health=127.0.0.1:0", *option),
+            *("env", f"WEBOTS_HOME={home}", f"PATH={home}:{os.environ['PATH']}"),
+            *("ROS_MASTER_URI=http://127.0.0.1:9", f"WEBOTS_ROS_CONTROLLER={choice}", PROGRAM),
+            *("--driver=webots", "--world=arena", f"--work={tmp_path}/work", "--job=j"),
+            *("--control=127.0.0.1:0", "--health=127.0.0.1:0"),
         ]
     )
 

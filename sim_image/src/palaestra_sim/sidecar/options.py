@@ -1,7 +1,8 @@
 """The command-line options of `palaestra-sidecar`."""
 
 import argparse
-from collections.abc import Sequence
+import os
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NoReturn
 
@@ -12,6 +13,7 @@ from palaestra_sim.sidecar.world_files import located
 
 EXIT_WRONG = 2
 OWN_CONTROLLER, STOCK_CONTROLLER = "palaestra", "webots"
+CONTROLLER = "WEBOTS_ROS_CONTROLLER"  # a job sets this variable, because it has no field for the option
 
 EPILOG = """
 This program does not start the simulator by itself. A client starts it with POST /start on the control port;
@@ -42,8 +44,8 @@ class _Parser(argparse.ArgumentParser):
         self.exit(EXIT_WRONG, f"{self.prog}: {message}; see --help\n")
 
 
-def parse(arguments: Sequence[str]) -> argparse.Namespace:
-    """Return the options; if an option is wrong, exit with code 2."""
+def parse(arguments: Sequence[str], environment: Mapping[str, str] = os.environ) -> argparse.Namespace:
+    """Return the options; if an option or the variable of an option is wrong, exit with code 2."""
     parser = _Parser(
         prog="palaestra-sidecar",
         description="Start, watch and stop one simulator at its trainer's command.",
@@ -51,13 +53,19 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
-    _add_simulator(parser)
+    _add_simulator(parser, environment)
     _add_listeners(parser)
     _add_identity(parser)
-    return parser.parse_args(arguments)
+    options = parser.parse_args(arguments)
+    if options.webots_controller not in {OWN_CONTROLLER, STOCK_CONTROLLER}:
+        parser.error(
+            f"{CONTROLLER}: {options.webots_controller!r} is no controller; "
+            f"set {OWN_CONTROLLER} or {STOCK_CONTROLLER}"
+        )
+    return options
 
 
-def _add_simulator(parser: argparse.ArgumentParser) -> None:
+def _add_simulator(parser: argparse.ArgumentParser, environment: Mapping[str, str]) -> None:
     group = parser.add_argument_group("the simulator")
     group.add_argument("--driver", choices=[driver.value for driver in Driver], required=True)
     group.add_argument(
@@ -75,9 +83,9 @@ def _add_simulator(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--webots-controller",
         choices=(OWN_CONTROLLER, STOCK_CONTROLLER),
-        default=OWN_CONTROLLER,
+        default=environment.get(CONTROLLER, OWN_CONTROLLER),
         help="for driver webots, the controller `ros`: of Palaestra, or of Webots up to R2023b "
-        "(default: %(default)s)",
+        f"(default: {CONTROLLER}, or {OWN_CONTROLLER})",
     )
     group.add_argument(
         "program", nargs="*", help="for driver command, after --; {world} stands for the world's path"
