@@ -1,10 +1,14 @@
 """The verdicts on the claims about the ROS interface."""
 
+import re
+from pathlib import Path
+
 import pytest
 
 from palaestra_trainer.conformance.claims import Claims, claims, subjects, verdicts
 from palaestra_trainer.conformance.report import differences, markdown, summary
 
+PAGE = Path(__file__).parents[4] / "docs/howto/conformance.md"
 PATHS = ("led/get_led", "led/set_led", "skin/get_bone_name", "supervisor/field/insert_bool")
 ASKED = Claims(
     robot="robot",
@@ -75,3 +79,14 @@ def test_only_our_simulators_have_our_services():
     assert not any(path.startswith("palaestra/") for path in of_webots)
     assert any(path.startswith("palaestra/") for _, path, _, _ in claims("stub").calls)
     assert claims("webots").fails == frozenset()
+
+
+@pytest.mark.parametrize("simulator", ["stub", "mujoco", "webots"])
+def test_the_page_has_the_number_of_claims(simulator):
+    """A reader compares this number with the last line of the program."""
+    asked = claims(simulator)
+    paths = {path for name, path, *_ in (*asked.calls, *asked.last) if name == path}
+    rows = re.findall(r"^\| (.+?) \| (\d+) \| (\d+|not measured.*) \|$", PAGE.read_text(), re.MULTILINE)
+    counts = {int(count) for name, count, _ in rows if name.lower() == simulator}
+
+    assert counts == {len(paths) + len(asked.topics)}
