@@ -137,7 +137,9 @@ class _Process:
 
     def __init__(self, options: argparse.Namespace, load: Load) -> None:
         self._ordered = faults.read_options(options, os.environ)
-        self._course = None if self._ordered is None else faults.begin(self._ordered, load, options.world)
+        self._course = (
+            None if self._ordered is None else faults.begin(self._ordered, faults.survey(load, options.world))
+        )
         self._loop = Loop()
         self._master_uri = os.environ.get("ROS_MASTER_URI", "http://localhost:11311")
         self._new_node = self._node_maker()

@@ -140,6 +140,52 @@ def test_a_refused_argument_is_one_line_in_the_console(webots, prefix):
     assert next(lines) == "WARNING: 'r0' controller exited with status: 2.\n"
 
 
+def test_an_injected_crash_ends_only_the_controller(webots, prefix, step):
+    """A user tests the training code; Webots goes on, as after a real crash of a controller."""
+    process = webots(
+        world(prefix, True, True), f"{prefix}_0", f"{prefix}_1", PALAESTRA_STUB_FAULTS="crash:step=2"
+    )
+    assert step_both(step)
+
+    with ThreadPoolExecutor() as pool:
+        crashed = [pool.submit(step, index) for index in range(2)]
+        assert all("failed" in it.result(DEADLINE_S) for it in crashed)
+
+    eventually(lambda: not children(process.pid), DEADLINE_S)
+    assert process.poll() is None
+
+
+def test_an_injected_value_reaches_the_client(webots, prefix, ask):
+    """Faults of messages need no process to end."""
+    faulty = "wrong_value:service=robot/get_time,value=7"
+    webots(world(prefix, True), f"{prefix}_0", PALAESTRA_STUB_FAULTS=faulty)
+
+    assert ask(0, "robot/get_time", "get_float") == {"value": 7.0}
+    assert ask(0, "robot/get_basic_time_step", "get_float") == {"value": float(STEP_MS)}
+
+
+@pytest.mark.parametrize("slot", ["", "a"])
+def test_a_wrong_fault_ends_the_webots_of_a_sidecar_with_2(webots, prefix, slot):
+    """A job must not wait for a robot without a controller; a person's own Webots stays open."""
+    sidecar = {"PALAESTRA_SIMULATOR_SLOT": slot} if slot else {}
+    process = webots(world(prefix, True), PALAESTRA_STUB_FAULTS="lost:topic=gsp/values", **sidecar)
+
+    line = next(line for line in iter(process.stdout.readline, "") if "has no topic" in line)
+    assert "the world has no topic gsp/values; name another, such as gps/values" in line
+    if slot:
+        assert process.wait(DEADLINE_S) == 2
+    else:
+        assert "exited with status: 2" in process.stdout.readline()
+        assert process.poll() is None
+
+
+def step_both(step):
+    """Return whether a step of both robots succeeds."""
+    with ThreadPoolExecutor() as pool:
+        steps = [pool.submit(step, index) for index in range(2)]
+        return [it.result(DEADLINE_S) for it in steps] == [{"success": True}] * 2
+
+
 def children(pid):
     """Return the ids of the processes that a process has started."""
     return set(map(int, Path(f"/proc/{pid}/task/{pid}/children").read_text().split()))

@@ -18,10 +18,13 @@ def test_the_project_starts_the_controller_with_this_python(tmp_path, capsys):
     controller = folder / "controllers" / "ros" / "ros.py"
     first = controller.read_text().partition("\n")[0]
     ended = subprocess.run(
-        [first.removeprefix("#!"), controller], capture_output=True, text=True, check=False
+        ["env", "-u", "WEBOTS_HOME", first.removeprefix("#!"), controller],
+        capture_output=True,
+        text=True,
+        check=False,
     )
     assert first == f"#!{sys.executable}"
-    assert (ended.returncode, ended.stderr.startswith("ros: controllerArgs has no --name=")) == (2, True)
+    assert (ended.returncode, "ros: WEBOTS_HOME is not set" in ended.stderr) == (2, True)
     assert capsys.readouterr().out == f"export WEBOTS_EXTRA_PROJECT_PATH={folder}\n" * 2
 
 

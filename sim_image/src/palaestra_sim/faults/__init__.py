@@ -1,4 +1,4 @@
-"""Injected faults: the stub imitates the failures of real simulators, so that users can test training code.
+"""Injected faults: a simulator imitates failures of real simulators, so that users can test training code.
 
 - `kinds`: the kinds of faults, as data
 - `parser`: parses a description such as `crash:probability=0.0005`
@@ -10,13 +10,13 @@
 - `faulty_node`, with I/O: a ROS node that drops, delays or changes its requests and messages
 - `process_faults`, with I/O: sends signals to the process, allocates memory, or exits
 
-A stub without faults uses the plain `RosNode`, so this package does not slow it down.
+A simulator without faults uses the plain `RosNode`, so this package does not slow it down.
 """
 
 from palaestra_sim.faults.fault_state import FaultState
 from palaestra_sim.faults.faulty_node import Failing, FaultyNode
-from palaestra_sim.faults.known_paths import begin
-from palaestra_sim.faults.options import add_options, read_options
+from palaestra_sim.faults.known_paths import begin, survey, survey_robot
+from palaestra_sim.faults.options import Ordered, add_options, read_environment, read_options
 from palaestra_sim.faults.parser import FaultError
 from palaestra_sim.faults.process_faults import ProcessFaults
 
@@ -25,8 +25,12 @@ __all__ = [
     "FaultError",
     "FaultState",
     "FaultyNode",
+    "Ordered",
     "ProcessFaults",
     "add_options",
     "begin",
+    "read_environment",
     "read_options",
+    "survey",
+    "survey_robot",
 ]

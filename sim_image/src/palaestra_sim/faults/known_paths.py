@@ -23,6 +23,9 @@ from palaestra_sim.faults.options import Ordered
 from palaestra_sim.faults.parser import FaultError
 from palaestra_sim.faults.schedule import FaultSchedule, Life
 from palaestra_sim.ros.node import ServiceFailed
+from palaestra_sim.ros_controller.controller import RosController
+from palaestra_sim.ros_controller.options import FrontOptions
+from palaestra_sim.ros_controller.served_robot import ServedRobot
 from palaestra_sim.ros_controller.simulator import Load, RunningSimulator
 from palaestra_sim.ros_interfaces import Fields, Handler
 
@@ -70,15 +73,24 @@ def survey(load: Load, world_path: Path) -> KnownPaths:
     )
 
 
-def begin(ordered: Ordered, load: Load, world_path: Path) -> FaultState:
-    """Return the fault state of this process, for the faults `ordered` and the world that `load` loads.
+def survey_robot(robot: ServedRobot, name: str) -> KnownPaths:
+    """Return the services and topics of one robot, whose ROS name is `name`; its sensors stay as they are."""
+    node = _Listener(name)
+    RosController(robot, node, FrontOptions(), lambda: 0.0).start()
+    topics = {
+        f"{device.path}/{topic.name}": topic.type_name
+        for device in (*robot.devices, *robot.inputs)
+        for topic in (*device.topics, *(it for stream in device.streams for it in stream.topics))
+    }
+    return KnownPaths(simulator=_HASH.sub("", name), services=node.types, topics=topics | node.topics)
+
+
+def begin(ordered: Ordered, found: KnownPaths) -> FaultState:
+    """Return the fault state of this process, for the faults `ordered` and the paths of its world.
 
     Raises:
         FaultError: a fault names a path that the world does not have.
-        WorldError: the world is wrong.
-        OSError: the world cannot be read.
     """
-    found = survey(load, world_path)
     check(ordered.faults, found)
     life = Life(seed=ordered.seed, simulator=found.simulator, number=ordered.life)
     return FaultState(FaultSchedule(faults=ordered.faults, life=life))

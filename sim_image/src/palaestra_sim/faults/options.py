@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import secrets
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -52,15 +52,30 @@ def read_options(options: argparse.Namespace, environment: Mapping[str, str]) ->
     Raises:
         FaultError: a description or a number is wrong.
     """
+    return _ordered(options.fault, options.fault_seed, options.fault_life, environment)
+
+
+def read_environment(environment: Mapping[str, str]) -> Ordered | None:
+    """Return the faults of the environment, for a program that has no options; None if there are no faults.
+
+    Raises:
+        FaultError: a description or a number is wrong.
+    """
+    return _ordered((), None, None, environment)
+
+
+def _ordered(
+    texts: Sequence[str], seed_text: str | None, life_text: str | None, environment: Mapping[str, str]
+) -> Ordered | None:
     faults = tuple(
         fault
-        for where, text in (*(("--fault", it) for it in options.fault), (FAULTS, environment.get(FAULTS, "")))
+        for where, text in (*(("--fault", it) for it in texts), (FAULTS, environment.get(FAULTS, "")))
         for fault in parse(text, where)
     )
     if not faults:
         return None
-    seed = _whole(0, ("--fault-seed", options.fault_seed), (SEED, environment.get(SEED)))
-    life = _whole(1, ("--fault-life", options.fault_life), (START, environment.get(START)))
+    seed = _whole(0, ("--fault-seed", seed_text), (SEED, environment.get(SEED)))
+    life = _whole(1, ("--fault-life", life_text), (START, environment.get(START)))
     _check(faults, counted=life is not None)
     return Ordered(
         faults=faults,
