@@ -4,7 +4,7 @@ import argparse
 
 import pytest
 
-from palaestra_sim.faults import FaultError, add_options, begin, read_options
+from palaestra_sim.faults import FaultError, add_options, begin, read_options, survey
 from palaestra_sim.scene.loader import Loader
 from palaestra_sim.scene.validation import LeaveOut
 from palaestra_sim.stub.physics import StubPhysics
@@ -110,7 +110,7 @@ def test_an_error_names_the_place_of_the_mistake(read, arguments, environment, w
 def test_the_error_for_a_name_that_the_world_lacks_suggests_one_that_it_has(read, arena, fault, words):
     """To find all names, the controllers of the world are started on nodes that only record registrations."""
     with pytest.raises(FaultError, match=words):
-        begin(read(f"--fault={fault}"), Loader(physics=StubPhysics), arena)
+        begin(read(f"--fault={fault}"), survey(Loader(physics=StubPhysics), arena))
 
 
 @pytest.mark.parametrize(
@@ -119,7 +119,8 @@ def test_the_error_for_a_name_that_the_world_lacks_suggests_one_that_it_has(read
 def test_what_the_world_has_can_be_named(read, arena, fault):
     """A topic can be named even before a client enables its sensor."""
     assert (
-        begin(read(f"--fault={fault}"), Loader(physics=StubPhysics), arena).schedule.faults[0].text == fault
+        begin(read(f"--fault={fault}"), survey(Loader(physics=StubPhysics), arena)).schedule.faults[0].text
+        == fault
     )
 
 
@@ -128,7 +129,9 @@ def test_the_random_part_of_a_ros_name_makes_no_difference(read, arena):
     names = []
     for name in (b"job_r0_collect_0a_robotino_8c31f2", b"job_r0_collect_0a_robotino_00ff00"):
         arena.write_bytes(builtin("arena").replace(b"--name=robotino", b"--name=" + name))
-        names.append(begin(read("--fault=crash"), Loader(physics=StubPhysics), arena).schedule.life.simulator)
+        names.append(
+            begin(read("--fault=crash"), survey(Loader(physics=StubPhysics), arena)).schedule.life.simulator
+        )
 
     assert names == ["job_r0_collect_0a_robotino"] * 2
 
@@ -139,4 +142,4 @@ def test_faults_are_looked_up_in_the_world_as_it_will_run(read, tmp_path):
     world.write_bytes(builtin("arena") + b"Unheard { }")
     load = Loader(physics=StubPhysics, leave_out=LeaveOut(everything=True))
 
-    assert begin(read("--fault=crash"), load, world).schedule.faults[0].text == "crash"
+    assert begin(read("--fault=crash"), survey(load, world)).schedule.faults[0].text == "crash"
