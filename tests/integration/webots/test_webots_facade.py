@@ -2,12 +2,16 @@
 
 import os
 import signal
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 
 import pytest
 
 from palaestra_trainer.errors import SimulatorDead, SimulatorHung
 from palaestra_trainer.robots import Pose
-from palaestra_trainer.webots import Mode
+from palaestra_trainer.webots import Mode, Observer, facade
+
+DEADLINE_S = 60.0
 
 
 def test_a_started_simulator_is_available_until_it_is_stopped(own_arena):
@@ -123,3 +127,29 @@ def test_a_reload_brings_the_world_back_with_new_handles(own_arena):
 
     assert moved.x_m > 0.1
     assert own_arena.robot.pose() == Pose(0.0, 0.0, 0.0)
+
+
+def test_a_start_waits_for_the_controllers_of_all_robots(own_arena, make, name):
+    """In Webots, the controller of a robot may start after that of the supervisor, which responds already."""
+    webots = own_arena.webots
+    webots.at_start("late", lambda: None, [name])
+
+    def devices():
+        webots.wait_available()
+        with closing(Observer(name)) as observer:
+            return observer.devices()
+
+    with ThreadPoolExecutor() as pool:
+        found = pool.submit(devices)
+        make().start()
+
+        assert "touch sensor" in found.result(DEADLINE_S)
+
+
+def test_a_robot_without_a_controller_is_named(own_arena, monkeypatch):
+    """A wrong name is a mistake, so the wait ends long before the deadline of a start."""
+    monkeypatch.setattr(facade, "_CONTROLLERS_S", 0.5)
+    own_arena.webots.at_start("nobody", lambda: None, ["nobody"])
+
+    with pytest.raises(SimulatorDead, match="nobody: no node serves /nobody/robot/get_device_list"):
+        own_arena.webots.wait_available()

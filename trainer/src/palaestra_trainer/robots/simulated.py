@@ -77,7 +77,7 @@ class SimulatedRobot(RobotAbc):
         if self.definition:
             self.simulation.track(self.definition)
         self.equip()
-        webots.at_start(name, self.connect)
+        webots.at_start(name, self.connect, together)
 
     def equip(self) -> None:
         """Add sensors and motors to `simulation`; a subclass with devices overrides this method."""

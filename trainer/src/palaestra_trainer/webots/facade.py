@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Self, TypeVar
@@ -35,6 +35,7 @@ Result = TypeVar("Result")
 _PROBE_S = 1.0
 _POLL_S = 0.02
 _STOP_DEADLINE_S = 5.0  # the longest time that a simulator may take to quit
+_CONTROLLERS_S = 20.0  # the longest time from the supervisor's first response until all robots respond
 
 
 class Webots:
@@ -87,6 +88,7 @@ class Webots:
         self._probe = RosService(f"/{supervisor_node_name}/robot/get_time", "webots_ros/get_float", _PROBE_S)
         self._start_deadline_s = start_deadline_s
         self._at_start: dict[str, Callable[[], None]] = {}
+        self._robots: dict[str, tuple[str, ...]] = {}
         self._entered = 0
         self._stopped = False
         open_facades.offer(self)
@@ -100,9 +102,13 @@ class Webots:
         """Return the ROS name of a running robot; `robot` is its ROS name in the world."""
         return f"{robot}{self._suffix}"
 
-    def at_start(self, name: str, connect: Callable[[], None]) -> None:
-        """Call `connect` after each later start, instead of a previous function with this `name`."""
+    def at_start(self, name: str, connect: Callable[[], None], robots: Iterable[str] = ()) -> None:
+        """Call `connect` after each later start, instead of a previous function with this `name`.
+
+        The controllers of `robots`, which are the ROS names of running robots, respond before the call.
+        """
         self._at_start[name] = connect
+        self._robots[name] = tuple(robots)
 
     def start(self) -> None:
         """Start the simulator and wait until it responds and its robots are connected.
@@ -127,24 +133,25 @@ class Webots:
             connect()
 
     def wait_available(self) -> None:
-        """Wait until the simulator responds, after a start or a reload.
+        """Wait until the simulator and the controllers of its robots respond, after a start or a reload.
 
         Raises:
             SimulatorDead: the simulator's process ended; SimulatorRefused, a subclass, if it refused its
-                input.
+                input. Also if a robot has no controller.
             SimulatorHung: it did not respond in time.
         """
         give_up = time.monotonic() + self._start_deadline_s
         while not self.available():
-            failure = self._launcher.failure()
-            if failure is not None:
-                kind = SimulatorRefused if self._launcher.refused() else SimulatorDead
-                raise kind(self.supervisor_node_name, failure)
+            self._check_process()
             if time.monotonic() > give_up:
                 raise SimulatorHung(
                     self.supervisor_node_name, f"did not start within {self._start_deadline_s:g} s"
                 )
             time.sleep(_POLL_S)  # the master has no call that waits for a node
+        give_up = time.monotonic() + _CONTROLLERS_S
+        robots = (robot for group in self._robots.values() for robot in group)
+        for robot in dict.fromkeys((self.supervisor_node_name, *robots)):
+            self._await_controller(robot, give_up)
 
     def stop(self) -> None:
         """End the simulator through its supervisor; kill it only if it does not quit.
@@ -226,6 +233,31 @@ class Webots:
         self._disconnect()
         if self._own is not None:
             self._own.close()
+
+    def _await_controller(self, robot: str, give_up: float) -> None:
+        """Wait until a robot returns its devices, whose service a controller registers last.
+
+        In Webots, each robot has a controller process of its own, which may start after the supervisor's.
+        """
+        while True:
+            observer = Observer(robot)
+            try:
+                observer.devices()
+            except SimulatorDead:
+                self._check_process()
+                if time.monotonic() > give_up:
+                    raise
+            else:
+                return
+            finally:
+                observer.close()
+            time.sleep(_POLL_S)
+
+    def _check_process(self) -> None:
+        failure = self._launcher.failure()
+        if failure is not None:
+            kind = SimulatorRefused if self._launcher.refused() else SimulatorDead
+            raise kind(self.supervisor_node_name, failure)
 
     def _end(self) -> None:
         if not self.available():
