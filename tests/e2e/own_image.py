@@ -6,15 +6,18 @@ program as a process of its own, because the lock of the image store works only 
 """
 
 import os
+import subprocess
 import sys
 from pathlib import Path
+
+import pytest
 
 from tools.images import cache
 from tools.images.engines import Buildah, Docker, Order
 
 ROOT = Path(__file__).parents[2]
 ARCHIVES = "PALAESTRA_E2E_IMAGES"  # a file with a line NAME=ARCHIVE for each, which tests/cluster/e2e.sh sets
-LOCK_DEADLINE_S = 300
+LOCK_DEADLINE_S, BUILD_S, LOAD_S = 300, 600, 300
 
 
 def main() -> None:
@@ -36,6 +39,21 @@ def main() -> None:
             )
         )
     sys.stdout.write(f"{archive}\n")
+
+
+def skip_without_archives() -> None:
+    """Skip the test if no image can be built or loaded here."""
+    if ARCHIVES not in os.environ or os.environ.get("PALAESTRA_CLUSTER") == "existing":
+        pytest.skip("the release's archives or the cluster's engine are not here; `make e2e` has both")
+
+
+def load_image(context: Path, name: str, base: str = "trainer") -> str:
+    """Build the image of a folder in a process of its own, load it into the cluster, and return its name."""
+    build = [sys.executable, "-m", "tests.e2e.own_image", context, name, base]
+    archive = subprocess.run(build, cwd=ROOT, check=True, timeout=BUILD_S, stdout=subprocess.PIPE, text=True)
+    load = [ROOT / "tests/cluster/load.sh", archive.stdout.strip()]
+    subprocess.run(load, check=True, timeout=LOAD_S)
+    return name
 
 
 def archives() -> dict[str, Path]:

@@ -1,14 +1,13 @@
 """A simulator in a container of a real Docker Engine, the one that carries the cluster."""
 
 import json
-import os
 import subprocess
 import sys
 
 import pytest
 
 from tests.chart.helm import ROOT
-from tests.e2e.own_image import ARCHIVES, archives
+from tests.e2e.own_image import archives, skip_without_archives
 
 RUN_S = 240
 pytestmark = [pytest.mark.beside, pytest.mark.comes_late]
@@ -17,8 +16,7 @@ pytestmark = [pytest.mark.beside, pytest.mark.comes_late]
 def test_simulators_start_in_containers_and_end_with_their_programs(namespace):
     """test_launchers.py shows the same over a server that has no containers, and so no network of its own."""
     del namespace  # only the engine of the cluster is needed
-    if ARCHIVES not in os.environ or os.environ.get("PALAESTRA_CLUSTER") == "existing":
-        pytest.skip("the release's archives or the cluster's engine are not here; `make e2e` has both")
+    skip_without_archives()
     beside = ROOT / "tests/cluster/beside_containers.sh"
     told = subprocess.run(
         [beside, archives()["stub"], sys.executable, "-m", "tests.e2e.containers"],

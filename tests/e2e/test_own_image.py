@@ -1,23 +1,18 @@
 """docs/start/your-environment.md in a cluster: a job runs an environment that a user's image contains."""
 
-import os
-import subprocess
-import sys
-
 import pytest
 import yaml
 
 from tests.chart.helm import ROOT
 from tests.e2e.jobs import SLOW
 from tests.e2e.namespace import LONG_S
-from tests.e2e.own_image import ARCHIVES
+from tests.e2e.own_image import load_image, skip_without_archives
 from tests.pages import fenced
 
 pytestmark = pytest.mark.timeout(1200)
 
 PAGE = dict(fenced((ROOT / "docs/start/your-environment.md").read_text()))
 IMAGE = "corridor:1"
-BUILD_S, LOAD_S = 600, 300
 # One rollout and one episode. tests/integration/run tests that the page's environment can be learned.
 SHORT = {
     "steps": 256,
@@ -31,17 +26,12 @@ WHOSE = "import corridor, os; print(os.getuid(), os.stat(corridor.__file__).st_u
 def image(cluster, tmp_path_factory):
     """The page's image on the nodes of the cluster."""
     del cluster
-    if ARCHIVES not in os.environ or os.environ.get("PALAESTRA_CLUSTER") == "existing":
-        pytest.skip("the release's archives are not here, or this cluster loads none; `make e2e` has both")
+    skip_without_archives()
     folder = tmp_path_factory.mktemp("own") / "corridor"
     folder.mkdir(mode=0o755)
     for name in ("python corridor.py", "dockerfile Dockerfile"):
         (folder / name.split()[1]).write_text(PAGE[name])
-    build = [sys.executable, "-m", "tests.e2e.own_image", folder, IMAGE]
-    archive = subprocess.run(build, cwd=ROOT, check=True, timeout=BUILD_S, stdout=subprocess.PIPE, text=True)
-    load = [ROOT / "tests/cluster/load.sh", archive.stdout.strip()]
-    subprocess.run(load, check=True, timeout=LOAD_S)
-    return IMAGE
+    return load_image(folder, IMAGE)
 
 
 def test_an_environment_in_an_image_of_its_own_trains_in_a_restricted_pod(namespace, image):

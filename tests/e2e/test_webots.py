@@ -1,23 +1,19 @@
 """A job with `driver: webots`, whose image has the Webots of the tests."""
 
-import os
 import shutil
-import subprocess
-import sys
 from importlib.metadata import version
 
 import pytest
 
 from tests.chart.helm import ROOT
 from tests.e2e.namespace import LONG_S
-from tests.e2e.own_image import ARCHIVES
+from tests.e2e.own_image import load_image, skip_without_archives
 from tests.fake_webots.home import make_home
 from tests.soak.jobs import LITTLE_DQN
 
 pytestmark = pytest.mark.timeout(900)
 
 IMAGE = "fake-webots:1"
-BUILD_S, LOAD_S = 600, 300
 DOCKERFILE = f"""FROM palaestra-stub:{version("palaestra-sim")}
 COPY R2025a /opt/webots
 COPY tests /opt/repository/tests
@@ -29,18 +25,13 @@ ENV WEBOTS_HOME=/opt/webots PATH=/opt/webots:/usr/local/bin:/usr/bin:/bin
 def image(cluster, tmp_path_factory):
     """Return the name of an image with the Webots of the tests, on the nodes of the cluster."""
     del cluster
-    if ARCHIVES not in os.environ or os.environ.get("PALAESTRA_CLUSTER") == "existing":
-        pytest.skip("the release's archives are not here, or this cluster loads none; `make e2e` has both")
+    skip_without_archives()
     folder = tmp_path_factory.mktemp("webots") / "context"
     folder.mkdir(mode=0o755)
     make_home(folder, python="python3", repository="/opt/repository")
     shutil.copytree(ROOT / "tests/fake_webots", folder / "tests/fake_webots")
     (folder / "Dockerfile").write_text(DOCKERFILE)
-    build = [sys.executable, "-m", "tests.e2e.own_image", folder, IMAGE, "stub"]
-    archive = subprocess.run(build, cwd=ROOT, check=True, timeout=BUILD_S, stdout=subprocess.PIPE, text=True)
-    load = [ROOT / "tests/cluster/load.sh", archive.stdout.strip()]
-    subprocess.run(load, check=True, timeout=LOAD_S)
-    return IMAGE
+    return load_image(folder, IMAGE, "stub")
 
 
 def test_a_policy_is_trained_in_webots(namespace, job, image):

@@ -14,7 +14,7 @@ _STOCK = '#!/bin/sh\necho "the controller of Webots was started"\nexec sleep 100
 def make_home(folder, release="R2025a", python=sys.executable, repository=REPOSITORY):
     """Write a WEBOTS_HOME into a folder, and return its path.
 
-    The release R2023b has a controller `ros` of its own, which is a program; R2025a has none.
+    The home of R2023b also contains Webots' own controller `ros`, a program; R2025a has removed it.
 
     Args:
         folder: the folder in which the home is made.

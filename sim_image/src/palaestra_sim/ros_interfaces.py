@@ -8,13 +8,22 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Final, NamedTuple, Protocol
 
 from palaestra_sim.errors import SimError
 
 Fields = Mapping[str, Any]
 Handler = Callable[[Any], Any]
 Row = tuple[str, str, Handler]  # a declared service: last part of the path, type without package, handler
+
+FORCE_FEEDBACK: Final = {
+    "set_constant_force": "set_int",
+    "set_constant_force_duration": "set_float",
+    "set_auto_centering_gain": "set_float",
+    "set_resistance_gain": "set_float",
+    "set_force_axis": "set_int",
+}
+"""The services of a joystick for force feedback, with their types."""
 
 
 class UnsimulatedError(SimError, NotImplementedError):

@@ -82,7 +82,7 @@ def test_services_respond_in_a_pause_and_a_step_waits_for_its_end(webots, prefix
 
 @pytest.mark.parametrize("paused", [False, True])
 def test_a_reload_ends_both_controllers_and_starts_them_again(webots, prefix, ask, paused):
-    """All names disappear and come back, also those of the robot that is no supervisor."""
+    """A reload must remove and register again the ROS names of a supervisor and of another robot."""
     process = webots(
         world(prefix, True, False), f"{prefix}_0", f"{prefix}_1", mode="pause" if paused else "fast"
     )

@@ -25,6 +25,5 @@ def test_a_wrong_variable_ends_the_sidecar_with_one_sentence(capsys):
     with pytest.raises(SystemExit):
         parse(NEEDED, {"WEBOTS_ROS_CONTROLLER": "mine"})
 
-    assert (
-        "WEBOTS_ROS_CONTROLLER: 'mine' is no controller; set palaestra or webots" in capsys.readouterr().err
-    )
+    printed = capsys.readouterr().err
+    assert "WEBOTS_ROS_CONTROLLER: 'mine' is not a controller; set palaestra or webots" in printed

@@ -56,7 +56,7 @@ def read_options(options: argparse.Namespace, environment: Mapping[str, str]) ->
 
 
 def read_environment(environment: Mapping[str, str]) -> Ordered | None:
-    """Return the faults of the environment, for a program that has no options; None if there are no faults.
+    """Return the faults that the environment describes; None if it describes none.
 
     Raises:
         FaultError: a description or a number is wrong.

@@ -12,7 +12,7 @@ from functools import partial
 from typing import Any, Final
 
 from palaestra_sim.ros_controller.served_robot import ServedDevice
-from palaestra_sim.ros_interfaces import Fields, Handler, Row
+from palaestra_sim.ros_interfaces import FORCE_FEEDBACK, Fields, Handler, Row
 from palaestra_sim.scene.devices.device_type import DeviceTopic
 from palaestra_sim.scene.robot import Robot
 
@@ -152,14 +152,7 @@ def _joystick_answers(joystick: _Joystick) -> tuple[Row, ...]:
 
 def _force_feedback() -> tuple[Row, ...]:
     """Return the services for force feedback, which only return success, as in Webots' controller."""
-    types = {
-        "set_constant_force": "set_int",
-        "set_constant_force_duration": "set_float",
-        "set_auto_centering_gain": "set_float",
-        "set_resistance_gain": "set_float",
-        "set_force_axis": "set_int",
-    }
-    return tuple((name, type_name, lambda _: {"success": True}) for name, type_name in types.items())
+    return tuple((name, type_name, lambda _: {"success": True}) for name, type_name in FORCE_FEEDBACK.items())
 
 
 def _joystick_moves(joystick: _Joystick) -> tuple[Row, ...]:

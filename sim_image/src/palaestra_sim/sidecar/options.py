@@ -59,7 +59,7 @@ def parse(arguments: Sequence[str], environment: Mapping[str, str] = os.environ)
     options = parser.parse_args(arguments)
     if options.webots_controller not in {OWN_CONTROLLER, STOCK_CONTROLLER}:
         parser.error(
-            f"{CONTROLLER}: {options.webots_controller!r} is no controller; "
+            f"{CONTROLLER}: {options.webots_controller!r} is not a controller; "
             f"set {OWN_CONTROLLER} or {STOCK_CONTROLLER}"
         )
     return options

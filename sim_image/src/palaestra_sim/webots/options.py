@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from palaestra_sim.errors import SimError
+from palaestra_sim.scene.arguments import ControllerArguments
 
 _NAME: Final = "--name="
 _MASTER: Final = "--ROS_MASTER_URI="
@@ -19,20 +20,14 @@ class OptionError(SimError, ValueError):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ControllerOptions:
+class ControllerOptions(ControllerArguments):
     """The options of one controller.
 
     Attributes:
-        name: the name of the ROS node, and the prefix of all its paths.
-        clock: whether to publish /clock.
-        auto_publish: whether every sensor is enabled from the start.
         master_uri: the URI of the ROS master, if an argument names one; else "".
         unknown: the other arguments, which have no effect, as in Webots' controller.
     """
 
-    name: str
-    clock: bool
-    auto_publish: bool
     master_uri: str
     unknown: tuple[str, ...]
 

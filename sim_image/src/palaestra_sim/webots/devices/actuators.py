@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Final
 
 from palaestra_sim.ros.node import ServiceFailed
@@ -182,27 +183,27 @@ def _move_bone(calls: DeviceCalls) -> Handler:
 
 def connector(calls: DeviceCalls) -> ServedDevice:
     """Return a Connector."""
-    presence = DeviceTopic(
-        name="presence", type_name="webots_ros/Int8Stamped", source=Reading(calls.get_presence)
-    )
-
-    def lock(request: Any) -> Fields:
-        (calls.lock if request.value else calls.unlock)()
-        return {"success": True}
-
-    rows = (("lock", "set_bool", lock), *facts(calls, "get_bool", "is_locked"))
-    return served(calls, topics=(presence,), rows=rows, sensor="presence")
+    rows = (_set_bool("lock", calls.lock, calls.unlock), *facts(calls, "get_bool", "is_locked"))
+    return served(calls, topics=(_presence(calls, "Int8Stamped"),), rows=rows, sensor="presence")
 
 
 def vacuum_gripper(calls: DeviceCalls) -> ServedDevice:
     """Return a VacuumGripper."""
-    presence = DeviceTopic(
-        name="presence", type_name="webots_ros/BoolStamped", source=Reading(calls.get_presence)
+    rows = (_set_bool("turn_on", calls.turn_on, calls.turn_off), *facts(calls, "get_bool", "is_on"))
+    return served(calls, topics=(_presence(calls, "BoolStamped"),), rows=rows, sensor="presence")
+
+
+def _presence(calls: DeviceCalls, type_name: str) -> DeviceTopic:
+    return DeviceTopic(
+        name="presence", type_name=f"webots_ros/{type_name}", source=Reading(calls.get_presence)
     )
 
-    def turn_on(request: Any) -> Fields:
-        (calls.turn_on if request.value else calls.turn_off)()
-        return {"success": True}
 
-    rows = (("turn_on", "set_bool", turn_on), *facts(calls, "get_bool", "is_on"))
-    return served(calls, topics=(presence,), rows=rows, sensor="presence")
+def _set_bool(name: str, on: Callable[[], Any], off: Callable[[], Any]) -> Row:
+    """Return the service that calls `on` for true and `off` for false."""
+
+    def set_bool(request: Any) -> Fields:
+        (on if request.value else off)()
+        return _DONE
+
+    return name, "set_bool", set_bool

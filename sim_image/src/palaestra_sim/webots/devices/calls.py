@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import ctypes
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 from palaestra_sim.ros_controller.served_robot import ServedDevice
 from palaestra_sim.ros_interfaces import Row, topic_name
@@ -15,6 +15,32 @@ from palaestra_sim.scene.devices.device_type import DeviceTopic, Stream
 from palaestra_sim.webots.library import Library
 
 _DONE: Final = {"success": True}
+
+
+class Calls(Protocol):
+    """Functions of libController whose names begin alike; an attribute has the rest of the name."""
+
+    def __getattr__(self, name: str) -> Callable[..., Any]:
+        """Return a function, such as `get_model`."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class InputCalls:
+    """The functions for an input of the robot: `calls.get_model()` calls `wb_<kind>_get_model()`.
+
+    Attributes:
+        library: the library of Webots.
+        kind: the part of the functions' names that names the input, such as "joystick".
+    """
+
+    library: Library
+    kind: str
+
+    def __getattr__(self, name: str) -> Callable[..., Any]:
+        """Return a function of the input, such as `get_model`."""
+        function: Callable[..., Any] = getattr(self.library, f"{self.kind}_{name}")
+        return function
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,7 +68,7 @@ class DeviceCalls:
         return text
 
     def name_of(self, neighbor: str) -> str:
-        """Return the name of another device of the joint, such as "motor"; "" if it has none."""
+        """Return the name of the joint's device of a type, such as "motor"; "" if there is none."""
         tag = getattr(self, f"get_{neighbor}")()
         return self.library.device_get_name(tag) if tag else ""
 
@@ -89,7 +115,7 @@ def served(
     return ServedDevice(
         path=topic_name(calls.name),
         topics=tuple(topics),
-        enabled=switch(calls, sensor),
+        enabled=switch(calls, sensor and f"_{sensor}"),
         prefix=sensor and f"{sensor}_sensor/",
         rows=(
             ("get_model", "get_string", lambda _: {"value": library.device_get_model(tag)}),
@@ -102,25 +128,30 @@ def served(
     )
 
 
-def switch(calls: DeviceCalls, sensor: str = "") -> Callable[[int], None]:
-    """Return the function that enables a sensor with a period in ms, and disables it with 0."""
-    end = sensor and f"_{sensor}"
+def switch(calls: Calls, end: str = "", begin: str = "") -> Callable[[int], None]:
+    """Return the function that enables a sensor with a period in ms, and disables it with 0.
+
+    Args:
+        calls: the functions of the device or the input.
+        end: what follows "enable" and "disable" in the names of the two functions, such as "_presence".
+        begin: what precedes them, such as "recognition_".
+    """
 
     def enabled(period_ms: int) -> None:
         if period_ms:
-            getattr(calls, f"enable{end}")(period_ms)
+            getattr(calls, f"{begin}enable{end}")(period_ms)
         else:
-            getattr(calls, f"disable{end}")()
+            getattr(calls, f"{begin}disable{end}")()
 
     return enabled
 
 
-def facts(calls: DeviceCalls, type_name: str, *names: str) -> tuple[Row, ...]:
+def facts(calls: Calls, type_name: str, *names: str) -> tuple[Row, ...]:
     """Return services with the names of functions without arguments, whose value they return."""
     return tuple((name, type_name, partial(_fact, getattr(calls, name))) for name in names)
 
 
-def commands(calls: DeviceCalls, type_name: str, *names: str) -> tuple[Row, ...]:
+def commands(calls: Calls, type_name: str, *names: str) -> tuple[Row, ...]:
     """Return services with the names of functions that get the request's value and always succeed."""
     return tuple((name, type_name, partial(_command, getattr(calls, name))) for name in names)
 
@@ -141,6 +172,12 @@ def neighbors(calls: DeviceCalls, *roles: str) -> tuple[Row, ...]:
         (f"get_{role}_name", "get_string", lambda _, role=role: {"value": calls.name_of(role)})
         for role in roles
     )
+
+
+def elements(array: Any, count: int) -> Iterator[Any]:
+    """Yield the elements of an array of structures; an array that is NULL has none."""
+    for index in range(count if array else 0):
+        yield array[index]
 
 
 def copied(pointer: Any, size: int) -> list[bytes]:

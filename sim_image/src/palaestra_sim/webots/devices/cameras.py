@@ -5,7 +5,6 @@ A topic has no message while Webots has no picture, for example right after `ena
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any, Final
 
 from palaestra_sim.ros_controller.served_robot import ServedDevice
@@ -14,7 +13,16 @@ from palaestra_sim.scene.camera_interface import Lens
 from palaestra_sim.scene.devices.camera_common import PIXEL_BYTES, picture_topic, projection_topic
 from palaestra_sim.scene.devices.device_type import DeviceTopic, Stream
 from palaestra_sim.scene.geometry import axis_angle_to_quaternion
-from palaestra_sim.webots.devices.calls import DeviceCalls, Reading, commands, copied, facts, served
+from palaestra_sim.webots.devices.calls import (
+    DeviceCalls,
+    Reading,
+    commands,
+    copied,
+    elements,
+    facts,
+    served,
+    switch,
+)
 from palaestra_sim.webots.library import RecognitionObject
 
 _CHANNELS: Final = 3
@@ -134,24 +142,17 @@ def _recognition(calls: DeviceCalls, lens: Lens) -> Stream:
     objects = DeviceTopic(
         name="recognition_objects",
         type_name="webots_ros/RecognitionObjects",
-        source=Reading(lambda: list(_objects(calls))),
+        source=Reading(lambda: _objects(calls)),
         reading="objects",
     )
     image = picture_topic(
         "recognition_segmentation_image", Reading(lambda: _segments(calls, lens)), lens, "bgra8", many=True
     )
-
-    def enabled(period_ms: int) -> None:
-        if period_ms:
-            calls.recognition_enable(period_ms)
-        else:
-            calls.recognition_disable()
-
     return Stream(
         prefix="recognition_",
         topics=(objects, image) if calls.recognition_has_segmentation() else (objects,),
         silent=False,
-        enabled=enabled,
+        enabled=switch(calls, begin="recognition_"),
     )
 
 
@@ -161,10 +162,9 @@ def _segments(calls: DeviceCalls, lens: Lens) -> list[bytes]:
     return copied(calls.recognition_get_segmentation_image(), _bytes(lens))
 
 
-def _objects(calls: DeviceCalls) -> Iterator[Fields]:
-    objects = calls.recognition_get_objects()
-    for index in range(calls.recognition_get_number_of_objects() if objects else 0):
-        yield _object(objects[index])
+def _objects(calls: DeviceCalls) -> list[Fields]:
+    objects = elements(calls.recognition_get_objects(), calls.recognition_get_number_of_objects())
+    return [_object(it) for it in objects]
 
 
 def _object(found: RecognitionObject) -> Fields:

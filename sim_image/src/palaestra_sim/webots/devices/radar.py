@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 from palaestra_sim.ros_controller.served_robot import ServedDevice
 from palaestra_sim.ros_interfaces import Fields
 from palaestra_sim.scene.devices.device_type import DeviceTopic
-from palaestra_sim.webots.devices.calls import DeviceCalls, Reading, facts, served
+from palaestra_sim.webots.devices.calls import DeviceCalls, Reading, elements, facts, served
 
 
 def radar(calls: DeviceCalls) -> ServedDevice:
@@ -16,7 +14,7 @@ def radar(calls: DeviceCalls) -> ServedDevice:
     targets = DeviceTopic(
         name="targets",
         type_name="webots_ros/RadarTarget",
-        source=Reading(lambda: list(_targets(calls))),
+        source=Reading(lambda: _targets(calls)),
         many=True,
         whole=True,
     )
@@ -28,13 +26,13 @@ def radar(calls: DeviceCalls) -> ServedDevice:
     return served(calls, topics=(targets, count), rows=facts(calls, "get_float", *limits))
 
 
-def _targets(calls: DeviceCalls) -> Iterator[Fields]:
-    found = calls.get_targets()
-    for index in range(calls.get_number_of_targets() if found else 0):
-        target = found[index]
-        yield {
+def _targets(calls: DeviceCalls) -> list[Fields]:
+    return [
+        {
             "distance": target.distance,
             "receivedPower": target.received_power,
             "speed": target.speed,
             "azimuth": target.azimuth,
         }
+        for target in elements(calls.get_targets(), calls.get_number_of_targets())
+    ]

@@ -70,13 +70,11 @@ def _touch_topic(calls: DeviceCalls) -> DeviceTopic:
 
 def light_sensor(calls: DeviceCalls) -> ServedDevice:
     """Return a LightSensor; its value is what its lookup table makes of the irradiance."""
-    value = DeviceTopic(
-        name="value",
-        type_name="sensor_msgs/Illuminance",
-        source=Reading(calls.get_value),
-        reading="illuminance",
+    value = Reading(calls.get_value)
+    topic = DeviceTopic(
+        name="value", type_name="sensor_msgs/Illuminance", source=value, reading="illuminance"
     )
-    return served(calls, topics=(value,), rows=(lookup_table(calls),))
+    return _with_table(calls, topic)
 
 
 def position_sensor(calls: DeviceCalls) -> ServedDevice:
@@ -92,14 +90,12 @@ def altimeter(calls: DeviceCalls) -> ServedDevice:
 
 def accelerometer(calls: DeviceCalls) -> ServedDevice:
     """Return an Accelerometer, in m/s2."""
-    topic = imu_topic("values", vector(calls.get_values), "linear_acceleration")
-    return served(calls, topics=(topic,), rows=(lookup_table(calls),))
+    return _with_table(calls, imu_topic("values", vector(calls.get_values), "linear_acceleration"))
 
 
 def gyro(calls: DeviceCalls) -> ServedDevice:
     """Return a Gyro, in rad/s."""
-    topic = imu_topic("values", vector(calls.get_values), "angular_velocity")
-    return served(calls, topics=(topic,), rows=(lookup_table(calls),))
+    return _with_table(calls, imu_topic("values", vector(calls.get_values), "angular_velocity"))
 
 
 def inertial_unit(calls: DeviceCalls) -> ServedDevice:
@@ -110,13 +106,11 @@ def inertial_unit(calls: DeviceCalls) -> ServedDevice:
 
 def compass(calls: DeviceCalls) -> ServedDevice:
     """Return a Compass; its value is a vector of length 1 to the north."""
-    values = DeviceTopic(
-        name="values",
-        type_name="sensor_msgs/MagneticField",
-        source=vector(calls.get_values),
-        reading="magnetic_field",
+    values = vector(calls.get_values)
+    topic = DeviceTopic(
+        name="values", type_name="sensor_msgs/MagneticField", source=values, reading="magnetic_field"
     )
-    return served(calls, topics=(values,), rows=(lookup_table(calls),))
+    return _with_table(calls, topic)
 
 
 def gps(calls: DeviceCalls) -> ServedDevice:
@@ -160,3 +154,7 @@ def _degrees(calls: DeviceCalls) -> Row:
 
 def _value(calls: DeviceCalls) -> DeviceTopic:
     return DeviceTopic(name="value", type_name=_FLOAT, source=Reading(calls.get_value))
+
+
+def _with_table(calls: DeviceCalls, topic: DeviceTopic) -> ServedDevice:
+    return served(calls, topics=(topic,), rows=(lookup_table(calls),))
