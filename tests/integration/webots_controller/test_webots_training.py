@@ -38,7 +38,8 @@ def test_one_of_three_robots_of_a_stranger_is_trained(tmp_path, driver):
     world = tmp_path / "football" / "worlds" / "football.wbt"
     world.parent.mkdir(parents=True)
     world.write_text(FOOTBALL)
-    where = {"driver": driver, "world": {"file": str(world)}}
+    # A reload ends the controllers of all robots, and starts them again.
+    where = {"driver": driver, "world": {"file": str(world)}, "reset": "Reload"}
     evaluation = {"everySteps": 0}
     job = tiny_job(collect=where, steps=100, evaluation=evaluation, algorithm=LITTLE_DQN)
 
@@ -47,3 +48,4 @@ def test_one_of_three_robots_of_a_stranger_is_trained(tmp_path, driver):
 
     assert code == 0, output
     assert "faults            0" in output
+    assert run.summary()["goodput"]["recycling"] > 0.0

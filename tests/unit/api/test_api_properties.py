@@ -60,6 +60,7 @@ def groups(role: str) -> st.SearchStrategy[dict]:
         "count": st.integers(1, 16),
         "world": WORLDS,
         "recycle": RECYCLING,
+        "reset": st.sampled_from(["Reset", "Reload"]),
         "standby": st.booleans(),
         "minSimulators": st.just(1),
         "restart": st.fixed_dictionaries({}, optional={"limit": st.integers(0, 9)}),

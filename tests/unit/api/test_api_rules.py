@@ -67,6 +67,13 @@ BROKEN = {
         {"simulators.0.recycle": {}},
         "spec.simulators[0].recycle: sets no limit; set afterResets, afterMinutes or aboveMemory",
     ),
+    "two numbers of resets before a restart": (
+        {"simulators.0.reset": "Restart", "simulators.0.recycle": {"afterResets": 24}},
+        (
+            "spec.simulators[0].recycle: contradicts reset: Restart, which restarts after each reset; "
+            "remove one of them"
+        ),
+    ),
     "more than there are are enough": (
         {"simulators.0.count": 2, "simulators.0.minSimulators": 3},
         "spec.simulators[0].minSimulators: is more than count; lower it or raise count",

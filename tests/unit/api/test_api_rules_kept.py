@@ -24,6 +24,10 @@ KEPT = {
     "never recycled": {"simulators.0.recycle": {"afterResets": 0}},
     "recycled by its memory alone": {"simulators.0.recycle": {"aboveMemory": "400Mi"}},
     "recycled by its age alone": {"simulators.0.recycle": {"afterMinutes": 30}},
+    "a new process for each episode": {
+        "simulators.0.reset": "Restart",
+        "simulators.0.recycle": {"aboveMemory": "400Mi"},
+    },
     "all of a group are enough": {"simulators.0.count": 2, "simulators.0.minSimulators": 2},
     "a world in the image": {"simulators.0.world": {"file": "/worlds/hall.wbt"}},
     "a world below a root": {"simulators.0.world": {"file": "/lab/worlds/hall.wbt", "root": "/lab"}},

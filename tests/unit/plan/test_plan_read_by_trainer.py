@@ -180,3 +180,24 @@ def test_the_file_of_a_job_without_a_gpu_says_nothing_of_devices(valid_job):
     planned = plan(identified(valid_job(), "uid"), LAYOUT).replicas[0]
 
     assert "device" not in yaml.safe_load(planned.config_map["data"]["training.yaml"])
+
+
+@pytest.mark.parametrize(
+    ("written", "recycle", "reset"),
+    [
+        ({}, None, None),
+        ({"reset": "Reset"}, None, None),
+        ({"reset": "Reload"}, None, "Reload"),
+        ({"reset": "Restart"}, Recycle(after_resets=1), None),
+        (
+            {"reset": "Restart", "recycle": {"afterMinutes": 30}},
+            Recycle(after_resets=1, after_minutes=30),
+            None,
+        ),
+    ],
+)
+def test_the_kind_of_reset_is_read_as_it_was_written(valid_job, written, recycle, reset):
+    """A reset is not recycling, a reload is an order to the simulator, and a restart is recycling."""
+    collecting = read_back(valid_job(simulators=[COLLECT | written, EVALUATE])).simulators[0]
+
+    assert (collecting.recycle, collecting.reset) == (recycle, reset)

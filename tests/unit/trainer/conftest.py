@@ -104,7 +104,8 @@ class Corridor(gymnasium.Env[np.ndarray, Any]):
 class FakeMember:
     """A simulator that breaks at chosen steps, resets and starts, each counted from 1 over its whole life.
 
-    After `recycle_after` resets it is due to be recycled. With `held`, a restart waits until `release` is
+    A reload is a start. After `recycle_after` resets the simulator is due to be recycled. With `reloads`, it
+    loads its world before each episode but the first. With `held`, a restart waits until `release` is
     set, and fails if the simulator is abandoned.
     """
 
@@ -123,6 +124,7 @@ class FakeMember:
         self.log: list[str] = []
         self.resets = 0
         self._recycle_after = recycle_after
+        self.reloads = False
         self.release = threading.Event()
         self._abandoned = False
         if not held:
@@ -134,6 +136,15 @@ class FakeMember:
         """Return the reason to recycle the simulator, or None."""
         worn = self._recycle_after is not None and self.resets + episodes > self._recycle_after
         return f"{self.resets} resets" if worn else None
+
+    def reload_due(self) -> bool:
+        """Return whether the world must be loaded again."""
+        return self.reloads and self.resets > 0
+
+    def reload(self) -> None:
+        """Load the world again, or break."""
+        self.log.append("reload")
+        self._take("start")
 
     def start(self) -> None:
         """Start, or break."""

@@ -115,6 +115,14 @@ class WorldSource(ApiModel):
     )
 
 
+class ResetMethod(StrEnum):
+    """How a simulator returns to the initial state of its world between two episodes."""
+
+    RESET = "Reset"
+    RELOAD = "Reload"
+    RESTART = "Restart"
+
+
 class Recycle(ApiModel):
     """When a healthy simulator is restarted between two episodes: at the first limit that it reaches."""
 
@@ -189,6 +197,11 @@ class SimulatorGroup(ApiModel):
     """When a healthy simulator is restarted between two episodes; absent: after 24 resets. With driver `stub`
     or `mujoco`, absent means never, because these simulators neither leak memory nor slow down."""
 
+    reset: ResetMethod | None = Field(default=None, strict=False)
+    """How each episode begins. `Reset`, or absent: the simulator resets its world. `Reload`: it loads the
+    world again first, which forgets all that a reset leaves. `Restart`: a new process of the simulator loads
+    the world, as with `recycle: {afterResets: 1}`."""
+
     standby: bool = False
     """`true` runs a second simulator in the same container. The second simulator takes over at once when the
     first one is recycled or fails. The container then has twice the memory."""
@@ -222,6 +235,19 @@ class SimulatorGroup(ApiModel):
             holds=lambda group: group.driver is not Driver.COMMAND or group.image is not None,
             cel="self.driver != 'command' || has(self.image)",
             message="is required with driver command; name the image that contains your program",
+        ),
+        Rule(
+            field="recycle",
+            holds=lambda group: (
+                group.reset is not ResetMethod.RESTART
+                or group.recycle is None
+                or group.recycle.after_resets in {None, 1}
+            ),
+            cel=(
+                "!has(self.reset) || self.reset != 'Restart' || !has(self.recycle)"
+                " || !has(self.recycle.afterResets) || self.recycle.afterResets == 1"
+            ),
+            message="contradicts reset: Restart, which restarts after each reset; remove one of them",
         ),
         Rule(
             field="minSimulators",

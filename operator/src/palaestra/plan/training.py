@@ -11,7 +11,7 @@ from typing import Any, Self
 
 import yaml
 
-from palaestra.api.simulators import Driver, Recycle, SimulatorGroup
+from palaestra.api.simulators import Driver, Recycle, ResetMethod, SimulatorGroup
 from palaestra.plan.claim import initial_path
 from palaestra.plan.replica import PlannedSimulator, Replica
 from palaestra.plan.resources import asks_for_gpu, in_bytes
@@ -25,6 +25,7 @@ NEVER = Recycle(after_resets=0)
 DO_NOT_AGE = (Driver.STUB, Driver.MUJOCO)
 # In the experiments of the paper in CITATION.cff, Webots ended with a bus error after this number of resets.
 AFTER_24_RESETS = Recycle(after_resets=24)
+AFTER_EACH_RESET = Recycle(after_resets=1)
 
 
 def training_yaml(replica: Replica, files: Mapping[str, bytes]) -> bytes:
@@ -81,6 +82,8 @@ def _simulator(replica: Replica, simulator: PlannedSimulator, files: Mapping[str
     }
     if limits := _limits(recycling(group)):
         described["recycle"] = limits
+    if group.reset is ResetMethod.RELOAD:
+        described["reset"] = group.reset.value
     if group.standby:
         described["standby"] = True
     described["restart"] = {
@@ -152,6 +155,8 @@ class RunAddresses:
 
 def recycling(group: SimulatorGroup) -> Recycle:
     """Return the recycle limits of a group's simulators: the job's, or the default of the driver."""
+    if group.reset is ResetMethod.RESTART:
+        return (group.recycle or AFTER_EACH_RESET).model_copy(update={"after_resets": 1})
     if group.recycle is not None:
         return group.recycle
     return NEVER if group.driver in DO_NOT_AGE else AFTER_24_RESETS

@@ -44,7 +44,7 @@ class Cause(StrEnum):
     - CHECKPOINTING: the trainer wrote a checkpoint.
     - STARTING: the time before the first step.
     - RECOVERING: every simulator was broken, or the trainer restored the last state of a resumed run.
-    - RECYCLING: a planned restart of a healthy simulator.
+    - RECYCLING: a planned restart of a healthy simulator, or a planned reload of its world.
     """
 
     STEPPING = "stepping"

@@ -60,3 +60,30 @@ def test_a_recycling_that_fails_is_a_fault_like_any_other(make_vec_env, make_mem
 
     assert member.log == ["restart", "restart"]
     assert [infos[0]["palaestra"]["valid"] for _, _, _, infos in rows] == [True, True, True, False, True]
+
+
+def test_a_world_is_reloaded_before_each_episode_but_the_first(make_vec_env, make_member):
+    """A process that has just started has loaded its world already."""
+    member = make_member()
+    member.reloads = True
+    env = make_vec_env(member)
+    env.reset()
+
+    rows = walk(env, 9)
+
+    assert member.log == ["reload"] * (member.resets - 1)
+    assert member.resets > 2
+    assert all(infos[0]["palaestra"]["valid"] for _, _, _, infos in rows)
+
+
+def test_a_reload_that_fails_is_a_fault_like_any_other(make_vec_env, make_member):
+    """The simulator is restarted, and its new process needs no reload."""
+    member = make_member(starts=[1])
+    member.reloads = True
+    env = make_vec_env(member)
+    env.reset()
+
+    rows = walk(env, 5)
+
+    assert member.log[:2] == ["reload", "restart"]
+    assert [infos[0]["palaestra"]["valid"] for _, _, _, infos in rows] == [True, True, True, False, True]

@@ -198,6 +198,8 @@ class SimulatorConfiguration(_Section):
         driver: the simulator program, `stub`, `mujoco`, `webots` or `command`.
         options: command-line options of the simulator program.
         world: path of the generated world that the simulator loads.
+        reset: `Reload`: the simulator loads its world again before each episode but the first; None: it only
+            resets its world.
         standby: whether the sidecar also runs a standby for this simulator.
         start_deadline_seconds: seconds within which the simulator must respond after its start.
     """
@@ -212,6 +214,7 @@ class SimulatorConfiguration(_Section):
     options: tuple[str, ...] = ()
     world: str = ""
     recycle: Recycle | None = None
+    reset: Literal["Reload"] | None = None
     standby: bool = False
     restart: Restart = Field(default_factory=Restart)
     start_deadline_seconds: Annotated[float, Field(gt=0)] = 60

@@ -202,4 +202,6 @@ def simulator_at(sidecar: Sidecar, configuration: Configuration, entry: Simulato
     """
     make = partial(make_environment, configuration.environment)
     robot = robot_class(configuration.robot or DEFAULT_ROBOT)
-    return Simulator(entry.name, sidecar, make, entry.start_deadline_seconds, entry.recycle, robot)
+    simulator = Simulator(entry.name, sidecar, make, entry.start_deadline_seconds, entry.recycle, robot)
+    simulator.reloads = entry.reset is not None
+    return simulator

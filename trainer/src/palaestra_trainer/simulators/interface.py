@@ -70,6 +70,19 @@ class Spared(Protocol):
 
 
 @runtime_checkable
+class Reloadable(Protocol):
+    """A member whose simulator can load its world again between two episodes."""
+
+    def reload_due(self) -> bool:
+        """Return whether the simulator must load its world again before the next episode."""
+        ...
+
+    def reload(self) -> None:
+        """Load the world again, so that the simulator can step; raise `SimulatorFault` if that fails."""
+        ...
+
+
+@runtime_checkable
 class ReportsLeftOut(Protocol):
     """A member whose simulator reports the parts of its world that it does not simulate."""
 

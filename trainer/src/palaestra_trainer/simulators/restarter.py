@@ -33,7 +33,7 @@ from palaestra_trainer.errors import (
 from palaestra_trainer.simulators.attributes import Attributes
 from palaestra_trainer.simulators.budget import Group, RestartBudget, RestartLimit
 from palaestra_trainer.simulators.finite_check import check_observation, check_reward
-from palaestra_trainer.simulators.interface import Member, NullWatcher, Step, Watcher
+from palaestra_trainer.simulators.interface import Member, NullWatcher, Reloadable, Step, Watcher
 from palaestra_trainer.simulators.stats import SimulatorStats
 from palaestra_trainer.simulators.threads import in_background
 from palaestra_trainer.waiting.check import Check, go_on
@@ -147,16 +147,18 @@ class Restarter:
     def reset(
         self, seed: int, options: dict[str, Any] | None = None, check: Check = go_on
     ) -> tuple[Any, dict[str, Any]]:
-        """Recycle the member if that is due; return first observation and info of a new episode.
+        """Recycle or reload the member if that is due; return first observation and info of a new episode.
 
         Observation and info are copies, as in `step`, because the environment may write into its own objects
-        later. `check` is called every tenth of a second during a recycling; it raises to end the wait.
+        later. `check` is called every tenth of a second during a recycling or a reload; it raises to end the
+        wait.
 
         Raises:
             SimulatorFault: the member failed; call `begin_restart`.
             Diverged: the observation is not finite.
         """
         self._recycle_when_due(check)
+        self._reload_when_due(check)
         env = self.member.env
         self._attributes.give(env)
         observation, info = env.reset(seed=seed, options=copied(options))
@@ -310,6 +312,11 @@ class Restarter:
         self._log_recycling(reason)
         self._begin(self._recycle)
         self._await_recycling(check)
+
+    def _reload_when_due(self, check: Check) -> None:
+        if isinstance(self.member, Reloadable) and self.member.reload_due():
+            self._begin(self.member.reload)
+            self._await_recycling(check)
 
     def _await_recycling(self, check: Check) -> None:
         while not self.up():

@@ -49,6 +49,10 @@ class Simulator:
         recycle: limits after which the simulator is restarted between two episodes; None: no limits.
         robot: the class of the robot in the world.
 
+    Attributes:
+        reloads: whether the simulator loads its world again before each episode but the first; by default it
+            does not.
+
     Raises:
         SimulatorDead, SimulatorHung: the sidecar does not report the robots' names.
         ConfigurationError: the world has no robot that is a supervisor.
@@ -67,6 +71,7 @@ class Simulator:
         self.sidecar = sidecar
         self.start_deadline_s = start_deadline_s
         self.wear = RecyclePolicy(recycle, self._memory)
+        self.reloads = False
         self._abandoned = threading.Event()
         state = sidecar.first_state(start_deadline_s)
         supervisor = next((each for each in state.robots if each.supervisor), None)
@@ -104,6 +109,21 @@ class Simulator:
     def due(self, episodes: int = 1) -> str | None:
         """Return the reason to recycle the simulator before the next `episodes`, as text; None: no reason."""
         return self.wear.due(self.resets, episodes)
+
+    def reload_due(self) -> bool:
+        """Return whether the simulator must load its world again before the next episode."""
+        return self.reloads and self.resets > 0
+
+    def reload(self) -> None:
+        """Load the world again and connect to it, so that the simulator can step.
+
+        Raises:
+            SimulatorDead, SimulatorHung, WrongData: the world is not loaded in time.
+        """
+        self.webots.supervisor.reload()
+        self.webots.wait_available()
+        self.unpause()
+        self.robot.connect()
 
     def start(self) -> None:
         """Start the simulator and connect to it, so that it can step.

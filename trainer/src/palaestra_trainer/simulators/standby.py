@@ -89,6 +89,18 @@ class Standby:
         """Return the reason to recycle the active simulator before the next `episodes`; None: no reason."""
         return self._active.simulator.due(episodes)
 
+    def reload_due(self) -> bool:
+        """Return whether the active simulator must load its world again before the next episode."""
+        return self._active.simulator.reload_due()
+
+    def reload(self) -> None:
+        """Load the world of the active simulator again.
+
+        Raises:
+            SimulatorDead, SimulatorHung, WrongData: the world is not loaded in time.
+        """
+        self._active.simulator.reload()
+
     def start(self) -> None:
         """Start the active simulator; begin to start the spare in the background.
 
