@@ -23,11 +23,13 @@ from tests.bench import (
     simulators,
     stepping,
     watched,
+    webots,
 )
 
 PARTS = {
     "stepping": stepping.measure,
     "simulators": simulators.measure,
+    "webots": webots.measure,
     "watched": watched.measure,
     "parallel": parallel.measure,
     "recovery": runs.measure_recovery,

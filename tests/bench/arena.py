@@ -1,4 +1,4 @@
-"""A stub with the built-in arena and the facades that control it, for measurements."""
+"""A simulator with the built-in arena and the facades that control it, for measurements."""
 
 from contextlib import contextmanager
 
@@ -9,9 +9,9 @@ from palaestra_trainer.webots.launching.local_simulator import ProcessLauncher
 
 
 @contextmanager
-def running(*options, world="arena", name="robotino"):
+def running(*options, world="arena", name="robotino", driver="stub"):
     """Yield a connected robot, its scene and its launcher."""
-    launcher = ProcessLauncher(world, options=options)
+    launcher = ProcessLauncher(world, driver, options)
     webots = Webots(name, world, launcher=launcher)
     webots.start()
     webots.supervisor.set_mode(Mode.FAST)
