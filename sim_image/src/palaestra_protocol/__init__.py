@@ -7,6 +7,7 @@
 - `camera_picture`: the newest picture of a robot's camera, for viewers
 - `foreign_words`: options of other projects, and the TrainingJob fields that replace them
 - `messages`: derives the reader and the writer of a JSON message from its declaration
+- `policy_package`: the manifest of an exported policy with its files, and the check of these files
 - `fields`: checks received JSON, because its sender is not trusted
 - `metrics`: declares metrics as data: names, help texts, labels and buckets
 - `numbers`: parses the numbers of command-line options

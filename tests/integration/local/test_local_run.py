@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from palaestra_protocol.policy_package import MANIFEST, manifest_text
 from tests.integration.local.desk import PATIENCE_S, Desk
 from tests.local_run import left_of
 from tests.strangers import DRIVE, rover
@@ -83,7 +84,7 @@ def test_a_run_ends_with_a_summary_and_is_reported_when_it_is_typed_again(desk):
 def test_a_finished_run_is_prolonged_by_more_steps_and_began_with_the_policy_of_another(desk):
     """More steps do not change the policy with which the run began, and the trainer gets its path again.
 
-    A user types the path of the other run relative to the working directory.
+    A user types the path of the other run, or of a package, relative to the working directory.
     """
     other = desk.folder / "other"
     other.mkdir()
@@ -93,6 +94,7 @@ def test_a_finished_run_is_prolonged_by_more_steps_and_began_with_the_policy_of_
     desk.write(TELL, trainer=command | {"steps": 40})
     first = desk.run("--initial-policy", "other")
     desk.write(TELL, trainer=command | {"steps": 80})
+    (other / MANIFEST).write_bytes(manifest_text({}, {"model.zip": (other / "model.zip").read_bytes()}))
 
     second = desk.run("--initial-policy", "other")
     nothing = desk.run("--initial-policy", "nothing")

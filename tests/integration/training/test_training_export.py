@@ -13,9 +13,10 @@ import onnxruntime
 import pytest
 from safetensors import safe_open
 
+from palaestra_protocol.policy_package import MANIFEST, read_package
 from palaestra_trainer import exporting, load_policy
 from palaestra_trainer.cli.export import export
-from palaestra_trainer.errors import ExportError
+from palaestra_trainer.errors import ConfigurationError, ExportError
 from palaestra_trainer.exporting import onnx_file
 from palaestra_trainer.testing import fake_arena, fake_seeing
 
@@ -171,3 +172,39 @@ def test_the_example_drives_a_simulated_robot_without_pytorch(trained):
     outcome, rest = result.stdout.splitlines()
     assert outcome.split()[0] in {"reached", "collided", "time_up"}
     assert rest == "[]"
+
+
+def test_a_package_has_all_that_a_robot_and_a_reader_need(trained):
+    """The rate, the limits and the success must travel with the weights, or somebody has to guess them."""
+    run = trained(**CASES["PPO-continuous"])
+
+    written = exporting.export(run, "package")
+    manifest = read_package(written.path)
+
+    files = {entry["name"] for entry in manifest["files"]}
+    assert files == {"model.zip", "policy.onnx", "training.yaml"}
+    assert {path.name for path in written.path.iterdir()} == files | {MANIFEST}
+    assert manifest["robot"] == {"class": "Robotino", "definition": "ROBOTINO", "period_s": 0.192}
+    assert manifest["policy"]["environment"]["id"] == CONTINUOUS["id"]
+    assert manifest["policy"]["actions"]["space"]["low"] == -1.0
+    assert manifest["evaluated"][0]["simulators"] == ["stub"]
+    assert (written.path / "model.zip").read_bytes() == (run / "model.zip").read_bytes()
+    session = onnxruntime.InferenceSession(written.path / "policy.onnx")
+    assert [it.name for it in session.get_inputs()] == manifest["policy"]["inputs"]
+
+    again = exporting.export(run, "package")
+
+    assert read_package(again.path)["policy"] == manifest["policy"]
+    assert list(run.glob(".package-*")) == []
+
+
+def test_a_folder_that_is_no_package_is_not_replaced(trained, tmp_path):
+    """An export must not remove the files of a person."""
+    other = tmp_path / "thesis"
+    other.mkdir()
+    (other / "chapter.tex").write_text("words")
+
+    with pytest.raises(ConfigurationError, match="exists and is not a package; name a new folder"):
+        exporting.export(trained(**CASES["A2C"]), "package", other)
+
+    assert (other / "chapter.tex").read_text() == "words"

@@ -6,6 +6,7 @@ import pytest
 import yaml
 
 from palaestra.cli import main
+from palaestra_protocol.policy_package import MANIFEST, manifest_text
 from palaestra_sim.world import builtin, robots
 
 JOB = """\
@@ -397,3 +398,17 @@ def test_export_without_the_trainer_is_refused(tmp_path, monkeypatch, capsys):
     assert main(["export", str(tmp_path), "--to", "onnx"]) == 2
 
     assert "palaestra-none is not a program on this machine; install it" in capsys.readouterr().err
+
+
+def test_a_run_does_not_begin_with_a_damaged_package(job, tmp_path, capsys):
+    """A policy with one wrong weight would train on without a word."""
+    package = tmp_path / "package"
+    package.mkdir()
+    (package / "model.zip").write_bytes(b"another model")
+    (package / MANIFEST).write_bytes(manifest_text({}, {"model.zip": b"the model"}))
+
+    code = main(["run", str(job), "--dir", str(tmp_path / "runs"), "--initial-policy", str(package)])
+
+    assert code == 2
+    assert "model.zip: is not the file that was exported; copy the whole package" in capsys.readouterr().err
+    assert not (tmp_path / "runs").exists()

@@ -31,11 +31,14 @@ def add(commands: Commands) -> None:
     parser.add_argument("run", metavar="RUN", type=Path, help="run directory, such as runs/<job>/<replica>")
     parser.add_argument(
         "--to",
-        choices=("onnx", "safetensors"),
+        choices=("onnx", "safetensors", "package"),
         required=True,
-        help="onnx runs by itself; safetensors has the tensors for a network that you build",
+        help="onnx runs by itself; safetensors has the tensors for a network that you build; package is a "
+        "folder with the ONNX file, the model, the job, and a manifest with a checksum of each",
     )
-    parser.add_argument("--output", metavar="FILE", type=Path, help="default: RUN/policy.<format>")
+    parser.add_argument(
+        "--output", metavar="FILE", type=Path, help="default: RUN/policy.<format>, or RUN/package"
+    )
 
 
 def _export(options: argparse.Namespace) -> int:

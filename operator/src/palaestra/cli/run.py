@@ -8,12 +8,13 @@ from pathlib import Path
 from palaestra.api import TrainingJob
 from palaestra.cli.files import add_dir, job
 from palaestra.cli.subcommands import Commands, command
+from palaestra.errors import PalaestraError
 from palaestra.job_input import changed
 from palaestra.live_view.view_process import viewed
 from palaestra.local.run import RunOptions, run
 from palaestra_protocol.numbers import MOST_PORT, whole
+from palaestra_protocol.policy_package import MANIFEST, MODEL, PackageError, read_package
 
-MODEL = "model.zip"  # the best policy of a run
 RUN = """\
 Trains as the TrainingJob in FILE specifies, and prints a line about its progress every 10 s. Writes
 <dir>/<job name>/<replica>/: checkpoints/, tensorboard/, evaluations.jsonl, model.zip, the source worlds,
@@ -37,7 +38,7 @@ def add(commands: Commands) -> None:
         "--initial-policy",
         metavar="PATH",
         type=Path,
-        help="run directory or model.zip with the policy of a new run, as trainer.initialPolicy",
+        help="run directory, package or model.zip with the policy of a new run, as trainer.initialPolicy",
     )
     parser.add_argument(
         "--ros-port",
@@ -72,10 +73,15 @@ def _wanted(options: argparse.Namespace) -> TrainingJob:
     """Return the job in the file; the command line may replace its initial policy.
 
     Raises:
-        PalaestraError: the file cannot be read, or the job is invalid.
+        PalaestraError: the file cannot be read, or the job is invalid, or a package is damaged.
     """
     given, policy = job(options.file), options.initial_policy
     if policy is None:
         return given
+    if (policy / MANIFEST).is_file():
+        try:
+            read_package(policy)
+        except PackageError as error:
+            raise PalaestraError(str(error)) from error
     model = policy / MODEL if policy.is_dir() else policy
     return changed(given, {"trainer.initialPolicy": {"path": str(model.absolute())}})

@@ -24,8 +24,9 @@ Write the best policy of a run as one file for other programs.
 reads:
   RUN_DIR/model.zip, RUN_DIR/training.yaml
 writes:
-  the file, once it has acted as the policy on 1,000 observations: discrete actions are equal, continuous
-  ones within 1e-5; its path and its largest difference as one JSON object to standard output
+  the file, or the folder of a package, once it has acted as the policy on 1,000 observations: discrete
+  actions are equal, continuous ones within 1e-5; its path and its largest difference as one JSON object to
+  standard output
 
 The extra `export` of palaestra-trainer has the libraries. Stable-Baselines3 unpickles model.zip, so export
 only runs that you trust.
@@ -42,8 +43,10 @@ def export(arguments: Sequence[str] | None = None) -> int:
     """Run `palaestra-export`; return its exit code."""
     options = parser("palaestra-export", EXPORT, EXIT_CODES)
     options.add_argument("run", type=Path, metavar="RUN_DIR", help="run directory with a model.zip")
-    options.add_argument("--to", choices=("onnx", "safetensors"), required=True, help="format of the file")
-    options.add_argument("--output", type=Path, metavar="FILE", help="default: RUN_DIR/policy.FORMAT")
+    options.add_argument("--to", choices=("onnx", "safetensors", "package"), required=True, help="format")
+    options.add_argument(
+        "--output", type=Path, metavar="FILE", help="default: RUN_DIR/policy.FORMAT, or RUN_DIR/package"
+    )
     chosen = options.parse_args(arguments)
     configure_logs()
     with without_collections():

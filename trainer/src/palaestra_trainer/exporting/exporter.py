@@ -16,7 +16,12 @@ from palaestra_trainer.job.configuration import load
 from palaestra_trainer.job.run_directory import RunDirectory, replace_file
 from palaestra_trainer.run.policies import load_policy
 
-FORMATS: Mapping[str, str] = {"onnx": "onnx_file", "safetensors": "safetensors_file"}
+PACKAGE = "package"
+FORMATS: Mapping[str, str] = {
+    "onnx": "onnx_file",
+    "safetensors": "safetensors_file",
+    PACKAGE: "onnx_file",  # the policy in a package is an ONNX file
+}
 
 
 class Format(Protocol):
@@ -36,7 +41,7 @@ class Exported:
     """The result of an export.
 
     Attributes:
-        path: the file that was written.
+        path: the file, or the folder of the package, that was written.
         observations: number of observations in the comparison of the file with the policy.
         largest_difference: the largest difference between a number in an action of the file and the same
             number in the policy's action; for continuous actions, as a share of the range.
@@ -50,8 +55,11 @@ class Exported:
 def export(run: Path, to: str, file: Path | None = None) -> Exported:
     """Write the best policy of a run in the format `to`; by default to `policy.<to>` in its directory.
 
+    A package is a folder, by default `package` in the run directory.
+
     Raises:
-        ConfigurationError: the model or a library of the extra `export` is missing.
+        ConfigurationError: the model or a library of the extra `export` is missing, or the folder exists and
+            is not a package.
         ExportError: the file would act differently from the policy, so it was not written.
         OSError: the file could not be written.
     """
@@ -59,7 +67,8 @@ def export(run: Path, to: str, file: Path | None = None) -> Exported:
     directory = RunDirectory(run)
     loaded = load_policy(run)
     acting = PolicyModule(loaded)
-    sheet = data_sheet(acting, load(directory.configuration), directory)
+    configuration = load(directory.configuration)
+    sheet = data_sheet(acting, configuration, directory)
     content = known.content(acting, sheet)
 
     def converted(module: PolicyModule) -> Run:
@@ -67,8 +76,13 @@ def export(run: Path, to: str, file: Path | None = None) -> Exported:
         return known.runner(file, module)
 
     difference = compare(converted, acting, loaded)
-    path = file or run / f"policy.{to}"
-    replace_file(path, lambda name: name.write_bytes(content))
+    if to == PACKAGE:
+        path = file or run / PACKAGE
+        package: Any = import_module(f"{__package__}.package")  # it imports the library for ONNX
+        package.write_package(path, content, configuration, directory)
+    else:
+        path = file or run / f"policy.{to}"
+        replace_file(path, lambda name: name.write_bytes(content))
     return Exported(path=path, observations=OBSERVATIONS, largest_difference=difference)
 
 

@@ -91,3 +91,10 @@ def runner(file: bytes, acting: PolicyModule) -> Run:
         return tuple(np.asarray(output) for output in outputs)
 
     return run
+
+
+def sheet_of(file: bytes) -> dict[str, Any]:
+    """Return the data sheet in the file's metadata."""
+    known = {entry.key: entry.value for entry in onnx.load_model_from_string(file).metadata_props}
+    sheet: dict[str, Any] = json.loads(known[KEY])
+    return sheet

@@ -1,0 +1,86 @@
+"""Write a policy package: the exported network, the model to train on, the job, and a manifest of them."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Mapping
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from palaestra_protocol.pod.enums import Role
+from palaestra_protocol.policy_package import MANIFEST, MODEL, NETWORK, manifest_text
+from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.exporting.onnx_file import sheet_of
+from palaestra_trainer.job.configuration import DEFAULT_ROBOT, Configuration
+from palaestra_trainer.job.run_directory import RunDirectory, read_lines
+from palaestra_trainer.robots.registry import robot_class
+from palaestra_trainer.run.summary import measured
+
+JOB = "job.yaml"  # the TrainingJob; only a run of `palaestra run` has this file
+TRAINING = "training.yaml"
+_MS = 1000.0
+
+
+def write_package(folder: Path, network: bytes, configuration: Configuration, run: RunDirectory) -> None:
+    """Write a package, or replace an older one; no partial package is left.
+
+    Args:
+        folder: the folder of the package.
+        network: the exported policy, as the content of an ONNX file with its data sheet.
+        configuration: the configuration of the run.
+        run: the run directory.
+
+    Raises:
+        ConfigurationError: the folder exists and is not a package, or the robot's class is unknown.
+        OSError: a file cannot be read or written.
+    """
+    if folder.exists() and not (folder / MANIFEST).is_file():
+        raise ConfigurationError(f"{folder}: exists and is not a package; name a new folder with --output")
+    files = {NETWORK: network, MODEL: run.model.read_bytes(), TRAINING: run.configuration.read_bytes()}
+    if (job := run.path / JOB).is_file():
+        files[JOB] = job.read_bytes()
+    files[MANIFEST] = manifest_text(_description(sheet_of(network), configuration, run), files)
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=f".{folder.name}-", dir=folder.parent) as place:
+        fresh, old = Path(place, "new"), Path(place, "old")
+        fresh.mkdir()
+        for name, content in files.items():
+            (fresh / name).write_bytes(content)
+        if folder.exists():
+            shutil.move(folder, old)
+        fresh.rename(folder)
+
+
+def _description(sheet: Mapping[str, Any], configuration: Configuration, run: RunDirectory) -> dict[str, Any]:
+    """Return the fields of the manifest, except those about its files."""
+    name = configuration.robot or DEFAULT_ROBOT
+    robot = robot_class(name)
+    attempts = list(read_lines(run.attempts))
+    return {
+        "palaestra": version("palaestra-trainer"),
+        "versions": attempts[-1].get("versions", {}) if attempts else {},
+        "job": configuration.job,
+        "replica": configuration.replica,
+        "robot": {"class": name, "definition": robot.definition, "period_s": robot.period_ms / _MS},
+        "policy": dict(sheet),
+        "evaluated": _evaluated(configuration, run),
+        "reproduce": f"palaestra run {JOB}" if (run.path / JOB).is_file() else None,
+    }
+
+
+def _evaluated(configuration: Configuration, run: RunDirectory) -> list[dict[str, Any]]:
+    """Return the success of the policy, and the simulators that evaluated it; empty without evaluation."""
+    result = measured(run)
+    if not result:
+        return []
+    judges = [it for it in configuration.simulators if it.role is Role.EVALUATE]
+    return [
+        {
+            "simulators": sorted({it.driver for it in judges}),
+            "worlds": sorted({Path(it.world).name for it in judges}),
+            "success_rate": result.get("success_rate"),
+            "success_interval": result.get("success_interval"),
+        }
+    ]
