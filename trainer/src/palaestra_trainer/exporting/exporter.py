@@ -16,12 +16,8 @@ from palaestra_trainer.job.configuration import load
 from palaestra_trainer.job.run_directory import RunDirectory, replace_file
 from palaestra_trainer.run.policies import load_policy
 
-PACKAGE = "package"
-FORMATS: Mapping[str, str] = {
-    "onnx": "onnx_file",
-    "safetensors": "safetensors_file",
-    PACKAGE: "onnx_file",  # the policy in a package is an ONNX file
-}
+PACKAGE = "package"  # a folder, in which the policy is an ONNX file
+FORMATS: Mapping[str, str] = {"onnx": "onnx_file", "safetensors": "safetensors_file"}
 
 
 class Format(Protocol):
@@ -88,7 +84,7 @@ def export(run: Path, to: str, file: Path | None = None) -> Exported:
 
 def _format(name: str) -> Format:
     try:
-        known: Any = import_module(f"{__package__}.{FORMATS[name]}")
+        known: Any = import_module(f"{__package__}.{FORMATS['onnx' if name == PACKAGE else name]}")
     except ImportError as error:
         raise ConfigurationError(
             f"--to {name}: cannot be written ({error}); install palaestra-trainer[export]"
