@@ -195,7 +195,7 @@ def test_a_package_has_all_that_a_robot_and_a_reader_need(trained):
     again = exporting.export(run, "package")
 
     assert read_package(again.path)["policy"] == manifest["policy"]
-    assert list(run.glob(".package-*")) == []
+    assert list(written.path.glob(".*")) == []
 
 
 def test_a_folder_that_is_no_package_is_not_replaced(trained, tmp_path):
@@ -204,7 +204,7 @@ def test_a_folder_that_is_no_package_is_not_replaced(trained, tmp_path):
     other.mkdir()
     (other / "chapter.tex").write_text("words")
 
-    with pytest.raises(ConfigurationError, match="exists and is not a package; name a new folder"):
+    with pytest.raises(ConfigurationError, match=r"contains chapter\.tex, which no package has; name"):
         exporting.export(trained(**CASES["A2C"]), "package", other)
 
     assert (other / "chapter.tex").read_text() == "words"

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import shutil
-import tempfile
 from collections.abc import Mapping
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -14,17 +13,21 @@ from palaestra_protocol.policy_package import MANIFEST, MODEL, NETWORK, manifest
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.exporting.onnx_file import sheet_of
 from palaestra_trainer.job.configuration import DEFAULT_ROBOT, Configuration
-from palaestra_trainer.job.run_directory import RunDirectory, read_lines
+from palaestra_trainer.job.run_directory import RunDirectory, read_lines, replace_file
 from palaestra_trainer.robots.registry import robot_class
 from palaestra_trainer.run.summary import measured
 
 JOB = "job.yaml"  # the TrainingJob; only a run of `palaestra run` has this file
 TRAINING = "training.yaml"
+_OURS = frozenset({NETWORK, MODEL, JOB, TRAINING, MANIFEST})
 _MS = 1000.0
 
 
 def write_package(folder: Path, network: bytes, configuration: Configuration, run: RunDirectory) -> None:
-    """Write a package, or replace an older one; no partial package is left.
+    """Write a package into a new or an empty folder, or replace an older package.
+
+    The manifest is written last. Until then, a reader refuses the package, because the older manifest has
+    other checksums.
 
     Args:
         folder: the folder of the package.
@@ -33,24 +36,26 @@ def write_package(folder: Path, network: bytes, configuration: Configuration, ru
         run: the run directory.
 
     Raises:
-        ConfigurationError: the folder exists and is not a package, or the robot's class is unknown.
+        ConfigurationError: the folder contains another file, or the robot's class is unknown.
         OSError: a file cannot be read or written.
     """
-    if folder.exists() and not (folder / MANIFEST).is_file():
-        raise ConfigurationError(f"{folder}: exists and is not a package; name a new folder with --output")
     files = {NETWORK: network, MODEL: run.model.read_bytes(), TRAINING: run.configuration.read_bytes()}
     if (job := run.path / JOB).is_file():
         files[JOB] = job.read_bytes()
     files[MANIFEST] = manifest_text(_description(sheet_of(network), configuration, run), files)
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix=f".{folder.name}-", dir=folder.parent) as place:
-        fresh, old = Path(place, "new"), Path(place, "old")
-        fresh.mkdir()
-        for name, content in files.items():
-            (fresh / name).write_bytes(content)
-        if folder.exists():
-            shutil.move(folder, old)
-        fresh.rename(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    if others := sorted({path.name for path in folder.iterdir()} - _OURS):
+        raise ConfigurationError(
+            f"{folder}: contains {others[0]}, which no package has; name a new folder with --output"
+        )
+    for name, content in files.items():
+        replace_file(folder / name, partial(_write, content))
+    for name in _OURS - files.keys():
+        (folder / name).unlink(missing_ok=True)
+
+
+def _write(content: bytes, path: Path) -> None:
+    path.write_bytes(content)
 
 
 def _description(sheet: Mapping[str, Any], configuration: Configuration, run: RunDirectory) -> dict[str, Any]:
