@@ -106,7 +106,7 @@ class Goodput(StatusModel):
 
     recycling: Seconds = 0
     """Seconds in which training waited for the restart of a healthy simulator that had reached a limit of
-    `recycle`."""
+    `recycle`, or, with `reset: Reload`, until simulators had loaded their worlds again."""
 
 
 class MemoryKills(StatusModel):
