@@ -10,7 +10,7 @@ import hashlib
 import json
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final, cast
 
@@ -26,7 +26,6 @@ MOST_FILES: Final = 64
 
 _DIGEST: Final = re.compile(r"[0-9a-f]{64}")
 _FILE_NAME: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
-_CHUNK: Final = 2**20
 
 
 class PackageError(ProtocolError):
@@ -75,8 +74,7 @@ def manifest_text(description: Mapping[str, Any], files: Mapping[str, bytes]) ->
         description: the fields of the manifest, except `format` and `files`.
         files: the contents, by file name.
     """
-    described = [PackageFile.of(name, content) for name, content in sorted(files.items())]
-    entries = [{"name": it.name, "size": it.size, "sha256": it.sha256} for it in described]
+    entries = [asdict(PackageFile.of(name, content)) for name, content in sorted(files.items())]
     content = {"format": FORMAT, **description, "files": entries}
     return (json.dumps(content, indent=2, allow_nan=False) + "\n").encode()
 
@@ -116,12 +114,9 @@ def _check(path: Path, described: PackageFile) -> None:
     """Raise PackageError unless a file has the described size and digest."""
     try:
         with path.open("rb") as file:
-            size, digest = 0, hashlib.sha256()
-            # A file that is too long is not read to its end.
-            while size <= described.size and (chunk := file.read(_CHUNK)):
-                size += len(chunk)
-                digest.update(chunk)
+            same = path.stat().st_size == described.size
+            same = same and hashlib.file_digest(file, "sha256").hexdigest() == described.sha256
     except OSError as error:
         raise PackageError(f"{path}: {error.strerror}; copy the whole package") from error
-    if size != described.size or digest.hexdigest() != described.sha256:
+    if not same:
         raise PackageError(f"{path}: is not the file that was exported; copy the whole package again")

@@ -38,7 +38,7 @@ def extra_projects(folder: Path, environment: Mapping[str, str]) -> dict[str, st
 
 
 def foreign_controller(folder: Path) -> Path | None:
-    """Return a file of a controller `ros` in `folder` that Palaestra did not write; None if there is none."""
+    """Return a file of another controller `ros` in the project; None if only ours is there."""
     for path in sorted(_controller(folder).parent.glob("*")):
         ours = path.name == "__pycache__" or (path.name == "ros.py" and _IMPORT in path.read_text())
         if not ours:

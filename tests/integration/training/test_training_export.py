@@ -175,7 +175,7 @@ def test_the_example_drives_a_simulated_robot_without_pytorch(trained):
 
 
 def test_a_package_has_all_that_a_robot_and_a_reader_need(trained):
-    """The rate, the limits and the success must travel with the weights, or somebody has to guess them."""
+    """A program on the robot reads the rate and the limits; a person reads the success."""
     run = trained(**CASES["PPO-continuous"])
 
     written = exporting.export(run, "package")

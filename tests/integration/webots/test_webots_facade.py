@@ -149,7 +149,7 @@ def test_a_start_waits_for_the_controllers_of_all_robots(own_arena, make, name):
 def test_a_robot_without_a_controller_is_named(own_arena, monkeypatch):
     """A wrong name is a mistake, so the wait ends long before the deadline of a start."""
     monkeypatch.setattr(facade, "_CONTROLLERS_S", 0.5)
-    own_arena.webots.at_start("nobody", lambda: None, ["nobody"])
+    own_arena.webots.at_start("absent", lambda: None, ["absent"])
 
-    with pytest.raises(SimulatorDead, match="nobody: no node serves /nobody/robot/get_device_list"):
+    with pytest.raises(SimulatorDead, match="absent: no node serves /absent/robot/get_device_list"):
         own_arena.webots.wait_available()

@@ -21,7 +21,7 @@ def folder(tmp_path):
 
 
 def test_a_whole_package_is_described_by_its_manifest(folder):
-    """A file beside the package, such as a note, is no mistake."""
+    """The reader accepts other files in the folder, such as notes."""
     (folder / "notes.txt").write_text("drives well")
 
     content = read_package(folder)

@@ -87,8 +87,8 @@ class Webots:
         # The probe has its own connection with a shorter deadline, because it must detect a hang early.
         self._probe = RosService(f"/{supervisor_node_name}/robot/get_time", "webots_ros/get_float", _PROBE_S)
         self._start_deadline_s = start_deadline_s
-        self._at_start: dict[str, Callable[[], None]] = {}
-        self._robots: dict[str, tuple[str, ...]] = {}
+        # By name: the function to call, and the robots that must respond before.
+        self._at_start: dict[str, tuple[Callable[[], None], tuple[str, ...]]] = {}
         self._entered = 0
         self._stopped = False
         open_facades.offer(self)
@@ -107,8 +107,7 @@ class Webots:
 
         The controllers of `robots`, which are the ROS names of running robots, respond before the call.
         """
-        self._at_start[name] = connect
-        self._robots[name] = tuple(robots)
+        self._at_start[name] = (connect, tuple(robots))
 
     def start(self) -> None:
         """Start the simulator and wait until it responds and its robots are connected.
@@ -129,7 +128,7 @@ class Webots:
         self._launcher.confirm_ready()
         self._stopped = False
         self.supervisor.set_mode(Mode.FAST if self._entered else Mode.PAUSE)
-        for connect in self._at_start.values():
+        for connect, _ in self._at_start.values():
             connect()
 
     def wait_available(self) -> None:
@@ -149,7 +148,7 @@ class Webots:
                 )
             time.sleep(_POLL_S)  # the master has no call that waits for a node
         give_up = time.monotonic() + _CONTROLLERS_S
-        robots = (robot for group in self._robots.values() for robot in group)
+        robots = (robot for _, group in self._at_start.values() for robot in group)
         for robot in dict.fromkeys((self.supervisor_node_name, *robots)):
             self._await_controller(robot, give_up)
 

@@ -68,7 +68,7 @@ class DeviceCalls:
         return text
 
     def name_of(self, neighbor: str) -> str:
-        """Return the name of the joint's device of a type, such as "motor"; "" if there is none."""
+        """Return the name of the motor, brake or sensor on the same joint; "" if the joint lacks it."""
         tag = getattr(self, f"get_{neighbor}")()
         return self.library.device_get_name(tag) if tag else ""
 
@@ -175,7 +175,7 @@ def neighbors(calls: DeviceCalls, *roles: str) -> tuple[Row, ...]:
 
 
 def elements(array: Any, count: int) -> Iterator[Any]:
-    """Yield the elements of an array of structures; an array that is NULL has none."""
+    """Yield the elements of an array of structures, or nothing if the array is NULL."""
     for index in range(count if array else 0):
         yield array[index]
 
