@@ -97,6 +97,7 @@ golden: setup ## record the plans of the examples and other generated files agai
 	@$(BIN)/python -m tests.golden
 
 lock: setup ## resolve the dependencies again, within the bounds of the pyproject files
-	@$(COMPILE) --no-emit-package palaestra-sim --group dev --extra docker --extra mujoco --extra export --extra film --extra install --extra kubernetes --extra sweeps --extra view $(PACKAGES:%=%/pyproject.toml) -o requirements.lock
+	@$(COMPILE) --no-emit-package palaestra-sim --group dev --extra deploy --extra docker --extra mujoco --extra export --extra film --extra install --extra kubernetes --extra sweeps --extra train --extra view $(PACKAGES:%=%/pyproject.toml) -o requirements.lock
 	@$(COMPILE) --group notebook --constraint requirements.lock -o images/notebook/requirements.lock
 	@$(COMPILE) --group checkov -o tests/chart/checkov.lock
+	@$(COMPILE) --group ros2 --constraint requirements.lock -o tests/ros2.lock

@@ -100,8 +100,10 @@ class CurriculumEnv(MoveToTargetEnv):
         return super().reset(seed=seed, options=options)
 
 
-def make(robot: RobotinoAbc, scene: Scene, **options: Any) -> CurriculumEnv:
-    """Return the environment of one simulator."""
+def make(robot: RobotinoAbc, scene: Scene, **options: Any) -> MoveToTargetEnv:
+    """Return the environment of one simulator; a real robot is not disturbed, and nothing moves around it."""
+    if robot.real:
+        return MoveToTargetEnv(robot, scene, parse(options))
     disturbed = DisturbedRobot(robot)
     return CurriculumEnv(disturbed, HarderScene(disturbed, scene), parse(options))
 

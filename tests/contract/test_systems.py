@@ -66,6 +66,7 @@ def on(system, program, *arguments):
         ("darwin", ["palaestra-sidecar"]),
         ("win32", ["palaestra-stub"]),
         ("win32", ["palaestra-mujoco"]),
+        ("win32", ["palaestra-mock-robot"]),
         ("darwin", ["palaestra-train"]),
         ("darwin", ["palaestra-eval", "runs/a/0"]),
     ],

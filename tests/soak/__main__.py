@@ -11,7 +11,7 @@ import sys
 import time
 import traceback
 
-from tests.soak import chaos, damage, faults, kills, kinds, leaks, recovery, recycling, resume
+from tests.soak import chaos, damage, faults, kills, kinds, leaks, recovery, recycling, resume, robots
 
 PARTS = {
     "recovery": recovery.measure,
@@ -23,6 +23,7 @@ PARTS = {
     "recycling": recycling.measure,
     "chaos": chaos.measure,
     "faults": faults.measure,
+    "robot": robots.measure,
 }
 
 

@@ -60,7 +60,7 @@ def of_wheels(root: Path, folder: Path, machine: str) -> tuple[Path, ...]:
 
 def _of_wheel(root: Path, folder: Path, package: str, machine: str) -> Path:
     ours = [project(root, each) for each in WHEELS[package]]
-    recipe = Recipe(name=package, dockerfile="", packages=WHEELS[package])
+    recipe = Recipe(name=package, dockerfile="", packages=WHEELS[package], extras=("train",))
     locked = context.contents(root, recipe, machine).requirements
     whole, *needed = (_wheel(one["name"], one["version"]) for one in reversed(ours))
     parts = (*needed, *map(_locked, lock.parse(locked.text)))

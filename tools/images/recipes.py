@@ -69,7 +69,7 @@ def recipes(torch: str) -> Mapping[str, Recipe]:
             name="trainer",
             dockerfile="trainer/Dockerfile",
             packages=("sim_image", "trainer"),
-            extras=("install",),
+            extras=("install", "train"),
             without=stood_in_for,
             arguments={"TORCH": torch},
         ),
@@ -77,7 +77,7 @@ def recipes(torch: str) -> Mapping[str, Recipe]:
             name="notebook",
             dockerfile="images/notebook/Dockerfile",
             packages=("sim_image", "trainer", "operator"),
-            extras=("install",),
+            extras=("install", "train"),
             files=(
                 "images/notebook/notebook.sh",
                 "images/notebook/overrides.json",

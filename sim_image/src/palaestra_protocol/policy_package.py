@@ -20,6 +20,7 @@ MANIFEST: Final = "manifest.json"
 FORMAT: Final = 1
 MODEL: Final = "model.zip"
 NETWORK: Final = "policy.onnx"
+TRAINING: Final = "training.yaml"
 
 MOST_MANIFEST_BYTES: Final = 2**22
 MOST_FILES: Final = 64
@@ -79,12 +80,16 @@ def manifest_text(description: Mapping[str, Any], files: Mapping[str, bytes]) ->
     return (json.dumps(content, indent=2, allow_nan=False) + "\n").encode()
 
 
-def read_package(folder: Path) -> dict[str, Any]:
+def read_package(folder: Path, *needed: str) -> dict[str, Any]:
     """Return the manifest of the package in a folder, after a check of every file.
 
+    Args:
+        folder: the folder.
+        needed: the names of the files that the caller uses.
+
     Raises:
-        PackageError: the folder has no manifest, or the manifest has another format; or a file is missing or
-            has changed.
+        PackageError: the folder has no manifest, the manifest has another format or lacks a needed file, or a
+            file is missing or has changed.
     """
     manifest = folder / MANIFEST
     try:
@@ -96,6 +101,8 @@ def read_package(folder: Path) -> dict[str, Any]:
         content, files = _parsed(text)
     except ProtocolError as error:
         raise PackageError(f"{manifest}: {error}; export the package again") from error
+    if lacking := sorted(set(needed) - {each.name for each in files}):
+        raise PackageError(f"{manifest}: does not list {lacking[0]}; export the package again")
     for each in files:
         _check(folder / each.name, each)
     return content

@@ -7,7 +7,8 @@ import pytest
 
 from palaestra_trainer.errors import NoReading, NoSuchSensor, WrongData
 from palaestra_trainer.robots import Movement, Pose
-from palaestra_trainer.robots.robotino import Robotino, meters
+from palaestra_trainer.robots.infrared import meters
+from palaestra_trainer.robots.robotino import Robotino
 
 START = Pose(-1.5, 0.0, 0.0)
 

@@ -16,6 +16,7 @@ EXAMPLES = [
     "cartpole-mjcf",
     "chaos",
     "curriculum",
+    "imprecise",
     "minimal",
     "move-to-target",
     "move-to-target-mujoco",

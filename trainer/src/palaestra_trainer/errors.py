@@ -2,6 +2,7 @@
 
 TrainerError
 ├── ConfigurationError   the configuration is wrong; retrying cannot help     exit 2
+│   └── RobotUnfit       a real robot must not be driven now                  exit 2
 ├── UnreadableAnswer     the ROS master or a node sent an invalid ROS response
 ├── MasterLost           the ROS master is gone; nothing re-registers         exit 75
 ├── Interrupted          a signal asked the run to end (run.signals)          exit 75
@@ -15,6 +16,9 @@ TrainerError
 ├── NoReading            a sensor was read before its first message arrived
 ├── NotConforming        a robot breaks a rule of the interface (testing.conformance)
 ├── Paused               a step was requested while the simulation is paused
+├── RobotStopped         a safety rule stopped a real robot; a person decides
+├── NewGoal              a person sent another goal (deployment.goals)
+├── LinkError            a real robot did not respond in time, or not as a robot
 └── SimulatorFault       one simulator failed; restart it and continue
     ├── SimulatorDead    its connections are refused or were closed
     │   └── SimulatorRefused  its process ended with the exit code of a wrong input
@@ -105,6 +109,18 @@ class Paused(TrainerError, RuntimeError):
 
     The caller made a mistake: the simulator is healthy, so a restart cannot help.
     """
+
+
+class RobotUnfit(ConfigurationError):
+    """A real robot must not be driven now: it does not respond, charges, or another client drives it."""
+
+
+class RobotStopped(TrainerError, RuntimeError):
+    """A safety rule has stopped a real robot; only a person may decide to go on."""
+
+
+class LinkError(TrainerError, ConnectionError):
+    """A real robot did not confirm a request in time, or responded as no robot does."""
 
 
 class SimulatorFault(TrainerError):

@@ -30,6 +30,7 @@ COMMANDS: Mapping[str, Command] = MappingProxyType(
         "report": Command("report", "write the report of runs as one HTML file"),
         "view": Command("view", "look at the simulators of a run in a browser"),
         "export": Command("export", "write a policy as one file for other programs"),
+        "deploy": Command("deploy", "drive a real robot with a policy package"),
         "from-zoo": Command("from_zoo", "write a job from a file of RL-Baselines3-Zoo"),
         "explain": Command("explain", "show what a field of a job means"),
         "plan": Command("offline_commands", "print the objects that a job needs"),

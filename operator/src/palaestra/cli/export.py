@@ -1,4 +1,4 @@
-"""`palaestra export`: a policy as one file for other programs."""
+"""`palaestra export`: a policy, or the recorded episodes of a run, as one file for other programs."""
 
 from __future__ import annotations
 
@@ -15,12 +15,14 @@ an observation as the environment returns it, the file returns the action as the
 file is written only if it returns the actions of the policy for 1,000 observations. It contains a data sheet
 of observations and actions, and the environment, steps and success of the run. Export only runs that you
 trust.
+
+With --to mcap, the command writes the recorded episodes of the run instead, as a bag of ROS 2.
 """
 EXIT_CODES = """\
 exit codes:
   0    done
   1    any other error, such as a file that would act differently; nothing was written
-  2    RUN or the file name is wrong, or palaestra-trainer[export] is not installed
+  2    RUN or the file name is wrong, or the extra of palaestra-trainer is not installed
   130  ended by Ctrl-C
 """
 
@@ -31,13 +33,17 @@ def add(commands: Commands) -> None:
     parser.add_argument("run", metavar="RUN", type=Path, help="run directory, such as runs/<job>/<replica>")
     parser.add_argument(
         "--to",
-        choices=("onnx", "safetensors", "package"),
+        choices=("onnx", "safetensors", "package", "mcap"),
         required=True,
-        help="onnx runs by itself; safetensors has the tensors for a network that you build; package is a "
-        "folder with the ONNX file, the model, the job, and a manifest with a checksum of each",
+        help="onnx runs by itself; safetensors has the tensors for a network that you build. A package is a "
+        "folder with the ONNX file, the model, the job, and a manifest with a checksum of each. The format "
+        "mcap is a ROS 2 bag of the recorded episodes",
     )
     parser.add_argument(
-        "--output", metavar="FILE", type=Path, help="default: RUN/policy.<format>, or RUN/package"
+        "--output",
+        metavar="FILE",
+        type=Path,
+        help="default: RUN/policy.<format>, RUN/package or RUN/episodes.mcap",
     )
 
 

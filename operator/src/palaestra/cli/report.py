@@ -14,6 +14,8 @@ checkpoints, and the command that repeats the run. The file refers to no address
 opened anywhere. `palaestra run` and the trainer of a cluster write the report at the end of each run; this
 command writes it again, also for a run that still trains.
 
+RUN may also be the record of a deployment on a real robot, FILE.mcap. The report then replays its episodes.
+
 With --film FILE, the command instead writes the best recorded episode of one run, seen from above.
 """
 EXIT_CODES = """\
@@ -30,11 +32,18 @@ def add(commands: Commands) -> None:
     """Add the command."""
     parser = command(commands, "report", _report, REPORT, EXIT_CODES)
     parser.add_argument(
-        "runs", metavar="RUN", type=Path, nargs="+", help="run directory, such as runs/<job>/<replica>"
+        "runs",
+        metavar="RUN",
+        type=Path,
+        nargs="+",
+        help="run directory, such as runs/<job>/<replica>; or FILE.mcap",
     )
     to = parser.add_mutually_exclusive_group()
     to.add_argument(
-        "--out", metavar="FILE", type=Path, help="default: RUN/report.html; of several runs: ./report.html"
+        "--out",
+        metavar="FILE",
+        type=Path,
+        help="default: RUN/report.html; of FILE.mcap: FILE.html; of several: ./report.html",
     )
     to.add_argument(
         "--film",

@@ -80,7 +80,7 @@ def _wanted(options: argparse.Namespace) -> TrainingJob:
         return given
     if (policy / MANIFEST).is_file():
         try:
-            read_package(policy)
+            read_package(policy, MODEL)
         except PackageError as error:
             raise PalaestraError(str(error)) from error
     model = policy / MODEL if policy.is_dir() else policy

@@ -49,14 +49,19 @@ def command(
     function: Callable[[argparse.Namespace], int],
     description: str,
     exit_codes: str = EXIT_CODES,
+    **options: Any,
 ) -> argparse.ArgumentParser:
-    """Return the parser of a new command; `function` runs the command and returns its exit code."""
+    """Return the parser of a new command; `function` runs the command and returns its exit code.
+
+    `options` are further arguments of argparse's parser.
+    """
     parser = commands.add_parser(
         name,
         help=COMMANDS[name].summary,
         description=description,
         epilog=exit_codes,
         formatter_class=argparse.RawDescriptionHelpFormatter,
+        **options,
     )
     parser.set_defaults(command=function)
     return parser

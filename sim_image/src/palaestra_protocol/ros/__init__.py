@@ -10,6 +10,7 @@ All modules except `sockets` are pure.
 - `variable`: encodes messages with strings and lists, section by section
 - `codec`: encodes and decodes any message, with `fixed` or `variable`
 - `rostypes`: the types of the interface, each with its md5 sum and its codecs
+- `topic_headers`: the headers that a publisher and a subscriber exchange
 - `sockets`: the socket options of both ends of a connection
 - `shutdown`: the reason of a shutdown, which names the node that the master wants to end
 """

@@ -51,21 +51,26 @@ def decode_header(payload: bytes) -> dict[str, str]:
 
 
 class FrameReader:
-    """Splits a stream of bytes into frames; a frame may arrive in several pieces."""
+    """Splits a stream of bytes into frames; a frame may arrive in several pieces.
 
-    __slots__ = ("_buffer",)
+    Args:
+        most_bytes: the longest frame.
+    """
 
-    def __init__(self) -> None:
+    __slots__ = ("_buffer", "_most_bytes")
+
+    def __init__(self, most_bytes: int = MAX_FRAME_BYTES) -> None:
         self._buffer = bytearray()
+        self._most_bytes = most_bytes
 
     def feed(self, data: bytes) -> Iterable[bytes]:
         """Return the payload of every frame that `data` completes; iterate over the result only once.
 
         Raises:
-            FramingError: the length of a frame exceeds MAX_FRAME_BYTES; raised during the iteration.
+            FramingError: a frame is longer than `most_bytes`; raised during the iteration.
         """
         begins_here = not self._buffer and len(data) >= LENGTH.size
-        if begins_here and LENGTH.unpack_from(data)[0] == len(data) - LENGTH.size <= MAX_FRAME_BYTES:
+        if begins_here and LENGTH.unpack_from(data)[0] == len(data) - LENGTH.size <= self._most_bytes:
             return (data[LENGTH.size :],)  # the usual case: the data is exactly one whole frame
         self._buffer += data
         return self._cut()
@@ -74,8 +79,8 @@ class FrameReader:
         buffer = self._buffer
         while len(buffer) >= LENGTH.size:
             (length,) = LENGTH.unpack_from(buffer)
-            if length > MAX_FRAME_BYTES:
-                raise FramingError(f"a frame of {length} bytes, more than the limit of {MAX_FRAME_BYTES}")
+            if length > self._most_bytes:
+                raise FramingError(f"a frame of {length} bytes, more than the limit of {self._most_bytes}")
             end = LENGTH.size + length
             if len(buffer) < end:
                 return

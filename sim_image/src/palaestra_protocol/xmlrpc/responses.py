@@ -13,3 +13,19 @@ class RpcResponse(NamedTuple):
     code: int
     text: str
     value: Any
+
+
+def response_of(value: Any) -> RpcResponse | None:
+    """Return the value of a ROS call as a response; None if it is not a code, a text and a result."""
+    match value:
+        case [int(code), str(text), result]:
+            return RpcResponse(code, text, result)
+    return None
+
+
+def address_of(response: RpcResponse) -> tuple[str, int] | None:
+    """Return host and port in the response to `requestTopic`; None if it is not an address of TCPROS."""
+    match response.value:
+        case [str(), str(host), int(port)] if response.code == OK:
+            return host, port
+    return None

@@ -5,8 +5,9 @@ each robot, and fast responses. So this package implements the protocols itself:
 
 - `loop`: one event loop for all sockets and timers
 - `master`: XML-RPC with the ROS master and with other nodes
-- `links`: connections to clients and subscribers
-- `topics`: topics and their publishers
+- `links`: connections to clients, subscribers and publishers
+- `topics`: the topics that a node publishes
+- `subscriber`: the topics to which a node subscribes
 - `node`: names and services
 - `local_socket`: a Unix socket in the same loop, for the sidecar
 

@@ -1,4 +1,4 @@
-"""TCPROS connections: each serves one client of a service, or one subscriber of a topic.
+"""TCPROS connections: to a client of a service, to a subscriber of a topic, or to its publisher.
 
 Sockets are non-blocking. Responses to the client of a service are queued without loss. A subscriber that
 reads too slowly gets only the newest message, as from a publisher with queue size 1.
@@ -11,7 +11,14 @@ from collections.abc import Callable, Mapping
 from typing import Protocol
 
 from palaestra_protocol.ros import sockets
-from palaestra_protocol.ros.tcpros import FrameReader, FramingError, decode_header, encode_header
+from palaestra_protocol.ros.tcpros import (
+    MAX_FRAME_BYTES,
+    FrameReader,
+    FramingError,
+    decode_header,
+    encode_header,
+)
+from palaestra_protocol.ros.topic_headers import HeaderRefused
 from palaestra_sim.ros.loop import Loop
 
 # The node closes a finished connection after one to two times this time. By then roscpp and rospy have closed
@@ -60,10 +67,6 @@ class Connection(Protocol):
         ...
 
 
-class HeaderRefused(Exception):
-    """The header names a service or topic that this node does not have; the peer gets the error text."""
-
-
 Greet = Callable[["RosLink", Mapping[str, str]], Endpoint]
 
 
@@ -99,14 +102,15 @@ class Lingering:
 
 
 class RosLink:
-    """A connection from accept to close.
+    """A connection from accept or connect to close.
 
     Args:
         loop: the event loop of the socket.
-        connection: the accepted socket.
+        connection: the connected socket.
         greet: returns the endpoint for the header of the connection.
         lingering: closes the connection some time after `finish`.
         gone: called when the connection is closed, even if its header was not read yet.
+        most_bytes: the longest frame of the peer; a longer frame ends the connection.
     """
 
     __slots__ = (
@@ -130,6 +134,7 @@ class RosLink:
         greet: Greet,
         lingering: Lingering,
         gone: Callable[[RosLink], None],
+        most_bytes: int = MAX_FRAME_BYTES,
     ) -> None:
         connection.setblocking(False)
         for option in sockets.OPTIONS:
@@ -139,7 +144,7 @@ class RosLink:
         self._greet = greet
         self._lingering = lingering
         self._gone = gone
-        self._frames = FrameReader()
+        self._frames = FrameReader(most_bytes)
         self._endpoint: Endpoint | None = None
         self._unsent: bytes | memoryview = b""
         self._newest: bytes | None = None

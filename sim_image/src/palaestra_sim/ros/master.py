@@ -126,14 +126,22 @@ class Master:
 
 
 class Bus(Protocol):
-    """The topics of a node and their subscribers; the methods are called from another thread."""
+    """The topics of a node and their connections; the methods are called from another thread."""
 
     def publications(self) -> list[list[str]]:
-        """Return the name and type of each topic."""
+        """Return the name and type of each published topic."""
+        ...
+
+    def subscriptions(self) -> list[list[str]]:
+        """Return the name and type of each topic to which the node subscribes."""
         ...
 
     def connections(self) -> list[list[Any]]:
-        """Return an entry of `getBusInfo` for each connected subscriber."""
+        """Return an entry of `getBusInfo` for each connected subscriber and publisher."""
+        ...
+
+    def publishers_changed(self, topic: str, uris: list[str]) -> None:
+        """Connect to the publishers of a topic, which have these URIs now."""
         ...
 
 
@@ -144,7 +152,7 @@ class SlaveApi:
         host: the name under which other nodes reach this machine.
         master_uri: the URI of the master.
         tcpros_port: the port of the node's TCPROS listener.
-        bus: the topics that the node publishes, and their subscribers.
+        bus: the topics of the node, and their connections.
         on_shutdown: called in another thread when the master requests the end of the node.
     """
 
@@ -181,9 +189,9 @@ class SlaveApi:
             "getMasterUri": lambda _caller: [OK, "", self._master_uri],
             "getBusStats": lambda _caller: [OK, "", [[], [], []]],
             "getBusInfo": lambda _caller: [OK, "", self._bus.connections()],
-            "getSubscriptions": lambda _caller: [OK, "", []],
+            "getSubscriptions": lambda _caller: [OK, "", self._bus.subscriptions()],
             "getPublications": lambda _caller: [OK, "", self._bus.publications()],
-            "publisherUpdate": lambda _caller, _topic, _publishers: [OK, "", 0],
+            "publisherUpdate": self._publisher_update,
             "paramUpdate": lambda _caller, _key, _value: [OK, "", 0],
             "shutdown": self._shutdown,
         }
@@ -192,6 +200,10 @@ class SlaveApi:
         if all(topic != name for name, _ in self._bus.publications()):
             return [FAILED, f"this node does not publish {topic}", 0]
         return [OK, "", ["TCPROS", self._host, self._port]]
+
+    def _publisher_update(self, _caller: str, topic: str, publishers: list[Any]) -> list[Any]:
+        self._bus.publishers_changed(topic, [uri for uri in publishers if isinstance(uri, str)])
+        return [OK, "", 0]
 
     def _shutdown(self, _caller: str, reason: str = "") -> list[Any]:
         self._on_shutdown(reason)

@@ -1,4 +1,4 @@
-"""A ROS node: services and published topics, under one name.
+"""A ROS node: services, published topics and subscriptions, under one name.
 
 The controller of a robot uses this interface. The handler of a service gets the decoded request and returns
 the fields of the response. A handler may return `LATER` instead; the controller then calls `answer` when the
@@ -19,10 +19,12 @@ from typing import Any, Final
 from palaestra_protocol.ros.rostypes import ServiceType, message_type, service_type
 from palaestra_protocol.ros.shutdown import means_another_node
 from palaestra_protocol.ros.tcpros import encode_header, frame
+from palaestra_protocol.ros.topic_headers import HeaderRefused, agreed_md5, publisher_header
 from palaestra_protocol.xmlrpc.server import bind_address, host_name
-from palaestra_sim.ros.links import Connection, Endpoint, HeaderRefused, Lingering, RosLink
+from palaestra_sim.ros.links import Connection, Endpoint, Lingering, RosLink
 from palaestra_sim.ros.loop import Loop
 from palaestra_sim.ros.master import Master, MasterUnreachable, SlaveApi
+from palaestra_sim.ros.subscriber import Heard, Subscription
 from palaestra_sim.ros.topics import PublishedTopic, Publisher
 
 LATER: Final = object()
@@ -53,6 +55,7 @@ class RosNode:
         self._master = Master(master_uri, f"/{name}")
         self._services: dict[str, tuple[ServiceType, Handler]] = {}
         self._topics: dict[str, PublishedTopic] = {}
+        self._subscriptions: dict[str, Subscription] = {}
         self._links: set[RosLink] = set()
         self._lingering = Lingering(loop)
         self._subscribers: dict[Connection, list[Any]] = {}  # the entries that getBusInfo returns
@@ -122,6 +125,27 @@ class RosNode:
             for link in list(topic.links):
                 link.close()
 
+    def subscribe(self, path: str, type_name: str, heard: Heard) -> None:
+        """Subscribe to a topic, once; call `heard` with each message of each publisher.
+
+        Raises:
+            MasterUnreachable: the master did not accept the registration.
+        """
+        name = self.resolve(path)
+        subscription = Subscription(self._loop, f"/{self.name}", name, message_type(type_name), heard)
+        self._subscriptions[name] = subscription
+        publishers = self._master.call("registerSubscriber", name, type_name, self._slave.uri)
+        # The loop handles an update of the master after this call, so an update is newer than `publishers`.
+        subscription.set_publishers(publishers)
+
+    def set_parameter(self, path: str, value: Any) -> None:
+        """Set a parameter at the master, where other programs read it.
+
+        Raises:
+            MasterUnreachable: the master did not accept the parameter.
+        """
+        self._master.tell("setParam", self.resolve(path), value)
+
     def answer(self, call: object, fields: Mapping[str, Any]) -> None:
         """Send the response to a call whose handler returned LATER; then handle the waiting requests."""
         if isinstance(call, ServiceEnd):
@@ -151,13 +175,15 @@ class RosNode:
         self.abandon()
 
     def unregister(self) -> None:
-        """Unregister every service and topic at the master; connections stay open."""
+        """Unregister every service, topic and subscription at the master; connections stay open."""
         # A master that does not run has no names to unregister.
         with contextlib.suppress(MasterUnreachable), self._master.together():
             for name in self._services:
                 self._master.tell("unregisterService", name, self._rosrpc)
             for name in self._topics:
                 self._master.tell("unregisterPublisher", name, self._slave.uri)
+            for name in self._subscriptions:
+                self._master.tell("unregisterSubscriber", name, self._slave.uri)
 
     def abandon(self) -> None:
         """Close every socket without unregistering, like a controller that was killed."""
@@ -165,6 +191,8 @@ class RosNode:
         self._listener.close()
         for link in list(self._links):
             link.close()
+        for subscription in self._subscriptions.values():
+            subscription.close()
         self._slave.close()
         self._master.close()
 
@@ -177,12 +205,28 @@ class RosNode:
         self._master.call("getPid")
 
     def publications(self) -> list[list[str]]:
-        """Return the name and type of each topic, for `getPublications`."""
+        """Return the name and type of each published topic, for `getPublications`."""
         return [[topic.name, topic.type.name] for topic in tuple(self._topics.values())]
 
+    def subscriptions(self) -> list[list[str]]:
+        """Return the name and type of each topic to which this node subscribes, for `getSubscriptions`."""
+        return [[one.topic, one.type.name] for one in tuple(self._subscriptions.values())]
+
     def connections(self) -> list[list[Any]]:
-        """Return number, subscriber, direction, transport and topic of each connection, for `getBusInfo`."""
-        return list(self._subscribers.values())
+        """Return number, peer, direction, transport and topic of each connection, for `getBusInfo`."""
+        subscriptions = tuple(self._subscriptions.values())
+        publishers = [(uri, one.topic) for one in subscriptions for uri in one.connected]
+        incoming = [
+            [number, uri, "i", "TCPROS", topic, True]
+            for number, (uri, topic) in enumerate(publishers, self._connected + 1)
+        ]
+        return [*self._subscribers.values(), *incoming]
+
+    def publishers_changed(self, topic: str, uris: list[str]) -> None:
+        """Connect to the publishers of a topic, which have these URIs now."""
+        subscription = self._subscriptions.get(topic)
+        if subscription is not None:
+            self._loop.post(lambda: subscription.set_publishers(uris))
 
     def on_end(self, callback: Callable[[str], None]) -> None:
         """Set the function to call when another program requests the end of this node.
@@ -214,7 +258,7 @@ class RosNode:
         if known is None:
             raise HeaderRefused(f"this node has no service {header['service']}")
         service, handler = known
-        md5 = _agreed_md5(header, service.name, service.md5, service.later_md5)
+        md5 = agreed_md5(header, service.name, service.md5, service.later_md5)
         link.send(
             encode_header(
                 {
@@ -232,35 +276,12 @@ class RosNode:
         topic = self._topics.get(header.get("topic", ""))
         if topic is None:
             raise HeaderRefused(f"this node has no topic {header.get('topic')}")
-        _agreed_md5(header, topic.type.name, topic.type.md5)
-        link.send(
-            encode_header(
-                {
-                    "callerid": f"/{self.name}",
-                    "latching": str(int(topic.latched)),
-                    "md5sum": topic.type.md5,
-                    "message_definition": topic.type.definition,
-                    "topic": topic.name,
-                    "type": topic.type.name,
-                }
-            )
-        )
+        ours = publisher_header(f"/{self.name}", topic.name, topic.type, header, latched=topic.latched)
+        link.send(encode_header(ours))
         self._connected += 1
         caller = header.get("callerid", "")
         self._subscribers[link] = [self._connected, caller, "o", "TCPROS", topic.name, True]
         return topic.connect(link, self._subscribers.pop)
-
-
-def _agreed_md5(header: Mapping[str, str], type_name: str, *known: str) -> str:
-    """Return the md5 sum that the header of a client names, or the first known sum if it accepts any sum.
-
-    Raises:
-        HeaderRefused: the client's md5 sum is not one of `known`.
-    """
-    theirs = header.get("md5sum", "*")
-    if theirs not in {"*", *known}:
-        raise HeaderRefused(f"the client wants md5sum {theirs}, but {type_name} has {known[0]}")
-    return known[0] if theirs == "*" else theirs
 
 
 class ServiceEnd:

@@ -65,7 +65,7 @@ def compare(arguments: Sequence[str] | None = None) -> int:
 
 def compare_and_leave() -> int:
     """Run `palaestra-compare`, and end the process soon even if a thread of a job's code still runs."""
-    return leaving(compare())
+    return leaving(compare)
 
 
 def _options() -> argparse.ArgumentParser:

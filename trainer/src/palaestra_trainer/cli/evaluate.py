@@ -81,7 +81,7 @@ def evaluate(arguments: Sequence[str] | None = None) -> int:
 
 def evaluate_and_leave() -> int:
     """Run `palaestra-eval`, and end the process soon even if a thread of the job's code still runs."""
-    return leaving(evaluate())
+    return leaving(evaluate)
 
 
 def _evaluate(chosen: argparse.Namespace) -> None:

@@ -1,4 +1,4 @@
-"""`palaestra-export` writes the best policy of a run as one file for other programs."""
+"""`palaestra-export` writes the best policy of a run, or its recorded episodes, for other programs."""
 
 from __future__ import annotations
 
@@ -19,17 +19,18 @@ from palaestra_trainer.errors import TrainerError
 from palaestra_trainer.run.telemetry.logs import configure_logs
 
 EXPORT = """\
-Write the best policy of a run as one file for other programs.
+Write the best policy of a run, or its recorded episodes, as one file for other programs.
 
 reads:
-  RUN_DIR/model.zip, RUN_DIR/training.yaml
+  RUN_DIR/model.zip, RUN_DIR/training.yaml; for mcap only RUN_DIR/replays.json
 writes:
   the file, or the folder of a package, once it has acted as the policy on 1,000 observations: discrete
   actions are equal, continuous ones within 1e-5; its path and its largest difference as one JSON object to
   standard output
+  mcap is a ROS 2 bag of the recorded episodes; the object has the number of episodes and messages
 
-The extra `export` of palaestra-trainer has the libraries. Stable-Baselines3 unpickles model.zip, so export
-only runs that you trust.
+The extra `export` of palaestra-trainer has the libraries, and the extra `deploy` has those for mcap.
+Stable-Baselines3 unpickles model.zip, so export only runs that you trust.
 """
 EXIT_CODES = """\
 exit codes:
@@ -43,9 +44,14 @@ def export(arguments: Sequence[str] | None = None) -> int:
     """Run `palaestra-export`; return its exit code."""
     options = parser("palaestra-export", EXPORT, EXIT_CODES)
     options.add_argument("run", type=Path, metavar="RUN_DIR", help="run directory with a model.zip")
-    options.add_argument("--to", choices=("onnx", "safetensors", "package"), required=True, help="format")
     options.add_argument(
-        "--output", type=Path, metavar="FILE", help="default: RUN_DIR/policy.FORMAT, or RUN_DIR/package"
+        "--to", choices=("onnx", "safetensors", "package", "mcap"), required=True, help="format"
+    )
+    options.add_argument(
+        "--output",
+        type=Path,
+        metavar="FILE",
+        help="default: RUN_DIR/policy.FORMAT, RUN_DIR/package or RUN_DIR/episodes.mcap",
     )
     chosen = options.parse_args(arguments)
     configure_logs()
@@ -53,7 +59,11 @@ def export(arguments: Sequence[str] | None = None) -> int:
         from palaestra_trainer import exporting
 
     try:
-        written = exporting.export(chosen.run, chosen.to, chosen.output)
+        written = (
+            exporting.export_episodes(chosen.run, chosen.output)
+            if chosen.to == exporting.BAG
+            else exporting.export(chosen.run, chosen.to, chosen.output)
+        )
     except (TrainerError, OSError) as error:
         return refuse_without_run(error)
     sys.stdout.write(json.dumps(asdict(written), default=str) + "\n")
@@ -62,4 +72,4 @@ def export(arguments: Sequence[str] | None = None) -> int:
 
 def export_and_leave() -> int:
     """Run `palaestra-export`, and end the process soon even if a thread of the job's code still runs."""
-    return leaving(export())
+    return leaving(export)

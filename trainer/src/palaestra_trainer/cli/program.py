@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Callable
 
 import structlog
 
 from palaestra_protocol.pod.status import ExitCode, Termination
+from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.run.signals import Interrupted
 from palaestra_trainer.run.telemetry.logs import last_lines
 from palaestra_trainer.run.termination import UNEXPECTED, end_of, write_last_word
@@ -17,6 +19,10 @@ log = structlog.get_logger(__name__)
 
 LEFT_S = 10.0  # time for the work of libraries at the exit of Python, such as an upload
 KEYBOARD_INTERRUPT = 130  # the exit status that shells report for a process that SIGINT ended
+_EXTRAS = {
+    **dict.fromkeys(("PIL", "sb3_contrib", "stable_baselines3", "tensorboard", "torch"), "train"),
+    **dict.fromkeys(("httpx", "mcap", "mcap_ros2", "onnxruntime"), "deploy"),
+}
 _KEPT = (ExitCode.CONFIGURATION, ExitCode.FAULT_BUDGET)
 
 
@@ -54,8 +60,18 @@ def write_line(line: str) -> None:
     sys.stdout.flush()
 
 
-def leaving(code: int) -> int:
-    """Return the exit code, and let the process end soon even if a thread of the job's code still runs."""
+def leaving(program: Callable[[], int]) -> int:
+    """Run a program and return its exit code; the process ends soon even if a thread of the job still runs.
+
+    The libraries of an extra may be missing: a robot's computer needs no PyTorch, and a trainer no robot.
+    """
+    try:
+        code = program()
+    except ModuleNotFoundError as error:
+        if (extra := _EXTRAS.get(error.name or "")) is None:
+            raise
+        fact = f"{error.name} is not installed; install palaestra-trainer[{extra}]"
+        code = refuse_without_run(ConfigurationError(fact))
     sys.stdout.flush()
     leave_after(LEFT_S, code)
     return code

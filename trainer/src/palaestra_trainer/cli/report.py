@@ -8,17 +8,18 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from palaestra_protocol.pod.enums import ExitCode
+from palaestra_trainer.cli.program import leaving
+from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.job.run_directory import RunDirectory
-from palaestra_trainer.reporting.write_film import write_film
-from palaestra_trainer.reporting.write_report import write_report
 
 REPORT = """\
 Write the report of a run, or of several runs side by side, as one HTML file of at most 2.5 MB. It refers to
 no address, so it can be mailed. A running or damaged run is reported as far as its files can be read.
+A file .mcap is the record of a deployment on a real robot, whose episodes the report replays.
 With --film, write instead the best recorded episode of one run from above.
 
 reads:
-  RUN_DIR/*.json, *.jsonl, *.yaml, tensorboard/
+  RUN_DIR/*.json, *.jsonl, *.yaml, tensorboard/; or FILE.mcap
 writes:
   the file; its path to standard output
 """
@@ -29,6 +30,7 @@ exit codes:
   1   the file cannot be written
 """
 FAILED = 1
+BAG = ".mcap"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -39,34 +41,59 @@ def main(arguments: Sequence[str] | None = None) -> int:
         epilog=EXIT_CODES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("runs", type=Path, nargs="+", metavar="RUN_DIR", help="run directory")
+    parser.add_argument(
+        "runs", type=Path, nargs="+", metavar="RUN_DIR", help="run directory, or record of a deployment"
+    )
     to = parser.add_mutually_exclusive_group()
     to.add_argument(
         "--out",
         type=Path,
         metavar="FILE",
-        help="default: report.html in RUN_DIR, or in the current folder for several runs",
+        help="default: report.html in RUN_DIR, FILE.html of FILE.mcap, report.html here for several",
     )
     to.add_argument(
         "--film", type=Path, metavar="FILE", help="animated GIF of at most 200 kB (.gif), or video (.mp4)"
     )
     chosen = parser.parse_args(arguments)
-    runs = [RunDirectory(folder.absolute()) for folder in chosen.runs]
-    wrong = [given for given, run in zip(chosen.runs, runs, strict=True) if not run.configuration.exists()]
+    records = [given for given in chosen.runs if BAG in given.suffixes]
+    folders = [given for given in chosen.runs if given not in records]
+    runs = [RunDirectory(folder.absolute()) for folder in folders]
+    wrong = [given for given, run in zip(folders, runs, strict=True) if not run.configuration.exists()]
     if wrong:
         sys.stderr.writelines(f"{one}: has no training.yaml; give a run directory\n" for one in wrong)
         return ExitCode.CONFIGURATION
     if chosen.film is not None:
-        return _film(runs, chosen.film)
-    out = chosen.out or (runs[0] if len(runs) == 1 else RunDirectory(Path())).report
-    return _written(out, "--out", lambda: write_report(runs, out))
+        return _film(chosen.runs, runs, chosen.film)
+    return _report(runs, records, chosen.out)
 
 
-def _film(runs: Sequence[RunDirectory], film: Path) -> int:
-    """Write a film of a run; refuse several runs."""
-    if len(runs) > 1:
+def _report(runs: Sequence[RunDirectory], records: Sequence[Path], out: Path | None) -> int:
+    """Write the report of runs and of the records of deployments."""
+    from palaestra_trainer.reporting.write_report import write_report
+
+    deployments = []
+    for file in records:
+        from palaestra_trainer.reporting.read_deployment import read_deployment
+
+        try:
+            deployments.append(read_deployment(file))
+        except (ConfigurationError, OSError) as error:
+            sys.stderr.write(f"{error}\n")
+            return ExitCode.CONFIGURATION
+    if out is None:
+        one = runs[0].report if len(runs) == 1 else RunDirectory(Path()).report
+        out = records[0].with_suffix(".html") if len(records) == 1 and not runs else one
+    to = out
+    return _written(to, "--out", lambda: write_report(runs, to, deployments))
+
+
+def _film(given: Sequence[Path], runs: Sequence[RunDirectory], film: Path) -> int:
+    """Write a film of a run; refuse several runs, and records of deployments."""
+    if len(given) > 1 or not runs:
         sys.stderr.write(f"{film}: a film shows one run; give one run directory\n")
         return ExitCode.CONFIGURATION
+    from palaestra_trainer.reporting.write_film import write_film
+
     try:
         return _written(film, "--film", lambda: write_film(runs[0], film))
     except ValueError as error:
@@ -83,3 +110,8 @@ def _written(to: Path, option: str, write: Callable[[], None]) -> int:
         return FAILED
     sys.stdout.write(f"{to}\n")
     return ExitCode.DONE
+
+
+def report_and_leave() -> int:
+    """Run `palaestra-report`."""
+    return leaving(main)

@@ -73,9 +73,13 @@ def train(arguments: Sequence[str] | None = None) -> int:
 
 def train_and_leave() -> int:
     """Run `palaestra-train`, and end the process soon even if a thread of the job's code still runs."""
+    return leaving(_undisturbed_at_the_end)
+
+
+def _undisturbed_at_the_end() -> int:
     code = train()
     end_undisturbed()
-    return leaving(code)
+    return code
 
 
 def _run_directory(chosen: Path | None) -> Path:

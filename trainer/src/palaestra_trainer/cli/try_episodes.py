@@ -76,7 +76,7 @@ def attempt(arguments: Sequence[str] | None = None) -> int:
 
 def try_and_leave() -> int:
     """Run `palaestra-try`, and end the process soon even if a thread of the job's code still runs."""
-    return leaving(attempt())
+    return leaving(attempt)
 
 
 def _attempt(chosen: argparse.Namespace, interruption: Interruption) -> int:

@@ -134,6 +134,7 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
     """
 
     needs: ClassVar[tuple[type, ...]] = (RobotinoAbc,)
+    reached_m: ClassVar[float] = REACHED_M  # a subclass may ask for a smaller distance to the target
 
     def __init__(
         self,
@@ -228,7 +229,7 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
     def _outcome(self, seen: StepState) -> EpisodeOutcome:
         if seen.bumped:
             return EpisodeOutcome.COLLIDED
-        if seen.target_distance_m < REACHED_M and seen.speed_m_s < STANDING_M_S:
+        if seen.target_distance_m < self.reached_m and seen.speed_m_s < STANDING_M_S:
             return EpisodeOutcome.REACHED if self._at == len(self._targets) - 1 else EpisodeOutcome.DELIVERED
         return EpisodeOutcome.TIME_UP if self._steps >= self.options.max_steps else EpisodeOutcome.RUNNING
 

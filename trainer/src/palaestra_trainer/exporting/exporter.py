@@ -1,4 +1,7 @@
-"""Export the best policy of a run: convert it, compare the result with the policy, and write the file."""
+"""Export the best policy of a run: convert it, compare the result with the policy, and write the file.
+
+The recorded episodes of a run are exported without its policy.
+"""
 
 from __future__ import annotations
 
@@ -17,6 +20,7 @@ from palaestra_trainer.job.run_directory import RunDirectory, replace_file
 from palaestra_trainer.run.policies import load_policy
 
 PACKAGE = "package"  # a folder, in which the policy is an ONNX file
+BAG = "mcap"  # the recorded episodes, without the policy
 FORMATS: Mapping[str, str] = {"onnx": "onnx_file", "safetensors": "safetensors_file"}
 
 
@@ -46,6 +50,21 @@ class Exported:
     path: Path
     observations: int
     largest_difference: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ExportedEpisodes:
+    """The result of an export of recorded episodes.
+
+    Attributes:
+        path: the file that was written.
+        episodes: number of episodes in the file.
+        messages: number of messages in the file.
+    """
+
+    path: Path
+    episodes: int
+    messages: int
 
 
 def export(run: Path, to: str, file: Path | None = None) -> Exported:
@@ -82,12 +101,29 @@ def export(run: Path, to: str, file: Path | None = None) -> Exported:
     return Exported(path=path, observations=OBSERVATIONS, largest_difference=difference)
 
 
+def export_episodes(run: Path, file: Path | None = None) -> ExportedEpisodes:
+    """Write the recorded episodes of a run as an MCAP file; by default to `episodes.mcap` in its directory.
+
+    Raises:
+        ConfigurationError: the run has no recorded episode, or a library of the extra `deploy` is missing.
+        OSError: the file could not be written.
+    """
+    bag_file = _module("bag_file", BAG, "deploy")
+    path = file or run / f"episodes.{BAG}"
+    episodes, messages = bag_file.write_bag(RunDirectory(run), path)
+    return ExportedEpisodes(path=path, episodes=episodes, messages=messages)
+
+
 def _format(name: str) -> Format:
+    module: Format = _module(FORMATS["onnx" if name == PACKAGE else name], name, "export")
+    return module
+
+
+def _module(module: str, to: str, extra: str) -> Any:
+    """Return a module of this package, which imports libraries of an extra."""
     try:
-        known: Any = import_module(f"{__package__}.{FORMATS['onnx' if name == PACKAGE else name]}")
+        return import_module(f"{__package__}.{module}")
     except ImportError as error:
         raise ConfigurationError(
-            f"--to {name}: cannot be written ({error}); install palaestra-trainer[export]"
+            f"--to {to}: cannot be written ({error}); install palaestra-trainer[{extra}]"
         ) from error
-    module: Format = known
-    return module

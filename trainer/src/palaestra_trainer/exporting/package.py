@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from palaestra_protocol.pod.enums import Role
-from palaestra_protocol.policy_package import MANIFEST, MODEL, NETWORK, manifest_text
+from palaestra_protocol.policy_package import MANIFEST, MODEL, NETWORK, TRAINING, manifest_text
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.exporting.onnx_file import sheet_of
 from palaestra_trainer.job.configuration import DEFAULT_ROBOT, Configuration
@@ -18,7 +18,6 @@ from palaestra_trainer.robots.registry import robot_class
 from palaestra_trainer.run.summary import measured
 
 JOB = "job.yaml"  # the TrainingJob; only a run of `palaestra run` has this file
-TRAINING = "training.yaml"
 _OURS = frozenset({NETWORK, MODEL, JOB, TRAINING, MANIFEST})
 _MS = 1000.0
 

@@ -85,7 +85,7 @@ class Replay:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunData:
-    """The data of one run.
+    """The data of one run, or of one deployment on a real robot.
 
     Attributes:
         name: name of the job and number of the replica.
@@ -100,6 +100,7 @@ class RunData:
         curves: step and value of each point of each curve, by the name of the curve.
         faults: faults of simulators, in the order of time.
         fault_count: number of all faults of the run; `faults` may have fewer.
+        decisions: time and text of each decision of a deployment, which has no simulators and so no faults.
         goodput: seconds of the run under each cause of `GoodputLedger`.
         checkpoints: step, size and time of each checkpoint, as texts.
         attempts: start and reason of each attempt, as texts.
@@ -120,6 +121,7 @@ class RunData:
     curves: Mapping[str, Points] = field(default_factory=dict)
     faults: tuple[ReportedFault, ...] = ()
     fault_count: int = 0
+    decisions: tuple[tuple[str, str], ...] = ()
     goodput: Mapping[str, float] = field(default_factory=dict)
     checkpoints: tuple[tuple[str, str, str], ...] = ()
     attempts: tuple[tuple[str, str], ...] = ()

@@ -16,6 +16,9 @@ from palaestra_trainer.reporting.run_data import Replay
 from palaestra_trainer.reporting.tolerant_files import json_file
 
 VIDEO_PX: Final = 720
+NO_EPISODE: Final = (
+    "has no recorded episode; set evaluation.everySteps in the job, and use a robot that drives on a floor"
+)
 _LEAST_HZ, _MOST_HZ = 1, 60
 
 
@@ -35,10 +38,7 @@ def write_film(run: RunDirectory, to: Path) -> None:
         raise ValueError(f"{to}: a film is a GIF or an MP4; give a name that ends in .gif or .mp4")
     replays = list(replays_of(json_file(run.replays)))
     if not replays:
-        raise ValueError(
-            f"{run.path}: has no recorded episode; set evaluation.everySteps in the job, and use a robot "
-            "that drives on a floor"
-        )
+        raise ValueError(f"{run.path}: {NO_EPISODE}")
     best = next((replay for replay in replays if replay.title == "best"), replays[0])
     replace_file(to, lambda name: write(best, name))
 

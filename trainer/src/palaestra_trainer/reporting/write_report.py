@@ -13,20 +13,26 @@ import structlog
 from palaestra_trainer.job.run_directory import RunDirectory, replace_file
 from palaestra_trainer.reporting.page import page
 from palaestra_trainer.reporting.read_run import read_run
+from palaestra_trainer.reporting.run_data import RunData
 
 log = structlog.get_logger(__name__)
 
 END_S = 20.0  # longest time for the report at the end of a run
 
 
-def write_report(runs: Sequence[RunDirectory], to: Path) -> None:
+def write_report(runs: Sequence[RunDirectory], to: Path, others: Sequence[RunData] = ()) -> None:
     """Write the report of one run, or of several runs side by side.
+
+    Args:
+        runs: the run directories.
+        to: the file to write.
+        others: further data to report, such as those of deployments.
 
     Raises:
         OSError: the file could not be written; an old file is unchanged.
         ValueError: there are too many runs for one file.
     """
-    text = page([read_run(run) for run in runs])
+    text = page([*map(read_run, runs), *others])
     replace_file(to, lambda name: name.write_text(text, encoding="utf-8"))
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 from palaestra_trainer.robots.capabilities import Bumper, Distances, Localization, Omnidrive
 from palaestra_trainer.robots.geometry import SPEED_M_S, TURN_RAD_S, Point, Pose
@@ -29,7 +29,12 @@ class RobotAbc(ABC):
     If the robot is simulated, any call may raise `SimulatorFault`. Readings change only in `advance`, so
     between two calls of `advance` all readings describe the same moment. Before the first call of `advance`,
     a reading raises `NoReading`.
+
+    Attributes:
+        real: whether the robot is a real one, which a task must not disturb to make a policy robust.
     """
+
+    real: ClassVar[bool] = False
 
     @property
     @abstractmethod

@@ -9,8 +9,9 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from palaestra_trainer.robots.base import SENSOR_RANGE_M, RobotinoAbc
+from palaestra_trainer.robots.base import RobotinoAbc
 from palaestra_trainer.robots.capabilities import Cameras, Forklift, Gripper, Scanner
+from palaestra_trainer.robots.infrared import meters
 from palaestra_trainer.robots.lidar_scan import scan_of
 from palaestra_trainer.robots.simulated import MobileRobot
 from palaestra_trainer.webots import (
@@ -28,11 +29,6 @@ from palaestra_trainer.webots import (
 _WHEEL_RADIUS_M = 0.063
 _WHEEL_DISTANCE_M = 0.1826
 _SIN_60 = math.sqrt(0.75)
-
-# The distance in meters is a * V**b + c for V volts of the GP2Y0A41, the default sensor of the model. Source:
-# the sample controller of that model, R2023b.
-_RANGE_SCALE, _RANGE_EXPONENT, _RANGE_OFFSET_M = 0.1594, -0.8533, -0.02916
-_LEAST_VOLTS = 0.05  # below the sensor's range; avoids an infinite result
 
 
 class Robotino(MobileRobot, RobotinoAbc, Cameras, Scanner, Gripper, Forklift):
@@ -160,9 +156,3 @@ def wheel_speeds(vx: float, vy: float, omega: float) -> Sequence[float]:
         (-_SIN_60 * vx - 0.5 * vy - turn) / _WHEEL_RADIUS_M,
         (_SIN_60 * vx - 0.5 * vy - turn) / _WHEEL_RADIUS_M,
     )
-
-
-def meters(volts: float) -> float:
-    """Return the distance in meters, within the sensor's range, for a reading in volts."""
-    distance: float = _RANGE_SCALE * max(volts, _LEAST_VOLTS) ** _RANGE_EXPONENT + _RANGE_OFFSET_M
-    return min(max(distance, SENSOR_RANGE_M[0]), SENSOR_RANGE_M[1])

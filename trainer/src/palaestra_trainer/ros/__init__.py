@@ -5,6 +5,9 @@ it is our own (`node`). The calls of each step never use rospy. A thread of rosp
 than the simulation, and its service proxies have no deadline. Instead, `RosService` and `RosSubscriber` hold
 one persistent connection each. They wait with a deadline, reconnect after a failure, and distinguish dead,
 hung and wrong data. One thread uses the services and subscribers of one simulator.
+
+A program for a real robot names its master itself, and publishes too. So it has a node of its own kind
+(`topic_node`), with publishers (`publisher`). All nodes of ours serve the methods of `slave_api`.
 """
 
 from palaestra_trainer.ros.master import Master

@@ -19,14 +19,19 @@ _NODE_TIMEOUT_S = 1.0
 
 
 class Master:
-    """A client of the master at ROS_MASTER_URI; its calls come from the node `caller`.
+    """A client of a master; its calls come from the node `caller`.
 
     Every method except `ping` raises MasterLost if no master responds or the master refuses the request.
     These methods raise UnreadableAnswer if the response of the master is invalid.
+
+    Args:
+        caller: the full name of the calling node.
+        timeout_s: time limit of each call.
+        uri: the URI of the master; None means ROS_MASTER_URI.
     """
 
-    def __init__(self, caller: str, timeout_s: float = _TIMEOUT_S) -> None:
-        self.uri = os.environ.get("ROS_MASTER_URI", DEFAULT_URI)
+    def __init__(self, caller: str, timeout_s: float = _TIMEOUT_S, uri: str | None = None) -> None:
+        self.uri = uri or os.environ.get("ROS_MASTER_URI", DEFAULT_URI)
         self._caller = caller
         self._timeout_s = timeout_s
 
@@ -64,6 +69,27 @@ class Master:
     def unregister_subscriber(self, topic: str, node_uri: str) -> None:
         """Unregister this node as a subscriber."""
         self._call("unregisterSubscriber", topic, node_uri)
+
+    def register_publisher(self, topic: str, type_name: str, node_uri: str) -> None:
+        """Register this node as a publisher."""
+        self._call("registerPublisher", topic, type_name, node_uri)
+
+    def unregister_publisher(self, topic: str, node_uri: str) -> None:
+        """Unregister this node as a publisher."""
+        self._call("unregisterPublisher", topic, node_uri)
+
+    def publishers(self, topic: str) -> set[str]:
+        """Return the full names of the nodes that publish a topic."""
+        answer = self._call("getSystemState")
+        try:
+            return {str(node) for name, nodes in answer.value[0] if name == topic for node in nodes}
+        except (ValueError, TypeError, LookupError) as error:
+            raise self._unreadable(f"the publishers of {topic}", answer) from error
+
+    def parameter(self, name: str) -> Any:
+        """Return the value of a parameter with a full name; None if it is not set."""
+        answer = self._answer("getParam", name)
+        return answer.value if answer.code == OK else None
 
     def node_names(self) -> set[str]:
         """Return the full names of all nodes that publish, subscribe or offer services."""

@@ -8,7 +8,8 @@ from collections.abc import Callable
 from typing import Any
 
 from palaestra_protocol.ros.rostypes import message_type
-from palaestra_protocol.xmlrpc.responses import OK
+from palaestra_protocol.ros.topic_headers import subscriber_header
+from palaestra_protocol.xmlrpc.responses import OK, address_of
 from palaestra_trainer.errors import (
     MasterLost,
     SimulatorDead,
@@ -21,6 +22,7 @@ from palaestra_trainer.ros.known_types import known_type, node_of
 from palaestra_trainer.ros.master import Master
 from palaestra_trainer.ros.node import ensure_node, node_uri
 from palaestra_trainer.ros.tcpros_client import TcprosClient
+from palaestra_trainer.ros.topic_node import TopicNode
 from palaestra_trainer.ros.xmlrpc import call
 
 DEADLINE_S = 0.5
@@ -35,12 +37,13 @@ class RosSubscriber:
         type_name: e.g. sensor_msgs/Range
         decode: returns the value in the bytes of a message; None: the whole message is decoded.
         deadline_s: the longest time to wait for a message.
+        node: the subscribing node; None: the node of this process.
 
     Raises:
         ConfigurationError: the name is not a full name, or the type is not known.
     """
 
-    __slots__ = ("_deadline_s", "_decode", "_registered", "_type", "_wire", "name", "simulator")
+    __slots__ = ("_deadline_s", "_decode", "_node", "_registered", "_type", "_wire", "name", "simulator")
 
     def __init__(
         self,
@@ -48,12 +51,14 @@ class RosSubscriber:
         type_name: str,
         decode: Callable[[bytes | memoryview], Any] | None = None,
         deadline_s: float = DEADLINE_S,
+        node: TopicNode | None = None,
     ) -> None:
         self.name = name
         self.simulator = node_of(name)
         self._type = known_type(message_type, type_name)
         self._decode = decode or self._type.codec.decode
         self._deadline_s = deadline_s
+        self._node = node
         self._wire: TcprosClient | None = None
         self._registered = False
 
@@ -71,23 +76,16 @@ class RosSubscriber:
             WrongData: the master or the publisher sends an invalid response.
         """
         self._drop()
-        node = ensure_node()
+        node, uri, master = self._subscribing()
         try:
-            publishers = Master(node).register_subscriber(self.name, self._type.name, node_uri())
+            publishers = master.register_subscriber(self.name, self._type.name, uri)
         except UnreadableAnswer as error:
             raise WrongData(self.simulator, f"{self.name} cannot be subscribed to: {error}") from error
         self._registered = True
         if not publishers:
             raise SimulatorDead(self.simulator, f"no node publishes {self.name}")
         address = self._ask_for_address(publishers[-1], node)
-        header = {
-            "callerid": node,
-            "md5sum": self._type.md5,
-            "message_definition": self._type.definition,
-            "tcp_nodelay": "1",
-            "topic": self.name,
-            "type": self._type.name,
-        }
+        header = subscriber_header(node, self.name, self._type)
         self._wire = TcprosClient(address, header, self.simulator, self._deadline_s)
         self._wire.acknowledge_late()
 
@@ -99,10 +97,9 @@ class RosSubscriber:
             SimulatorDead: the connection was lost, or `connect` was never called.
             WrongData: the message cannot be read.
         """
-        if self._wire is None:
-            raise SimulatorDead(self.simulator, f"{self.name} is not connected")
+        wire = self._connection()
         try:
-            return self._decode(self._wire.receive())
+            return self._decode(wire.receive())
         except SimulatorHung:
             raise
         except SimulatorFault:
@@ -138,7 +135,28 @@ class RosSubscriber:
             # If the master does not run, the registration does not exist. A master that sends invalid
             # responses cannot unregister the subscriber.
             with contextlib.suppress(MasterLost, UnreadableAnswer):
-                Master(ensure_node()).unregister_subscriber(self.name, node_uri())
+                _, uri, master = self._subscribing()
+                master.unregister_subscriber(self.name, uri)
+
+    def fileno(self) -> int:
+        """Return the descriptor, which becomes readable when a message arrives or the connection is lost.
+
+        Raises:
+            SimulatorDead: the subscriber is not connected.
+        """
+        return self._connection().fileno()
+
+    def _subscribing(self) -> tuple[str, str, Master]:
+        """Return the name and the URI of the subscribing node, and its client of the master."""
+        if self._node is not None:
+            return self._node.name, self._node.uri, self._node.master
+        name = ensure_node()
+        return name, node_uri(), Master(name)
+
+    def _connection(self) -> TcprosClient:
+        if self._wire is None:
+            raise SimulatorDead(self.simulator, f"{self.name} is not connected")
+        return self._wire
 
     def _drop(self) -> None:
         if self._wire is not None:
@@ -161,9 +179,8 @@ class RosSubscriber:
             ) from error
         if answer.code != OK:
             raise SimulatorDead(self.simulator, f"{self.name} is not published: {answer.text}")
-        match answer.value:
-            case [str(), str(host), int(port)]:
-                return host, port
+        if (address := address_of(answer)) is not None:
+            return address
         raise WrongData(
             self.simulator, f"{self.name} is published at {answer.value!r}, which is not an address"
         )

@@ -11,7 +11,7 @@ from typing import Any
 
 from palaestra_protocol.xmlrpc import client
 from palaestra_protocol.xmlrpc.documents import UnreadableDocument
-from palaestra_protocol.xmlrpc.responses import RpcResponse
+from palaestra_protocol.xmlrpc.responses import RpcResponse, response_of
 from palaestra_trainer.errors import UnreadableAnswer
 
 
@@ -26,9 +26,8 @@ def call(uri: str, timeout_s: float, method: str, *arguments: Any) -> RpcRespons
         answer: Any = client.call(uri, timeout_s, method, *arguments)
     except (UnreadableDocument, xmlrpc.client.Fault) as error:
         raise UnreadableAnswer(f"{uri} responded to {method} with invalid XML-RPC: {error}") from error
-    match answer:
-        case [int(code), str(text), value]:
-            return RpcResponse(code, text, value)
+    if (response := response_of(answer)) is not None:
+        return response
     raise UnreadableAnswer(
         f"{uri} responded to {method} with {answer!r} instead of a code, a text and a value"
     )

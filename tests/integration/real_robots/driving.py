@@ -1,0 +1,41 @@
+"""A program that drives a robot forward until something happens to it."""
+
+import signal
+import sys
+import threading
+import time
+
+from palaestra_trainer.real_robots.command_loop import Hooks
+from palaestra_trainer.real_robots.rest import RestLink
+from palaestra_trainer.real_robots.robot_clock import RobotClock
+from palaestra_trainer.real_robots.robotino import RealRobotino
+from palaestra_trainer.real_robots.safety import SafetyRules
+from palaestra_trainer.run.signals import Interruption
+
+
+def main():
+    """Drive: `address`, `speed` of the robot's clock, and what the policy does after a second."""
+    address, speed, then = sys.argv[1], float(sys.argv[2]), sys.argv[3]
+    clock = RobotClock(speed)
+    with Interruption() as interruption:
+        hooks = Hooks(check=interruption.check)
+        link = RestLink(address, clock=clock)
+        with RealRobotino(link, SafetyRules(speed_m_s=0.5), clock=clock, hooks=hooks) as robot:
+            robot.connect()
+            for step in range(10_000):
+                robot.drive(0.5 if step % 12 < 6 else -0.5, 0.0, 0.0)
+                robot.advance()
+                if step == 3:
+                    print("driving", flush=True)  # noqa: T201
+                    if then == "hang":
+                        robot.drive(0.5, 0.0, 0.0)
+                        threading.Event().wait()
+                    if then == "raise":
+                        raise ZeroDivisionError
+
+
+if __name__ == "__main__":
+    signal.signal(signal.SIGALRM, signal.SIG_DFL)
+    signal.alarm(120)  # no child of a test outlives it for long
+    time.sleep(0)
+    main()

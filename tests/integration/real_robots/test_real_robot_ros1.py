@@ -1,0 +1,260 @@
+"""A Robotino over ROS 1: the driver of the mock robot, a ROS master of ours, and no installed ROS."""
+
+import contextlib
+import time
+import xmlrpc.client
+
+import pytest
+
+from palaestra_trainer.errors import LinkError, RobotUnfit
+from palaestra_trainer.real_robots.readings import ReadingStore
+from palaestra_trainer.real_robots.robot_clock import RobotClock
+from palaestra_trainer.real_robots.robotino import RealRobotino
+from palaestra_trainer.real_robots.ros1 import Ros1Link
+from palaestra_trainer.real_robots.safety import SafetyRules
+from palaestra_trainer.robots.geometry import Pose
+from palaestra_trainer.ros import Master
+from palaestra_trainer.testing.conformance import check_robot
+from tests.mock_robots import DEADLINE_S, ended, started
+from tests.waiting import eventually
+
+SPEED = 10.0
+OPTIONS = ("--ros1", "--drift=0", f"--speed={SPEED:g}")
+PACE_S = 0.005  # 1 ms is 10 ms of the robot
+
+
+@contextlib.contextmanager
+def mock_in(namespace, *options):
+    """Yield the client of a mock robot whose driver is in a namespace."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("ROS_NAMESPACE", namespace)
+        process, client = started(*OPTIONS, *options)
+    try:
+        yield client
+    finally:
+        process.terminate()
+        process.wait(DEADLINE_S)
+        ended(process, client)
+
+
+@pytest.fixture(scope="module")
+def running(master):
+    """Yield the client of a robot whose driver allows 0.5 m/s, as the usual launch file does."""
+    del master
+    with mock_in("", "--max-speed=0.5") as client:
+        yield client
+
+
+@pytest.fixture
+def mock(running):
+    """Return the client of a robot that stands in the middle of the arena."""
+    running.send("/data/omnidrive", [0, 0, 0])
+    running.send("/mock/place", [0, 0, 0])
+    eventually(lambda: stands(running), pace_s=PACE_S)
+    return running
+
+
+@pytest.fixture(scope="module")
+def slow(master):
+    """Yield the client of a robot whose driver has the default limits, in the namespace /lab/slow."""
+    del master
+    with mock_in("lab/slow") as client:
+        yield client
+
+
+@pytest.fixture
+def robot(master):
+    """Yield a function that returns a connected robot; its keywords are safety rules."""
+    made = []
+
+    def make(namespace="", **rules):
+        robot = real(address(master, namespace), **rules)
+        made.append(robot)
+        robot.connect()
+        return robot
+
+    yield make
+    for each in made:
+        each.close()
+
+
+@pytest.fixture
+def link(master):
+    """Yield a function that returns a link and the store of its readings."""
+    made = []
+
+    def make(namespace=""):
+        link, store = Ros1Link(address(master, namespace), clock=RobotClock(SPEED)), ReadingStore()
+        made.append(link)
+        link.start(store)
+        return link, store
+
+    yield make
+    for each in made:
+        each.close()
+
+
+def address(master, namespace=""):
+    """Return the address of a robot at the master of this process."""
+    return master.replace("http:", "ros1:").rstrip("/") + namespace
+
+
+def real(where, **rules):
+    """Return a robot that is not connected."""
+    clock = RobotClock(SPEED)
+    return RealRobotino(Ros1Link(where, clock=clock), SafetyRules(**{"speed_m_s": 0.5} | rules), clock=clock)
+
+
+def stands(client):
+    """Return whether the robot stands."""
+    truth = client.get("/mock/truth")
+    return truth["vx"] == truth["vy"] == truth["omega"] == 0.0
+
+
+def drive(robot, twist, periods):
+    """Drive at a velocity for some periods."""
+    for _ in range(periods):
+        robot.drive(*twist)
+        robot.advance()
+
+
+def keep(link, twist, until):
+    """Send a velocity again and again until a condition is true; return the condition's value."""
+
+    def sent():
+        link.send(twist)
+        return until()
+
+    return eventually(sent, pace_s=PACE_S)
+
+
+def test_the_robot_keeps_the_rules_of_every_robot_over_ros(robot, mock):
+    """An environment uses a robot over REST and over ROS in the same way."""
+    del mock
+    check_robot(robot())
+
+
+def test_the_robot_drives_forward_and_stands_after_the_end(robot, mock):
+    """The end of the context commands zero, and the topic of commands is unregistered."""
+    with robot() as real_robot:
+        real_robot.stand_at(Pose(1.0, 2.0, 0.0), placed=True)
+        drive(real_robot, (0.5, 0.0, 0.0), 5)
+        real_robot.stand()
+        real_robot.advance()
+        pose = real_robot.pose()
+        drive(real_robot, (-0.5, 0.0, 0.0), 1)
+        before = mock.get("/mock/truth")
+    after = mock.get("/mock/truth")
+
+    assert pose.x_m - 1.0 > 0.3
+    assert pose.x_m - 1.0 > before["x"]  # it drives back when the context ends
+    assert (after["vx"], after["vy"], after["omega"]) == (0.0, 0.0, 0.0)
+    assert Master("/test").publishers("/cmd_vel") == set()
+
+
+def test_a_wall_presses_the_bumper_over_ros(link, mock):
+    """The driver publishes the bumper only when it changes, so the state is kept with each other message."""
+    mock.send("/mock/place", [1.6, 0, 0])
+    connected, store = link()
+    assert eventually(lambda: store.newest.oldest_s > 0.0, pace_s=PACE_S)
+    before = store.newest.bumped
+    keep(connected, (0.5, 0.0, 0.0), lambda: store.newest.bumped)
+    hit_s = store.newest.odometry_s
+    eventually(lambda: store.newest.bumped_s > hit_s + 0.5, pace_s=PACE_S)
+
+    assert before is False
+    assert store.newest.bumped is True
+    _, late = link()
+    assert eventually(lambda: late.newest.bumped, pace_s=PACE_S) is True  # from the latched message
+
+
+def test_the_driver_clips_what_is_faster_than_its_limit(link, slow):
+    """The policy's program learns nothing of it, so it must ask for the limit before it drives."""
+    connected, _ = link("/lab/slow")
+    speeds = []
+
+    def settled():
+        speeds.append(slow.get("/mock/truth")["vx"])
+        return len(speeds) > 20 and max(speeds) > 0.19
+
+    keep(connected, (0.5, 0.0, 0.0), settled)
+
+    assert max(speeds) == pytest.approx(0.2)
+
+
+def test_a_driver_with_a_lower_limit_is_refused(master, slow):
+    """The robot would be slower than in the simulation, and the policy would fail without an error."""
+    del slow
+    where = address(master, "/lab/slow")
+    message = r"/lab/slow/robotino_node/max_linear_vel is 0\.2 m/s, below 0\.5 m/s; set the parameter and"
+    with pytest.raises(RobotUnfit, match=message), real(where) as refused:
+        refused.connect()
+
+
+def test_a_driver_with_its_limit_at_the_speed_of_the_rules_is_used(robot, slow):
+    """The default of the rules is the driver's default."""
+    real_robot = robot("/lab/slow", speed_m_s=0.2)
+
+    def speed():
+        drive(real_robot, (0.5, 0.0, 0.0), 1)
+        return slow.get("/mock/truth")["vx"]
+
+    eventually(lambda: speed() == pytest.approx(0.2), pace_s=0.0)
+
+
+def test_a_limit_that_nobody_has_set_is_the_drivers_default(master, slow):
+    """The driver reads its parameter, but does not write it."""
+    del slow
+    with xmlrpc.client.ServerProxy(master) as server:
+        server.deleteParam("/test", "/lab/slow/robotino_node/max_linear_vel")
+    link = Ros1Link(address(master, "/lab/slow"))
+    link.refuse_unfit(0.2)
+
+    with pytest.raises(RobotUnfit, match=r"max_linear_vel is 0\.2 m/s by default, below 0\.3 m/s"):
+        link.refuse_unfit(0.3)
+
+
+def test_without_a_master_the_robot_is_refused():
+    """The usual mistake is the address of another computer."""
+    message = r"ros1://127\.0\.0\.1:9: no ROS master responds at .* check the address, and that the robot is"
+    with pytest.raises(RobotUnfit, match=message):
+        real("ros1://127.0.0.1:9").connect()
+
+
+def test_without_a_driver_the_robot_is_refused(master):
+    """A master alone drives nothing, and a wrong namespace looks the same."""
+    message = r"/nowhere: no node that this computer reaches publishes /nowhere/odom; start robotino_node"
+    with pytest.raises(RobotUnfit, match=message):
+        real(address(master, "/nowhere")).connect()
+
+
+def test_a_command_that_nobody_receives_is_an_error(master):
+    """The loop of commands then knows that zero was not confirmed."""
+    link = Ros1Link(address(master))
+
+    with pytest.raises(LinkError, match="/cmd_vel: no subscriber is connected"):
+        link.send((0.1, 0.0, 0.0))
+    link.close()
+
+
+def test_a_driver_that_starts_again_is_found(link):
+    """A driver may crash during a drive; the readings are old for some time, and the drive continues."""
+    with mock_in("lab/again"):
+        connected, store = link("/lab/again")
+        eventually(lambda: store.newest.oldest_s > 0.0, pace_s=PACE_S)
+    gone_s = time.monotonic() * SPEED
+    with pytest.raises(LinkError):
+        keep(connected, (0.1, 0.0, 0.0), lambda: False)
+
+    with mock_in("lab/again") as again:
+        eventually(lambda: store.newest.oldest_s > gone_s, pace_s=PACE_S)
+        eventually(lambda: subscribed(connected), pace_s=PACE_S)
+        assert keep(connected, (0.1, 0.0, 0.0), lambda: again.get("/mock/truth")["vx"] > 0.09)
+
+
+def subscribed(link):
+    """Return whether a driver receives commands."""
+    with contextlib.suppress(LinkError):
+        link.send((0.0, 0.0, 0.0))
+        return True
+    return False

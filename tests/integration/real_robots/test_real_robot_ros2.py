@@ -1,0 +1,233 @@
+"""A Robotino over ROS 2: a small driver of the mock robot, the connection, and the policy as a node."""
+
+import cmath
+import json
+import shlex
+import signal
+import subprocess
+import sys
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from tests import ros2
+from tests.mock_robots import DEADLINE_S, ended, started
+from tests.packages import write_package
+from tests.pages import blocks
+from tests.waiting import TooLate, eventually
+
+HERE = Path(__file__).parent
+PAGE = (HERE.parents[2] / "docs/howto/ros2.md").read_text()
+SPEED = 4.0
+RADIUS_M = 0.2286
+
+
+@contextmanager
+def driver(client, namespace, *options, speed=SPEED):
+    """Yield a driver of a mock robot that is ready; its standard input takes goals."""
+    words = [HERE / "ros2_driver.py", client.address, speed, *options]
+    words += ["--ros-args", "-r", f"__ns:={namespace}"]
+    program = ros2.start(*words, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    try:
+        assert program.stdout.readline() == "ready\n"
+        yield program
+    finally:
+        leave(program)
+
+
+@contextmanager
+def node(package, kind, *arguments):
+    """Yield a policy node, started as a block of the page does it, with its log."""
+    [command] = blocks(PAGE, f"sh {kind}")
+    program, shown, *words = shlex.split(command)
+    assert (program, shown) == ("palaestra-policy-node", "package")
+    log = package.parent / f"{kind}.log"
+    with log.open("w") as errors:
+        module = ("-m", "palaestra_trainer.cli.policy_node")
+        program = ros2.start(*module, package, *words, *arguments, stderr=errors)
+    try:
+        wait_for(log, "ready; waiting for a goal")
+        yield program, log
+    finally:
+        program.terminate()
+        leave(program)
+
+
+def leave(program):
+    """Wait for the end of a program; one that is killed would leave its shared memory."""
+    try:
+        program.communicate(timeout=DEADLINE_S)
+    finally:
+        program.kill()
+        program.wait()
+
+
+def wait_for(log, words):
+    """Wait until a log has these words."""
+    try:
+        eventually(lambda: words in log.read_text(), pace_s=0.01)
+    except TooLate as error:
+        raise AssertionError(log.read_text()) from error
+
+
+def send(program, frame, goal):
+    """Let the driver publish a goal."""
+    program.stdin.write(f"{frame} {goal[0]} {goal[1]}\n")
+    program.stdin.flush()
+
+
+def of_odometry(client, x_m, y_m):
+    """Return a point of the room in the frame of odometry, which begins anywhere."""
+    at_x, at_y, heading, *_ = client.get("/data/odometry")
+    truth = client.get("/mock/truth")
+    turned = cmath.rect(1.0, heading - truth["heading"])
+    point = complex(at_x, at_y) + turned * (complex(x_m, y_m) - complex(truth["x"], truth["y"]))
+    return point.real, point.imag
+
+
+def driving(address):
+    """Return a program that drives forward."""
+    return ros2.start(HERE / "ros2_driving.py", address, SPEED, 0.5, stdout=subprocess.PIPE)
+
+
+def found_by(program):
+    """Return what the program has found at its end."""
+    shown, _ = program.communicate(timeout=DEADLINE_S)
+    return json.loads(shown)
+
+
+@pytest.fixture(scope="module")
+def running():
+    """Yield a client of a fast mock robot with a perfect odometry, which all tests of this file share."""
+    process, client = started(f"--speed={SPEED:g}", "--drift=0")
+    yield client
+    ended(process, client)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def lonely():
+    """Yield a program that drives where no driver is; it waits for one while the other tests run."""
+    program = driving("ros2:/nobody")
+    yield program
+    leave(program)
+
+
+@pytest.fixture
+def mock(running):
+    """Return the client of a robot that stands in the middle of the arena."""
+    running.send("/data/omnidrive", [0, 0, 0])
+    running.send("/mock/place", [0, 0, 0])
+    eventually(lambda: running.get("/mock/truth")["vx"] == 0.0, pace_s=0.005)
+    return running
+
+
+@pytest.fixture(scope="module")
+def package(tmp_path_factory):
+    """Return a package whose policy drives to the target."""
+    return write_package(tmp_path_factory.mktemp("ros2") / "package")
+
+
+@pytest.mark.parametrize("options", [(), ("--best-effort",)], ids=["reliable", "best-effort"])
+def test_the_robot_drives_over_topics(mock, options):
+    """Publishers of sensors are reliable in one driver and best effort in the next."""
+    with driver(mock, "/one", *options):
+        found = found_by(driving("ros2:/one"))
+        truth = mock.get("/mock/truth")
+
+    assert found["x"] == pytest.approx(truth["x"], abs=1e-3)
+    assert truth["x"] > 0.4
+    assert truth["vx"] == 0.0
+    assert found["distances"] == pytest.approx(mock.get("/data/distancesensorarray"), abs=0.05)
+    assert found["bumped"] is False
+
+
+def test_a_latched_bump_from_before_the_connection_is_noticed(mock):
+    """A driver publishes the bumper only when it changes, and the robot may touch a wall already."""
+    mock.send("/mock/place", [1.6, 0, 0])
+    mock.send("/data/omnidrive", [0.5, 0, 0])
+    eventually(lambda: (mock.send("/data/omnidrive", [0.5, 0, 0]), mock.get("/data/bumper")["value"])[1])
+    with driver(mock, "/latched", "--latched"):
+        found = found_by(driving("ros2:/latched"))
+
+    assert found["bumped"] is True
+
+
+def test_the_policy_node_drives_to_goals_in_the_time_of_clock(mock, package):
+    """A simulation is often faster than real time, and then the node's period must be shorter too."""
+    x_m, y_m = of_odometry(mock, 0.0, 0.0)
+    fence = [x_m - 1.8, y_m - 1.8, x_m + 1.8, y_m + 1.8]
+    fenced = ("-p", f"fence:={fence}")
+    with (
+        driver(mock, "/robot1", "--clock") as robot,
+        node(package, "in-a-simulation", *fenced) as (program, log),
+    ):
+        send(robot, "map", (x_m, y_m))
+        wait_for(log, "goal ignored: its frame is map, that of odometry is odom")
+        send(robot, "odom", (x_m + 2.0, y_m))
+        wait_for(log, "is too close to the fence")
+        assert mock.get("/mock/truth")["x"] == 0.0
+
+        begun = mock.get("/mock/truth")
+        send(robot, "odom", of_odometry(mock, -1.0, 0.0))
+        eventually(lambda: mock.get("/mock/truth")["x"] < -0.1, pace_s=0.01)
+        send(robot, "odom", of_odometry(mock, 0.6, 0.4))
+        wait_for(log, "reached after")
+        truth = mock.get("/mock/truth")
+        assert (truth["x"], truth["y"]) == pytest.approx((0.6, 0.4), abs=0.2)
+        rate_hz = (truth["commands"] - begun["commands"]) / (truth["time_s"] - begun["time_s"])
+        assert 10.0 < rate_hz < 22.0  # of the robot's time, which is four times faster than real time
+
+        program.send_signal(signal.SIGINT)
+        assert program.wait(DEADLINE_S) == 0
+
+
+def test_the_policy_node_is_quiet_without_a_goal_and_opens_no_network(package):
+    """Other nodes may drive the robot then, and packets of tests must not leave this machine."""
+    process, client = started("--drift=0")
+    try:
+        with driver(client, "/", speed=1.0) as robot, node(package, "policy-node") as (program, log):
+            assert client.get("/mock/truth")["commands"] == 0
+            send(robot, "odom", of_odometry(client, 0.3, 0.0))
+            wait_for(log, "reached after")
+            assert 0.05 < client.get("/mock/truth")["x"] < 0.3
+            assert network_sockets(program.pid) == []
+            program.send_signal(signal.SIGTERM)
+            assert program.wait(DEADLINE_S) == 0
+            assert client.get("/mock/truth")["vx"] == 0.0
+    finally:
+        ended(process, client)
+
+
+def network_sockets(pid):
+    """Return the sockets of TCP and UDP that a process has open."""
+    links = [str(link.readlink()) for link in Path(f"/proc/{pid}/fd").iterdir() if link.is_symlink()]
+    found = []
+    for table in ("tcp", "tcp6", "udp", "udp6"):
+        rows = [line.split() for line in Path(f"/proc/{pid}/net/{table}").read_text().splitlines()[1:]]
+        found += [f"{table} {row[1]}" for row in rows if f"socket:[{row[9]}]" in links]
+    return found
+
+
+def test_a_robot_without_a_driver_is_refused(lonely):
+    """A wrong namespace is the usual mistake."""
+    found = found_by(lonely)
+
+    assert found["error"] == (
+        "RobotUnfit: ros2:/nobody: no odometry arrives on /nobody/odom; start the robot's driver, and "
+        "compare the namespace and ROS_DOMAIN_ID"
+    )
+
+
+def test_without_rclpy_the_message_names_the_remedy(package):
+    """Most users of this program have ROS 2, but have not sourced it in this terminal."""
+    done = subprocess.run(
+        [sys.executable, "-m", "palaestra_trainer.cli.policy_node", package],
+        check=False,
+        capture_output=True,
+        text=True,
+        timeout=DEADLINE_S,
+    )
+
+    assert done.returncode == 2
+    assert "rclpy is not installed; source the setup file of your ROS 2" in done.stderr

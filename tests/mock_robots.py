@@ -1,0 +1,107 @@
+"""Mock robots as processes, and a client of their REST interface that is not ours."""
+
+import contextlib
+import http.client
+import json
+import socket
+import subprocess
+import sys
+import threading
+
+PROGRAM = (sys.executable, "-m", "palaestra_sim.mock_robot.entry", "--listen=127.0.0.1:0")
+DEADLINE_S = 30.0  # moments on an idle machine
+
+
+class Client:
+    """A client with one connection, which stays open."""
+
+    def __init__(self, url):
+        self.address = url.strip().removeprefix("http://")
+        self.connection = http.client.HTTPConnection(self.address, timeout=DEADLINE_S)
+
+    def ask(self, method, path, body=None):
+        """Return status and JSON content of a response; None if the body is empty."""
+        text = body if body is None or isinstance(body, str) else json.dumps(body)
+        self.connection.request(method, path, body=text)
+        response = self.connection.getresponse()
+        content = response.read()
+        return response.status, json.loads(content) if content else None
+
+    def get(self, path):
+        """Return the content of a path."""
+        status, content = self.ask("GET", path)
+        assert status == 200
+        return content
+
+    def send(self, path, body):
+        """Send a body with PUT or POST, as the path wants it."""
+        method = "PUT" if path.startswith("/data/") else "POST"
+        assert self.ask(method, path, body) == (200, None)
+
+
+def started(*options, program=PROGRAM):
+    """Return a process of the mock robot that is ready, and its client."""
+    process = subprocess.Popen((*program, *options), stdout=subprocess.PIPE, text=True)
+    return process, Client(process.stdout.readline())
+
+
+def ended(process, client):
+    """Kill a process, and close its pipe and the connection to it."""
+    client.connection.close()
+    process.kill()
+    process.communicate()
+
+
+class Cable:
+    """A network cable between a program and a robot: a proxy on loopback that can be cut.
+
+    A cut passes nothing on and closes nothing, so each side sees only silence.
+    """
+
+    def __init__(self, client):
+        self._robot = client.address.split(":")
+        self._cut = threading.Event()
+        self._sockets = []
+        self._threads = []
+        self._server = socket.create_server(("127.0.0.1", 0))
+        self.url = f"http://127.0.0.1:{self._server.getsockname()[1]}"
+        self._begin(self._serve)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        for each in (self._server, *self._sockets):
+            with contextlib.suppress(OSError):
+                each.shutdown(socket.SHUT_RDWR)
+        for thread in self._threads:
+            thread.join(DEADLINE_S)
+        for each in (self._server, *self._sockets):
+            each.close()
+
+    def cut(self):
+        """Cut the cable."""
+        self._cut.set()
+
+    def _begin(self, task, *arguments):
+        thread = threading.Thread(target=task, args=arguments, daemon=True)
+        self._threads.append(thread)
+        thread.start()
+
+    def _serve(self):
+        with contextlib.suppress(OSError):
+            while True:
+                near, _ = self._server.accept()
+                self._sockets.append(near)
+                far = socket.create_connection(self._robot)
+                self._sockets.append(far)
+                for one, other in ((near, far), (far, near)):
+                    one.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+                    self._begin(self._pass, one, other)
+
+    def _pass(self, source, sink):
+        with contextlib.suppress(OSError):
+            while data := source.recv(65_536):
+                if not self._cut.is_set():
+                    sink.sendall(data)
+            sink.shutdown(socket.SHUT_WR)

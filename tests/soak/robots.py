@@ -1,0 +1,151 @@
+"""A policy on a mock robot: how fast it stands, whether it stops without a cause, and whether it arrives.
+
+The policies are trained first, as a user trains them. The mock robot runs at 20 times real time, except in
+the measurements of a stop, which run in real time. Run this part alone: a busy machine delays the requests.
+"""
+
+import math
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import structlog
+
+from palaestra_trainer.deployment import checked_package
+from palaestra_trainer.real_robots.command_loop import Hooks
+from palaestra_trainer.real_robots.rest import RestLink
+from palaestra_trainer.real_robots.robot_clock import RobotClock
+from palaestra_trainer.real_robots.robotino import RealRobotino
+from palaestra_trainer.real_robots.safety import SafetyRules
+from palaestra_trainer.robots.geometry import SPEED_M_S
+from tests.dead_man import LIMITS_S, after
+from tests.mock_episodes import succeeded, tasks
+from tests.mock_robots import ended, started
+
+TIMES, EPISODES, HOUR_S = 50, 100, 3600.0
+SPEED = 20.0
+SLOW_SPEED = 10.0  # a delay of 50 ms is 5 ms then
+HOUR_SPEED = 4.0  # a reading is stale after 75 ms then, longer than a usual pause of the scheduler
+BAD_NETWORK = ("--delay-ms=50", "--timeouts=0.05", "--drift=0.02")
+EXAMPLES = Path(__file__).parents[2] / "examples"
+MANIFESTS = Path(__file__).parents[2] / "manifests" / "examples"
+PROGRAMS = Path(sys.executable).parent
+OPEN_LOOP = ((0.3, 0.0, 0.0), (0.0, -0.2, 0.0), (0.2, 0.1, 0.3), (0.0, 0.0, -0.3), (-0.3, 0.0, 0.0))
+
+
+def measure(scale):
+    """Return the figures and claims of this part."""
+    structlog.configure(wrapper_class=structlog.make_filtering_bound_logger(30))
+    times, episodes = max(round(TIMES * scale), 2), max(round(EPISODES * scale), 4)
+    stops = {what: [after(what) for _ in range(times)] for what in LIMITS_S}
+    false_stops = causes_of_an_hour(HOUR_S * scale)
+    open_loop_m = open_loop()
+    with tempfile.TemporaryDirectory() as folder:
+        plain, robust = (trained(Path(folder), name) for name in ("move-to-target", "imprecise"))
+        arrivals = {
+            "plain": arrived(plain, episodes, "--drift=0"),
+            "plain, bad network": arrived(plain, episodes, *BAD_NETWORK, speed=SLOW_SPEED),
+            "robust, bad network": arrived(robust, episodes, *BAD_NETWORK, speed=SLOW_SPEED),
+        }
+    return {
+        "times": times,
+        "episodes": episodes,
+        "stands_s": {what: round(max(seconds), 3) for what, seconds in stops.items()},
+        "causes_of_an_hour": false_stops,
+        "open_loop_m": open_loop_m,
+        "arrived": arrivals,
+        "claims": {
+            **{
+                f"stands within {limit} s: {what}": max(stops[what]) < limit
+                for what, limit in LIMITS_S.items()
+            },
+            "no false stop in an hour with 50 ms of delay": not false_stops,
+            "open loop within 5 cm over 10 s": open_loop_m < 0.05,
+            "90 of 100 arrive": arrivals["plain"] >= 0.9 * episodes,
+            "85 of 100 arrive over a bad network": arrivals["robust, bad network"] >= 0.85 * episodes,
+        },
+    }
+
+
+def trained(folder, name):
+    """Train the job of an example, and return its package."""
+    subprocess.run(
+        [PROGRAMS / "palaestra", "run", MANIFESTS / f"{name}.yaml", "--dir", folder / "runs"],
+        check=True,
+        stdout=subprocess.DEVNULL,
+        cwd=EXAMPLES.parent,
+    )
+    run = folder / "runs" / name / "0"
+    importing = {**os.environ, "PYTHONPATH": str(EXAMPLES)}
+    exporting = [PROGRAMS / "palaestra-export", run, "--to", "package"]
+    subprocess.run(exporting, check=True, stdout=subprocess.DEVNULL, env=importing)
+    if str(EXAMPLES) not in sys.path:
+        sys.path.append(str(EXAMPLES))
+    return checked_package.read(run / "package")
+
+
+def arrived(package, episodes, *options, speed=SPEED):
+    """Return in how many episodes the mock robot truly stands on its target."""
+    robot, client = started(f"--speed={speed:g}", *options)
+    try:
+        wanted = tasks(episodes, seed=7)
+        return sum(succeeded(client, package, link_over_rest(client), speed, wanted))
+    finally:
+        ended(robot, client)
+
+
+def link_over_rest(client):
+    """Return a function that returns a link to a mock robot with a clock."""
+    return lambda clock: RestLink(f"http://{client.address}", clock=clock)
+
+
+def causes_of_an_hour(seconds):
+    """Drive to and fro with a delay of 50 ms; return how often each cause held the robot."""
+    counts, last = {}, [None]
+
+    def decided(situation, decision):
+        del situation
+        name = None if decision.cause is None else decision.cause.name
+        if name != last[0] and name is not None:
+            counts[name] = counts.get(name, 0) + 1
+        last[0] = name
+
+    robot, client = started(f"--speed={HOUR_SPEED:g}", "--delay-ms=50", "--drift=0")
+    clock = RobotClock(HOUR_SPEED)
+    rules = SafetyRules(speed_m_s=SPEED_M_S)
+    try:
+        link = link_over_rest(client)(clock)
+        with RealRobotino(link, rules, clock=clock, hooks=Hooks(decided=decided)) as real:
+            real.connect()
+            for step in range(round(seconds / real.period_s)):
+                real.drive(0.3 if step % 20 < 10 else -0.3, 0.0, 0.0)
+                real.advance()
+    finally:
+        ended(robot, client)
+    return counts
+
+
+def open_loop():
+    """Drive the same commands for 10 s; return how far the robot is from where the commands lead."""
+    robot, client = started("--speed=4", "--drift=0")
+    clock = RobotClock(4.0)
+    try:
+        with RealRobotino(link_over_rest(client)(clock), SafetyRules(speed_m_s=0.5), clock=clock) as real:
+            real.connect()
+            periods = round(10.0 / real.period_s / len(OPEN_LOOP))
+            x_m, y_m, heading = 0.0, 0.0, 0.0
+            for forward, left, turn in OPEN_LOOP:
+                for _ in range(periods):
+                    real.drive(forward, left, turn)
+                    real.advance()
+                    middle = heading + 0.5 * turn * real.period_s
+                    x_m += (forward * math.cos(middle) - left * math.sin(middle)) * real.period_s
+                    y_m += (forward * math.sin(middle) + left * math.cos(middle)) * real.period_s
+                    heading += turn * real.period_s
+            real.stand()
+            truth = client.get("/mock/truth")
+            return round(math.dist((truth["x"], truth["y"]), (x_m, y_m)), 4)
+    finally:
+        ended(robot, client)

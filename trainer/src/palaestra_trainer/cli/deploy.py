@@ -1,0 +1,219 @@
+"""`palaestra-deploy` drives a real Robotino with a policy package."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+import time
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from palaestra_protocol.imports import import_without
+
+# If structlog finds rich, it formats tracebacks with rich, but the log must have plain text.
+import_without("rich", "structlog")
+
+from palaestra_protocol.numbers import seconds
+from palaestra_protocol.pod.status import ExitCode
+from palaestra_trainer.cli.program import leaving, parser, refuse_without_run, write_line
+from palaestra_trainer.errors import ConfigurationError, RobotStopped, TrainerError
+from palaestra_trainer.real_robots.robot_clock import RobotClock
+from palaestra_trainer.real_robots.safety import Fence, SafetyRules
+from palaestra_trainer.real_robots.sensor_layout import ORDERS, UNITS, SensorLayout
+from palaestra_trainer.robots.geometry import TURN_RAD_S, Point, Pose
+from palaestra_trainer.run.signals import Interruption
+from palaestra_trainer.run.telemetry.logs import configure_logs
+
+if TYPE_CHECKING:
+    from palaestra_trainer.deployment.deploy import Deployment
+    from palaestra_trainer.deployment.terminal import Terminal
+
+DEPLOY = """\
+Drive a real Robotino with a policy package.
+
+reads:
+  PACKAGE, a folder of `palaestra export RUN --to package`; every file is checked before the robot moves
+writes:
+  a record of poses, readings, commands and decisions as a ROS 2 bag, by default deployment-<time>.mcap
+
+First the policy acts on live readings without driving, and the commands are shown. After a question, the
+robot drives while a key is held. Before you drive, read the page docs/howto/real-robot.md, and have the
+robot's emergency stop in reach: nothing of this program is a safety function.
+"""
+EXIT_CODES = """\
+exit codes:
+  0    every episode ended as a success, or the task counts none; or only a dry run was asked for
+  1    an episode ended without success, after which no further one begins; or any other error
+  2    the package, the robot or an option is wrong; the robot has not moved
+  3    a safety rule stopped the robot, or the person did not confirm
+  130  ended by Ctrl-C; the robot was commanded to stand
+"""
+STOPPED = 3
+_MARGIN_M = 1.0  # without --fence, the fence is this far around start and targets
+
+
+def deploy(arguments: Sequence[str] | None = None) -> int:
+    """Run `palaestra-deploy`; return its exit code."""
+    options = arguments_parser().parse_args(_joined(sys.argv[1:] if arguments is None else arguments))
+    configure_logs()
+    try:
+        with Interruption() as interruption:
+            return _drive(options, interruption)
+    except RobotStopped as error:
+        refuse_without_run(error)
+        return STOPPED
+    except (TrainerError, OSError) as error:
+        return refuse_without_run(error)
+
+
+def _drive(options: argparse.Namespace, interruption: Interruption) -> int:
+    from palaestra_trainer.deployment import checked_package
+    from palaestra_trainer.deployment.deploy import Deployment
+    from palaestra_trainer.deployment.hold_key import HoldKey
+    from palaestra_trainer.deployment.record import DeploymentRecord
+    from palaestra_trainer.deployment.terminal import Terminal
+    from palaestra_trainer.real_robots.command_loop import Hooks
+    from palaestra_trainer.real_robots.connect import link_to
+    from palaestra_trainer.real_robots.robotino import RealRobotino
+
+    package = checked_package.read(options.package)
+    clock = RobotClock(options.mock_speed)
+    link = link_to(options.robot, SensorLayout(order=options.sensor_order, unit=options.sensor_unit), clock)
+    path = options.log or Path(time.strftime("deployment-%Y%m%d-%H%M%S.mcap"))
+    record = DeploymentRecord(path, {"package": str(options.package), "robot": options.robot})
+    terminal = Terminal(None if options.no_hold or options.dry_run else HoldKey())
+    with ExitStack() as stack:
+        hooks = Hooks(permitted=terminal.permits, decided=record.decided, check=interruption.check)
+        robot = RealRobotino(link, _rules(options), package.period_s, clock, hooks)
+        stack.enter_context(robot)
+        robot.connect(muted=True)
+        stack.enter_context(record)
+        stack.callback(robot.close)  # the record also has how the robot stops
+        robot.stand_at(options.start, placed=True)
+        deployment = Deployment(package, robot, record, terminal.show)
+        targets: list[Point | None] = list(options.target) or [None]
+        deployment.rehearse(targets[0])
+        terminal.end_line()
+        if options.dry_run:
+            return ExitCode.DONE
+        if not options.yes and not terminal.confirms(options.robot):
+            return STOPPED
+        stack.enter_context(terminal.holding())
+        robot.unmute()
+        return _drive_all(deployment, targets, terminal)
+
+
+def _drive_all(deployment: Deployment, targets: Sequence[Point | None], terminal: Terminal) -> int:
+    """Drive the episodes up to the first one without success, after which the robot may touch something."""
+    for target in targets:
+        end = deployment.drive(target)
+        terminal.end_line()
+        write_line(f"{end.outcome} after {end.steps} steps")
+        if end.success is False:
+            return 1
+    return ExitCode.DONE
+
+
+def _rules(options: argparse.Namespace) -> SafetyRules:
+    fence = _fence(options)
+    start = (options.start.x_m, options.start.y_m)
+    for name, (x_m, y_m) in (("start", start), *(("target", point) for point in options.target)):
+        if fence.gap_m(Pose(x_m, y_m, 0.0)) <= 0.0:
+            raise ConfigurationError(
+                f"fence: the {name} ({x_m:g}, {y_m:g}) is too close to the fence for the robot; widen --fence"
+            )
+    return SafetyRules(speed_m_s=options.speed_limit, turn_rad_s=options.turn_limit, fence=fence)
+
+
+def _fence(options: argparse.Namespace) -> Fence:
+    if isinstance(options.fence, Fence):
+        return options.fence
+    if not options.target:
+        raise ConfigurationError("fence: neither --target nor --fence is given; give the floor for the robot")
+    points: list[Point] = [(options.start.x_m, options.start.y_m), *options.target]
+    xs, ys = zip(*points, strict=True)
+    return Fence((min(xs) - _MARGIN_M, min(ys) - _MARGIN_M), (max(xs) + _MARGIN_M, max(ys) + _MARGIN_M))
+
+
+def arguments_parser() -> argparse.ArgumentParser:
+    """Return the parser of the program's arguments."""
+    options = parser("palaestra-deploy", DEPLOY, EXIT_CODES)
+    add = options.add_argument
+    add("package", type=Path, metavar="PACKAGE", help="folder of the package")
+    add("--robot", required=True, metavar="ADDRESS", help=_ROBOT)
+    add("--target", type=_point, action="append", default=[], metavar="X,Y", help=_TARGET)
+    add("--start", type=_pose, default=Pose(0.0, 0.0, 0.0), metavar="X,Y,HEADING", help=_START)
+    add("--fence", type=_rectangle, metavar="X,Y,X,Y", help=_FENCE)
+    add(
+        "--speed-limit",
+        type=seconds,
+        default=SafetyRules().speed_m_s,
+        metavar="M/S",
+        help="default: %(default)s",
+    )
+    add("--turn-limit", type=seconds, default=TURN_RAD_S, metavar="RAD/S", help="default: %(default)s")
+    add("--dry-run", action="store_true", help="show the commands of some steps, and do not drive")
+    add("--yes", action="store_true", help="do not ask before driving")
+    add("--no-hold", action="store_true", help="drive without a held key; only where nobody can be hit")
+    add("--sensor-order", choices=ORDERS, default=ORDERS[0], help="order of the robot's distance sensors")
+    add("--sensor-unit", choices=UNITS, default=UNITS[0], help="unit of the robot's distance sensors")
+    add("--log", type=Path, metavar="FILE", help="the record; default: deployment-<time>.mcap")
+    add("--mock-speed", type=seconds, default=1.0, metavar="N", help="speed of a mock robot, times real time")
+    return options
+
+
+_ROBOT = "http://HOST of the robot, or ros1://HOST:PORT[/NAMESPACE] of the ROS master with robotino_node"
+_TARGET = "target of an episode in m; repeatable: each further episode begins where the one before ended"
+_START = "where the robot stands, in m and rad of the task's frame (default: 0,0,0)"
+_FENCE = "least x and y, then greatest, in m: the robot stays inside (default: 1 m around start and targets)"
+_NEGATIVE = ("--target", "--start", "--fence")
+
+
+def _joined(arguments: Sequence[str]) -> list[str]:
+    """Join options with their values, because argparse takes a value such as -1,0 for an option."""
+    joined: list[str] = []
+    for argument in arguments:
+        if joined and joined[-1] in _NEGATIVE:
+            joined[-1] += f"={argument}"
+        else:
+            joined.append(argument)
+    return joined
+
+
+def _point(text: str) -> Point:
+    x_m, y_m = _numbers(text, "X,Y")
+    return x_m, y_m
+
+
+def _pose(text: str) -> Pose:
+    return Pose(*_numbers(text, "X,Y,HEADING"))
+
+
+def _rectangle(text: str) -> Fence:
+    low_x, low_y, high_x, high_y = _numbers(text, "X,Y,X,Y")
+    try:
+        return Fence((low_x, low_y), (high_x, high_y))
+    except ConfigurationError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+
+
+def _numbers(text: str, form: str) -> list[float]:
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) != len(form.split(",")) or not all(map(math.isfinite, numbers)):
+        raise argparse.ArgumentTypeError(f"{text!r} is not {form} in meters and radians")
+    return numbers
+
+
+def deploy_and_leave() -> int:
+    """Run `palaestra-deploy`; before the process ends, the robot has been commanded to stand."""
+    return leaving(deploy)
+
+
+if __name__ == "__main__":
+    sys.exit(deploy_and_leave())

@@ -1,0 +1,217 @@
+"""`palaestra-policy-node` is a node of ROS 2 that drives a Robotino to goals with a policy package."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from palaestra_protocol.imports import import_without
+
+# If structlog finds rich, it formats tracebacks with rich, but the log must have plain text.
+import_without("rich", "structlog")
+
+from palaestra_protocol.pod.status import ExitCode
+from palaestra_trainer.cli.program import leaving, parser, refuse_without_run
+from palaestra_trainer.errors import ConfigurationError, NoReading, RobotUnfit, TrainerError
+from palaestra_trainer.real_robots.robot_clock import RobotClock
+from palaestra_trainer.real_robots.ros2_clock import SimulationClock, SimulationTime
+from palaestra_trainer.real_robots.safety import Fence, SafetyRules
+from palaestra_trainer.robots.geometry import TURN_RAD_S, Pose
+from palaestra_trainer.ros2.node import Ros2Node, require
+from palaestra_trainer.run.signals import Interrupted, Interruption
+from palaestra_trainer.run.telemetry.logs import configure_logs
+from palaestra_trainer.waiting.check import Check
+
+if TYPE_CHECKING:
+    from palaestra_trainer.deployment.goals import Goals
+    from palaestra_trainer.real_robots.robotino import RealRobotino
+    from palaestra_trainer.real_robots.ros2 import Ros2Link
+
+ABOUT = """\
+Drive a Robotino to goals in ROS 2, with a policy package. rclpy must be installed.
+
+subscribes:
+  goal_pose (geometry_msgs/msg/PoseStamped), in the frame of odometry; each goal begins an episode
+  odom, irsensor_scan or distance_sensors, bumper, as the robot's driver publishes them
+publishes:
+  cmd_vel (geometry_msgs/msg/Twist), 20 times a second while it drives to a goal; otherwise nothing
+parameters:
+  speed_limit (0.2 m/s), turn_limit (1.0 rad/s), fence (least x and y, then greatest, in m of the frame of
+  odometry), use_sim_time (false)
+
+The policy acts with the rate of its package. The node asks no question and needs no held key: a node above
+it, such as a twist mux, or the driver decides whether the robot obeys. Nothing of it is a safety function.
+"""
+EXIT_CODES = """\
+exit codes:
+  0  ended by Ctrl-C or SIGTERM; the robot was commanded to stand
+  1  any other error
+  2  the package, a parameter or an argument is wrong
+"""
+NAME: Final = "palaestra_policy"
+_CORNERS: Final = 4
+
+
+def policy_node(arguments: Sequence[str] | None = None) -> int:
+    """Run `palaestra-policy-node`; return its exit code."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    own, ros = separated(given)
+    options = _parser().parse_args(own)
+    configure_logs()
+    try:
+        with Interruption() as interruption:
+            _serve(options.package, ros, interruption)
+    except Interrupted:
+        return ExitCode.DONE
+    except (TrainerError, OSError) as error:
+        return refuse_without_run(error)
+    return ExitCode.DONE
+
+
+def separated(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Return the arguments of the program, and those of ROS: from each `--ros-args` to the next `--`."""
+    own: list[str] = []
+    ros: list[str] = []
+    of_ros = False
+    for argument in arguments:
+        of_ros = of_ros or argument == "--ros-args"
+        (ros if of_ros else own).append(argument)
+        of_ros = of_ros and argument != "--"
+    return own, ros
+
+
+def _serve(folder: Path, ros_arguments: Sequence[str], interruption: Interruption) -> None:
+    from palaestra_trainer.deployment import checked_package
+    from palaestra_trainer.deployment.deploy import Deployment
+    from palaestra_trainer.deployment.goals import GoalDriver, Goals, NewGoal, QuietLink
+    from palaestra_trainer.deployment.record import DeploymentRecord
+    from palaestra_trainer.real_robots.command_loop import Hooks
+    from palaestra_trainer.real_robots.robotino import RealRobotino
+    from palaestra_trainer.real_robots.ros2 import Ros2Link
+
+    package = checked_package.read(folder)
+    goals = Goals()
+
+    def check() -> None:
+        interruption.check()
+        if goals.waits:
+            raise NewGoal
+
+    with ExitStack() as stack:
+        node = Ros2Node(NAME, arguments=ros_arguments)
+        stack.callback(node.close)
+        rules = _rules(node)
+        simulation = _simulation(node)
+        clock = RobotClock() if simulation is None else SimulationClock(time=simulation)
+        link = Ros2Link(f"ros2:{node.ros.get_namespace()}", None, clock, node, interruption.check)
+        quiet = QuietLink(link)
+        robot = RealRobotino(quiet, rules, package.period_s, clock, Hooks(check=check))
+        stack.callback(robot.close)
+        if simulation is not None:
+            stack.callback(simulation.leave)
+        say, warn = node.ros.get_logger().info, node.ros.get_logger().warning
+        _connect(robot, simulation, interruption.check, warn)
+        deployment = Deployment(package, robot, DeploymentRecord(Path(), {}), node.ros.get_logger().debug)
+        _subscribe(node, link, goals, rules.fence)
+        say(f"ready; waiting for a goal on {node.ros.resolve_topic_name('goal_pose')}")
+        driver = GoalDriver(robot, quiet, deployment, goals, lambda: _reported(link))
+        driver.run(interruption.check, say, warn)
+
+
+def _connect(
+    robot: RealRobotino, simulation: SimulationTime | None, check: Check, warn: Callable[[str], object]
+) -> None:
+    """Wait until the robot may be driven, because nodes of a launch file start in any order."""
+    while True:
+        try:
+            if simulation is not None:
+                simulation.refuse_unset(check)
+            robot.connect()
+        except RobotUnfit as error:
+            warn(f"{error}; waiting for the robot")
+        else:
+            return
+
+
+def _simulation(node: Ros2Node) -> SimulationTime | None:
+    """Return the time of the simulation if the node has `use_sim_time`."""
+    if not node.ros.get_parameter("use_sim_time").value:
+        return None
+    clock = node.ros.get_clock()
+    return SimulationTime(lambda: float(clock.now().nanoseconds) * 1e-9)
+
+
+def _rules(node: Ros2Node) -> SafetyRules:
+    speed_m_s = _declared(node, "speed_limit", SafetyRules().speed_m_s)
+    turn_rad_s = _declared(node, "turn_limit", TURN_RAD_S)
+    for name, value in (("speed_limit", speed_m_s), ("turn_limit", turn_rad_s)):
+        if not 0.0 < value < math.inf:
+            raise ConfigurationError(f"{name}: {value} is not a positive number")
+    corners = list(_declared(node, "fence", require("rclpy.parameter").Parameter.Type.DOUBLE_ARRAY) or [])
+    if len(corners) not in {0, _CORNERS}:
+        raise ConfigurationError(f"fence: {corners} are not four numbers; give least x and y, then greatest")
+    fence = Fence((corners[0], corners[1]), (corners[2], corners[3])) if corners else None
+    return SafetyRules(speed_m_s=speed_m_s, turn_rad_s=turn_rad_s, fence=fence)
+
+
+def _declared(node: Ros2Node, name: str, default: Any) -> Any:
+    """Declare a parameter that is read once, and return its value; the default may be a type without value.
+
+    Raises:
+        ConfigurationError: the value has another type.
+    """
+    descriptor = require("rcl_interfaces.msg").ParameterDescriptor(read_only=True)
+    try:
+        return node.ros.declare_parameter(name, default, descriptor).value
+    except require("rclpy.exceptions").InvalidParameterTypeException as error:
+        raise ConfigurationError(f"{name}: {error}; write a number such as 1.0") from error
+
+
+def _subscribe(node: Ros2Node, link: Ros2Link, goals: Goals, fence: Fence | None) -> None:
+    """Put each goal in the frame of odometry, and within the fence, into `goals`."""
+    warn = node.ros.get_logger().warning
+
+    def take(message: Any) -> None:
+        frame, x_m, y_m = message.header.frame_id, message.pose.position.x, message.pose.position.y
+        if frame not in {"", link.frame_id}:
+            warn(
+                f"goal ignored: its frame is {frame}, that of odometry is {link.frame_id}; set the fixed "
+                "frame of RViz to it, or transform the goal"
+            )
+        elif not (math.isfinite(x_m) and math.isfinite(y_m)):
+            warn("goal ignored: its position is not finite")
+        elif fence is not None and fence.gap_m(Pose(x_m, y_m, 0.0)) <= 0.0:
+            warn(f"goal ignored: ({x_m:g}, {y_m:g}) is too close to the fence for the robot")
+        else:
+            goals.put((x_m, y_m))
+
+    qos = require("rclpy.qos")
+    reliable = qos.QoSProfile(depth=1, reliability=qos.ReliabilityPolicy.RELIABLE)
+    node.ros.create_subscription(require("geometry_msgs.msg").PoseStamped, "goal_pose", take, reliable)
+
+
+def _reported(link: Ros2Link) -> Pose:
+    if link.odometry is None:
+        raise NoReading("odometry has not arrived")
+    return link.odometry.pose
+
+
+def _parser() -> argparse.ArgumentParser:
+    options = parser("palaestra-policy-node", ABOUT, EXIT_CODES)
+    options.usage = "palaestra-policy-node PACKAGE [--ros-args ...]"
+    options.add_argument("package", type=Path, metavar="PACKAGE", help="folder of the package")
+    return options
+
+
+def policy_node_and_leave() -> int:
+    """Run `palaestra-policy-node`; before the process ends, the robot has been commanded to stand."""
+    return leaving(policy_node)
+
+
+if __name__ == "__main__":
+    sys.exit(policy_node_and_leave())

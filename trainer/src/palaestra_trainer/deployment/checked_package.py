@@ -1,0 +1,63 @@
+"""Read a policy package for a deployment, and refuse a package that cannot drive the robot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from palaestra_protocol.policy_package import MANIFEST, NETWORK, TRAINING, PackageError, read_package
+from palaestra_trainer.deployment.onnx_policy import OnnxPolicy
+from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.job.configuration import Environment, load
+
+ROBOT: Final = "Robotino"
+_PERIODS_S: Final = (0.02, 2.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CheckedPackage:
+    """A package that can drive a Robotino.
+
+    Attributes:
+        policy: its policy.
+        environment: the environment in which the policy learned.
+        period_s: seconds between two actions.
+        manifest: the manifest, as data.
+    """
+
+    policy: OnnxPolicy
+    environment: Environment
+    period_s: float
+    manifest: dict[str, Any]
+
+
+def read(folder: Path) -> CheckedPackage:
+    """Return the package in a folder, after a check of every file.
+
+    Raises:
+        ConfigurationError: a file is missing or has changed, the policy drives another robot, or its rate
+            is unknown.
+    """
+    try:
+        manifest = read_package(folder, NETWORK, TRAINING)
+    except PackageError as error:
+        raise ConfigurationError(str(error)) from error
+    match manifest.get("robot"):
+        case {"class": str(name), "period_s": float() | int() as period_s}:
+            pass
+        case other:
+            raise ConfigurationError(f"{folder / MANIFEST}: robot: {other!r} names no class and period_s")
+    if name != ROBOT:
+        raise ConfigurationError(f"{folder}: the policy drives a {name}; only a {ROBOT} can be deployed to")
+    if not _PERIODS_S[0] <= period_s <= _PERIODS_S[1]:
+        raise ConfigurationError(
+            f"{folder}: the policy acts every {period_s:g} s, but a robot is driven with"
+            f" {_PERIODS_S[0]} to {_PERIODS_S[1]} s; train one with another rate"
+        )
+    return CheckedPackage(
+        policy=OnnxPolicy(folder / NETWORK, manifest.get("policy") or {}),
+        environment=load(folder / TRAINING).environment,
+        period_s=float(period_s),
+        manifest=manifest,
+    )

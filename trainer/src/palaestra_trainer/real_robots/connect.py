@@ -1,0 +1,39 @@
+"""Choose the connection to a robot by the scheme of its address."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Final
+
+from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.real_robots.link import RobotLink
+from palaestra_trainer.real_robots.rest import RestLink
+from palaestra_trainer.real_robots.robot_clock import RobotClock
+from palaestra_trainer.real_robots.ros1 import Ros1Link
+from palaestra_trainer.real_robots.ros2 import Ros2Link
+from palaestra_trainer.real_robots.sensor_layout import SensorLayout
+
+LINKS: Final[Mapping[str, Callable[[str, SensorLayout, RobotClock], RobotLink]]] = {
+    "http://": RestLink,
+    "ros1://": Ros1Link,
+    "ros2:": Ros2Link,
+}
+
+
+def link_to(address: str, sensors: SensorLayout, clock: RobotClock) -> RobotLink:
+    """Return the connection to the robot at an address, such as http://192.168.0.1; it is not open yet.
+
+    Args:
+        address: the address of the robot; it begins with a key of `LINKS`.
+        sensors: how the robot reports its distance sensors.
+        clock: the robot's clock.
+
+    Raises:
+        ConfigurationError: the scheme is not known, the address is not one of its scheme, or the
+            connection needs rclpy, which is not installed.
+    """
+    for scheme, link in LINKS.items():
+        if address.startswith(scheme):
+            return link(address, sensors, clock)
+    known = " or ".join(LINKS)
+    raise ConfigurationError(f"robot: {address!r} has an unknown scheme; begin it with {known}")

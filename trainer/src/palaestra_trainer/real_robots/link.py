@@ -1,0 +1,45 @@
+"""The interface of a connection to a real robot."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from palaestra_trainer.real_robots.readings import ReadingStore
+from palaestra_trainer.robots.geometry import Twist
+
+
+class RobotLink(Protocol):
+    """A connection to one robot.
+
+    Attributes:
+        address: the address of the robot, for messages.
+    """
+
+    address: str
+
+    def refuse_unfit(self, speed_m_s: float) -> None:
+        """Refuse a robot that must not be driven.
+
+        Args:
+            speed_m_s: the speed at which the robot is to be driven.
+
+        Raises:
+            RobotUnfit: the robot does not respond, charges, or does not allow the speed.
+        """
+        ...
+
+    def start(self, store: ReadingStore) -> None:
+        """Begin to put readings into `store`, in threads of the connection, until `close`."""
+        ...
+
+    def send(self, twist: Twist) -> None:
+        """Send one velocity: forward and left in m/s, counter-clockwise in rad/s.
+
+        Raises:
+            LinkError: the robot has not confirmed the velocity.
+        """
+        ...
+
+    def close(self) -> None:
+        """End all threads and connections; further calls have no effect."""
+        ...

@@ -1,0 +1,34 @@
+"""The time of a robot, in seconds.
+
+A real robot has real time. A mock robot with `--speed N` lives N seconds in each second, so a program that
+drives it multiplies all its times by the same factor.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class RobotClock:
+    """A monotonic clock.
+
+    Attributes:
+        speed: robot seconds in a second; 1 for a real robot.
+    """
+
+    speed: float = 1.0
+
+    def now_s(self) -> float:
+        """Return the robot's time in seconds, from an arbitrary start."""
+        return time.monotonic() * self.speed
+
+    def real_s(self, robot_s: float) -> float:
+        """Return the seconds of real time in which the robot lives `robot_s` seconds."""
+        return robot_s / self.speed
+
+    def wait(self, event: threading.Event, until_s: float) -> bool:
+        """Wait for an event until a time of this clock; return whether the event is set."""
+        return event.wait(max(self.real_s(until_s - self.now_s()), 0.0))

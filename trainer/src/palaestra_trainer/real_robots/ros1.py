@@ -1,0 +1,217 @@
+"""The connection to a Robotino over ROS 1, through its driver `robotino_node`.
+
+The connection needs no installed ROS. Three facts about the driver matter:
+
+- It forwards each command once, up to 33 ms late, and has no watchdog. So the base's own dead man stops the
+  robot.
+- It clips each axis of a command to its limits, and raises a small speed to its minimum, without a notice.
+- It publishes the bumper's state only when the state changes, as a latched message. So the bumper counts as
+  not pressed until the first message, and the last state stays after a new connection. A message of `odom` or
+  `distance_sensors` confirms the state, because all topics are connected again if one of them fails.
+"""
+
+from __future__ import annotations
+
+import itertools
+import os
+import re
+import select
+import threading
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import replace
+from typing import Any, Final
+from urllib.parse import urlsplit
+
+import structlog
+
+from palaestra_trainer.errors import (
+    ConfigurationError,
+    LinkError,
+    MasterLost,
+    RobotUnfit,
+    SimulatorFault,
+    UnreadableAnswer,
+)
+from palaestra_trainer.real_robots.readings import ReadingStore
+from palaestra_trainer.real_robots.robot_clock import RobotClock
+from palaestra_trainer.real_robots.ros1_messages import distances_of, fields_of, odometry_of
+from palaestra_trainer.real_robots.sensor_layout import UNITS, SensorLayout
+from palaestra_trainer.robots.geometry import Twist
+from palaestra_trainer.ros.master import Master
+from palaestra_trainer.ros.publisher import RosPublisher
+from palaestra_trainer.ros.subscriber import RosSubscriber
+from palaestra_trainer.ros.topic_node import TopicNode
+
+log = structlog.get_logger(__name__)
+
+DRIVER_SPEED_M_S: Final = 0.2  # the driver's limit if its parameter is not set; source: RobotinoNode.cpp
+_CHECK_S: Final = 2.0
+_DRIVER_CONNECTS_S: Final = 5.0
+_SILENCE_S: Final = 1.0  # with an older reading, all topics are connected again
+_RETRY_S: Final = 0.5
+_END_S: Final = 3.0
+_ADDRESS: Final = re.compile(r"ros1://[^/@?#]+(/[A-Za-z][A-Za-z0-9_]*)*/?")
+_numbers: Final = itertools.count()  # the nodes of one process need different names
+
+Reader = Callable[[Any, float], None]
+
+
+class Ros1Link:
+    """The connection to one Robotino; see `RobotLink`.
+
+    Args:
+        address: the address of the ROS master, and the driver's namespace: ros1://HOST:PORT[/NAMESPACE].
+        sensors: the order of the distance sensors; the driver's unit is always meters.
+        clock: the robot's clock. The time of a reading is the time at which its message arrived.
+
+    Raises:
+        ConfigurationError: the address does not have this form.
+    """
+
+    def __init__(
+        self, address: str, sensors: SensorLayout | None = None, clock: RobotClock | None = None
+    ) -> None:
+        self.address = address
+        self._master_uri, self._namespace = _parts(address)
+        self._sensors = replace(sensors or SensorLayout(), unit=UNITS[0])
+        self._clock = clock or RobotClock()
+        self._bumped = False
+        self._commands: RosPublisher | None = None
+        self._over = threading.Event()
+        self._open = ExitStack()
+
+    def refuse_unfit(self, speed_m_s: float) -> None:
+        """Refuse a robot without a running driver, or whose driver clips the speed.
+
+        The driver does not report the charger, so a charging robot is not refused.
+
+        Raises:
+            RobotUnfit: no master responds, no driver publishes odometry, or its limit is below the speed.
+        """
+        odom, parameter = self._name("odom"), self._name("robotino_node/max_linear_vel")
+        master = Master(self._name("palaestra"), _CHECK_S, self._master_uri)
+        try:
+            master.ping()
+            runs = any(master.runs(node) for node in sorted(master.publishers(odom)))
+            limit = master.parameter(parameter)
+        except (MasterLost, UnreadableAnswer) as error:
+            raise RobotUnfit(
+                f"{self.address}: {error}; check the address, and that the robot is switched on"
+            ) from error
+        if not runs:
+            fact = f"{self.address}: no node that this computer reaches publishes {odom}"
+            raise RobotUnfit(f"{fact}; start robotino_node, with ROS_IP set to the robot's address")
+        most_m_s = DRIVER_SPEED_M_S if limit is None else limit
+        if not isinstance(most_m_s, int | float) or most_m_s < speed_m_s:
+            note = " by default" if limit is None else ""
+            fact = f"{self.address}: {parameter} is {most_m_s!r} m/s{note}, below {speed_m_s:g} m/s"
+            raise RobotUnfit(f"{fact}; set the parameter and restart the driver, or lower the speed limit")
+
+    def start(self, store: ReadingStore) -> None:
+        """Begin to receive readings, after the driver has connected to the topic of commands.
+
+        Raises:
+            RobotUnfit: the master is gone, or the driver does not connect.
+        """
+        topic = self._name("cmd_vel")
+        try:
+            node = TopicNode(self._name(f"palaestra_{os.getpid()}_{next(_numbers)}"), self._master_uri)
+            self._open.callback(node.close)
+            self._commands = RosPublisher(node, topic, "geometry_msgs/Twist")
+            self._open.callback(self._commands.close)
+        except (MasterLost, UnreadableAnswer) as error:
+            raise RobotUnfit(f"{self.address}: {error}; check the network, and try again") from error
+        if not self._commands.wait_for_subscriber(_DRIVER_CONNECTS_S):
+            fact = f"{self.address}: the driver has not connected to {topic} at {node.host}"
+            raise RobotUnfit(f"{fact}; set ROS_IP to an address of this computer that the robot reaches")
+        thread = threading.Thread(target=self._listen, args=(node, store), name="robot-topics", daemon=True)
+        self._open.callback(thread.join, _END_S)
+        thread.start()
+
+    def send(self, twist: Twist) -> None:
+        """Send one velocity to all subscribers of `cmd_vel`; the driver itself confirms nothing.
+
+        Raises:
+            LinkError: no subscriber is connected.
+        """
+        if self._commands is None or not self._commands.publish(**fields_of(twist)):
+            raise LinkError(f"{self._name('cmd_vel')}: no subscriber is connected")
+
+    def close(self) -> None:
+        """Unregister, end the thread, and close the connections."""
+        self._over.set()
+        self._open.close()
+
+    def _name(self, name: str) -> str:
+        return f"{self._namespace}/{name}"
+
+    def _listen(self, node: TopicNode, store: ReadingStore) -> None:
+        """Receive messages; after a failure, connect all topics again, so that a latched message returns."""
+        readers = self._readers(node, store)
+        while not self._over.is_set():
+            try:
+                self._receive(readers, store)
+            except (SimulatorFault, MasterLost) as error:
+                log.debug("no readings", error=str(error))
+            self._clock.wait(self._over, self._clock.now_s() + _RETRY_S)
+        for topic in readers:
+            topic.close()
+
+    def _readers(self, node: TopicNode, store: ReadingStore) -> dict[RosSubscriber, Reader]:
+        """Return the topics in the order in which their messages are read."""
+
+        def bumper(message: Any, at_s: float) -> None:
+            self._bumped = message.data
+            store.set_bumped(at_s, bumped=self._bumped)
+
+        def odometry(message: Any, at_s: float) -> None:
+            store.set_odometry(odometry_of(message), at_s)
+            store.set_bumped(at_s, bumped=self._bumped)
+
+        def distances(message: Any, at_s: float) -> None:
+            store.set_distances(distances_of(message, self._sensors), at_s)
+            store.set_bumped(at_s, bumped=self._bumped)
+
+        return {
+            RosSubscriber(self._name("bumper"), "std_msgs/Bool", node=node): bumper,
+            RosSubscriber(self._name("distance_sensors"), "sensor_msgs/PointCloud", node=node): distances,
+            RosSubscriber(self._name("odom"), "nav_msgs/Odometry", node=node): odometry,
+        }
+
+    def _receive(self, readers: dict[RosSubscriber, Reader], store: ReadingStore) -> None:
+        """Connect all topics and read their messages, until a reading is older than `_SILENCE_S`.
+
+        Raises:
+            SimulatorFault: a topic has no publisher, or its connection failed.
+            MasterLost: the master does not respond.
+        """
+        for topic in readers:
+            topic.connect()
+        at_s = begin_s = self._clock.now_s()
+        while not self._over.is_set() and at_s - max(begin_s, store.newest.oldest_s) < _SILENCE_S:
+            select.select(list(readers), [], [], self._clock.real_s(_SILENCE_S))
+            at_s = self._clock.now_s()
+            # A topic that is not ready may have a message too: a latched one, which came with the header.
+            for topic, read in readers.items():
+                for message in topic.arrived()[-1:]:
+                    try:
+                        read(message, at_s)
+                    except LinkError as error:
+                        log.debug("no reading", error=str(error))
+
+
+def _parts(address: str) -> tuple[str, str]:
+    """Return the URI of the master, and the namespace of the driver: "" or a name that begins with "/".
+
+    Raises:
+        ConfigurationError: the address does not have the form ros1://HOST:PORT[/NAMESPACE].
+    """
+    try:
+        parts = urlsplit(address)
+        if _ADDRESS.fullmatch(address) and parts.hostname and parts.port:
+            return f"http://{parts.netloc}/", parts.path.rstrip("/")
+    except ValueError:
+        pass
+    fact = f"robot: {address!r} is not an address such as ros1://192.168.0.1:11311"
+    raise ConfigurationError(f"{fact}; give host and port of the ROS master, and the driver's namespace")

@@ -1,0 +1,204 @@
+"""The connection to a Robotino over the topics of its ROS 2 driver, such as rto_node of ros2-robotino.
+
+| topic | type | here |
+|---|---|---|
+| odom | nav_msgs/msg/Odometry | read |
+| irsensor_scan | sensor_msgs/msg/LaserScan, a ray for each of the nine sensors | read |
+| distance_sensors | sensor_msgs/msg/PointCloud, as a bridge to the ROS 1 driver publishes it | read |
+| bumper | std_msgs/msg/Bool | read |
+| cmd_vel | geometry_msgs/msg/Twist | published |
+
+A best-effort subscription matches reliable publishers too, and an old reading is of no use.
+
+rto_node publishes the bumper only when it changes, and keeps no message for later subscribers. So the bumper
+counts as not pressed before the first message. While a node publishes the topic, each odometry confirms the
+bumper's last state. Another driver may latch the state. A latched message arrives only in a subscription
+that is transient local, and both sides warn if such a subscription meets a volatile publisher. So a second
+subscription of the bumper begins when a publisher is transient local. A bumper that the driver never reports
+cannot be noticed.
+"""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any, Final
+
+import numpy as np
+import structlog
+from numpy.typing import NDArray
+
+from palaestra_trainer.errors import ConfigurationError, LinkError, RobotUnfit
+from palaestra_trainer.real_robots.readings import Odometry, ReadingStore
+from palaestra_trainer.real_robots.robot_clock import RobotClock
+from palaestra_trainer.real_robots.ros1_messages import distances_of as distances_of_points
+from palaestra_trainer.real_robots.ros1_messages import odometry_of
+from palaestra_trainer.real_robots.ros2_messages import distances_of as distances_of_scan
+from palaestra_trainer.real_robots.sensor_layout import UNITS, SensorLayout
+from palaestra_trainer.robots.geometry import Twist
+from palaestra_trainer.ros2.node import Ros2Node, require
+from palaestra_trainer.waiting.check import Check, go_on
+
+log = structlog.get_logger(__name__)
+
+SCHEME: Final = "ros2"
+_ADDRESS: Final = re.compile(r"ros2:((?:/[A-Za-z_][A-Za-z0-9_]*)*)/?")
+_FIRST_S: Final = 5.0
+_LOOK_S: Final = 0.02
+
+Floats = NDArray[np.float32]
+
+
+class Ros2Link:
+    """The connection to one Robotino; see `RobotLink`.
+
+    Args:
+        address: `ros2:`, or `ros2:/NAMESPACE` for topics such as /NAMESPACE/odom.
+        sensors: the order of the distance sensors; the driver's unit is always meters.
+        clock: the robot's clock. The time of a reading is the time at which its message arrived.
+        node: the node that subscribes and publishes, which its maker closes; None: a new one.
+        check: called often while the connection waits for the robot; it may raise.
+
+    Attributes:
+        frame_id: the frame of the newest odometry, such as `odom`; empty before it.
+        odometry: the newest odometry; None before it.
+
+    Raises:
+        ConfigurationError: the address is wrong, or rclpy is not installed.
+    """
+
+    def __init__(
+        self,
+        address: str,
+        sensors: SensorLayout | None = None,
+        clock: RobotClock | None = None,
+        node: Ros2Node | None = None,
+        check: Check = go_on,
+    ) -> None:
+        namespace = _namespace(address)
+        self.address = address
+        self.frame_id = ""
+        self.odometry: Odometry | None = None
+        self._sensors = replace(sensors or SensorLayout(), unit=UNITS[0])
+        self._clock = clock or RobotClock()
+        self._check = check
+        self._node = node or Ros2Node("palaestra", namespace or None)
+        self._owned = node is None
+        self._store = ReadingStore()
+        self._bumped = False
+        self._latched = False
+        self._open = True
+        self._twist = require("geometry_msgs.msg").Twist
+        self._commands = self._subscribe()
+        self._node.start()
+
+    def refuse_unfit(self, speed_m_s: float) -> None:
+        """Refuse a robot without odometry, or without a subscriber of the commands.
+
+        Topics show neither a charger nor the driver's limit of speed.
+
+        Raises:
+            RobotUnfit: within 5 s, no odometry arrived, or nobody subscribed the commands.
+        """
+        del speed_m_s
+        end_s = time.monotonic() + _FIRST_S
+        while self.odometry is None or not self._commands.get_subscription_count():
+            if time.monotonic() > end_s:
+                raise RobotUnfit(f"{self.address}: {self._missing()}")
+            self._check()
+            time.sleep(_LOOK_S)
+
+    def start(self, store: ReadingStore) -> None:
+        """Put readings into `store` from now on."""
+        self._store = store
+
+    def send(self, twist: Twist) -> None:
+        """Publish one velocity; ROS 2 does not confirm that the robot has taken it."""
+        if not self._open or not self._commands.get_subscription_count():
+            raise LinkError(f"nobody subscribes {self._commands.topic_name}")
+        message = self._twist()
+        message.linear.x, message.linear.y, message.angular.z = map(float, twist)
+        self._commands.publish(message)
+
+    def close(self) -> None:
+        """Publish nothing from now on, and end the node unless it was given."""
+        self._open = False
+        if self._owned:
+            self._node.close()
+
+    def _subscribe(self) -> Any:
+        """Subscribe all readings, and return the publisher of the commands."""
+        qos = require("rclpy.qos")
+        best_effort, reliable = qos.ReliabilityPolicy.BEST_EFFORT, qos.ReliabilityPolicy.RELIABLE
+        newest = qos.QoSProfile(depth=1, reliability=best_effort)
+        sensor_messages = require("sensor_msgs.msg")
+        for kind, topic, read, profile in (
+            (require("nav_msgs.msg").Odometry, "odom", self._read_odometry, newest),
+            (sensor_messages.LaserScan, "irsensor_scan", self._distances(distances_of_scan), newest),
+            (sensor_messages.PointCloud, "distance_sensors", self._distances(distances_of_points), newest),
+            (require("std_msgs.msg").Bool, "bumper", self._read_bumper, newest),
+        ):
+            self._node.ros.create_subscription(kind, topic, read, profile)
+        return self._node.ros.create_publisher(
+            self._twist, "cmd_vel", qos.QoSProfile(depth=1, reliability=reliable)
+        )
+
+    def _read_odometry(self, message: Any) -> None:
+        at_s = self._clock.now_s()
+        try:
+            odometry = odometry_of(message)
+        except LinkError as error:
+            log.debug("no reading", error=str(error))
+            return
+        self.frame_id, self.odometry = message.header.frame_id, odometry
+        self._store.set_odometry(odometry, at_s)
+        self._confirm_bumper(at_s)
+
+    def _confirm_bumper(self, at_s: float) -> None:
+        """Store the bumper's last state again, while a node publishes it."""
+        publishers = self._node.ros.get_publishers_info_by_topic(self._resolved("bumper"))
+        if publishers:
+            self._store.set_bumped(at_s, bumped=self._bumped)
+        qos = require("rclpy.qos")
+        latched = qos.DurabilityPolicy.TRANSIENT_LOCAL
+        if not self._latched and any(each.qos_profile.durability == latched for each in publishers):
+            self._latched = True
+            profile = qos.QoSProfile(depth=1, reliability=qos.ReliabilityPolicy.RELIABLE, durability=latched)
+            self._node.ros.create_subscription(
+                require("std_msgs.msg").Bool, "bumper", self._read_bumper, profile
+            )
+
+    def _read_bumper(self, message: Any) -> None:
+        self._bumped = bool(message.data)
+        self._store.set_bumped(self._clock.now_s(), bumped=self._bumped)
+
+    def _distances(self, meters_of: Callable[[Any, SensorLayout], Floats]) -> Callable[[Any], None]:
+        def read(message: Any) -> None:
+            try:
+                distances_m = meters_of(message, self._sensors)
+            except LinkError as error:
+                log.debug("no reading", error=str(error))
+                return
+            self._store.set_distances(distances_m, self._clock.now_s())
+
+        return read
+
+    def _missing(self) -> str:
+        if self.odometry is None:
+            topic = self._resolved("odom")
+            return (
+                f"no odometry arrives on {topic}; start the robot's driver, and compare the namespace and "
+                "ROS_DOMAIN_ID"
+            )
+        return f"nobody subscribes {self._commands.topic_name}; start the robot's driver, or remap the topic"
+
+    def _resolved(self, topic: str) -> str:
+        return str(self._node.ros.resolve_topic_name(topic))
+
+
+def _namespace(address: str) -> str:
+    if (found := _ADDRESS.fullmatch(address)) is None:
+        raise ConfigurationError(f"robot: {address!r} is not an address such as ros2: or ros2:/robot1")
+    return found[1]

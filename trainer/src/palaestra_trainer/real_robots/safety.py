@@ -1,0 +1,200 @@
+"""The rules that decide, for each command, whether a real robot may move: a pure function of the situation.
+
+A rule either holds the robot back until its cause has ended, or stops the robot until a person begins a new
+episode. The order of `CHECKS` is the order of importance. These rules are no safety function: only the
+robot's own emergency stop is one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.robots.base import OUTLINE_M
+from palaestra_trainer.robots.geometry import TURN_RAD_S, Point, Pose, Twist
+
+BUMPER: Final = "bumper"
+SILENCE: Final = "silent policy"
+STANDING: Final[Twist] = (0.0, 0.0, 0.0)
+
+# A robot may drive this long before a stop takes effect: one period of commands, a delayed request, braking.
+_REACTION_S: Final = 0.25
+_SETTLED_S: Final = 1.0  # a robot stands at the latest this long after its last command to move
+# Faster than this, a robot without commands moves; odometry of a standing robot is exactly zero.
+_MOVING: Final = (0.02, 0.02, 0.05)
+
+
+@dataclass(frozen=True, slots=True)
+class Fence:
+    """The rectangle that the robot's outline must not leave, in meters of the task's frame."""
+
+    low: Point
+    high: Point
+
+    def __post_init__(self) -> None:
+        """Refuse a rectangle in which the robot has no place."""
+        sides = [high - low for low, high in zip(self.low, self.high, strict=True)]
+        if not all(2.0 * OUTLINE_M < side < math.inf for side in sides):
+            raise ConfigurationError(
+                f"fence: from {self.low} to {self.high} has no place for a robot of {2 * OUTLINE_M:.2f} m; "
+                "give the smallest x and y, then the greatest"
+            )
+
+    def gap_m(self, pose: Pose) -> float:
+        """Return the meters between the robot's outline and the fence; negative beyond the fence."""
+        x_m, y_m = pose.x_m, pose.y_m
+        return min(x_m - self.low[0], self.high[0] - x_m, y_m - self.low[1], self.high[1] - y_m) - OUTLINE_M
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SafetyRules:
+    """The limits of a deployment.
+
+    Attributes:
+        speed_m_s: greatest speed along the floor; a faster command is scaled, its direction stays.
+        turn_rad_s: greatest rate of turning.
+        fence: the rectangle for the robot; None: no fence.
+        odometry_error: the share of the driven way by which odometry may be wrong; the fence is closer by it.
+        silence_s: seconds without a call of the policy's program, after which the robot is held back.
+        stale_s: age of the oldest reading, above which the robot is held back.
+        lost_s: age of the oldest reading, above which the robot is stopped.
+    """
+
+    speed_m_s: float = 0.2
+    turn_rad_s: float = TURN_RAD_S
+    fence: Fence | None = None
+    odometry_error: float = 0.05
+    silence_s: float = 0.2
+    stale_s: float = 0.3
+    lost_s: float = 2.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Situation:
+    """All that a decision depends on.
+
+    Attributes:
+        command: the newest command of the policy; None: the policy has sent none.
+        silent_s: seconds since the program of the policy last called the robot; it calls while it waits.
+        permitted: whether the person allows motion now, for example by holding a key.
+        readings_age_s: age of the oldest of the newest readings; infinite without readings.
+        bumped: whether the bumper touches something.
+        pose: the pose by odometry, in the task's frame; None before the first reading.
+        velocity: the velocity by odometry, in the robot's frame.
+        driven_m: meters driven since a person confirmed the pose.
+        rested_s: seconds for which only zero has been commanded.
+    """
+
+    command: Twist | None
+    silent_s: float
+    permitted: bool
+    readings_age_s: float
+    bumped: bool
+    pose: Pose | None
+    velocity: Twist
+    driven_m: float
+    rested_s: float
+
+
+class StopCause(NamedTuple):
+    """Why a robot may not move.
+
+    Attributes:
+        name: a short name, for logs.
+        message: fact and remedy.
+        stops: whether the robot stays stopped after the cause has ended.
+    """
+
+    name: str
+    message: str
+    stops: bool
+
+
+class SafetyDecision(NamedTuple):
+    """The velocity that is sent to the robot, and why the robot is held back or stopped, if it is."""
+
+    twist: Twist
+    cause: StopCause | None = None
+
+
+Check = Callable[[Situation, SafetyRules], StopCause | None]
+
+
+def decide(situation: Situation, rules: SafetyRules) -> SafetyDecision:
+    """Return the velocity to send: that of the policy within the limits, or zero and the first cause."""
+    for check in CHECKS:
+        if cause := check(situation, rules):
+            return SafetyDecision(STANDING, cause)
+    return SafetyDecision(limited(situation.command or STANDING, rules))
+
+
+def limited(twist: Twist, rules: SafetyRules) -> Twist:
+    """Return a velocity within the limits, in the same direction along the floor."""
+    forward, left, turning = twist
+    speed = math.hypot(forward, left)
+    share = min(rules.speed_m_s / speed, 1.0) if speed else 1.0
+    return forward * share, left * share, min(max(turning, -rules.turn_rad_s), rules.turn_rad_s)
+
+
+def is_finite(twist: Twist) -> bool:
+    """Return whether all numbers of a velocity are finite."""
+    return all(map(math.isfinite, twist))
+
+
+def _bumper(situation: Situation, rules: SafetyRules) -> StopCause | None:
+    del rules
+    if not situation.bumped:
+        return None
+    return StopCause(BUMPER, "the bumper touches something; free the robot", stops=True)
+
+
+def _lost(situation: Situation, rules: SafetyRules) -> StopCause | None:
+    if situation.readings_age_s <= rules.lost_s:
+        return None
+    fact = f"no readings for {rules.lost_s:g} s; check the network between this computer and the robot"
+    return StopCause("connection lost", fact, stops=True)
+
+
+def _fence(situation: Situation, rules: SafetyRules) -> StopCause | None:
+    if rules.fence is None or situation.pose is None:
+        return None
+    margin_m = rules.odometry_error * situation.driven_m
+    margin_m += _REACTION_S * math.hypot(situation.velocity[0], situation.velocity[1])
+    if rules.fence.gap_m(situation.pose) > margin_m:
+        return None
+    at = f"({situation.pose.x_m:.2f}, {situation.pose.y_m:.2f})"
+    fact = f"the robot at {at} is within {margin_m:.2f} m of the fence; move it back, or widen --fence"
+    return StopCause("fence", fact, stops=True)
+
+
+def _foreign(situation: Situation, rules: SafetyRules) -> StopCause | None:
+    del rules
+    moving = any(abs(part) > most for part, most in zip(situation.velocity, _MOVING, strict=True))
+    if not moving or situation.rested_s <= _SETTLED_S:
+        return None
+    return StopCause(
+        "another client", "moves without a command of this program; end the other client", stops=True
+    )
+
+
+def _not_permitted(situation: Situation, rules: SafetyRules) -> StopCause | None:
+    del rules
+    return None if situation.permitted else StopCause("released", "hold the key to drive", stops=False)
+
+
+def _stale(situation: Situation, rules: SafetyRules) -> StopCause | None:
+    if situation.readings_age_s <= rules.stale_s:
+        return None
+    return StopCause("stale readings", f"the readings are older than {rules.stale_s:g} s", stops=False)
+
+
+def _silent(situation: Situation, rules: SafetyRules) -> StopCause | None:
+    if situation.command is None or situation.silent_s <= rules.silence_s:
+        return None
+    return StopCause(SILENCE, f"the policy computes for more than {rules.silence_s:g} s", stops=False)
+
+
+CHECKS: Final[tuple[Check, ...]] = (_bumper, _lost, _fence, _foreign, _not_permitted, _stale, _silent)
