@@ -4,6 +4,7 @@ The mock robot runs in real time, because a faster one would measure this machin
 """
 
 import contextlib
+import re
 import signal
 import subprocess
 import sys
@@ -12,7 +13,7 @@ from pathlib import Path
 from tests.mock_robots import Cable, ended, started
 
 DRIVING = Path(__file__).parent / "integration" / "real_robots" / "driving.py"
-LIMITS_S = {"kill": 0.35, "cut": 0.35, "hang": 0.6}
+LIMITS_S = {"kill": 0.35, "cut": 0.35, "hang": 0.6, "kill, over ros1": 0.4, "hang, over ros1": 0.6}
 
 
 def standing_s(client, begin_s=0.0, *, commands=True):
@@ -51,17 +52,46 @@ def driver(url, speed=1.0, then="go"):
 def after(what):
     """Return the robot's seconds from its last command, or from the last action, until it stands.
 
-    `what` is `kill`, `cut` or `hang`.
+    `what` is one of `LIMITS_S`.
     """
-    robot, client = started("--drift=0")
+    with (
+        robot(over_ros="ros" in what) as (address, client, cut),
+        driver(address, then="hang" if "hang" in what else "go") as program,
+    ):
+        if "hang" in what:
+            return standing_s(client, client.get("/mock/truth")["time_s"], commands=False)
+        if "cut" in what:
+            cut()
+        else:
+            program.send_signal(signal.SIGKILL)
+        return standing_s(client)
+
+
+@contextlib.contextmanager
+def robot(*, over_ros):
+    """Yield the address of a mock robot, a client that sees its truth, and a function that cuts its network.
+
+    The network of a robot with the ROS driver cannot be cut, because nodes of ROS name their own addresses.
+    """
+    with contextlib.ExitStack() as stack:
+        master = stack.enter_context(ros_master()) if over_ros else None
+        options = ("--ros1", "--max-speed=0.5") if over_ros else ()
+        process, client = started("--drift=0", *options, **({"ROS_MASTER_URI": master} if master else {}))
+        stack.callback(ended, process, client)
+        if master is not None:
+            yield master.replace("http://", "ros1://").rstrip("/"), client, None
+        else:
+            cable = stack.enter_context(Cable(client))
+            yield cable.url, client, cable.cut
+
+
+@contextlib.contextmanager
+def ros_master():
+    """Yield the address of a new ROS master."""
+    program = [sys.executable, "-m", "palaestra_trainer.ros_master", "--listen", "127.0.0.1:0"]
+    master = subprocess.Popen(program, stdout=subprocess.PIPE, text=True)
     try:
-        with Cable(client) as cable, driver(cable.url, then="hang" if what == "hang" else "go") as program:
-            if what == "hang":
-                return standing_s(client, client.get("/mock/truth")["time_s"], commands=False)
-            if what == "cut":
-                cable.cut()
-            else:
-                program.send_signal(signal.SIGKILL)
-            return standing_s(client)
+        yield re.search(r"http://\S+", master.stdout.readline())[0]
     finally:
-        ended(robot, client)
+        master.kill()
+        master.communicate()

@@ -3,6 +3,7 @@
 import contextlib
 import http.client
 import json
+import os
 import socket
 import subprocess
 import sys
@@ -39,9 +40,13 @@ class Client:
         assert self.ask(method, path, body) == (200, None)
 
 
-def started(*options, program=PROGRAM):
-    """Return a process of the mock robot that is ready, and its client."""
-    process = subprocess.Popen((*program, *options), stdout=subprocess.PIPE, text=True)
+def started(*options, program=PROGRAM, **variables):
+    """Return a process of the mock robot that is ready, and its client.
+
+    `variables` are variables of its environment, in addition to those of this process.
+    """
+    environment = {**os.environ, **variables}
+    process = subprocess.Popen((*program, *options), stdout=subprocess.PIPE, text=True, env=environment)
     return process, Client(process.stdout.readline())
 
 
@@ -93,6 +98,8 @@ class Cable:
             while True:
                 near, _ = self._server.accept()
                 self._sockets.append(near)
+                if self._cut.is_set():
+                    continue
                 far = socket.create_connection(self._robot)
                 self._sockets.append(far)
                 for one, other in ((near, far), (far, near)):
@@ -104,4 +111,6 @@ class Cable:
             while data := source.recv(65_536):
                 if not self._cut.is_set():
                     sink.sendall(data)
-            sink.shutdown(socket.SHUT_WR)
+        if not self._cut.is_set():
+            with contextlib.suppress(OSError):
+                sink.shutdown(socket.SHUT_RDWR)

@@ -7,7 +7,10 @@ import onnx
 from onnx import TensorProto, helper, numpy_helper
 
 from palaestra_protocol.policy_package import MANIFEST, NETWORK, TRAINING, manifest_text
-from palaestra_trainer.job.configuration import dump, parse
+from palaestra_trainer.environments.data_sheet import environment_sheet, parts_of
+from palaestra_trainer.environments.make import make_environment
+from palaestra_trainer.job.configuration import Environment, dump, parse
+from palaestra_trainer.testing import fake_arena
 
 NUMBERS, TARGET = 16, (13, 14)  # numbers of the observation of MoveToTargetEnv, and those of the target
 
@@ -39,12 +42,15 @@ def write_package(folder, *, gain=1.0, robot="Robotino", period_s=0.192, options
     """Write a package whose policy drives to the target, and return its folder."""
     environment = {"id": "MoveToTargetEnv-v0", "options": {"actions": "continuous"} | (options or {})}
     simulators = [{"name": "collect-0", "group": "collect", "index": 0, "role": "Collect"}]
+    wanted = Environment(**environment)
+    arena = make_environment(wanted, *fake_arena())
+    sheet = environment_sheet(parts_of(arena.observation_space), arena.action_space, wanted)
     job = {"job": "linear", "environment": environment, "steps": 1, "simulators": simulators}
     files = {NETWORK: linear_network(gain), TRAINING: dump(parse(job)).encode()}
     about = {
         "job": "linear",
         "robot": {"class": robot, "period_s": period_s},
-        "policy": {"state_shape": None},
+        "policy": sheet,
     }
     folder.mkdir(parents=True)
     for name, content in files.items():

@@ -45,6 +45,7 @@ def install(wheels: list[Path], interpreter: Path, folder: Path, *, offline: boo
     Raises:
         Uncached: `offline` is true, and a package must be downloaded.
     """
+    wanted = [_with_training(wheel) for wheel in wheels]
     quiet = [_UV, "--quiet", *(["--offline"] if offline else [])]
     environment = ["--python", folder]
     subprocess.run(
@@ -52,7 +53,7 @@ def install(wheels: list[Path], interpreter: Path, folder: Path, *, offline: boo
     )
     done = subprocess.run(
         # Symbolic links need no disk space, and they work across file systems.
-        [*quiet, "pip", "install", "--link-mode", "symlink", *environment, *wheels],
+        [*quiet, "pip", "install", "--link-mode", "symlink", *environment, *wanted],
         capture_output=True,
         text=True,
         timeout=None if not offline else DEADLINE_S,
@@ -64,6 +65,13 @@ def install(wheels: list[Path], interpreter: Path, folder: Path, *, offline: boo
         raise RuntimeError(done.stderr)
     subprocess.run([*quiet, "pip", "check", *environment], check=True, timeout=DEADLINE_S)
     return folder / "bin"
+
+
+def _with_training(wheel: Path) -> str:
+    """Return the requirement of a wheel, with the libraries for training if it is that of the trainer."""
+    if wheel.name.startswith("palaestra_trainer"):
+        return f"palaestra-trainer[train] @ {wheel.as_uri()}"
+    return str(wheel)
 
 
 def cache() -> Path:

@@ -4,6 +4,7 @@ The policies are trained first, as a user trains them. The mock robot runs at 20
 the measurements of a stop, which run in real time. Run this part alone: a busy machine delays the requests.
 """
 
+import json
 import math
 import os
 import subprocess
@@ -15,12 +16,14 @@ import structlog
 
 from palaestra_trainer.deployment import checked_package
 from palaestra_trainer.real_robots.command_loop import Hooks
+from palaestra_trainer.real_robots.connect import link_to
 from palaestra_trainer.real_robots.rest import RestLink
 from palaestra_trainer.real_robots.robot_clock import RobotClock
 from palaestra_trainer.real_robots.robotino import RealRobotino
 from palaestra_trainer.real_robots.safety import SafetyRules
+from palaestra_trainer.real_robots.sensor_layout import SensorLayout
 from palaestra_trainer.robots.geometry import SPEED_M_S
-from tests.dead_man import LIMITS_S, after
+from tests.dead_man import LIMITS_S, after, ros_master
 from tests.mock_episodes import succeeded, tasks
 from tests.mock_robots import ended, started
 
@@ -32,7 +35,7 @@ BAD_NETWORK = ("--delay-ms=50", "--timeouts=0.05", "--drift=0.02")
 EXAMPLES = Path(__file__).parents[2] / "examples"
 MANIFESTS = Path(__file__).parents[2] / "manifests" / "examples"
 PROGRAMS = Path(sys.executable).parent
-OPEN_LOOP = ((0.3, 0.0, 0.0), (0.0, -0.2, 0.0), (0.2, 0.1, 0.3), (0.0, 0.0, -0.3), (-0.3, 0.0, 0.0))
+OPEN_LOOP = ((0.3, 0.0, 0.0), (0.0, -0.1, 0.0), (0.2, 0.1, 0.3), (0.0, 0.0, -0.3), (-0.3, 0.0, 0.0))
 
 
 def measure(scale):
@@ -45,6 +48,8 @@ def measure(scale):
     with tempfile.TemporaryDirectory() as folder:
         plain, robust = (trained(Path(folder), name) for name in ("move-to-target", "imprecise"))
         arrivals = {
+            "plain, over ros1": arrived_over_ros(plain, episodes),
+            **simulated(Path(folder) / "runs/move-to-target/0", episodes),
             "plain": arrived(plain, episodes, "--drift=0"),
             "plain, bad network": arrived(plain, episodes, *BAD_NETWORK, speed=SLOW_SPEED),
             "robust, bad network": arrived(robust, episodes, *BAD_NETWORK, speed=SLOW_SPEED),
@@ -63,7 +68,10 @@ def measure(scale):
             },
             "no false stop in an hour with 50 ms of delay": not false_stops,
             "open loop within 5 cm over 10 s": open_loop_m < 0.05,
-            "90 of 100 arrive": arrivals["plain"] >= 0.9 * episodes,
+            **{
+                f"90 of 100 arrive: {where}": arrivals[where] >= 0.9 * episodes
+                for where in ("plain", "plain, over ros1", "plain, in stub", "plain, in mujoco")
+            },
             "85 of 100 arrive over a bad network": arrivals["robust, bad network"] >= 0.85 * episodes,
         },
     }
@@ -96,13 +104,42 @@ def arrived(package, episodes, *options, speed=SPEED):
         ended(robot, client)
 
 
+def arrived_over_ros(package, episodes):
+    """Return in how many episodes the mock robot stands on its target if its ROS 1 driver drives it."""
+    with ros_master() as master:
+        options = ("--drift=0", "--ros1", "--max-speed=0.5", f"--speed={SLOW_SPEED:g}")
+        robot, client = started(*options, ROS_MASTER_URI=master)
+        address = master.replace("http://", "ros1://").rstrip("/")
+        try:
+            wanted = tasks(episodes, seed=7)
+            return sum(
+                succeeded(
+                    client,
+                    package,
+                    lambda clock: link_to(address, SensorLayout(), clock),
+                    SLOW_SPEED,
+                    wanted,
+                )
+            )
+        finally:
+            ended(robot, client)
+
+
+def simulated(run, episodes):
+    """Return in how many episodes the policy of a run arrives in the stub and in MuJoCo."""
+    command = [PROGRAMS / "palaestra-eval", run, "--in", "stub,mujoco", "--json", "--episodes", str(episodes)]
+    lines = subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()
+    results = map(json.loads, lines)
+    return {f"plain, in {one['simulator']}": round(one["success_rate"] * episodes) for one in results}
+
+
 def link_over_rest(client):
     """Return a function that returns a link to a mock robot with a clock."""
     return lambda clock: RestLink(f"http://{client.address}", clock=clock)
 
 
 def causes_of_an_hour(seconds):
-    """Drive to and fro with a delay of 50 ms; return how often each cause held the robot."""
+    """Turn to and fro, where nothing can be hit, with a delay of 50 ms; return how often each cause held."""
     counts, last = {}, [None]
 
     def decided(situation, decision):
@@ -120,7 +157,7 @@ def causes_of_an_hour(seconds):
         with RealRobotino(link, rules, clock=clock, hooks=Hooks(decided=decided)) as real:
             real.connect()
             for step in range(round(seconds / real.period_s)):
-                real.drive(0.3 if step % 20 < 10 else -0.3, 0.0, 0.0)
+                real.drive(0.0, 0.0, 0.5 if step % 20 < 10 else -0.5)
                 real.advance()
     finally:
         ended(robot, client)

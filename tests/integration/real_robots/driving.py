@@ -6,10 +6,11 @@ import threading
 import time
 
 from palaestra_trainer.real_robots.command_loop import Hooks
-from palaestra_trainer.real_robots.rest import RestLink
+from palaestra_trainer.real_robots.connect import link_to
 from palaestra_trainer.real_robots.robot_clock import RobotClock
 from palaestra_trainer.real_robots.robotino import RealRobotino
 from palaestra_trainer.real_robots.safety import SafetyRules
+from palaestra_trainer.real_robots.sensor_layout import SensorLayout
 from palaestra_trainer.run.signals import Interruption
 
 
@@ -19,7 +20,7 @@ def main():
     clock = RobotClock(speed)
     with Interruption() as interruption:
         hooks = Hooks(check=interruption.check)
-        link = RestLink(address, clock=clock)
+        link = link_to(address, SensorLayout(), clock)
         with RealRobotino(link, SafetyRules(speed_m_s=0.5), clock=clock, hooks=hooks) as robot:
             robot.connect()
             for step in range(10_000):

@@ -95,10 +95,10 @@ def test_the_record_has_poses_commands_and_readings(deploy, tmp_path):
 
     assert sorted(topics) == [
         "/bumper",
-        "/cmd_vel",
         "/distance_sensors",
         "/odom",
         "/palaestra/action",
+        "/palaestra/cmd_vel",
         "/palaestra/decisions",
         "/palaestra/observation",
         "/target",
@@ -169,6 +169,7 @@ def test_a_robot_at_its_charger_is_refused_and_leaves_no_record(deploy, mock, tm
         ({"robot": {"class": "Robotino", "period_s": 9.0}}, "the policy acts every 9 s"),
         ({"robot": None}, "robot: None names no class and period_s"),
         ({"files": []}, "does not list policy.onnx"),
+        ({"policy": {}}, "its observations differ from those that the policy learned with"),
     ],
 )
 def test_a_package_that_cannot_drive_the_robot_is_refused(deploy, package, fields, message):
@@ -178,6 +179,21 @@ def test_a_package_that_cannot_drive_the_robot_is_refused(deploy, package, field
 
     assert done.returncode == 2
     assert message in done.stderr
+
+
+def test_ctrl_c_at_the_question_ends_the_program(mock, package, tmp_path):
+    """A person who has changed their mind must not have to answer."""
+    before = mock.get("/mock/truth")["commands"]
+    command = [sys.executable, "-c", LEAN, package, f"--robot=http://{mock.address}", "--target=1,0"]
+    command += ["--no-hold", f"--mock-speed={SPEED:g}", f"--log={tmp_path / 'log.mcap'}"]
+    streams = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
+    with subprocess.Popen(command, **streams) as program:
+        os.set_blocking(program.stdout.fileno(), False)
+        eventually(lambda: b"Type yes:" in (program.stdout.read() or b""))
+        program.send_signal(signal.SIGINT)
+
+        assert program.wait(DEADLINE_S) == 130
+    assert mock.get("/mock/truth")["commands"] == before
 
 
 def test_a_safety_rule_ends_the_deployment(deploy, mock, tmp_path):

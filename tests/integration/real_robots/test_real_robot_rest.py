@@ -3,9 +3,10 @@
 import math
 import signal
 
+import numpy as np
 import pytest
 
-from palaestra_trainer.errors import RobotStopped, RobotUnfit
+from palaestra_trainer.errors import ConfigurationError, RobotStopped, RobotUnfit
 from palaestra_trainer.real_robots.command_loop import Hooks
 from palaestra_trainer.real_robots.rest import RestLink
 from palaestra_trainer.real_robots.robot_clock import RobotClock
@@ -71,7 +72,7 @@ def test_the_real_robot_keeps_the_rules_of_every_robot(robot):
 def test_odometry_is_shifted_to_where_the_person_placed_the_robot(robot, mock):
     """Odometry begins anywhere, and REST has no request that resets it."""
     real = robot()
-    real.stand_at(Pose(1.0, 2.0, math.pi / 2.0), placed=True)
+    real.stand_at(Pose(1.0, 2.0, math.pi / 2.0))
     drive(real, (0.5, 0.0, 0.0), 5)
     real.stand()
     real.advance()
@@ -161,6 +162,86 @@ def test_a_robot_without_a_connection_is_lost(robot, mock):
             drive(real, (0.2, 0.0, 0.0), 40)
 
 
+def test_a_short_bump_ends_the_episode_too(robot, mock):
+    """The bumper may be released again before the policy looks, and the robot stays stopped."""
+    real = robot()
+    drive(real, (0.2, 0.0, 0.0), 1)
+    mock.send("/mock/place", [1.76, 0, 0])
+    eventually(lambda: mock.get("/mock/truth")["contacts"] and real.advance() is not None and real.bumped())
+    mock.send("/mock/place", [0, 0, 0])
+    drive(real, (0.2, 0.0, 0.0), 3)
+
+    assert real.bumped()
+    assert mock.get("/mock/truth")["vx"] == 0.0
+
+
+def test_the_numbers_of_a_policy_may_be_those_of_numpy(robot, mock):
+    """An environment of a user passes the numbers of an action as they are."""
+    drive(robot(), np.array([0.2, 0.0, 0.0], np.float32), 3)
+
+    assert mock.get("/mock/truth")["vx"] == pytest.approx(0.2)
+
+
+def test_an_error_in_the_thread_of_the_commands_reaches_the_program(robot, mock):
+    """Otherwise the policy would drive a robot that stands, until its time is up."""
+
+    def decided(situation, decision):
+        del decision
+        if situation.command is not None:
+            raise ZeroDivisionError
+
+    real = robot(hooks=Hooks(decided=decided))
+    with pytest.raises(RobotStopped, match="internal error: ZeroDivisionError"):
+        drive(real, (0.2, 0.0, 0.0), 5)
+
+    assert mock.get("/mock/truth")["vx"] == 0.0
+
+
+def test_after_a_pause_the_policy_looks_before_the_robot_moves(robot):
+    """The command of before the pause was made for another view."""
+    permitted, sent = [True], []
+
+    def decided(situation, decision):
+        del situation
+        sent.append(decision.twist[0])
+
+    real = robot(hooks=Hooks(permitted=lambda: permitted[0], decided=decided))
+    drive(real, (0.2, 0.0, 0.0), 2)
+    permitted[0] = False
+    eventually(lambda: sent[-3:] == [0.0] * 3, pace_s=0.001)
+    permitted[0] = True
+    count = len(sent)
+    eventually(lambda: len(sent) > count + 5, pace_s=0.001)
+
+    assert not any(sent[count:])
+
+
+def test_a_new_episode_begins_where_odometry_says(robot, mock):
+    """The robot may have rolled on after the last step, or was pushed."""
+    real = robot()
+    drive(real, (0.5, 0.0, 0.0), 3)
+    real.begin()
+
+    assert real.pose().x_m == pytest.approx(mock.get("/mock/truth")["x"], abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    "address",
+    ["http://robot/?x=1", "http://me@robot", "https://robot", "robot", "http://robot/api", "http://[::"],
+)
+def test_an_address_that_is_more_than_a_host_is_refused(address):
+    """A request would go to another path than that of a Robotino."""
+    with pytest.raises(ConfigurationError, match="is not an address such as"):
+        RestLink(address)
+
+
+@pytest.mark.parametrize("host", ["999.1.1.1", "a..b", "no-such-host.invalid"])
+def test_a_name_without_an_address_is_refused(host):
+    """The name is looked up once, before the robot moves."""
+    with pytest.raises(RobotUnfit, match="has no address"):
+        RealRobotino(RestLink(f"http://{host}")).connect()
+
+
 def test_an_address_without_a_robot_is_refused():
     """The usual mistake is the address of another computer."""
     with pytest.raises(RobotUnfit, match="check the address, and that the robot is switched on"):
@@ -184,7 +265,7 @@ def test_an_error_of_the_policy_commands_the_robot_to_stand(mock):
         assert mock.get("/mock/truth")["vx"] == 0.0
 
 
-@pytest.mark.parametrize("what", LIMITS_S)
+@pytest.mark.parametrize("what", ["kill", "cut", "hang"])
 def test_the_robot_stands_soon_after(what):
     """A killed program and a cut cable leave only the robot's dead man; a hung policy leaves our watchdog."""
     assert after(what) < LIMITS_S[what]

@@ -137,7 +137,7 @@ def test_the_robot_keeps_the_rules_of_every_robot_over_ros(robot, mock):
 def test_the_robot_drives_forward_and_stands_after_the_end(robot, mock):
     """The end of the context commands zero, and the topic of commands is unregistered."""
     with robot() as real_robot:
-        real_robot.stand_at(Pose(1.0, 2.0, 0.0), placed=True)
+        real_robot.stand_at(Pose(1.0, 2.0, 0.0))
         drive(real_robot, (0.5, 0.0, 0.0), 5)
         real_robot.stand()
         real_robot.advance()
@@ -208,10 +208,12 @@ def test_a_limit_that_nobody_has_set_is_the_drivers_default(master, slow):
     with xmlrpc.client.ServerProxy(master) as server:
         server.deleteParam("/test", "/lab/slow/robotino_node/max_linear_vel")
     link = Ros1Link(address(master, "/lab/slow"))
-    link.refuse_unfit(0.2)
+    link.refuse_unfit(0.2, 1.0)
 
     with pytest.raises(RobotUnfit, match=r"max_linear_vel is 0\.2 m/s by default, below 0\.3 m/s"):
-        link.refuse_unfit(0.3)
+        link.refuse_unfit(0.3, 1.0)
+    with pytest.raises(RobotUnfit, match=r"max_angular_vel is 1\.0 rad/s.*, below 2 rad/s"):
+        link.refuse_unfit(0.2, 2.0)
 
 
 def test_without_a_master_the_robot_is_refused():

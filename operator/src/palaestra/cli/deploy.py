@@ -1,9 +1,10 @@
 """`palaestra deploy`: drive a real robot with a policy package."""
 
 import argparse
+import os
 
 from palaestra.cli.subcommands import Commands, command
-from palaestra.local.trainer_program import run_program
+from palaestra.local.trainer_program import require_program
 
 PROGRAM = "palaestra-deploy"
 DEPLOY = """\
@@ -29,4 +30,5 @@ def add(commands: Commands) -> None:
 
 
 def _deploy(options: argparse.Namespace) -> int:
-    return run_program([PROGRAM, *options.arguments], reads_keys=True)
+    # The program replaces this one: a stop by Ctrl-Z must reach the process that commands the robot.
+    os.execv(require_program(PROGRAM), [PROGRAM, *options.arguments])

@@ -7,6 +7,7 @@ program; a second Ctrl-C kills the program. All processes of the program end wit
 from __future__ import annotations
 
 import asyncio
+import shutil
 import signal
 import subprocess
 import sys
@@ -15,7 +16,7 @@ from collections.abc import Mapping, Sequence
 
 from palaestra.local.errors import KILLED, RunRefused
 from palaestra.local.interrupt import Interrupt
-from palaestra.local.process import OrphanKiller, Process, marked
+from palaestra.local.process import OrphanKiller, Process, marked, program_path
 from palaestra.local.simulators import lack
 
 
@@ -32,9 +33,19 @@ def run_program(
     Raises:
         RunRefused: the program is not installed here.
     """
-    if (problem := lack(command[0])) is not None:
-        raise RunRefused(f"{problem}: it is a program of the package palaestra-trainer")
+    require_program(command[0])
     return asyncio.run(_run(command, env or {}, sys.stdin.fileno() if reads_keys else subprocess.DEVNULL))
+
+
+def require_program(name: str) -> str:
+    """Return the path of a program of palaestra-trainer that is installed here.
+
+    Raises:
+        RunRefused: the program is not installed here.
+    """
+    if (problem := lack(name)) is not None:
+        raise RunRefused(f"{problem}: it is a program of the package palaestra-trainer")
+    return shutil.which(name, path=program_path()) or name
 
 
 class _Program:

@@ -22,8 +22,9 @@ def body(content):
 
 def test_odometry_has_pose_and_velocity():
     """The documented order is x, y, rotation, vx, vy, omega, number; a rotation may exceed a turn."""
-    found = odometry_of(body([1.0, -2.0, 3.5 * math.pi, 0.1, 0.2, 0.3, 17]))
+    number, found = odometry_of(body([1.0, -2.0, 3.5 * math.pi, 0.1, 0.2, 0.3, 17]))
 
+    assert number == 17
     assert found.pose == Pose(1.0, -2.0, pytest.approx(-0.5 * math.pi))
     assert found.velocity == (0.1, 0.2, 0.3)
 
@@ -78,6 +79,9 @@ def test_external_power_counts_as_charging(power, charging):
         (odometry_of, body([1, 2, 3, 4, 5, 6, None])),
         (odometry_of, b"[NaN,0,0,0,0,0,0]"),
         (odometry_of, body([True, 0, 0, 0, 0, 0, 0])),
+        (odometry_of, body([10**400, 0, 0, 0, 0, 0, 0])),
+        (odometry_of, body([0, 0, 0, 1.5e308, 1.5e308, 0, 0])),
+        (odometry_of, b"[" * 60_000),
         (lambda text: distances_of(text, LAYOUT), body([0.1] * 8)),
         (lambda text: distances_of(text, LAYOUT), body({"value": 1})),
         (bumped_of, body({"value": 1})),

@@ -15,6 +15,7 @@ from palaestra_trainer.real_robots.safety import (
     Situation,
     decide,
     is_finite,
+    is_motion,
     limited,
 )
 from palaestra_trainer.robots.geometry import Pose
@@ -26,11 +27,14 @@ DRIVING = Situation(
     silent_s=0.01,
     permitted=True,
     readings_age_s=0.05,
+    unconfirmed_s=0.05,
+    asleep_s=0.05,
     bumped=False,
     pose=Pose(0.0, 0.0, 0.0),
     velocity=(0.2, 0.0, 0.0),
     driven_m=1.0,
     rested_s=0.0,
+    pushing_s=0.0,
 )
 # Each row: what differs from DRIVING, the cause, and whether the robot stays stopped.
 CAUSES = [
@@ -40,6 +44,9 @@ CAUSES = [
     ({"pose": Pose(1.75, 0.0, 0.0)}, "fence", True),
     ({"pose": Pose(0.0, -3.0, 0.0)}, "fence", True),
     ({"rested_s": 1.1}, "another client", True),
+    ({"unconfirmed_s": 2.1}, "commands refused", True),
+    ({"asleep_s": 2.1}, "suspended", True),
+    ({"pushing_s": 1.1}, "no effect", True),
     ({"permitted": False}, "released", False),
     ({"readings_age_s": 0.31}, "stale readings", False),
     ({"silent_s": 0.21}, "silent policy", False),
@@ -78,6 +85,23 @@ def test_the_fence_is_closer_after_a_long_way():
 
     assert decide(at, RULES).cause is None
     assert decide(replace(at, driven_m=10.0), RULES).cause.name == "fence"
+
+
+def test_the_fence_is_closer_for_old_readings_and_fast_commands():
+    """While a reading is old, the robot drives on, at the speed that was commanded."""
+    at = replace(DRIVING, pose=Pose(1.68, 0.0, 0.0), driven_m=0.0, velocity=(0.0, 0.0, 0.0))
+
+    assert decide(at, RULES).cause is None
+    assert decide(replace(at, readings_age_s=0.29), RULES).cause.name == "fence"
+    assert decide(at, replace(RULES, speed_m_s=0.5)).cause.name == "fence"
+
+
+@pytest.mark.parametrize(
+    ("twist", "moves"), [((0.06, 0.0, 0.0), True), ((0.03, 0.03, 0.0), False), ((0.0, 0.0, -0.2), True)]
+)
+def test_a_command_below_the_least_speed_of_a_robotino_is_no_motion(twist, moves):
+    """Near its target a policy commands less than the motors can do, and the robot rightly stands."""
+    assert is_motion(twist) is moves
 
 
 def test_without_a_fence_the_robot_may_go_anywhere():

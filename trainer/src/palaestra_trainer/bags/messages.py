@@ -47,7 +47,7 @@ def odometry(stamp_s: float, pose: Pose, velocity: Velocity | None, frame: str =
     of its covariance is -1.
     """
     return {
-        "header": _header(stamp_s, frame),
+        "header": header(stamp_s, frame),
         "child_frame_id": BASE,
         "pose": {"pose": _pose(pose), "covariance": _COVARIANCE},
         "twist": {
@@ -78,7 +78,7 @@ def ranges(stamp_s: float, distances_m: Sequence[float], within_m: tuple[float, 
     low, high = within_m
     step = 2.0 * math.pi / len(distances_m)
     return {
-        "header": _header(stamp_s, BASE),
+        "header": header(stamp_s, BASE),
         "angle_min": 0.0,
         "angle_max": step * (len(distances_m) - 1),
         "angle_increment": step,
@@ -105,14 +105,14 @@ def numbers(values: Sequence[float], label: str) -> Content:
 
 def target(stamp_s: float, x_m: float, y_m: float, frame: str = ODOM) -> Content:
     """Return a PoseStamped of a target, which has no heading: its orientation is the frame's."""
-    return {"header": _header(stamp_s, frame), "pose": _pose((x_m, y_m, 0.0))}
+    return {"header": header(stamp_s, frame), "pose": _pose((x_m, y_m, 0.0))}
 
 
 def transform(stamp_s: float, pose: Pose, frame: str = ODOM) -> Content:
     """Return a TFMessage with the transform from `frame` to `base_link`."""
     x_m, y_m, heading = pose
     stamped = {
-        "header": _header(stamp_s, frame),
+        "header": header(stamp_s, frame),
         "child_frame_id": BASE,
         "transform": {"translation": _vector(x_m, y_m, 0.0), "rotation": _quaternion(heading)},
     }
@@ -129,7 +129,8 @@ def record(fields: Mapping[str, object]) -> Content:
     return {"data": json.dumps(dict(fields), separators=(",", ":"), allow_nan=False)}
 
 
-def _header(stamp_s: float, frame: str) -> Content:
+def header(stamp_s: float, frame: str) -> Content:
+    """Return a Header."""
     sec, nanosec = divmod(nanoseconds(stamp_s), _NS)
     return {"stamp": {"sec": sec, "nanosec": nanosec}, "frame_id": frame}
 

@@ -80,28 +80,30 @@ def _drive(options: argparse.Namespace, interruption: Interruption) -> int:
     from palaestra_trainer.real_robots.robotino import RealRobotino
 
     package = checked_package.read(options.package)
+    rules = _rules(options)
+    terminal = Terminal(None if options.no_hold or options.dry_run else HoldKey())
     clock = RobotClock(options.mock_speed)
     link = link_to(options.robot, SensorLayout(order=options.sensor_order, unit=options.sensor_unit), clock)
     path = options.log or Path(time.strftime("deployment-%Y%m%d-%H%M%S.mcap"))
     record = DeploymentRecord(path, {"package": str(options.package), "robot": options.robot})
-    terminal = Terminal(None if options.no_hold or options.dry_run else HoldKey())
     with ExitStack() as stack:
         hooks = Hooks(permitted=terminal.permits, decided=record.decided, check=interruption.check)
-        robot = RealRobotino(link, _rules(options), package.period_s, clock, hooks)
+        robot = RealRobotino(link, rules, package.period_s, clock, hooks)
         stack.enter_context(robot)
         robot.connect(muted=True)
         stack.enter_context(record)
         stack.callback(robot.close)  # the record also has how the robot stops
-        robot.stand_at(options.start, placed=True)
+        robot.stand_at(options.start)
         deployment = Deployment(package, robot, record, terminal.show)
         targets: list[Point | None] = list(options.target) or [None]
         deployment.rehearse(targets[0])
         terminal.end_line()
         if options.dry_run:
             return ExitCode.DONE
-        if not options.yes and not terminal.confirms(options.robot):
+        if not options.yes and not terminal.confirms(options.robot, interruption.check):
             return STOPPED
         stack.enter_context(terminal.holding())
+        stack.callback(robot.close)  # before the terminal is restored, which may wait
         robot.unmute()
         return _drive_all(deployment, targets, terminal)
 
@@ -165,7 +167,7 @@ def arguments_parser() -> argparse.ArgumentParser:
     return options
 
 
-_ROBOT = "http://HOST of the robot, or ros1://HOST:PORT[/NAMESPACE] of the ROS master with robotino_node"
+_ROBOT = "http://HOST of the robot, ros1://HOST:PORT[/NAMESPACE] of its ROS master, or ros2:[/NAMESPACE]"
 _TARGET = "target of an episode in m; repeatable: each further episode begins where the one before ended"
 _START = "where the robot stands, in m and rad of the task's frame (default: 0,0,0)"
 _FENCE = "least x and y, then greatest, in m: the robot stays inside (default: 1 m around start and targets)"

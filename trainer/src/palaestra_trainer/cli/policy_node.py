@@ -17,7 +17,7 @@ import_without("rich", "structlog")
 
 from palaestra_protocol.pod.status import ExitCode
 from palaestra_trainer.cli.program import leaving, parser, refuse_without_run
-from palaestra_trainer.errors import ConfigurationError, NoReading, RobotUnfit, TrainerError
+from palaestra_trainer.errors import ConfigurationError, RobotUnfit, TrainerError
 from palaestra_trainer.real_robots.robot_clock import RobotClock
 from palaestra_trainer.real_robots.ros2_clock import SimulationClock, SimulationTime
 from palaestra_trainer.real_robots.safety import Fence, SafetyRules
@@ -119,7 +119,7 @@ def _serve(folder: Path, ros_arguments: Sequence[str], interruption: Interruptio
         deployment = Deployment(package, robot, DeploymentRecord(Path(), {}), node.ros.get_logger().debug)
         _subscribe(node, link, goals, rules.fence)
         say(f"ready; waiting for a goal on {node.ros.resolve_topic_name('goal_pose')}")
-        driver = GoalDriver(robot, quiet, deployment, goals, lambda: _reported(link))
+        driver = GoalDriver(robot, quiet, deployment, goals)
         driver.run(interruption.check, say, warn)
 
 
@@ -193,12 +193,6 @@ def _subscribe(node: Ros2Node, link: Ros2Link, goals: Goals, fence: Fence | None
     qos = require("rclpy.qos")
     reliable = qos.QoSProfile(depth=1, reliability=qos.ReliabilityPolicy.RELIABLE)
     node.ros.create_subscription(require("geometry_msgs.msg").PoseStamped, "goal_pose", take, reliable)
-
-
-def _reported(link: Ros2Link) -> Pose:
-    if link.odometry is None:
-        raise NoReading("odometry has not arrived")
-    return link.odometry.pose
 
 
 def _parser() -> argparse.ArgumentParser:

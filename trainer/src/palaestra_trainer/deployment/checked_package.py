@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+import gymnasium
+
 from palaestra_protocol.policy_package import MANIFEST, NETWORK, TRAINING, PackageError, read_package
 from palaestra_trainer.deployment.onnx_policy import OnnxPolicy
+from palaestra_trainer.environments.data_sheet import environment_sheet, parts_of
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.job.configuration import Environment, load
 
@@ -30,6 +34,23 @@ class CheckedPackage:
     environment: Environment
     period_s: float
     manifest: dict[str, Any]
+
+    def refuse_other(self, env: gymnasium.Env[Any, Any]) -> None:
+        """Refuse an environment whose numbers differ from those that the policy learned with.
+
+        Another release, or another version of a user's module, may order or scale them otherwise.
+
+        Raises:
+            ConfigurationError: a space or a table of the data sheet differs.
+        """
+        made = environment_sheet(parts_of(env.observation_space), env.action_space, self.environment)
+        sheet = self.manifest.get("policy") or {}
+        for part, found in json.loads(json.dumps(made)).items():
+            if sheet.get(part) != found:
+                raise ConfigurationError(
+                    f"{self.environment.id}: its {part} differ from those that the policy learned with; "
+                    "deploy with the release and the modules of the training, or train and export again"
+                )
 
 
 def read(folder: Path) -> CheckedPackage:

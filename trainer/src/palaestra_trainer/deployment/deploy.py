@@ -45,7 +45,7 @@ class Deployment:
         show: shows a line of status, which the next line may replace.
 
     Raises:
-        ConfigurationError: the environment cannot be made for this robot.
+        ConfigurationError: the environment cannot be made, or differs from that of the training.
     """
 
     def __init__(
@@ -57,6 +57,7 @@ class Deployment:
         self._show = show
         self._scene = RealScene(robot, _refuse_to_carry)
         self._env = make_environment(package.environment, robot, self._scene)
+        package.refuse_other(self._env)
 
     def rehearse(self, target: Point | None) -> None:
         """Let the policy act on live readings for some steps, while a muted robot gets no command."""
@@ -93,6 +94,7 @@ class Deployment:
         return end
 
     def _begin(self, target: Point | None) -> Any:
+        self._robot.stand()
         pose = self._robot.pose()
         options: dict[str, Any] = {"start": (pose.x_m, pose.y_m, pose.heading_rad)}
         if target is not None:

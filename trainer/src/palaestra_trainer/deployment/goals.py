@@ -9,6 +9,7 @@ from typing import Final
 
 from palaestra_trainer.deployment.deploy import Deployment
 from palaestra_trainer.errors import ConfigurationError, RobotStopped, TrainerError
+from palaestra_trainer.real_robots.frames import OdometryFrame
 from palaestra_trainer.real_robots.link import RobotLink
 from palaestra_trainer.real_robots.readings import ReadingStore
 from palaestra_trainer.real_robots.robotino import RealRobotino
@@ -16,6 +17,7 @@ from palaestra_trainer.robots.geometry import Point, Pose, Twist
 from palaestra_trainer.waiting.check import Check
 
 _LOOK_S: Final = 0.05
+_OF_ODOMETRY: Final = OdometryFrame(Pose(0.0, 0.0, 0.0))  # the frame of the goals
 Say = Callable[[str], object]
 
 
@@ -69,9 +71,9 @@ class QuietLink:
         self.quiet = True
         self._link = link
 
-    def refuse_unfit(self, speed_m_s: float) -> None:
+    def refuse_unfit(self, speed_m_s: float, turn_rad_s: float) -> None:
         """Refuse a robot that must not be driven."""
-        self._link.refuse_unfit(speed_m_s)
+        self._link.refuse_unfit(speed_m_s, turn_rad_s)
 
     def start(self, store: ReadingStore) -> None:
         """Begin to put readings into `store`."""
@@ -95,7 +97,6 @@ class GoalDriver:
         link: its connection.
         deployment: the policy on this robot.
         goals: the goals.
-        reported: returns the pose by odometry, in the frame of odometry.
     """
 
     def __init__(
@@ -104,13 +105,11 @@ class GoalDriver:
         link: QuietLink,
         deployment: Deployment,
         goals: Goals,
-        reported: Callable[[], Pose],
     ) -> None:
         self._robot = robot
         self._link = link
         self._deployment = deployment
         self._goals = goals
-        self._reported = reported
 
     def run(self, check: Check, say: Say, warn: Say) -> None:
         """Drive to each goal that arrives, until `check` raises.
@@ -138,8 +137,7 @@ class GoalDriver:
             NewGoal: the robot's check found a newer goal.
         """
         self._link.quiet = False
-        # The frame of the task is that of odometry, in which the goals are.
-        self._robot.stand_at(self._reported(), placed=False)
+        self._robot.begin(_OF_ODOMETRY)
         end = self._deployment.drive(goal)
         return f"{end.outcome} after {end.steps} steps"
 

@@ -84,7 +84,7 @@ class DeploymentRecord:
     def decided(self, situation: Situation, decision: SafetyDecision) -> None:
         """Record a decision of the command loop, with the odometry that it depended on."""
         now_s = time.time()
-        self._put("/cmd_vel", TWIST, messages.twist(decision.twist), now_s)
+        self._put("/palaestra/cmd_vel", TWIST, messages.twist(decision.twist), now_s)
         if situation.pose is not None:
             pose = (situation.pose.x_m, situation.pose.y_m, situation.pose.heading_rad)
             odometry = messages.odometry(now_s, pose, situation.velocity)

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import select
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Final
 
 from palaestra_trainer.deployment.hold_key import HoldKey
+from palaestra_trainer.waiting.check import Check
+
+_LOOK_S: Final = 0.1
 
 
 class Terminal:
@@ -48,10 +53,17 @@ class Terminal:
             self._write("\n")
             self._open = False
 
-    def confirms(self, robot: str) -> bool:
-        """Ask the person whether the robot may drive, and return the decision."""
+    def confirms(self, robot: str, check: Check) -> bool:
+        """Ask the person whether the robot may drive, and return the decision.
+
+        `check` is called often during the wait, and may raise to end it.
+        """
         self._write(f"drive {robot}? Its emergency stop must be in reach. Type yes: ")
-        return sys.stdin.readline().strip() == "yes"
+        while not select.select([sys.stdin], [], [], _LOOK_S)[0]:
+            check()
+        confirmed = sys.stdin.readline().strip() == "yes"
+        check()
+        return confirmed
 
     def _write(self, text: str) -> None:
         sys.stdout.write(text)

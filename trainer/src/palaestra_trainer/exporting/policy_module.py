@@ -16,11 +16,11 @@ from gymnasium import spaces
 from stable_baselines3.common.preprocessing import is_image_space, is_image_space_channels_first
 from torch import nn
 
+from palaestra_trainer.environments.data_sheet import OBSERVATION, parts_of
 from palaestra_trainer.environments.masks import ACTION_MASKS, choices_of
 from palaestra_trainer.errors import ExportError
 from palaestra_trainer.run.policies import TrainedPolicy
 
-OBSERVATION = "observation"
 STATE = ("hidden", "cell")  # the state of a recurrent policy; shape (layers, observations, units)
 
 
@@ -174,11 +174,6 @@ class Scoring(PolicyModule):
         one = found[0] if isinstance(found, tuple) else found
         made = one.distributions if hasattr(one, "distributions") else one.distribution
         return (torch.cat([part.logits for part in made], dim=1) if isinstance(made, list) else made.logits,)
-
-
-def parts_of(space: spaces.Space[Any]) -> dict[str, spaces.Space[Any]]:
-    """Return the space of each key of a Dict, in the order of the keys; any other space is the only part."""
-    return dict(space.spaces) if isinstance(space, spaces.Dict) else {OBSERVATION: space}
 
 
 def as_returned(space: spaces.Space[Any]) -> spaces.Space[Any]:

@@ -9,8 +9,9 @@ import numpy as np
 import torch
 from gymnasium import spaces
 
+from palaestra_trainer.environments.data_sheet import OBSERVATION
 from palaestra_trainer.errors import ExportError
-from palaestra_trainer.exporting.policy_module import OBSERVATION, PolicyModule, Scoring
+from palaestra_trainer.exporting.policy_module import PolicyModule, Scoring
 from palaestra_trainer.exporting.sample_observations import EPISODE, drawn, drawn_masks, magnitudes
 from palaestra_trainer.run.policies import TrainedPolicy
 

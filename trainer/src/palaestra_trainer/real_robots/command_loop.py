@@ -6,6 +6,7 @@ no command is sent, and the robot's own dead man stops it.
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,15 +17,18 @@ import structlog
 from palaestra_trainer.errors import LinkError
 from palaestra_trainer.real_robots.frames import OdometryFrame
 from palaestra_trainer.real_robots.link import RobotLink
-from palaestra_trainer.real_robots.readings import ReadingStore
+from palaestra_trainer.real_robots.readings import Readings, ReadingStore
 from palaestra_trainer.real_robots.robot_clock import RobotClock
 from palaestra_trainer.real_robots.safety import (
+    SILENCE,
     STANDING,
     SafetyDecision,
     SafetyRules,
     Situation,
     StopCause,
     decide,
+    is_motion,
+    stands,
 )
 from palaestra_trainer.robots.geometry import Pose, Twist
 from palaestra_trainer.waiting.check import Check, go_on
@@ -34,6 +38,7 @@ log = structlog.get_logger(__name__)
 PERIOD_S: Final = 0.05
 _END_S: Final = 0.5  # at the end, zero is sent at least this long, and until the robot has confirmed it
 _MOST_END_S: Final = 2.0
+_STUCK_S: Final = 2.0  # of real time: a request has a timeout of 0.1 s
 
 
 def _always() -> bool:
@@ -92,17 +97,22 @@ class CommandLoop:
         self._thread = threading.Thread(target=self._run, name="robot-commands", daemon=True)
         self._command: Twist | None = None
         self._alive_s = 0.0
-        self._begun_s = clock.now_s()
-        self._rested_s = 0.0
-        self._driven_m = 0.0
+        self._begun_s = self._turn_s = self._confirmed_s = clock.now_s()
+        self._sent = STANDING
+        self._rested_s = self._pushing_s = self._driven_m = 0.0
         self._frame = OdometryFrame(Pose(0.0, 0.0, 0.0))
         self._cause: StopCause | None = None
+        self._failed: StopCause | None = None
 
     @property
     def cause(self) -> StopCause | None:
         """Why the robot is held back or stopped now; None while it may move."""
         with self._lock:
-            return self._cause
+            turned_s = self._clock.real_s(self._clock.now_s() - self._turn_s)
+            if self._failed is None and self._thread.is_alive() and turned_s > _STUCK_S:
+                fact = f"no command was sent for {_STUCK_S:g} s, because a request does not return"
+                return StopCause("commands hang", f"{fact}; check the network", stops=True)
+            return self._failed or self._cause
 
     @property
     def frame(self) -> OdometryFrame:
@@ -112,7 +122,7 @@ class CommandLoop:
 
     def start(self) -> None:
         """Begin to send commands; without a command of the policy, the robot stands."""
-        self._begun_s = self._clock.now_s()
+        self._begun_s = self._turn_s = self._confirmed_s = self._clock.now_s()
         self._thread.start()
 
     def command(self, twist: Twist) -> None:
@@ -125,15 +135,15 @@ class CommandLoop:
         with self._lock:
             self._alive_s = self._clock.now_s()
 
-    def begin(self, frame: OdometryFrame, *, placed: bool) -> None:
-        """Begin an episode in a frame: the robot stands until the next command, and is no longer stopped.
+    def begin(self, frame: OdometryFrame | None = None, *, placed: bool = False) -> None:
+        """Begin an episode: the robot stands until the next command, and is no longer stopped.
 
         Args:
-            frame: the frame of the task.
+            frame: the frame of the task; None: the frame stays.
             placed: whether a person has confirmed the pose, so that odometry has no error yet.
         """
         with self._lock:
-            self._frame = frame
+            self._frame = frame or self._frame
             self._driven_m = 0.0 if placed else self._driven_m
             self._command, self._cause = None, None
 
@@ -141,7 +151,7 @@ class CommandLoop:
         """Stop the robot, and end the thread; further calls have no effect."""
         self._over.set()
         if self._thread.is_alive():
-            self._thread.join(self._clock.real_s(_MOST_END_S) + 1.0)
+            self._thread.join(_MOST_END_S + 1.0)
 
     def _run(self) -> None:
         due_s = self._clock.now_s()
@@ -149,46 +159,64 @@ class CommandLoop:
             while not self._clock.wait(self._over, due_s):
                 self._send(self._decided())
                 due_s = max(due_s + PERIOD_S, self._clock.now_s())
+        except Exception as error:  # a hook or a connection may raise anything; then the robot must stand
+            log.exception("no more commands are sent")
+            with self._lock:
+                fact = f"{type(error).__name__}: {error}; report this error"
+                self._failed = StopCause("internal error", fact, stops=True)
         finally:
             self._stand()
 
     def _decided(self) -> SafetyDecision:
-        situation = self._situation()
-        decision = decide(situation, self._rules)
+        """Decide, and return what to send now and why."""
+        permitted = self._hooks.permitted()
+        seen = self._store.newest
         with self._lock:
+            situation = self._situation(seen, permitted=permitted)
+            decision = decide(situation, self._rules)
             if self._cause is not None and self._cause.stops:
                 decision = SafetyDecision(STANDING, self._cause)
             self._cause = decision.cause
+            if decision.cause is not None and decision.cause.name != SILENCE:
+                self._command = None  # the policy must see the robot before it moves again
+        if self.muted:
+            decision = SafetyDecision(STANDING, decision.cause)
         self._hooks.decided(situation, decision)
         return decision
 
-    def _situation(self) -> Situation:
+    def _situation(self, seen: Readings, *, permitted: bool) -> Situation:
         now_s = self._clock.now_s()
-        permitted = self._hooks.permitted()
-        seen = self._store.newest
+        elapsed_s, self._turn_s = now_s - self._turn_s, now_s
         odometry = seen.odometry
-        with self._lock:
-            velocity = STANDING if odometry is None else odometry.velocity
-            self._driven_m += PERIOD_S * abs(complex(velocity[0], velocity[1]))
-            return Situation(
-                command=self._command,
-                silent_s=now_s - self._alive_s,
-                permitted=permitted,
-                readings_age_s=now_s - max(seen.oldest_s, self._begun_s),
-                bumped=bool(seen.bumped),
-                pose=None if odometry is None else self._frame.of_task(odometry.pose),
-                velocity=velocity,
-                driven_m=self._driven_m,
-                rested_s=self._rested_s,
-            )
+        velocity = STANDING if odometry is None else odometry.velocity
+        self._driven_m += min(elapsed_s, 1.0) * math.hypot(velocity[0], velocity[1])
+        pushes = is_motion(self._sent) and stands(velocity)
+        self._pushing_s = self._pushing_s + PERIOD_S if pushes else 0.0
+        return Situation(
+            command=self._command,
+            silent_s=now_s - self._alive_s,
+            permitted=permitted,
+            readings_age_s=now_s - max(seen.oldest_s, self._begun_s),
+            unconfirmed_s=0.0 if self.muted else now_s - self._confirmed_s,
+            asleep_s=self._clock.real_s(elapsed_s),
+            bumped=bool(seen.bumped),
+            pose=None if odometry is None else self._frame.of_task(odometry.pose),
+            velocity=velocity,
+            driven_m=self._driven_m,
+            rested_s=self._rested_s,
+            pushing_s=self._pushing_s,
+        )
 
     def _send(self, decision: SafetyDecision) -> None:
         if self.muted:
+            self._confirmed_s = self._clock.now_s()
             return
         # Counted in commands: a clock would also count the time in which this thread did not run.
         self._rested_s = self._rested_s + PERIOD_S if decision.twist == STANDING else 0.0
+        self._sent = decision.twist
         try:
             self._link.send(decision.twist)
+            self._confirmed_s = self._clock.now_s()
         except LinkError as error:
             log.debug("no command", error=str(error))
 
@@ -203,4 +231,6 @@ class CommandLoop:
                 confirmed_s += PERIOD_S
             except LinkError as error:
                 log.debug("no command", error=str(error))
+            except Exception:  # whatever fails, the next attempt may succeed
+                log.exception("no command")
             self._clock.wait(pause, self._clock.now_s() + PERIOD_S)

@@ -17,11 +17,12 @@ class RobotLink(Protocol):
 
     address: str
 
-    def refuse_unfit(self, speed_m_s: float) -> None:
+    def refuse_unfit(self, speed_m_s: float, turn_rad_s: float) -> None:
         """Refuse a robot that must not be driven.
 
         Args:
-            speed_m_s: the speed at which the robot is to be driven.
+            speed_m_s: the greatest speed at which the robot is to be driven.
+            turn_rad_s: the greatest rate of turning.
 
         Raises:
             RobotUnfit: the robot does not respond, charges, or does not allow the speed.

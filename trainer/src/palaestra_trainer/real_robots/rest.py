@@ -7,6 +7,8 @@ until the robot's dead man of 200 ms stops it.
 
 from __future__ import annotations
 
+import socket
+import struct
 import threading
 from collections.abc import Callable, Mapping
 from typing import Final
@@ -25,15 +27,26 @@ from palaestra_trainer.real_robots.rest_answers import (
     odometry_of,
 )
 from palaestra_trainer.real_robots.robot_clock import RobotClock
+from palaestra_trainer.real_robots.safety import STANDING, stands
 from palaestra_trainer.real_robots.sensor_layout import SensorLayout
 from palaestra_trainer.robots.geometry import Twist
 
 log = structlog.get_logger(__name__)
 
+SocketOption = tuple[int, int, int] | tuple[int, int, bytes]
+
 TIMEOUT_S: Final = 0.1  # of a request; the dead man of the robot leaves time for one more
 _FIRST_TIMEOUT_S: Final = 2.0  # before the robot moves, a slow network may take longer
 _POLL_S: Final = 0.05
+_HTTP: Final = 80
 _CLIENT: Final = {"sid": "palaestra"}  # clients of the official example name themselves so
+# A command that was not confirmed must not arrive later, when the robot has been told to stand. So the system
+# neither sends what a closed connection has not sent yet, nor repeats a packet for long.
+_SOCKET_OPTIONS: Final[list[SocketOption]] = [
+    (socket.IPPROTO_TCP, socket.TCP_NODELAY, 1),
+    (socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0)),
+    (socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, 200),
+]
 
 Reader = Callable[[bytes, float], None]
 
@@ -53,16 +66,19 @@ class RestLink:
     def __init__(
         self, address: str, sensors: SensorLayout | None = None, clock: RobotClock | None = None
     ) -> None:
-        self.address = _checked(address)
+        self.address, self._host, self._port = _parts(address)
         self._sensors = sensors or SensorLayout()
         self._clock = clock or RobotClock()
-        self._commands = self._client(TIMEOUT_S)
+        self._base = self.address  # with the address of the host, once it is known
+        self._commands: httpx.Client | None = None
+        self._newest = (-1.0, STANDING)  # number and velocity of the newest odometry
         self._over = threading.Event()
         self._threads: list[threading.Thread] = []
 
-    def refuse_unfit(self, speed_m_s: float) -> None:
+    def refuse_unfit(self, speed_m_s: float, turn_rad_s: float) -> None:
         """Refuse a robot that does not respond as a Robotino, or that charges; REST has no limit of speed."""
-        del speed_m_s
+        del speed_m_s, turn_rad_s
+        self._resolve()
         with self._client(_FIRST_TIMEOUT_S) as client:
             try:
                 odometry_of(self._got(client, "odometry"))
@@ -76,8 +92,9 @@ class RestLink:
 
     def start(self, store: ReadingStore) -> None:
         """Begin to request odometry, distances and bumper 20 times a second."""
+        self._commands = self._client(TIMEOUT_S)
         readers: Mapping[str, Reader] = {
-            "odometry": lambda body, at_s: store.set_odometry(odometry_of(body), at_s),
+            "odometry": lambda body, at_s: self._read_odometry(store, body, at_s),
             "distancesensorarray": lambda body, at_s: store.set_distances(
                 distances_of(body, self._sensors), at_s
             ),
@@ -91,8 +108,14 @@ class RestLink:
 
     def send(self, twist: Twist) -> None:
         """Send one velocity."""
+        if self._commands is None:
+            raise LinkError("/data/omnidrive: the connection has not begun")
         try:
-            self._commands.put("/data/omnidrive", params=_CLIENT, json=list(twist)).raise_for_status()
+            with self._commands.stream(
+                "PUT", "/data/omnidrive", params=_CLIENT, json=list(twist)
+            ) as response:
+                response.raise_for_status()
+                self._read(response, "omnidrive")
         except httpx.HTTPError as error:
             raise LinkError(f"/data/omnidrive: {_fact(error)}") from error
 
@@ -101,7 +124,25 @@ class RestLink:
         self._over.set()
         for thread in self._threads:
             thread.join(_FIRST_TIMEOUT_S)
-        self._commands.close()
+        if self._commands is not None:
+            self._commands.close()
+
+    def _resolve(self) -> None:
+        """Look up the address of the host once, because a name server may be slow while the robot drives."""
+        try:
+            family, _, _, _, found = socket.getaddrinfo(self._host, self._port, type=socket.SOCK_STREAM)[0]
+        except (OSError, UnicodeError) as error:
+            raise RobotUnfit(f"{self.address}: the name has no address ({error}); check it") from error
+        host = f"[{found[0]}]" if family == socket.AF_INET6 else found[0]
+        self._base = f"http://{host}:{self._port}"
+
+    def _read_odometry(self, store: ReadingStore, body: bytes, at_s: float) -> None:
+        """Store odometry, unless a robot that moves returns the same odometry again."""
+        number, odometry = odometry_of(body)
+        if (number, odometry.velocity) == self._newest and not stands(odometry.velocity):
+            raise LinkError(f"/data/odometry: returned number {number:g} again")
+        self._newest = (number, odometry.velocity)
+        store.set_odometry(odometry, at_s)
 
     def _poll(self, route: str, read: Reader) -> None:
         """Request a reading again and again; the age of the newest reading shows a failure."""
@@ -126,25 +167,47 @@ class RestLink:
         try:
             with client.stream("GET", f"/data/{route}", params=_CLIENT) as response:
                 response.raise_for_status()
-                body = b""
-                for part in response.iter_raw():
-                    body += part
-                    if len(body) > MOST_BYTES:
-                        raise LinkError(f"/data/{route}: returned more than {MOST_BYTES} bytes")
-                return body
+                return self._read(response, route)
         except httpx.HTTPError as error:
             raise LinkError(f"/data/{route}: {_fact(error)}") from error
 
+    def _read(self, response: httpx.Response, route: str) -> bytes:
+        """Return the body of a response, of a bounded size and within a bounded time.
+
+        Raises:
+            LinkError: the body is too long, or comes too slowly.
+            httpx.HTTPError: the connection failed.
+        """
+        end_s = self._clock.now_s() + _FIRST_TIMEOUT_S
+        body = b""
+        for part in response.iter_raw():
+            body += part
+            if len(body) > MOST_BYTES or self._clock.now_s() > end_s:
+                raise LinkError(f"/data/{route}: returned more than {MOST_BYTES} bytes, or too slowly")
+        return body
+
     def _client(self, timeout_s: float) -> httpx.Client:
         # A proxy of the environment, or a redirection, must not come between a robot and its commands.
-        return httpx.Client(base_url=self.address, timeout=self._clock.real_s(timeout_s), trust_env=False)
+        return httpx.Client(
+            base_url=self._base,
+            timeout=self._clock.real_s(timeout_s),
+            trust_env=False,
+            headers={"Host": urlsplit(self.address).netloc, "Accept-Encoding": "identity"},
+            transport=httpx.HTTPTransport(socket_options=_SOCKET_OPTIONS, trust_env=False),
+        )
 
 
-def _checked(address: str) -> str:
+def _parts(address: str) -> tuple[str, str, int]:
+    """Return an address without a slash at its end, its host and its port.
+
+    Raises:
+        ConfigurationError: the address is not one of HTTP, or has more than host and port.
+    """
     try:
         parts = urlsplit(address)
-        if parts.scheme == "http" and parts.hostname and parts.port != 0 and parts.path in {"", "/"}:
-            return address.rstrip("/")
+        plain = parts.path in {"", "/"} and not (parts.query or parts.fragment or parts.username)
+        if parts.scheme == "http" and parts.hostname and parts.port != 0 and plain:
+            return address.rstrip("/"), parts.hostname, parts.port or _HTTP
     except ValueError:
         pass
     raise ConfigurationError(f"robot: {address!r} is not an address such as http://192.168.0.1")

@@ -7,7 +7,6 @@ data of another program, so each is checked before it is used.
 from __future__ import annotations
 
 import json
-import math
 from typing import Any, Final
 
 import numpy as np
@@ -22,17 +21,18 @@ from palaestra_trainer.robots.geometry import Pose
 
 MOST_BYTES: Final = 65_536  # the longest response, that of a laser scanner, has about 10,000 bytes
 
+_MOST: Final = 1e12  # also the number of a measurement is smaller for thousands of years
 _ODOMETRY: Final = 7  # x, y, rotation, vx, vy, omega, number
 
 
-def odometry_of(body: bytes) -> Odometry:
-    """Return the odometry in a response to /data/odometry.
+def odometry_of(body: bytes) -> tuple[float, Odometry]:
+    """Return the number of a measurement and the odometry in a response to /data/odometry.
 
     Raises:
         LinkError: the response is not odometry.
     """
-    x_m, y_m, heading, *velocity, _ = _numbers("odometry", body, _ODOMETRY)
-    return Odometry(Pose(x_m, y_m, wrapped(heading)), (velocity[0], velocity[1], velocity[2]))
+    x_m, y_m, heading, *velocity, number = _numbers("odometry", body, _ODOMETRY)
+    return number, Odometry(Pose(x_m, y_m, wrapped(heading)), (velocity[0], velocity[1], velocity[2]))
 
 
 def distances_of(body: bytes, layout: SensorLayout) -> NDArray[np.float32]:
@@ -79,13 +79,14 @@ def _numbers(route: str, body: bytes, count: int) -> list[float]:
 
 
 def _is_finite(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    """Return whether a value is a number that a robot may report."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and -_MOST <= value <= _MOST
 
 
 def _json(route: str, body: bytes) -> Any:
     try:
         return json.loads(body)
-    except ValueError:
+    except (ValueError, RecursionError):
         raise _unreadable(route, body[:80]) from None
 
 

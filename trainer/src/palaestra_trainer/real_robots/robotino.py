@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from dataclasses import replace
 from typing import Final, Self
 
 import numpy as np
@@ -15,16 +16,23 @@ from palaestra_trainer.real_robots.frames import OdometryFrame, extrapolated
 from palaestra_trainer.real_robots.link import RobotLink
 from palaestra_trainer.real_robots.readings import Odometry, Readings, ReadingStore
 from palaestra_trainer.real_robots.robot_clock import RobotClock
-from palaestra_trainer.real_robots.safety import BUMPER, SILENCE, STANDING, SafetyRules, is_finite, limited
+from palaestra_trainer.real_robots.safety import (
+    BUMPER,
+    SILENCE,
+    STANDING,
+    SafetyRules,
+    is_finite,
+    limited,
+    stands,
+)
 from palaestra_trainer.robots.base import RobotinoAbc
-from palaestra_trainer.robots.geometry import Pose, Twist
+from palaestra_trainer.robots.geometry import Pose
 
 _FIRST_READINGS_S: Final = 5.0
 _STAND_S: Final = 3.0  # a Robotino brakes in a fraction of a second
 _LOOK_S: Final = 0.01
 _CHECK_S: Final = 0.05
 _MOST_HELD_BACK_S: Final = 600.0
-_STANDS: Final = (0.01, 0.01, 0.02)
 
 
 class RealRobotino(RobotinoAbc):
@@ -83,13 +91,13 @@ class RealRobotino(RobotinoAbc):
         Raises:
             RobotUnfit: the robot does not respond, charges, moves, or does not allow the speed of the rules.
         """
-        self._link.refuse_unfit(self.rules.speed_m_s)
+        self._link.refuse_unfit(self.rules.speed_m_s, self.rules.turn_rad_s)
         self._link.start(self._store)
         self._wait_for_readings()
         self._refuse_moving()
         self._loop.muted = muted
         self._loop.start()
-        self.stand_at(Pose(0.0, 0.0, 0.0), placed=True)
+        self.stand_at(Pose(0.0, 0.0, 0.0))
 
     def close(self) -> None:
         """Stop the robot and end the connection; further calls have no effect."""
@@ -114,7 +122,7 @@ class RealRobotino(RobotinoAbc):
         Raises:
             RobotStopped: a velocity is not finite.
         """
-        twist = (vx, vy, omega)
+        twist = (float(vx), float(vy), float(omega))  # a policy's numbers may be NumPy's
         if not is_finite(twist):
             self._loop.command(STANDING)
             raise RobotStopped(f"the policy commands {twist}; a velocity must be finite")
@@ -140,38 +148,46 @@ class RealRobotino(RobotinoAbc):
         now_s = self._clock.now_s()
         late = now_s > due_s + 0.5 * self._period_s
         extra = round((now_s - due_s) / self._period_s) if late else 0
-        self._look(now_s if late else due_s)
+        self._look(due_s + extra * self._period_s)
         return extra
 
     def stand(self) -> None:
-        """Stop the robot, and wait until it stands.
+        """Stop the robot, wait until it stands, and update all readings.
 
         Raises:
             RobotStopped: the robot still moves after some seconds.
         """
         self._loop.command(STANDING)
-        end_s = self._clock.now_s() + _STAND_S
-        while not _stands(self._store.newest.odometry):
-            if self._clock.now_s() > end_s:
+        begin_s = self._clock.now_s()
+        while not self._stands_since(begin_s):
+            if self._clock.now_s() > begin_s + _STAND_S:
                 raise RobotStopped(f"does not stand {_STAND_S:g} s after the command; use its emergency stop")
             self._wait(_LOOK_S)
+        self._look(self._clock.now_s())
 
-    def stand_at(self, start: Pose, *, placed: bool) -> None:
-        """Begin an episode where the robot stands, which is `start` in the frame of the task.
-
-        Args:
-            start: the pose.
-            placed: whether a person has confirmed the pose, so that odometry has no error yet.
+    def stand_at(self, start: Pose) -> None:
+        """Begin an episode where the robot stands, which a person says is `start` in the frame of the task.
 
         Raises:
             RobotStopped: the robot does not stop.
-            NoReading: odometry has never arrived.
         """
         self.stand()
         odometry = self._store.newest.odometry
-        if odometry is None:
-            raise NoReading("odometry has not arrived; call connect() first")
-        self._loop.begin(OdometryFrame.through(odometry.pose, start), placed=placed)
+        reported = start if odometry is None else odometry.pose
+        self._loop.begin(OdometryFrame.through(reported, start), placed=True)
+        self._look(self._clock.now_s())
+
+    def begin(self, frame: OdometryFrame | None = None) -> None:
+        """Begin an episode where the robot stands, by its odometry.
+
+        Args:
+            frame: the frame of the task; None: the frame stays.
+
+        Raises:
+            RobotStopped: the robot does not stop.
+        """
+        self.stand()
+        self._loop.begin(frame)
         self._look(self._clock.now_s())
 
     def pose(self) -> Pose:
@@ -200,12 +216,21 @@ class RealRobotino(RobotinoAbc):
 
     def _look(self, at_s: float) -> None:
         """Take the newest readings; odometry is extrapolated to `at_s`, since it is up to 0.1 s old."""
-        self._seen = seen = self._store.newest
+        seen = self._store.newest
+        cause = self._loop.cause
+        if cause is not None and cause.name == BUMPER:
+            seen = replace(seen, bumped=True)  # the bumper may have been released since it stopped the robot
+        self._seen = seen
         self._tick_s = at_s
         if seen.odometry is not None:
             age_s = min(max(at_s - seen.odometry_s, 0.0), self.rules.stale_s)
             reported = extrapolated(seen.odometry.pose, seen.odometry.velocity, age_s)
             self._pose = self._loop.frame.of_task(reported)
+
+    def _stands_since(self, begin_s: float) -> bool:
+        """Return whether odometry that was measured after a time says that the robot stands."""
+        seen = self._store.newest
+        return seen.odometry_s > begin_s and _stands(seen.odometry)
 
     def _wait_for_readings(self) -> None:
         end_s = self._clock.now_s() + _FIRST_READINGS_S
@@ -230,5 +255,4 @@ class RealRobotino(RobotinoAbc):
 
 
 def _stands(odometry: Odometry | None) -> bool:
-    velocity: Twist = STANDING if odometry is None else odometry.velocity
-    return all(abs(part) <= most for part, most in zip(velocity, _STANDS, strict=True))
+    return odometry is None or stands(odometry.velocity)

@@ -45,7 +45,8 @@ from palaestra_trainer.ros.topic_node import TopicNode
 
 log = structlog.get_logger(__name__)
 
-DRIVER_SPEED_M_S: Final = 0.2  # the driver's limit if its parameter is not set; source: RobotinoNode.cpp
+# The driver's limits, each with its default and its unit; source: RobotinoNode.cpp.
+_LIMITS: Final = {"max_linear_vel": (0.2, "m/s"), "max_angular_vel": (1.0, "rad/s")}
 _CHECK_S: Final = 2.0
 _DRIVER_CONNECTS_S: Final = 5.0
 _SILENCE_S: Final = 1.0  # with an older reading, all topics are connected again
@@ -81,7 +82,7 @@ class Ros1Link:
         self._over = threading.Event()
         self._open = ExitStack()
 
-    def refuse_unfit(self, speed_m_s: float) -> None:
+    def refuse_unfit(self, speed_m_s: float, turn_rad_s: float) -> None:
         """Refuse a robot without a running driver, or whose driver clips the speed.
 
         The driver does not report the charger, so a charging robot is not refused.
@@ -89,12 +90,12 @@ class Ros1Link:
         Raises:
             RobotUnfit: no master responds, no driver publishes odometry, or its limit is below the speed.
         """
-        odom, parameter = self._name("odom"), self._name("robotino_node/max_linear_vel")
+        odom = self._name("odom")
         master = Master(self._name("palaestra"), _CHECK_S, self._master_uri)
         try:
             master.ping()
             runs = any(master.runs(node) for node in sorted(master.publishers(odom)))
-            limit = master.parameter(parameter)
+            limits = {name: master.parameter(self._name(f"robotino_node/{name}")) for name in _LIMITS}
         except (MasterLost, UnreadableAnswer) as error:
             raise RobotUnfit(
                 f"{self.address}: {error}; check the address, and that the robot is switched on"
@@ -102,11 +103,15 @@ class Ros1Link:
         if not runs:
             fact = f"{self.address}: no node that this computer reaches publishes {odom}"
             raise RobotUnfit(f"{fact}; start robotino_node, with ROS_IP set to the robot's address")
-        most_m_s = DRIVER_SPEED_M_S if limit is None else limit
-        if not isinstance(most_m_s, int | float) or most_m_s < speed_m_s:
-            note = " by default" if limit is None else ""
-            fact = f"{self.address}: {parameter} is {most_m_s!r} m/s{note}, below {speed_m_s:g} m/s"
-            raise RobotUnfit(f"{fact}; set the parameter and restart the driver, or lower the speed limit")
+        for (name, (default, unit)), wanted in zip(_LIMITS.items(), (speed_m_s, turn_rad_s), strict=True):
+            most = default if limits[name] is None else limits[name]
+            if not isinstance(most, int | float) or most < wanted:
+                note = " by default" if limits[name] is None else ""
+                fact = f"{self.address}: {self._name(f'robotino_node/{name}')} is {most!r} {unit}{note}"
+                raise RobotUnfit(
+                    f"{fact}, below {wanted:g} {unit}; set the parameter and restart the driver, or lower the"
+                    " limit"
+                )
 
     def start(self, store: ReadingStore) -> None:
         """Begin to receive readings, after the driver has connected to the topic of commands.
@@ -194,7 +199,7 @@ class Ros1Link:
             at_s = self._clock.now_s()
             # A topic that is not ready may have a message too: a latched one, which came with the header.
             for topic, read in readers.items():
-                for message in topic.arrived()[-1:]:
+                for message in topic.arrived():  # all of them: the bumper may have been pressed and released
                     try:
                         read(message, at_s)
                     except LinkError as error:

@@ -45,6 +45,7 @@ log = structlog.get_logger(__name__)
 
 SCHEME: Final = "ros2"
 _ADDRESS: Final = re.compile(r"ros2:((?:/[A-Za-z_][A-Za-z0-9_]*)*)/?")
+_BUMPS: Final = 10  # messages of the bumper that may wait to be read
 _FIRST_S: Final = 5.0
 _LOOK_S: Final = 0.02
 
@@ -88,13 +89,13 @@ class Ros2Link:
         self._owned = node is None
         self._store = ReadingStore()
         self._bumped = False
-        self._latched = False
+        self._heard_bumpers: list[tuple[Any, Any]] = []
         self._open = True
         self._twist = require("geometry_msgs.msg").Twist
         self._commands = self._subscribe()
         self._node.start()
 
-    def refuse_unfit(self, speed_m_s: float) -> None:
+    def refuse_unfit(self, speed_m_s: float, turn_rad_s: float) -> None:
         """Refuse a robot without odometry, or without a subscriber of the commands.
 
         Topics show neither a charger nor the driver's limit of speed.
@@ -102,7 +103,7 @@ class Ros2Link:
         Raises:
             RobotUnfit: within 5 s, no odometry arrived, or nobody subscribed the commands.
         """
-        del speed_m_s
+        del speed_m_s, turn_rad_s
         end_s = time.monotonic() + _FIRST_S
         while self.odometry is None or not self._commands.get_subscription_count():
             if time.monotonic() > end_s:
@@ -134,13 +135,12 @@ class Ros2Link:
         best_effort, reliable = qos.ReliabilityPolicy.BEST_EFFORT, qos.ReliabilityPolicy.RELIABLE
         newest = qos.QoSProfile(depth=1, reliability=best_effort)
         sensor_messages = require("sensor_msgs.msg")
-        for kind, topic, read, profile in (
-            (require("nav_msgs.msg").Odometry, "odom", self._read_odometry, newest),
-            (sensor_messages.LaserScan, "irsensor_scan", self._distances(distances_of_scan), newest),
-            (sensor_messages.PointCloud, "distance_sensors", self._distances(distances_of_points), newest),
-            (require("std_msgs.msg").Bool, "bumper", self._read_bumper, newest),
+        for kind, topic, read in (
+            (require("nav_msgs.msg").Odometry, "odom", self._read_odometry),
+            (sensor_messages.LaserScan, "irsensor_scan", self._distances(distances_of_scan)),
+            (sensor_messages.PointCloud, "distance_sensors", self._distances(distances_of_points)),
         ):
-            self._node.ros.create_subscription(kind, topic, read, profile)
+            self._node.ros.create_subscription(kind, topic, read, newest)
         return self._node.ros.create_publisher(
             self._twist, "cmd_vel", qos.QoSProfile(depth=1, reliability=reliable)
         )
@@ -157,18 +157,23 @@ class Ros2Link:
         self._confirm_bumper(at_s)
 
     def _confirm_bumper(self, at_s: float) -> None:
-        """Store the bumper's last state again, while a node publishes it."""
+        """Store the bumper's last state again, while a node publishes it.
+
+        A bumper may be published only when it changes, so no message may be lost. Each kind of publisher gets
+        a subscription with its own reliability and durability, because no subscription fits them all.
+        """
         publishers = self._node.ros.get_publishers_info_by_topic(self._resolved("bumper"))
         if publishers:
             self._store.set_bumped(at_s, bumped=self._bumped)
         qos = require("rclpy.qos")
-        latched = qos.DurabilityPolicy.TRANSIENT_LOCAL
-        if not self._latched and any(each.qos_profile.durability == latched for each in publishers):
-            self._latched = True
-            profile = qos.QoSProfile(depth=1, reliability=qos.ReliabilityPolicy.RELIABLE, durability=latched)
-            self._node.ros.create_subscription(
-                require("std_msgs.msg").Bool, "bumper", self._read_bumper, profile
-            )
+        for each in publishers:
+            offered = each.qos_profile.reliability, each.qos_profile.durability
+            if offered not in self._heard_bumpers:
+                self._heard_bumpers.append(offered)
+                profile = qos.QoSProfile(depth=_BUMPS, reliability=offered[0], durability=offered[1])
+                self._node.ros.create_subscription(
+                    require("std_msgs.msg").Bool, "bumper", self._read_bumper, profile
+                )
 
     def _read_bumper(self, message: Any) -> None:
         self._bumped = bool(message.data)

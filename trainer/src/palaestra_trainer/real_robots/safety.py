@@ -22,8 +22,12 @@ STANDING: Final[Twist] = (0.0, 0.0, 0.0)
 
 # A robot may drive this long before a stop takes effect: one period of commands, a delayed request, braking.
 _REACTION_S: Final = 0.25
-_SETTLED_S: Final = 1.0  # a robot stands at the latest this long after its last command to move
-# Faster than this, a robot without commands moves; odometry of a standing robot is exactly zero.
+_SETTLED_S: Final = 1.0  # at the latest after this time, a robot follows a command to move or to stand
+_ASLEEP_S: Final = 2.0  # a suspended computer or a stopped process must not drive on when it wakes
+# Source: ~min_linear_vel and ~min_angular_vel of robotino_node, which raises slower commands to these.
+_LEAST_M_S, _LEAST_RAD_S = 0.05, 0.1
+# The odometry of a standing robot may have some noise; faster than _MOVING, the robot moves.
+_STANDING: Final = (0.01, 0.01, 0.02)
 _MOVING: Final = (0.02, 0.02, 0.05)
 
 
@@ -81,22 +85,28 @@ class Situation:
         silent_s: seconds since the program of the policy last called the robot; it calls while it waits.
         permitted: whether the person allows motion now, for example by holding a key.
         readings_age_s: age of the oldest of the newest readings; infinite without readings.
+        unconfirmed_s: seconds since the robot last confirmed a command.
+        asleep_s: seconds of real time since the decision before.
         bumped: whether the bumper touches something.
         pose: the pose by odometry, in the task's frame; None before the first reading.
         velocity: the velocity by odometry, in the robot's frame.
         driven_m: meters driven since a person confirmed the pose.
         rested_s: seconds for which only zero has been commanded.
+        pushing_s: seconds for which motion has been commanded while odometry stands.
     """
 
     command: Twist | None
     silent_s: float
     permitted: bool
     readings_age_s: float
+    unconfirmed_s: float
+    asleep_s: float
     bumped: bool
     pose: Pose | None
     velocity: Twist
     driven_m: float
     rested_s: float
+    pushing_s: float
 
 
 class StopCause(NamedTuple):
@@ -139,6 +149,16 @@ def limited(twist: Twist, rules: SafetyRules) -> Twist:
     return forward * share, left * share, min(max(turning, -rules.turn_rad_s), rules.turn_rad_s)
 
 
+def stands(velocity: Twist) -> bool:
+    """Return whether a velocity by odometry is that of a standing robot."""
+    return all(abs(part) <= most for part, most in zip(velocity, _STANDING, strict=True))
+
+
+def is_motion(twist: Twist) -> bool:
+    """Return whether a velocity is fast enough for a Robotino to move at all."""
+    return math.hypot(twist[0], twist[1]) >= _LEAST_M_S or abs(twist[2]) >= _LEAST_RAD_S
+
+
 def is_finite(twist: Twist) -> bool:
     """Return whether all numbers of a velocity are finite."""
     return all(map(math.isfinite, twist))
@@ -161,8 +181,11 @@ def _lost(situation: Situation, rules: SafetyRules) -> StopCause | None:
 def _fence(situation: Situation, rules: SafetyRules) -> StopCause | None:
     if rules.fence is None or situation.pose is None:
         return None
+    # The robot has driven on since the reading, perhaps at the speed that was commanded since.
+    speeds = (limited(situation.command or STANDING, rules), situation.velocity)
+    speed = max(math.hypot(forward, left) for forward, left, _ in speeds)
     margin_m = rules.odometry_error * situation.driven_m
-    margin_m += _REACTION_S * math.hypot(situation.velocity[0], situation.velocity[1])
+    margin_m += (_REACTION_S + min(situation.readings_age_s, rules.lost_s)) * speed
     if rules.fence.gap_m(situation.pose) > margin_m:
         return None
     at = f"({situation.pose.x_m:.2f}, {situation.pose.y_m:.2f})"
@@ -178,6 +201,29 @@ def _foreign(situation: Situation, rules: SafetyRules) -> StopCause | None:
     return StopCause(
         "another client", "moves without a command of this program; end the other client", stops=True
     )
+
+
+def _unconfirmed(situation: Situation, rules: SafetyRules) -> StopCause | None:
+    if situation.unconfirmed_s <= rules.lost_s:
+        return None
+    fact = f"the robot has confirmed no command for {rules.lost_s:g} s; check that it accepts commands"
+    return StopCause("commands refused", fact, stops=True)
+
+
+def _asleep(situation: Situation, rules: SafetyRules) -> StopCause | None:
+    del rules
+    if situation.asleep_s <= _ASLEEP_S:
+        return None
+    fact = f"this program did not run for {situation.asleep_s:.0f} s; begin again"
+    return StopCause("suspended", fact, stops=True)
+
+
+def _without_effect(situation: Situation, rules: SafetyRules) -> StopCause | None:
+    del rules
+    if situation.pushing_s <= _SETTLED_S:
+        return None
+    fact = "the robot does not move; release its emergency stop, look at its motors, and begin again"
+    return StopCause("no effect", fact, stops=True)
 
 
 def _not_permitted(situation: Situation, rules: SafetyRules) -> StopCause | None:
@@ -197,4 +243,15 @@ def _silent(situation: Situation, rules: SafetyRules) -> StopCause | None:
     return StopCause(SILENCE, f"the policy computes for more than {rules.silence_s:g} s", stops=False)
 
 
-CHECKS: Final[tuple[Check, ...]] = (_bumper, _lost, _fence, _foreign, _not_permitted, _stale, _silent)
+CHECKS: Final[tuple[Check, ...]] = (
+    _bumper,
+    _asleep,
+    _lost,
+    _unconfirmed,
+    _fence,
+    _foreign,
+    _without_effect,
+    _not_permitted,
+    _stale,
+    _silent,
+)

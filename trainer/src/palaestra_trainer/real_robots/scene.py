@@ -48,10 +48,11 @@ class RealScene(Scene):
 
     def place(self, start: Pose, target: Point) -> None:
         """Begin at `start`; if odometry says that the robot stands elsewhere, a person places it there."""
-        elsewhere = not _is_near(self._robot.pose(), start)
-        if elsewhere:
+        if _is_near(self._robot.pose(), start):
+            self._robot.begin()
+        else:
             self._ask(start)
-        self._robot.stand_at(start, placed=elsewhere)
+            self._robot.stand_at(start)
         self.target = target
 
     def mark(self, target: Point) -> None:

@@ -46,7 +46,7 @@ def read_deployment(path: Path) -> RunData:
     figures = {"episodes": f"{len(ended)}", "successes": f"{sum(each is True for each in succeeded)}"}
     if causes:
         figures["last cause to stand"] = causes[-1]
-    replays = (_replay(bag, each, number) for number, each in enumerate(ended[:MOST_EPISODES], 1))
+    replays = (_replay(bag, each, count) for count, each in enumerate(ended[:MOST_EPISODES], 1))
     return RunData(
         name=path.name,
         ended="good" if ended and all(each is not False for each in succeeded) else "failed",
@@ -114,7 +114,7 @@ def _target(bag: Bag, episode: _Ended) -> tuple[float, float] | None:
 def _pose(message: BagMessage) -> tuple[float, float, float]:
     pose = record(record(message.content.get("pose")).get("pose"))
     position, turned = record(pose.get("position")), record(pose.get("orientation"))
-    heading = 2.0 * math.atan2(number(turned.get("z")) or 0.0, number(turned.get("w")) or 1.0)
+    heading = 2.0 * math.atan2(number(turned.get("z")) or 0.0, number(turned.get("w")) or 0.0)
     return number(position.get("x")) or 0.0, number(position.get("y")) or 0.0, heading
 
 

@@ -16,6 +16,7 @@ from palaestra_trainer.ros.xmlrpc import call
 DEFAULT_URI = "http://localhost:11311"
 _TIMEOUT_S = 5.0
 _NODE_TIMEOUT_S = 1.0
+_PARTS = 3  # of getSystemState: publishers, subscribers, services
 
 
 class Master:
@@ -80,11 +81,31 @@ class Master:
 
     def publishers(self, topic: str) -> set[str]:
         """Return the full names of the nodes that publish a topic."""
-        answer = self._call("getSystemState")
+        published, _, _ = self._registered()
+        return published.get(topic, set())
+
+    def heard_topics(self) -> set[str]:
+        """Return the full names of the topics that have a publisher and a subscriber."""
+        published, subscribed, _ = self._registered()
+        return published.keys() & subscribed.keys()
+
+    def topic_types(self) -> dict[str, str]:
+        """Return the type of each topic, by the full name of the topic."""
+        answer = self._call("getTopicTypes")
         try:
-            return {str(node) for name, nodes in answer.value[0] if name == topic for node in nodes}
-        except (ValueError, TypeError, LookupError) as error:
-            raise self._unreadable(f"the publishers of {topic}", answer) from error
+            return {str(name): str(kind) for name, kind in answer.value}
+        except (ValueError, TypeError) as error:
+            raise self._unreadable("types of topics", answer) from error
+
+    def services(self) -> set[str]:
+        """Return the full names of all services."""
+        _, _, served = self._registered()
+        return set(served)
+
+    def node_uri(self, node: str) -> str | None:
+        """Return the URI of a node with a full name; None if the master does not know it."""
+        answer = self._answer("lookupNode", node)
+        return str(answer.value) if answer.code == OK else None
 
     def parameter(self, name: str) -> Any:
         """Return the value of a parameter with a full name; None if it is not set."""
@@ -93,16 +114,23 @@ class Master:
 
     def node_names(self) -> set[str]:
         """Return the full names of all nodes that publish, subscribe or offer services."""
-        answer = self._call("getSystemState")
-        try:
-            return {str(node) for part in answer.value for _, nodes in part for node in nodes}
-        except (ValueError, TypeError) as error:
-            raise self._unreadable("names of nodes", answer) from error
+        return {node for part in self._registered() for nodes in part.values() for node in nodes}
 
     def runs(self, node: str) -> bool:
         """Return whether a node of that full name runs; a killed node stays registered, but does not run."""
-        answer = self._answer("lookupNode", node)
-        return answer.code == OK and self._is_node(str(answer.value))
+        uri = self.node_uri(node)
+        return uri is not None and self._is_node(uri)
+
+    def _registered(self) -> list[dict[str, set[str]]]:
+        """Return the nodes of each topic with a publisher, each topic with a subscriber, each service."""
+        answer = self._call("getSystemState")
+        try:
+            parts = [{str(name): set(map(str, nodes)) for name, nodes in part} for part in answer.value]
+        except (ValueError, TypeError) as error:
+            raise self._unreadable("names of topics, services and nodes", answer) from error
+        if len(parts) != _PARTS:
+            raise self._unreadable("publishers, subscribers and services", answer)
+        return parts
 
     def _is_node(self, uri: str) -> bool:
         """Return whether a node of this master has that address; another program may have its port."""

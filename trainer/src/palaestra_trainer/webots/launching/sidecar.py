@@ -5,7 +5,7 @@ from __future__ import annotations
 import http.client
 import json
 import time
-from typing import Any
+from typing import Any, TypeVar
 from urllib.parse import urlsplit
 
 from palaestra_protocol.control import (
@@ -16,6 +16,7 @@ from palaestra_protocol.control import (
     StopRequest,
     decoded,
 )
+from palaestra_protocol.scene import MOST_SCENE_BYTES, MOST_STATE_BYTES, SceneState, VisibleScene
 from palaestra_trainer.errors import SimulatorDead, SimulatorHung, WrongData
 
 _TIMEOUT_S = 5.0
@@ -23,6 +24,8 @@ _POLL_S = 0.02
 _REFUSED = 2  # our simulators exit with this code if the world, an option or a variable is wrong
 _MOST_BYTES = 65536
 _CONFLICT = 409
+
+_Data = TypeVar("_Data", VisibleScene, SceneState)
 
 
 class Sidecar:
@@ -99,6 +102,20 @@ class Sidecar:
         last = self.state().last_exit
         return last is not None and last.code == _REFUSED
 
+    def scene(self) -> VisibleScene | None:
+        """Return the visible objects of the world; None: the simulator does not describe its world."""
+        return self._viewed(VisibleScene, "/scene", MOST_SCENE_BYTES)
+
+    def scene_state(self) -> SceneState:
+        """Return the poses after the last step; at most a thirtieth of a second old.
+
+        Raises:
+            WrongData: the simulator does not describe its world.
+        """
+        if (state := self._viewed(SceneState, "/watch", MOST_STATE_BYTES)) is None:
+            raise WrongData(self._name, "does not describe its world")
+        return state
+
     def wait_stopped(self, deadline_s: float) -> None:
         """Wait until the simulator has ended.
 
@@ -111,25 +128,48 @@ class Sidecar:
                 raise SimulatorHung(self._name, f"did not end within {deadline_s:g} s")
             time.sleep(_POLL_S)  # the control port has no request that waits for an end
 
+    def _viewed(self, kind: type[_Data], path: str, most_bytes: int) -> _Data | None:
+        """Return the data for viewers at a path; None if the simulator does not have it."""
+        status, text = self._response("GET", path, most_bytes=most_bytes + 1)
+        if status == http.client.NOT_FOUND:
+            return None
+        if status == http.client.SERVICE_UNAVAILABLE:
+            raise SimulatorDead(self._name, "does not describe its world now")
+        if status != http.client.OK:
+            raise self._refused_with(status, path)
+        try:
+            return kind.from_json(decoded(text, most_bytes))
+        except ProtocolError as error:
+            raise self._unreadable(path, error) from error
+
     def _ask(self, method: str, path: str, body: dict[str, Any] | None = None) -> SimulatorState:
+        status, text = self._response(method, path, body)
+        if status not in {http.client.OK, _CONFLICT}:
+            raise self._refused_with(status, path)
+        try:
+            return SimulatorState.from_json(decoded(text))
+        except ProtocolError as error:
+            raise self._unreadable(path, error) from error
+
+    def _response(
+        self, method: str, path: str, body: dict[str, Any] | None = None, most_bytes: int = _MOST_BYTES
+    ) -> tuple[int, bytes]:
+        """Return status and body of a response; at most `most_bytes` of the body are read."""
         connection = http.client.HTTPConnection(self._host, self._port, timeout=_TIMEOUT_S)
         try:
             connection.request(method, f"{self._above}{path}", None if body is None else json.dumps(body))
             answer = connection.getresponse()
-            text = answer.read(_MOST_BYTES)
+            return answer.status, answer.read(most_bytes)
         except TimeoutError as error:
             raise SimulatorHung(self._name, "its sidecar does not respond") from error
         except (OSError, http.client.HTTPException) as error:
             raise SimulatorDead(self._name, f"its sidecar cannot be reached ({error})") from error
         finally:
             connection.close()
-        if answer.status not in {http.client.OK, _CONFLICT}:
-            raise WrongData(
-                self._name, f"its sidecar responded to {self._above}{path} with HTTP status {answer.status}"
-            )
-        try:
-            return SimulatorState.from_json(decoded(text))
-        except ProtocolError as error:
-            raise WrongData(
-                self._name, f"its sidecar sent an invalid response to {self._above}{path}: {error}"
-            ) from error
+
+    def _refused_with(self, status: int, path: str) -> WrongData:
+        fact = f"its sidecar responded to {self._above}{path} with HTTP status {status}"
+        return WrongData(self._name, fact)
+
+    def _unreadable(self, path: str, error: ProtocolError) -> WrongData:
+        return WrongData(self._name, f"its sidecar sent an invalid response to {self._above}{path}: {error}")
