@@ -216,6 +216,22 @@ def test_after_a_pause_the_policy_looks_before_the_robot_moves(robot):
     assert not any(sent[count:])
 
 
+def test_the_last_command_of_a_dry_run_is_not_sent(mock):
+    """It was made for a robot that must not move, and the person has only just agreed."""
+    sent = []
+    hooks = Hooks(decided=lambda _, decision: sent.append(decision.twist))
+    clock = RobotClock(SPEED)
+    link = RestLink(f"http://{mock.address}", clock=clock)
+    with RealRobotino(link, SafetyRules(), clock=clock, hooks=hooks) as real:
+        real.connect(muted=True)
+        drive(real, (0.2, 0.0, 0.0), 2)
+        real.unmute()
+        count = len(sent)
+        eventually(lambda: len(sent) > count + 3, pace_s=0.001)
+
+    assert not any(map(any, sent))
+
+
 def test_a_new_episode_begins_where_odometry_says(robot, mock):
     """The robot may have rolled on after the last step, or was pushed."""
     real = robot()

@@ -113,7 +113,8 @@ class RealRobotino(RobotinoAbc):
         self.close()
 
     def unmute(self) -> None:
-        """End a dry run: send commands from now on."""
+        """End a dry run: send commands from now on; the last command of the dry run is not sent."""
+        self._loop.command(STANDING)
         self._loop.muted = False
 
     def drive(self, vx: float, vy: float, omega: float) -> None:
