@@ -139,7 +139,7 @@ def link_over_rest(client):
 
 
 def causes_of_an_hour(seconds):
-    """Turn to and fro, where nothing can be hit, with a delay of 50 ms; return how often each cause held."""
+    """Turn to and fro with a delay of 50 ms, away from obstacles; return the count of each cause."""
     counts, last = {}, [None]
 
     def decided(situation, decision):
@@ -165,7 +165,7 @@ def causes_of_an_hour(seconds):
 
 
 def open_loop():
-    """Drive the same commands for 10 s; return how far the robot is from where the commands lead."""
+    """Drive commands for 10 s; return the distance in meters from the integrated commands to the robot."""
     robot, client = started("--speed=4", "--drift=0")
     clock = RobotClock(4.0)
     try:

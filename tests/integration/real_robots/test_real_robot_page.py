@@ -65,7 +65,7 @@ def test_the_commands_of_the_page_drive_the_mock_robot(shell, tmp_path):
 
 
 def typed(leader, program):
-    """Answer yes, then hold the space bar until the program ends; return what the terminal shows."""
+    """Answer yes, then hold the space bar until the program ends; return the output of the terminal."""
     shown, ends = "", time.monotonic() + DEADLINE_S
     os.set_blocking(leader, False)
     while program.poll() is None and time.monotonic() < ends:
@@ -82,7 +82,7 @@ def typed(leader, program):
 
 
 def test_the_page_has_every_option_of_the_program():
-    """An option that the page does not explain is an option that nobody uses."""
+    """Readers use only the options that the page explains."""
     explained = set(re.findall(r"`(--[a-z-]+)", PAGE))
     options = {name for action in arguments_parser()._actions for name in action.option_strings}
 

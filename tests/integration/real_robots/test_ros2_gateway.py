@@ -267,7 +267,7 @@ def test_a_run_that_does_not_run_is_refused(tmp_path):
 
 
 def test_a_robot_without_a_node_is_refused_with_the_nodes_that_exist(master):
-    """Names of simulators in a run have a number that nobody can guess."""
+    """The ROS names of simulators in a run end with a hash, which a person cannot guess."""
     simulator = CountingSimulator("wanderer", master)
     try:
         assert re.search(

@@ -76,7 +76,7 @@ def test_a_person_carries_it_without_its_odometry(robot):
 
 
 def test_it_is_not_put_into_an_obstacle(robot):
-    """The physics would push the robot out to a place that nobody has chosen."""
+    """The physics would push the robot out of the obstacle, to another place than the wanted one."""
     with pytest.raises(MockRobotError, match=r"^x 2, y 0: an obstacle is there; choose a free place$"):
         robot.place(2.0, 0.0, 0.0)
 

@@ -43,7 +43,7 @@ def robot(name):
 
 
 def test_the_only_robot_needs_no_name():
-    """Most worlds have one robot, and its name in ROS has a number that nobody can remember."""
+    """Most worlds have one robot, and its name in ROS ends with a hash, which a person cannot remember."""
     assert chosen_robot([robot("a")], None).robot == "a"
     assert shown_node(scene("a"), "job_a") == "a"
 

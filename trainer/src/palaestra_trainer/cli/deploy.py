@@ -41,7 +41,7 @@ writes:
 
 First the policy acts on live readings without driving, and the commands are shown. After a question, the
 robot drives while a key is held. Before you drive, read the page docs/howto/real-robot.md, and have the
-robot's emergency stop in reach: nothing of this program is a safety function.
+robot's emergency stop in reach: this program is not a safety function.
 """
 EXIT_CODES = """\
 exit codes:
@@ -159,7 +159,11 @@ def arguments_parser() -> argparse.ArgumentParser:
     add("--turn-limit", type=seconds, default=TURN_RAD_S, metavar="RAD/S", help="default: %(default)s")
     add("--dry-run", action="store_true", help="show the commands of some steps, and do not drive")
     add("--yes", action="store_true", help="do not ask before driving")
-    add("--no-hold", action="store_true", help="drive without a held key; only where nobody can be hit")
+    add(
+        "--no-hold",
+        action="store_true",
+        help="drive without a held key; only if the robot cannot hit a person",
+    )
     add("--sensor-order", choices=ORDERS, default=ORDERS[0], help="order of the robot's distance sensors")
     add("--sensor-unit", choices=UNITS, default=UNITS[0], help="unit of the robot's distance sensors")
     add("--log", type=Path, metavar="FILE", help="the record; default: deployment-<time>.mcap")
@@ -171,6 +175,7 @@ _ROBOT = "http://HOST of the robot, ros1://HOST:PORT[/NAMESPACE] of its ROS mast
 _TARGET = "target of an episode in m; repeatable: each further episode begins where the one before ended"
 _START = "where the robot stands, in m and rad of the task's frame (default: 0,0,0)"
 _FENCE = "least x and y, then greatest, in m: the robot stays inside (default: 1 m around start and targets)"
+_NO_HOLD = "drive without a held key; use it only where the robot cannot hit a person"
 _NEGATIVE = ("--target", "--start", "--fence")
 
 
