@@ -9,8 +9,11 @@ import subprocess
 import sys
 import threading
 
+from tests.waiting import eventually
+
 PROGRAM = (sys.executable, "-m", "palaestra_sim.mock_robot.entry", "--listen=127.0.0.1:0")
 DEADLINE_S = 30.0  # moments on an idle machine
+SPEED = 5.0  # of the mock robots in tests of robots: faster ones depend on the scheduler of the machine
 
 
 class Client:
@@ -55,6 +58,22 @@ def ended(process, client):
     client.connection.close()
     process.kill()
     process.communicate()
+
+
+def settled(client):
+    """Put the robot into the middle of the arena, at rest and without a charger, and return its client."""
+    client.send("/data/omnidrive", [0, 0, 0])
+    client.send("/mock/charger", {"connected": False})
+    client.send("/mock/place", [0, 0, 0])
+    eventually(lambda: client.get("/mock/truth")["vx"] == 0.0, pace_s=0.005)
+    return client
+
+
+def drive(robot, twist, periods):
+    """Drive at a velocity for some periods."""
+    for _ in range(periods):
+        robot.drive(*twist)
+        robot.advance()
 
 
 class Cable:

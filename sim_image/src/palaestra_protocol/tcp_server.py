@@ -21,6 +21,7 @@ class TcpServer(socketserver.ThreadingTCPServer):
 
     Attributes:
         poll_s: maximum duration of `close`.
+        ends_connections: whether `close` closes the open connections too.
 
     Args:
         address: host and port on which the server listens; port 0 means that the system chooses a free port.
@@ -35,6 +36,7 @@ class TcpServer(socketserver.ThreadingTCPServer):
     allow_reuse_address = True
     daemon_threads = True
     poll_s = 0.1
+    ends_connections = False
 
     def __init__(
         self,
@@ -49,6 +51,11 @@ class TcpServer(socketserver.ThreadingTCPServer):
         self._thread: threading.Thread | None = None
         super().__init__(address, handler)
 
+    @property
+    def port(self) -> int:
+        """The port on which the server listens."""
+        return int(self.socket.getsockname()[1])
+
     def start(self) -> None:
         """Start to serve requests, in new threads."""
         self._thread = threading.Thread(
@@ -62,6 +69,8 @@ class TcpServer(socketserver.ThreadingTCPServer):
             self.shutdown()
             self._thread.join()
         self.server_close()
+        if self.ends_connections:
+            self.slots.clear()
 
     def __enter__(self) -> Self:
         """Start to serve requests."""

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from tests.mock_robots import DEADLINE_S, PROGRAM, ended, started
+from tests.mock_robots import DEADLINE_S, PROGRAM, ended, settled, started
 from tests.waiting import eventually
 
 SCRIPT = """
@@ -27,10 +27,7 @@ def running():
 @pytest.fixture
 def robot(running):
     """Return the client of a robot that stands in the middle of the arena."""
-    running.send("/data/omnidrive", [0, 0, 0])
-    running.send("/mock/place", [0, 0, 0])
-    eventually(lambda: running.get("/mock/truth")["vx"] == 0.0, pace_s=0.005)
-    return running
+    return settled(running)
 
 
 def test_the_odometry_advances_under_commands(robot):

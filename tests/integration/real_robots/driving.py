@@ -3,7 +3,6 @@
 import signal
 import sys
 import threading
-import time
 
 from palaestra_trainer.real_robots.command_loop import Hooks
 from palaestra_trainer.real_robots.connect import link_to
@@ -36,7 +35,5 @@ def main():
 
 
 if __name__ == "__main__":
-    signal.signal(signal.SIGALRM, signal.SIG_DFL)
     signal.alarm(120)  # no child of a test outlives it for long
-    time.sleep(0)
     main()

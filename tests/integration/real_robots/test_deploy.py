@@ -11,11 +11,10 @@ import time
 import pytest
 
 from palaestra_trainer.bags.reader import read_bag
-from tests.mock_robots import DEADLINE_S, ended, started
+from tests.mock_robots import DEADLINE_S, SPEED
 from tests.packages import changed_manifest, write_package
 from tests.waiting import eventually
 
-SPEED = 5.0
 HANDS_OFF = ("--yes", "--no-hold", "--speed-limit=0.5")
 # Imports of these fail, as on a robot's computer that has only the extra `deploy`.
 LEAN = """
@@ -29,24 +28,6 @@ sys.meta_path.insert(0, Absent())
 from palaestra_trainer.cli.deploy import deploy
 sys.exit(deploy(sys.argv[1:]))
 """
-
-
-@pytest.fixture(scope="module")
-def running():
-    """Yield a client of a fast mock robot, which all tests of this file share."""
-    process, client = started(f"--speed={SPEED:g}", "--drift=0")
-    yield client
-    ended(process, client)
-
-
-@pytest.fixture
-def mock(running):
-    """Return the client of a robot that stands in the middle of the arena, without a charger."""
-    running.send("/data/omnidrive", [0, 0, 0])
-    running.send("/mock/charger", {"connected": False})
-    running.send("/mock/place", [0, 0, 0])
-    eventually(lambda: running.get("/mock/truth")["vx"] == 0.0, pace_s=0.005)
-    return running
 
 
 @pytest.fixture

@@ -15,28 +15,8 @@ from palaestra_trainer.real_robots.safety import Fence, SafetyRules
 from palaestra_trainer.robots.geometry import Pose
 from palaestra_trainer.testing.conformance import check_robot
 from tests.dead_man import LIMITS_S, after, driver
-from tests.mock_robots import DEADLINE_S, Cable, ended, started
+from tests.mock_robots import DEADLINE_S, SPEED, Cable, drive
 from tests.waiting import eventually
-
-SPEED = 5.0
-
-
-@pytest.fixture(scope="module")
-def running():
-    """Yield a client of a fast mock robot with a perfect odometry, which all tests of this file share."""
-    process, client = started(f"--speed={SPEED:g}", "--drift=0")
-    yield client
-    ended(process, client)
-
-
-@pytest.fixture
-def mock(running):
-    """Return the client of a robot that stands in the middle of the arena, without a charger."""
-    running.send("/data/omnidrive", [0, 0, 0])
-    running.send("/mock/charger", {"connected": False})
-    running.send("/mock/place", [0, 0, 0])
-    eventually(lambda: running.get("/mock/truth")["vx"] == 0.0, pace_s=0.005)
-    return running
 
 
 @pytest.fixture
@@ -55,13 +35,6 @@ def robot(mock):
     yield make
     for each in made:
         each.close()
-
-
-def drive(robot, twist, periods):
-    """Drive at a velocity for some periods."""
-    for _ in range(periods):
-        robot.drive(*twist)
-        robot.advance()
 
 
 def test_the_real_robot_keeps_the_rules_of_every_robot(robot):
@@ -92,7 +65,7 @@ def test_the_speed_limit_holds_for_the_robot_itself(robot, mock):
 
 
 def test_the_robot_stands_after_a_bump_and_says_so(robot, mock):
-    """The environment ends the episode as a collision, so this is no error."""
+    """The environment ends the episode as a collision, so `advance` does not raise an error."""
     mock.send("/mock/place", [1.6, 0, 0])
     real = robot()
     for _ in range(20):
@@ -154,7 +127,7 @@ def test_a_velocity_that_is_not_finite_ends_the_drive(robot, mock):
 
 
 def test_a_robot_without_a_connection_is_lost(robot, mock):
-    """Two seconds without readings are no short delay, so a person must look."""
+    """Two seconds without readings are longer than a usual delay, so a person must look at the robot."""
     with Cable(mock) as cable:
         real = robot(cable.url)
         cable.cut()

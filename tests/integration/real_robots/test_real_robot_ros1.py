@@ -15,7 +15,7 @@ from palaestra_trainer.real_robots.safety import SafetyRules
 from palaestra_trainer.robots.geometry import Pose
 from palaestra_trainer.ros import Master
 from palaestra_trainer.testing.conformance import check_robot
-from tests.mock_robots import DEADLINE_S, ended, started
+from tests.mock_robots import DEADLINE_S, drive, ended, started
 from tests.waiting import eventually
 
 SPEED = 10.0
@@ -109,13 +109,6 @@ def stands(client):
     """Return whether the robot stands."""
     truth = client.get("/mock/truth")
     return truth["vx"] == truth["vy"] == truth["omega"] == 0.0
-
-
-def drive(robot, twist, periods):
-    """Drive at a velocity for some periods."""
-    for _ in range(periods):
-        robot.drive(*twist)
-        robot.advance()
 
 
 def keep(link, twist, until):

@@ -92,7 +92,7 @@ def driving(address):
 
 
 def found_by(program):
-    """Return what the program has found at its end."""
+    """Wait for the end of a program, and return its output as data."""
     shown, _ = program.communicate(timeout=DEADLINE_S)
     return json.loads(shown)
 
@@ -108,18 +108,9 @@ def running():
 @pytest.fixture(scope="module", autouse=True)
 def lonely():
     """Yield a program that drives where no driver is; it waits for one while the other tests run."""
-    program = driving("ros2:/nobody")
+    program = driving("ros2:/absent")
     yield program
     leave(program)
-
-
-@pytest.fixture
-def mock(running):
-    """Return the client of a robot that stands in the middle of the arena."""
-    running.send("/data/omnidrive", [0, 0, 0])
-    running.send("/mock/place", [0, 0, 0])
-    eventually(lambda: running.get("/mock/truth")["vx"] == 0.0, pace_s=0.005)
-    return running
 
 
 @pytest.fixture(scope="module")
@@ -214,7 +205,7 @@ def test_a_robot_without_a_driver_is_refused(lonely):
     found = found_by(lonely)
 
     assert found["error"] == (
-        "RobotUnfit: ros2:/nobody: no odometry arrives on /nobody/odom; start the robot's driver, and "
+        "RobotUnfit: ros2:/absent: no odometry arrives on /absent/odom; start the robot's driver, and "
         "compare the namespace and ROS_DOMAIN_ID"
     )
 

@@ -64,6 +64,7 @@ class RpcServer(TcpServer):
 
     request_queue_size = 128
     poll_s = 0.05
+    ends_connections = True
 
     def __init__(
         self,
@@ -80,16 +81,6 @@ class RpcServer(TcpServer):
         super().__init__(
             address, _Handler, name="XML-RPC", slots=ConnectionSlots(MOST_CONNECTIONS, MOST_CONNECTIONS)
         )
-
-    @property
-    def port(self) -> int:
-        """The port on which the server listens."""
-        return int(self.socket.getsockname()[1])
-
-    def close(self) -> None:
-        """Stop accepting connections, close the open connections, and free the port."""
-        super().close()
-        self.slots.clear()
 
     def respond(self, data: bytes) -> bytes:
         """Return the response to a request."""

@@ -47,6 +47,8 @@ class RestServer(TcpServer):
 
     poll_s = 0.05
 
+    ends_connections = True
+
     def __init__(self, address: Address, routes: Routes, wait_s: Callable[[str], float]) -> None:
         self.address_family = socket.AF_INET6 if ":" in address.host else socket.AF_INET
         self.routes = routes
@@ -63,7 +65,6 @@ class RestServer(TcpServer):
         """Stop accepting connections, close the open connections, and free the address."""
         self.closing.set()
         super().close()
-        self.slots.clear()
 
 
 class _Handler(BaseHTTPRequestHandler):

@@ -11,6 +11,7 @@ from palaestra_protocol.pod.enums import ExitCode
 from palaestra_trainer.cli.program import leaving
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.job.run_directory import RunDirectory
+from palaestra_trainer.reporting.run_data import RunData
 
 REPORT = """\
 Write the report of a run, or of several runs side by side, as one HTML file of at most 2.5 MB. It refers to
@@ -71,20 +72,29 @@ def _report(runs: Sequence[RunDirectory], records: Sequence[Path], out: Path | N
     """Write the report of runs and of the records of deployments."""
     from palaestra_trainer.reporting.write_report import write_report
 
-    deployments = []
-    for file in records:
-        from palaestra_trainer.reporting.read_deployment import read_deployment
-
-        try:
-            deployments.append(read_deployment(file))
-        except (ConfigurationError, OSError) as error:
-            sys.stderr.write(f"{error}\n")
-            return ExitCode.CONFIGURATION
-    if out is None:
-        one = runs[0].report if len(runs) == 1 else RunDirectory(Path()).report
-        out = records[0].with_suffix(".html") if len(records) == 1 and not runs else one
-    to = out
+    try:
+        deployments = _deployments(records)
+    except (ConfigurationError, OSError) as error:
+        sys.stderr.write(f"{error}\n")
+        return ExitCode.CONFIGURATION
+    to = out or _usual_file(runs, records)
     return _written(to, "--out", lambda: write_report(runs, to, deployments))
+
+
+def _deployments(records: Sequence[Path]) -> list[RunData]:
+    """Return the data of deployments; without records, the libraries of bags are not needed."""
+    if not records:
+        return []
+    from palaestra_trainer.reporting.read_deployment import read_deployment
+
+    return [read_deployment(record) for record in records]
+
+
+def _usual_file(runs: Sequence[RunDirectory], records: Sequence[Path]) -> Path:
+    """Return the file of a report for which no file was named."""
+    if len(records) == 1 and not runs:
+        return records[0].with_suffix(".html")
+    return (runs[0] if len(runs) == 1 else RunDirectory(Path())).report
 
 
 def _film(given: Sequence[Path], runs: Sequence[RunDirectory], film: Path) -> int:

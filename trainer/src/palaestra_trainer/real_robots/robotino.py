@@ -70,8 +70,9 @@ class RealRobotino(RobotinoAbc):
         self._period_s = period_s
         self._clock = clock or RobotClock()
         self._store = ReadingStore()
-        self._check = (hooks or Hooks()).check
-        self._loop = CommandLoop(link, self._store, self.rules, self._clock, hooks or Hooks())
+        called = hooks or Hooks()
+        self._check = called.check
+        self._loop = CommandLoop(link, self._store, self.rules, self._clock, called)
         self._seen = Readings()
         self._pose: Pose | None = None
         self._tick_s = 0.0

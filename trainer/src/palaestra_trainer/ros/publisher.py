@@ -128,20 +128,11 @@ class _Server(TcpServer):
     """The server of a topic's connections."""
 
     poll_s = 0.05
+    ends_connections = True
 
     def __init__(self, address: tuple[str, int], publisher: RosPublisher) -> None:
         self.publisher = publisher
         super().__init__(address, _Handler, name="publisher", slots=ConnectionSlots())
-
-    @property
-    def port(self) -> int:
-        """The port on which the server listens."""
-        return int(self.socket.getsockname()[1])
-
-    def close(self) -> None:
-        """Stop accepting connections, and close the open connections."""
-        super().close()
-        self.slots.clear()
 
 
 class _Handler(socketserver.BaseRequestHandler):
