@@ -57,7 +57,7 @@ WRONG = [
     ("DQN", {"gamma": "0.9"}, "gamma: '0.9' is refused; give a number"),
     ("DQN", {"batch_size": 32.5}, "batch_size: 32.5 is refused; give a whole number"),
     ("PPO", {"use_sde": 1}, "use_sde: 1 is refused; give true or false"),
-    ("PPO", {"clip_range_vf": "small"}, "'small' is refused; give null or a number or a schedule such as"),
+    ("PPO", {"clip_range_vf": "small"}, "'small' is refused; give a number or null or a schedule such as"),
     ("DQN", {"train_freq": ["a", 1]}, "give a whole number or a list of a whole number and text"),
     ("PPO", {"policy_kwargs": [64]}, "policy_kwargs: [64] is refused; give a mapping or null"),
     ("PPO", {"policy_kwargs": {"net_arc": [8]}}, "has no such argument; did you mean net_arch?"),

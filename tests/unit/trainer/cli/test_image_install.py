@@ -141,7 +141,7 @@ def test_a_dependency_that_the_image_lacks_comes_without_what_the_image_has(proj
     ("needs", "fact"),
     [
         ("gymnasium>=99", "corridor: needs gymnasium>=99, and the image has 1."),
-        ("companion", "companion: needs torch>=99, and the image has 2.6"),
+        ("companion", "companion: needs torch>=99, and the image has 2."),
         ("stable-baselines3[tests]", "corridor: needs pytest-cov, which the image does not have"),
     ],
     ids=["direct", "indirect", "extra"],

@@ -194,4 +194,11 @@ def _words(annotation: Any) -> str:
         return "a list of " + " and ".join(map(_words, parts))
     if origin in {list, dict}:
         return {list: "a list", dict: "a mapping"}[origin]
-    return " or ".join(map(_words, parts)) if parts else str(annotation)
+    return " or ".join(map(_words, sorted(parts, key=_place_in_words))) if parts else str(annotation)
+
+
+def _place_in_words(part: Any) -> int:
+    """Return a key for the order of a union's parts, which differs between releases of Stable-Baselines3."""
+    if collections.abc.Callable in {get_origin(part), part}:
+        return 2  # the words of a schedule contain a comma, so nothing may follow them
+    return 1 if part is type(None) else 0
