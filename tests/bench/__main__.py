@@ -21,6 +21,7 @@ from tests.bench import (
     plain,
     runs,
     simulators,
+    step_floor,
     stepping,
     watched,
     webots,
@@ -28,6 +29,7 @@ from tests.bench import (
 
 PARTS = {
     "stepping": stepping.measure,
+    "floor": step_floor.measure,
     "simulators": simulators.measure,
     "webots": webots.measure,
     "watched": watched.measure,
