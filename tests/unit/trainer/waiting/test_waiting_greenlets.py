@@ -11,6 +11,7 @@ from contextlib import ExitStack
 from functools import partial
 
 import pytest
+from greenlet import getcurrent
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -58,6 +59,30 @@ def test_everyone_has_a_first_turn_before_anyone_has_a_second(pauses):
 def test_alone_there_is_nobody_to_let():
     """A notebook with one environment has no other task to run."""
     assert let_others() is None
+
+
+def test_a_single_work_runs_in_the_greenlet_of_its_caller():
+    """A run with one simulator needs no greenlet, whose switches copy its stack at every wait."""
+
+    def work():
+        let_others()
+        return getcurrent(), away_s()
+
+    assert take_turns([work]) == [(getcurrent(), 0.0)]
+
+
+def test_a_single_work_within_a_turn_is_not_interrupted_by_other_tasks():
+    """The outer task is between a request and its response while it serves its own simulators."""
+    told = []
+
+    def inner(name):
+        told.append(f"{name} asks")
+        let_others()
+        told.append(f"{name} reads")
+
+    take_turns([lambda: take_turns([lambda: inner("a")]), lambda: take_turns([lambda: inner("b")])])
+
+    assert told == ["a asks", "a reads", "b asks", "b reads"]
 
 
 def test_turns_may_be_taken_within_a_turn():

@@ -122,6 +122,9 @@ def take_turns(works: Iterable[Callable[[], Any]]) -> list[Any]:
         BaseException: the error of the current work, for example after Ctrl-C; the other works are stopped at
             once.
     """
+    works = list(works)
+    if len(works) == 1 and not isinstance(getcurrent(), _Turn):
+        return [works[0]()]  # `let_others` then returns at once, and no greenlet's stack is copied
     turns = [(_idle.turns.pop() if _idle.turns else _Turn()).begin(work) for work in works]
     waiting = turns
     try:
