@@ -30,7 +30,7 @@ OF_STABLE_BASELINES3 = ("episode", "terminal_observation")
 def ours(info: Mapping[str, Any]) -> Mapping[str, Any]:
     """Return Palaestra's dict in the info of a step, or an empty dict if the info does not have one."""
     found = info.get(OURS)
-    return found if isinstance(found, Mapping) else {}
+    return found if type(found) is dict or isinstance(found, Mapping) else {}
 
 
 def is_valid(info: Mapping[str, Any]) -> bool:
@@ -49,6 +49,10 @@ def of_environment(info: Mapping[str, Any], **words: Any) -> dict[str, Any]:
     taken = {name: info[name] for name in OF_STABLE_BASELINES3 if name in info}
     if OURS in info and ours(info).keys() != {"extra_steps"}:
         taken[OURS] = info[OURS]
-    said = {"extra_steps": steps} if (steps := extra_steps(info)) else {}
-    kept = {name: value for name, value in info.items() if name not in taken}
-    return kept | {OURS: said | ({HIDDEN: taken} if taken else {}) | words}
+    said: dict[str, Any] = {"extra_steps": steps} if (steps := extra_steps(info)) else {}
+    kept = dict(info)
+    if taken:
+        kept = {name: value for name, value in info.items() if name not in taken}
+        said[HIDDEN] = taken
+    kept[OURS] = said | words
+    return kept

@@ -191,7 +191,8 @@ class Collector:
         except SimulatorFault as fault:
             self._break(fault)
             return self._invalid(seen=self._observation, done=True)
-        info = self._said(info) | {TRUNCATED: truncated and not terminated}
+        info = self._said(info)
+        info[TRUNCATED] = truncated and not terminated
         if terminated or truncated:
             info["terminal_observation"] = observation
             info["episode"] = self._summary()
@@ -228,7 +229,8 @@ class Collector:
 
     def _said(self, info: dict[str, Any]) -> dict[str, Any]:
         said = of_environment(info, valid=True)
-        for word in said[OURS].get(HIDDEN, {}).keys() - self._hidden:
+        hidden = said[OURS].get(HIDDEN)
+        for word in hidden.keys() - self._hidden if hidden else ():
             self._hidden.add(word)
             log.warning(
                 "info key of the environment moved: Stable-Baselines3 or Palaestra uses it",

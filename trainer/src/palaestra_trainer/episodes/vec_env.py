@@ -132,13 +132,13 @@ class SimulatorsVecEnv(MembersVecEnv):
             )
         if valid := sum(is_valid(row.info) for row in rows):
             self._watcher.stepped(valid)
-        dones = np.array([row.done for row in rows])
-        if dones.any():
+        dones = [row.done for row in rows]
+        if any(dones):
             self._keep_reset_infos()
         return (
             self._stack([row.observation for row in rows]),
             np.array([row.reward for row in rows], dtype=np.float32),
-            dones,
+            np.array(dones),
             [row.info for row in rows],
         )
 

@@ -35,15 +35,16 @@ class Movement(IntEnum):
     @property
     def twist(self) -> Twist:
         """The velocities of the movement, as arguments of `Omnidrive.drive`."""
-        return _TWISTS[self]
+        return _TWISTS[self.value]
 
 
-_TWISTS: dict[Movement, Twist] = {
-    Movement.STOP: (0.0, 0.0, 0.0),
-    Movement.FORWARD: (SPEED_M_S, 0.0, 0.0),
-    Movement.BACKWARD: (-SPEED_M_S, 0.0, 0.0),
-    Movement.LEFT: (0.0, SPEED_M_S, 0.0),
-    Movement.RIGHT: (0.0, -SPEED_M_S, 0.0),
-    Movement.TURN_LEFT: (0.0, 0.0, TURN_RAD_S),
-    Movement.TURN_RIGHT: (0.0, 0.0, -TURN_RAD_S),
-}
+# By the number of the movement.
+_TWISTS: tuple[Twist, ...] = (
+    (0.0, 0.0, 0.0),
+    (SPEED_M_S, 0.0, 0.0),
+    (-SPEED_M_S, 0.0, 0.0),
+    (0.0, SPEED_M_S, 0.0),
+    (0.0, -SPEED_M_S, 0.0),
+    (0.0, 0.0, TURN_RAD_S),
+    (0.0, 0.0, -TURN_RAD_S),
+)

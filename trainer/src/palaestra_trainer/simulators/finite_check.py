@@ -20,6 +20,8 @@ def check_observation(simulator: str, env: Environment, observation: Any) -> Non
     Raises:
         Diverged: a number is not finite; the message names the environment and the number's index.
     """
+    if isinstance(observation, np.ndarray) and not _not_finite(observation):
+        return
     parts = observation if isinstance(observation, Mapping) else {"": observation}
     for name, part in parts.items():
         if fact := _not_finite(part):
@@ -46,7 +48,7 @@ def check_reward(simulator: str, env: Environment, reward: Any, info: Mapping[st
 def _not_finite(part: Any) -> str:
     """Return index and value of the first number that is not finite; "" if all are finite."""
     numbers = np.asarray(part)
-    if numbers.dtype.kind != "f" or np.isfinite(numbers).all():
+    if numbers.dtype.kind != "f" or np.logical_and.reduce(np.isfinite(numbers), axis=None):
         return ""
     place = tuple(int(index) for index in np.argwhere(~np.isfinite(numbers))[0])
     return f"{list(place)} is {numbers[place]}"
