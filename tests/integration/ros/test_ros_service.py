@@ -67,6 +67,20 @@ def test_an_answer_of_any_length_comes_whole_also_after_short_ones(peer, service
         assert ask.finish().value == wanted
 
 
+def test_a_packed_request_may_be_sent_again_and_again(peer, service):
+    """A step sends the same request for a pose each time, so its bytes are made only once."""
+    heard = []
+    peer.do(lambda: peer.node.serve("hear", "webots_ros/set_int", lambda it: heard.append(it.value) or {}))
+    hear = service("hear", "webots_ros/set_int")
+    packed = hear.packed(value=7)
+
+    for _ in range(2):
+        hear.send(packed)
+        hear.finish()
+
+    assert heard == [7, 7]
+
+
 @pytest.mark.parametrize("length", [0, 439, 440, 441, 5_000, 100_000])
 def test_a_request_of_any_length_arrives_whole(peer, service, length):
     """A request may contain a whole world file."""

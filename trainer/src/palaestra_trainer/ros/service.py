@@ -15,6 +15,7 @@ from palaestra_trainer.ros.tcpros_client import TcprosClient
 
 DEADLINE_S = 5.0
 _OK_BYTE = 1
+_AHEAD_BYTES = 1 + LENGTH.size
 
 
 class RosService:
@@ -55,7 +56,22 @@ class RosService:
         Raises:
             SimulatorDead, SimulatorHung, WrongData: as a call.
         """
-        data = self._type.request.frame(fields)
+        self.send(self._type.request.frame(fields))
+
+    def packed(self, **fields: Any) -> bytes:
+        """Return the bytes of a request with `fields`, for `send`.
+
+        Raises:
+            ValueError: a value does not fit its field.
+        """
+        return self._type.request.frame(fields)
+
+    def send(self, data: bytes) -> None:
+        """Send a request that `packed` has returned; otherwise as `begin`.
+
+        Raises:
+            SimulatorDead, SimulatorHung, WrongData: as a call.
+        """
         try:
             (self._wire or self._connect()).send(data)
         except BaseException:  # for Ctrl-C too, because the next call would read this request's response
@@ -68,7 +84,7 @@ class RosService:
         Raises:
             SimulatorDead, SimulatorHung, WrongData: as a call.
         """
-        wire = self._asked()
+        wire = self._wire or self._asked()
         try:
             return self._read_answer(wire)
         except BaseException:  # for Ctrl-C too, because the next call would read this request's response
@@ -95,8 +111,8 @@ class RosService:
         return self._wire
 
     def _read_answer(self, wire: TcprosClient) -> Any:
-        answer = wire.receive(ahead=1)
-        payload = answer[1 + LENGTH.size :]
+        answer = wire.receive(1)
+        payload = answer[_AHEAD_BYTES:]
         if answer[0] != _OK_BYTE:
             words = bytes(payload).decode(errors="replace")
             raise WrongData(self.simulator, f"{self.name} failed: {words}")

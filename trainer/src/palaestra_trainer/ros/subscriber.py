@@ -97,7 +97,7 @@ class RosSubscriber:
             SimulatorDead: the connection was lost, or `connect` was never called.
             WrongData: the message cannot be read.
         """
-        wire = self._connection()
+        wire = self._wire or self._connection()
         try:
             return self._decode(wire.receive())
         except SimulatorHung:

@@ -27,6 +27,11 @@ _MOST_KEPT_BYTES = 4 << 20  # an image arrives at each step, so a buffer of its 
 _QUICK_S = 200e-6
 _LOOKS = 30
 
+# Plain numbers: a step reads a dozen messages, and each use of the flag's enum takes two lookups more.
+_NOW = int(socket.MSG_DONTWAIT)
+_FIRST_BYTES = sockets.FIRST_BYTES
+_LENGTH_BYTES = LENGTH.size
+
 
 class TcprosClient:
     """A connection; the constructor does the handshake.
@@ -93,10 +98,10 @@ class TcprosClient:
             # Usually exactly one whole frame has arrived. `recv` then reuses a small block of memory that is
             # still in the processor's cache. A buffer per connection would not be in the cache.
             try:
-                data = self._socket.recv(sockets.FIRST_BYTES, socket.MSG_DONTWAIT)
+                data = self._socket.recv(_FIRST_BYTES, _NOW)
             except OSError:
                 return self._receive_in_parts(ahead)
-            begin = ahead + LENGTH.size
+            begin = ahead + _LENGTH_BYTES
             if len(data) >= begin and LENGTH.unpack_from(data, ahead)[0] == len(data) - begin:
                 return data if ahead else data[begin:]
             self._filled = len(data)
@@ -131,7 +136,7 @@ class TcprosClient:
         if self._filled:
             return True
         try:
-            self._socket.recv(1, socket.MSG_PEEK | socket.MSG_DONTWAIT)
+            self._socket.recv(1, socket.MSG_PEEK | _NOW)
         except BlockingIOError:
             return False
         except OSError:
@@ -197,7 +202,7 @@ class TcprosClient:
         """Return the number of bytes that arrived during polling; None if no bytes arrived."""
         for _ in range(_LOOKS):
             try:
-                return self._socket.recv_into(room, 0, socket.MSG_DONTWAIT)
+                return self._socket.recv_into(room, 0, _NOW)
             except BlockingIOError:
                 os.sched_yield()
         return None
@@ -205,7 +210,7 @@ class TcprosClient:
     def _sleep(self, room: memoryview) -> int:
         """Return the number of bytes that arrived during a wait in the kernel."""
         began = time.perf_counter()
-        count = self._socket.recv_into(room, 0, socket.MSG_DONTWAIT if shutdown_deadline.is_over() else 0)
+        count = self._socket.recv_into(room, 0, _NOW if shutdown_deadline.is_over() else 0)
         self._quick = time.perf_counter() - began < _QUICK_S
         return count
 

@@ -57,6 +57,9 @@ class Observer:
         self._nodes: dict[str, int] = {}
         self._fields: dict[tuple[str, str], int] = {}
         self._types: dict[tuple[str, str], int] = {}
+        self._position = self._services.get("supervisor/node/get_position", "node_get_position")
+        self._orientation = self._services.get("supervisor/node/get_orientation", "node_get_orientation")
+        self._pose_requests: dict[str, tuple[bytes, bytes]] = {}
         self._surroundings = ObstacleReader(self._services)
 
     def time(self) -> float:
@@ -97,20 +100,19 @@ class Observer:
 
         Call `finish_pose` afterwards; other work may be done in between.
         """
-        node = self.node(name)
-        position, orientation = self._pose_services()
-        position.begin(node=node)
-        orientation.begin(node=node)
-        return orientation
+        position, orientation = self._pose_requests.get(name) or self._packed_pose_requests(name)
+        self._position.send(position)
+        self._orientation.send(orientation)
+        return self._orientation
 
     def finish_pose(self, name: str) -> tuple[float, float, float]:
         """Return the pose that `begin_pose` requested."""
-        position, orientation = (service.finish() for service in self._pose_services())
-        turn = orientation.orientation
-        heading = 2.0 * math.atan2(turn.z, turn.w)
-        pose = (position.position.x, position.position.y, math.remainder(heading, 2.0 * math.pi))
-        self._services.require_finite(f"the pose of {name}", *pose)
-        return pose
+        place, turn = self._position.finish().position, self._orientation.finish().orientation
+        x_m, y_m = place.x, place.y
+        heading_rad = math.remainder(2.0 * math.atan2(turn.z, turn.w), 2.0 * math.pi)
+        if not (math.isfinite(x_m) and math.isfinite(y_m) and math.isfinite(heading_rad)):
+            self._services.require_finite(f"the pose of {name}", x_m, y_m, heading_rad)
+        return x_m, y_m, heading_rad
 
     def full_pose(self, name: str) -> tuple[Vector, Quaternion]:
         """Return position and rotation, in the world, of the node with DEF `name`.
@@ -275,6 +277,7 @@ class Observer:
         self._nodes.clear()
         self._fields.clear()
         self._types.clear()
+        self._pose_requests.clear()
         self._surroundings.forget()
 
     def close(self) -> None:
@@ -282,11 +285,12 @@ class Observer:
         self.forget_handles()
         self._services.close()
 
-    def _pose_services(self) -> tuple[RosService, RosService]:
-        return (
-            self._services.get("supervisor/node/get_position", "node_get_position"),
-            self._services.get("supervisor/node/get_orientation", "node_get_orientation"),
-        )
+    def _packed_pose_requests(self, name: str) -> tuple[bytes, bytes]:
+        """Return the bytes of both requests for a pose; each step sends them again."""
+        node = self.node(name)
+        packed = self._position.packed(node=node), self._orientation.packed(node=node)
+        self._pose_requests[name] = packed
+        return packed
 
     def _read(self, kind: type[_Data], path: str, most_bytes: int) -> _Data:
         text = self._services.ask(path, "get_string")
