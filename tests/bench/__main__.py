@@ -12,6 +12,7 @@ import time
 
 from tests.bench import (
     abroad,
+    collection,
     hostile,
     learning,
     newcomer,
@@ -34,6 +35,7 @@ PARTS = {
     "webots": webots.measure,
     "watched": watched.measure,
     "parallel": parallel.measure,
+    "collection": collection.measure,
     "recovery": runs.measure_recovery,
     "shutdown": runs.measure_shutdown,
     "memory": runs.measure_memory,

@@ -178,7 +178,8 @@ def simulator():
     [pid] = [
         pid
         for pid, words in below(os.getpid())
-        if any(word.endswith("palaestra-stub") for word in words[:2]) and not any(REAPER in word for word in words)
+        if any(word.endswith("palaestra-stub") for word in words[:2])
+        and not any(REAPER in word for word in words)
     ]
     return pid
 

@@ -16,7 +16,17 @@ from tests.bench.__main__ import PARTS
 from tests.local_run import ROOT
 from tests.soak import chaos
 
-SMALL = ("floor", "newcomer", "parallel", "planning", "simulators", "stepping", "watched", "webots")
+SMALL = (
+    "collection",
+    "floor",
+    "newcomer",
+    "parallel",
+    "planning",
+    "simulators",
+    "stepping",
+    "watched",
+    "webots",
+)
 OF_A_CLUSTER = ("hostile",)
 # These parts run the examples in MEASURED of test_run_from_file_to_policy.py.
 OF_WHOLE_RUNS = ("learning", "plain", "seeing", "sparse", "transfer")

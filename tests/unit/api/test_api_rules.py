@@ -148,6 +148,13 @@ BROKEN = {
         )
         for name in ("TD3", "DDPG", "TQC", "CrossQ")
     },
+    "PPO that collects asynchronously": (
+        {"trainer.algorithm.name": "PPO", "trainer.collection": "Asynchronous"},
+        (
+            "spec.trainer.collection: Asynchronous needs an off-policy algorithm; remove the field, or use "
+            "DQN, SAC or a similar one"
+        ),
+    ),
     "QRDQN with twists": (
         {
             "trainer.algorithm.name": "QRDQN",

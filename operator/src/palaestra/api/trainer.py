@@ -41,6 +41,13 @@ class Cnn(StrEnum):
     SMALL = "small"
 
 
+class Collection(StrEnum):
+    """Whether a step of the trainer waits for all collecting simulators."""
+
+    SYNCHRONOUS = "Synchronous"
+    ASYNCHRONOUS = "Asynchronous"
+
+
 class PullPolicy(StrEnum):
     """When a node pulls an image."""
 
@@ -256,6 +263,21 @@ def _needs(algorithm: str, actions: str, others: str) -> Rule:
     )
 
 
+_LEARN_FROM_ROLLOUTS = ("A2C", "MaskablePPO", "PPO", "REINFORCE", "RecurrentPPO", "TRPO")
+ROLLOUTS_ARE_SYNCHRONOUS = Rule(
+    field="collection",
+    holds=lambda trainer: (
+        trainer.collection is not Collection.ASYNCHRONOUS
+        or trainer.algorithm.name not in _LEARN_FROM_ROLLOUTS
+    ),
+    cel=(
+        "!has(self.collection) || self.collection != 'Asynchronous' || "
+        f"!(self.algorithm.name in {[*_LEARN_FROM_ROLLOUTS]})"
+    ),
+    message="Asynchronous needs an off-policy algorithm; remove the field, or use DQN, SAC or a similar one",
+)
+
+
 class Trainer(ApiModel):
     """The task, the algorithm and the length of training."""
 
@@ -277,6 +299,11 @@ class Trainer(ApiModel):
 
     steps: Annotated[int, Field(ge=1, le=2_000_000_000)] = 50_000
     """Environment steps to train for, summed over all collecting simulators of a replica."""
+
+    collection: Collection | None = Field(default=None, strict=False)
+    """`Synchronous`: each step waits for all collecting simulators. `Asynchronous`: a slow simulator does not
+    hold back the others; only off-policy algorithms such as DQN and SAC learn so, and a resumed run does not
+    equal the uninterrupted one. Absent: `Synchronous`."""
 
     evaluation: Evaluation = Evaluation()
     """Evaluation of the policy during training."""
@@ -302,5 +329,6 @@ class Trainer(ApiModel):
     rules = (
         *(_needs(name, "continuous", "discrete") for name in ("SAC", "TD3", "DDPG", "TQC", "CrossQ")),
         *(_needs(name, "discrete", "continuous") for name in ("DQN", "QRDQN")),
+        ROLLOUTS_ARE_SYNCHRONOUS,
     )
     guards = (NO_PASSWORD_IN_COMMAND,)

@@ -54,6 +54,7 @@ def _training(replica: Replica, files: Mapping[str, bytes]) -> dict[str, Any]:
         "algorithm": trainer["algorithm"],
         "device": "cuda" if asks_for_gpu(spec.trainer.resources) else None,
         "steps": spec.trainer.steps,
+        "collection": trainer.get("collection"),
         "evaluation": trainer["evaluation"],
         "checkpoint": trainer["checkpoint"],
         "resumeFrom": another,

@@ -16,7 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from palaestra_trainer.waiting import shutdown_deadline
-from palaestra_trainer.waiting.greenlets import away_s, let_others, take_turns
+from palaestra_trainer.waiting.greenlets import OpenWorks, away_s, let_others, take_turns
 from palaestra_trainer.waiting.wait_time import waited_s
 
 
@@ -279,3 +279,63 @@ def test_each_thread_takes_turns_of_its_own():
     thread.join()
 
     assert found == [1, 2]
+
+
+@given(st.lists(st.integers(0, 4), min_size=1, max_size=5))
+def test_open_works_end_one_after_the_other(pauses):
+    """Each result comes once, the first after at most as many turns as the shortest work has."""
+    works = OpenWorks()
+    for place, pause in enumerate(pauses):
+        works.begin(place, partial(paused, pause, place))
+
+    results = []
+    while len(results) < len(pauses):
+        works.run(lambda _: True)
+        results += works.take().items()
+
+    assert sorted(results) == [(place, place) for place in range(len(pauses))]
+    assert pauses[results[0][0]] == min(pauses)
+
+
+def paused(turns, result):
+    """Let the others run a number of times, and return `result`."""
+    for _ in range(turns):
+        let_others()
+    return result
+
+
+def test_open_works_read_a_response_that_came_between_two_runs(connections):
+    """The simulators compute while the algorithm learns."""
+    works, [(client, server), _] = OpenWorks(), connections
+
+    def ask():
+        let_others(until=client)
+        return client.recv(9)
+
+    works.begin(0, ask)
+    works.begin(1, partial(paused, 0, "fast"))
+    works.run(lambda _: True)
+    assert works.take() == {1: "fast"}
+    server.send(b"slow")
+    works.run(lambda _: True)
+
+    assert works.take() == {0: b"slow"}
+
+
+def test_aborted_works_end_where_they_are():
+    """A work that continued later would use a closed connection."""
+    works, ended = OpenWorks(), []
+
+    def work():
+        try:
+            paused(2, None)
+        finally:
+            ended.append(True)
+
+    works.begin(0, work)
+    works.begin(1, partial(paused, 0, None))
+    works.run(lambda _: True)
+    works.abort()
+
+    assert ended == [True]
+    assert works.take() == {}

@@ -20,7 +20,7 @@ from stable_baselines3.common.buffers import (
 )
 
 from palaestra_trainer.algorithms.observations import by_name, part
-from palaestra_trainer.environments.infos import is_valid
+from palaestra_trainer.environments.infos import is_pending, is_valid
 
 
 def valid_rows(infos: Sequence[dict[str, Any]]) -> np.ndarray:
@@ -114,7 +114,7 @@ class ValidReplayBuffer(ReplayBuffer):
                 self._newest[row] = self.pos
                 self.changed.add(self.pos // self.chunk_rows)
                 super().add(part(obs, one), part(next_obs, one), action[one], reward[one], done[one], [info])
-            else:
+            elif not is_pending(info):
                 self._truncate(self._newest[row])
 
     def rows(self, start: int = 0, stop: int | None = None) -> dict[str, np.ndarray]:

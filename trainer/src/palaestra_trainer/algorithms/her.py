@@ -22,7 +22,7 @@ from palaestra_trainer.algorithms.buffers import (
     Positions,
     ValidDictReplayBuffer,
 )
-from palaestra_trainer.environments.infos import is_valid
+from palaestra_trainer.environments.infos import is_pending, is_valid
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.job.configuration import Algorithm, nearest
 
@@ -153,7 +153,8 @@ class ValidHerReplayBuffer(ValidDictReplayBuffer, HerReplayBuffer):
         actions = action.reshape((self.n_envs, self.action_dim))
         for column, info in enumerate(infos):
             if not is_valid(info):
-                self._cut(column)
+                if not is_pending(info):
+                    self._cut(column)
                 continue
             row = self._next[column]
             self._forget_episode_from(row, column)

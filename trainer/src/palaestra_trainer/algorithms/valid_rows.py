@@ -18,7 +18,7 @@ from sb3_contrib import MaskablePPO
 from sb3_contrib.common.maskable.buffers import MaskableDictRolloutBuffer, MaskableRolloutBuffer
 from sb3_contrib.common.recurrent.buffers import RecurrentDictRolloutBuffer, RecurrentRolloutBuffer
 from stable_baselines3.common.base_class import BaseAlgorithm
-from stable_baselines3.common.buffers import RolloutBuffer
+from stable_baselines3.common.buffers import ReplayBuffer, RolloutBuffer
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
@@ -26,6 +26,7 @@ from stable_baselines3.common.type_aliases import RolloutReturn, TrainFreq, Trai
 from stable_baselines3.common.utils import explained_variance
 
 from palaestra_trainer.algorithms import own_buffers
+from palaestra_trainer.algorithms.begun_actions import BegunActions
 from palaestra_trainer.algorithms.buffers import (
     ValidDictReplayBuffer,
     ValidReplayBuffer,
@@ -60,7 +61,7 @@ class ValidRowsCounted(BaseAlgorithm):
         super()._update_info_buffer(infos, dones)
 
     def _excluded_save_params(self) -> list[str]:
-        return [*super()._excluded_save_params(), *_BUFFERS]
+        return [*super()._excluded_save_params(), *_BUFFERS, "_begun", "_counted_at"]
 
 
 class OffPolicyRows(ValidRowsCounted, OffPolicyAlgorithm):
@@ -71,6 +72,7 @@ class OffPolicyRows(ValidRowsCounted, OffPolicyAlgorithm):
     """
 
     def _setup_model(self) -> None:
+        self._begun, self._counted_at = BegunActions(), 0
         as_dict = isinstance(self.observation_space, spaces.Dict)
         chosen = self.replay_buffer_class or (ValidDictReplayBuffer if as_dict else ValidReplayBuffer)
         self.replay_buffer_class = own_buffers.of_valid_rows(chosen)
@@ -82,10 +84,44 @@ class OffPolicyRows(ValidRowsCounted, OffPolicyAlgorithm):
         self, env: Any, callback: BaseCallback, train_freq: TrainFreq, *args: Any, **kwargs: Any
     ) -> RolloutReturn:
         """Collect the steps of `train_freq`, but stop at the run's number of steps."""
+        if _is_asynchronous(env) and train_freq.unit is TrainFrequencyUnit.STEP:
+            return self._collect_rows(train_freq.frequency * env.num_envs, env, callback, *args, **kwargs)
         if train_freq.unit is TrainFrequencyUnit.STEP:
             missing = math.ceil((self._total_timesteps - self.num_timesteps) / env.num_envs)
             train_freq = train_freq._replace(frequency=max(1, min(train_freq.frequency, missing)))
         return super().collect_rollouts(env, callback, train_freq, *args, **kwargs)
+
+    def _collect_rows(
+        self, count: int, env: Any, callback: BaseCallback, *args: Any, **kwargs: Any
+    ) -> RolloutReturn:
+        """Collect `count` valid rows; a vector step of an asynchronous environment may have only one."""
+        before, episodes = self.num_timesteps, 0
+        wanted = min(before + count, self._total_timesteps)
+        goes_on = True
+        while goes_on and self.num_timesteps < wanted:
+            one = TrainFreq(1, TrainFrequencyUnit.STEP)
+            rollout = super().collect_rollouts(env, callback, one, *args, **kwargs)
+            episodes += rollout.n_episodes
+            goes_on = rollout.continue_training
+        return RolloutReturn(self.num_timesteps - before, episodes, goes_on)
+
+    def _store_transition(
+        self,
+        replay_buffer: ReplayBuffer,
+        buffer_action: np.ndarray,
+        new_obs: np.ndarray | dict[str, np.ndarray],
+        reward: np.ndarray,
+        dones: np.ndarray,
+        infos: list[dict[str, Any]],
+    ) -> None:
+        taken = self._begun.taken(buffer_action, infos)
+        super()._store_transition(replay_buffer, taken, new_obs, reward, dones, infos)
+
+    def _on_step(self) -> None:
+        """Count a vector step, for example for the target network; with `n_envs` rows if asynchronous."""
+        if self.num_timesteps - self._counted_at >= self.n_envs or not _is_asynchronous(self.env):
+            self._counted_at = self.num_timesteps
+            super()._on_step()
 
     def train(self, gradient_steps: int, batch_size: int = 100) -> None:
         """Learn from the replay buffer; do nothing while the buffer has no rows to sample."""
@@ -154,6 +190,23 @@ class OnPolicyRows(ValidRowsCounted, OnPolicyAlgorithm):
         valid = rollout.swap_and_flatten(rollout.valid).flatten()
         explained = explained_variance(rollout.values.flatten()[valid], rollout.returns.flatten()[valid])
         self.logger.record("train/explained_variance", explained)
+
+
+def refuse_asynchronous(model: BaseAlgorithm) -> None:
+    """Check that a model learns from single rows, which may come in any order.
+
+    Raises:
+        ConfigurationError: the model learns from rollouts, which need a row of every simulator in each step.
+    """
+    if not isinstance(model, OffPolicyRows):
+        raise ConfigurationError(
+            "collection: Asynchronous needs an off-policy algorithm, such as DQN or SAC, and "
+            f"{type(model).__name__} learns from rollouts; remove the field, or use another algorithm"
+        )
+
+
+def _is_asynchronous(env: Any) -> bool:
+    return bool(getattr(env.unwrapped, "asynchronous", False))
 
 
 @cache

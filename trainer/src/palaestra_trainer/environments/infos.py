@@ -8,6 +8,7 @@ those of Palaestra cannot be confused:
 - `sim_fault`: the kind, simulator, fact, episode and step of a fault; only in the row of that fault
 - `recovering`: True in the rows after the fault until the simulator is up again; False in the rows after the
   simulator was given up
+- `pending`: True in the invalid rows of a simulator whose step has not ended yet, in asynchronous collection
 - `extra_steps`: simulation steps in addition to the usual one, because a message was late
 - `hidden`: the environment's own values for keys that Stable-Baselines3 or Palaestra uses
 """
@@ -36,6 +37,11 @@ def ours(info: Mapping[str, Any]) -> Mapping[str, Any]:
 def is_valid(info: Mapping[str, Any]) -> bool:
     """Return whether an algorithm may learn from a row."""
     return bool(ours(info).get("valid", True))
+
+
+def is_pending(info: Mapping[str, Any]) -> bool:
+    """Return whether a row only holds the place of a step that has not ended yet."""
+    return ours(info).get("pending") is True
 
 
 def extra_steps(info: Mapping[str, Any]) -> int:

@@ -91,6 +91,11 @@ class Collector:
         return self.restarter.member.env
 
     @property
+    def observation(self) -> Any:
+        """The newest observation of the member."""
+        return self._observation
+
+    @property
     def state(self) -> EpisodeState:
         """The current state of the member's episode."""
         if self._actions is None:

@@ -126,10 +126,7 @@ class SimulatorsVecEnv(MembersVecEnv):
         """
         self._await_somebody()
         with self._watcher.spending(Cause.TRANSPORT):
-            rows: list[CollectedRow] = take_turns(
-                partial(collector.step, action)
-                for collector, action in zip(self._collectors, self._actions, strict=True)
-            )
+            rows = self._rows()
         if valid := sum(is_valid(row.info) for row in rows):
             self._watcher.stepped(valid)
         dones = [row.done for row in rows]
@@ -172,6 +169,13 @@ class SimulatorsVecEnv(MembersVecEnv):
         if attr_name == ACTION_MASKS and self._gives_masks:
             return [self._collectors[index].action_mask for index in self._get_indices(indices)]
         return super().get_attr(attr_name, indices)
+
+    def _rows(self) -> list[CollectedRow]:
+        """Step all members and return their rows; called by `step_wait`."""
+        return take_turns(
+            partial(collector.step, action)
+            for collector, action in zip(self._collectors, self._actions, strict=True)
+        )
 
     def _action_masks(self, indices: VecEnvIndices) -> list[Any]:
         with self._watcher.spending(Cause.TRANSPORT):

@@ -228,6 +228,8 @@ class Configuration(_Section):
         device: device of the model; `cuda` is the GPU that the job requested, or the CPU if PyTorch finds no
             GPU.
         steps: number of valid environment steps of the whole run, of all simulators together.
+        collection: whether a vector step waits for all collecting simulators (`Synchronous`), or returns as
+            soon as one of them has a row (`Asynchronous`); None: `Synchronous`.
         resume_from: the run directory of another job; a run that has not saved a checkpoint yet resumes from
             the newest checkpoint in that directory.
         initial_policy: a model.zip with whose policy a new run begins; None: random weights.
@@ -248,6 +250,7 @@ class Configuration(_Section):
     algorithm: Algorithm = Field(default_factory=Algorithm)
     device: Device = "cpu"
     steps: Positive
+    collection: Literal["Synchronous", "Asynchronous"] | None = None
     evaluation: Evaluation = Field(default_factory=Evaluation)
     checkpoint: Checkpoint = Field(default_factory=Checkpoint)
     resume_from: Annotated[str, Field(min_length=1)] | None = None

@@ -24,6 +24,7 @@ from palaestra_trainer.algorithms import her
 from palaestra_trainer.algorithms.divergence import Learner
 from palaestra_trainer.algorithms.replay_size import replay_size
 from palaestra_trainer.environments.env_checker import refuse_statistics
+from palaestra_trainer.episodes.asynchronous_vec_env import AsynchronousVecEnv
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import ConfigurationError, Diverged, TrainerError, fact_of
 from palaestra_trainer.job.configuration import Configuration, dump
@@ -240,12 +241,15 @@ class Attempt:
         refuse_statistics(task, wanted.environment.id)
         algorithms.refuse_without_masks(self._algorithm, task, wanted.environment.id)
         judge = make_judge(wanted) if her.wanted(self._algorithm) else None
-        env = SimulatorsVecEnv(fleet.collecting, wanted.seed, check=interruption.check, judge=judge)
+        made = AsynchronousVecEnv if wanted.collection == "Asynchronous" else SimulatorsVecEnv
+        env = made(fleet.collecting, wanted.seed, check=interruption.check, judge=judge)
         stack.callback(env.close)
         self._progress.moments = env.moments
         replay = replay_size(self._algorithm, env.observation_space, env.action_space, wanted.steps)
         refuse_what_does_not_fit(replay, wanted.checkpoint, capacity_now(self._directory))
         model = algorithms.make_model(self._algorithm, env, wanted.seed, wanted.device)
+        if env.asynchronous:
+            algorithms.refuse_asynchronous(model)
         for line in algorithms.futile(model, wanted.steps):
             log.warning(line)
         if found is None and wanted.initial_policy is not None:

@@ -22,7 +22,12 @@ class MembersVecEnv(VecEnv):
 
     Args:
         restarters: the restarter of each member; rows have the same order.
+
+    Attributes:
+        asynchronous: whether a step may return while the steps of some members have not ended.
     """
+
+    asynchronous = False
 
     def __init__(self, restarters: Sequence[Restarter]) -> None:
         self._restarters = list(restarters)

@@ -145,19 +145,85 @@ def take_turns(works: Iterable[Callable[[], Any]]) -> list[Any]:
     return [result for result, _ in ended]
 
 
-def _ready(turns: list[_Turn]) -> list[_Turn]:
-    """Return the greenlets that can run, at least one, in their order; wait if all wait for responses."""
+class OpenWorks:
+    """Works that take turns, and of which some may stay open while the caller does something else.
+
+    Each work has a key. All methods must be called by the same thread.
+    """
+
+    def __init__(self) -> None:
+        self._open: dict[int, _Turn] = {}
+        self._ended: dict[int, _Turn] = {}
+
+    def begin(self, key: int, work: Callable[[], Any]) -> None:
+        """Begin a work at the next `run`, unless a work with this key is open or its result is not taken."""
+        if key not in self._open and key not in self._ended:
+            self._open[key] = (_idle.turns.pop() if _idle.turns else _Turn()).begin(work)
+
+    def run(self, enough: Callable[[Any], bool]) -> None:
+        """Run the works in turns until `enough` holds for a result, a work has failed, or all have ended.
+
+        Each open work has at least one turn if it does not wait for a response.
+
+        Raises:
+            BaseException: the error of the current work, for example after Ctrl-C; the other works are
+                stopped at once.
+        """
+        is_enough = self._has(enough)
+        try:
+            while self._open:
+                for turn in _ready([*self._open.values()], wait=not is_enough):
+                    turn.switch()
+                self._ended |= {key: turn for key, turn in self._open.items() if turn.done}
+                self._open = {key: turn for key, turn in self._open.items() if not turn.done}
+                if is_enough := is_enough or self._has(enough):
+                    break
+        except BaseException:  # for Ctrl-C too, because no work may continue in a later call
+            self.abort()
+            raise
+
+    def take(self) -> dict[int, Any]:
+        """Return the results of the ended works by key, and forget them.
+
+        Raises:
+            Exception: the error of the failed work with the lowest key.
+        """
+        ended = {key: turn.end() for key, turn in sorted(self._ended.items())}
+        _idle.turns += self._ended.values()
+        self._ended = {}
+        for _, failure in ended.values():
+            if failure is not None:
+                raise failure
+        return {key: result for key, (result, _) in ended.items()}
+
+    def abort(self) -> None:
+        """Stop all open works where they are, and forget all results."""
+        for turn in self._open.values():
+            if not turn.dead:
+                turn.throw()
+        self._open, self._ended = {}, {}
+
+    def _has(self, enough: Callable[[Any], bool]) -> bool:
+        return any(turn.failure is not None or enough(turn.result) for turn in self._ended.values())
+
+
+def _ready(turns: list[_Turn], *, wait: bool = True) -> list[_Turn]:
+    """Return the greenlets that can run, in their order.
+
+    If all of them wait for responses and `wait` is true, wait for a response; return at least one greenlet.
+    """
     awaited = [turn.until for turn in turns if turn.until is not None]
-    if not awaited or len(turns) == 1:
+    if not awaited or (wait and len(turns) == 1):
         return turns
     answers = select.poll()
     for file in awaited:
         answers.register(file, select.POLLIN)
-    nobody_can_go_on = len(awaited) == len(turns) and not shutdown_deadline.is_over()
+    nobody_can_go_on = wait and len(awaited) == len(turns) and not shutdown_deadline.is_over()
     began = time.perf_counter()
     come = {file for file, _ in answers.poll(_SOON_MS if nobody_can_go_on else 0)}
     waited_s = time.perf_counter() - began
     count_wait(waited_s)
     for turn in turns:
         turn.away_s -= waited_s
-    return [turn for turn in turns if turn.until is None or turn.until in come] or turns[:1]
+    ready = [turn for turn in turns if turn.until is None or turn.until in come]
+    return ready or (turns[:1] if wait else [])
