@@ -6,6 +6,7 @@ import numpy as np
 import onnx
 from onnx import TensorProto, helper, numpy_helper
 
+from palaestra_protocol.package_archive import archived
 from palaestra_protocol.policy_package import MANIFEST, NETWORK, TRAINING, manifest_text
 from palaestra_trainer.environments.data_sheet import environment_sheet, parts_of
 from palaestra_trainer.environments.make import make_environment
@@ -38,8 +39,8 @@ def linear_network(gain=1.0):
     return model.SerializeToString()
 
 
-def write_package(folder, *, gain=1.0, robot="Robotino", period_s=0.192, options=None):
-    """Write a package whose policy drives to the target, and return its folder."""
+def write_package(place, *, gain=1.0, robot="Robotino", period_s=0.192, options=None):
+    """Write a package whose policy drives to the target, as a folder or a zip, and return its place."""
     environment = {"id": "MoveToTargetEnv-v0", "options": {"actions": "continuous"} | (options or {})}
     simulators = [{"name": "collect-0", "group": "collect", "index": 0, "role": "Collect"}]
     wanted = Environment(**environment)
@@ -52,11 +53,14 @@ def write_package(folder, *, gain=1.0, robot="Robotino", period_s=0.192, options
         "robot": {"class": robot, "period_s": period_s},
         "policy": sheet,
     }
-    folder.mkdir(parents=True)
+    files[MANIFEST] = manifest_text(about, files)
+    if place.suffix == ".zip":
+        place.write_bytes(archived(files))
+        return place
+    place.mkdir(parents=True)
     for name, content in files.items():
-        (folder / name).write_bytes(content)
-    (folder / MANIFEST).write_bytes(manifest_text(about, files))
-    return folder
+        (place / name).write_bytes(content)
+    return place
 
 
 def changed_manifest(folder, **fields):

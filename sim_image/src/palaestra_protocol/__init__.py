@@ -8,6 +8,7 @@
 - `foreign_words`: options of other projects, and the TrainingJob fields that replace them
 - `messages`: derives the reader and the writer of a JSON message from its declaration
 - `policy_package`: the manifest of an exported policy with its files, and the check of these files
+- `package_archive`: a policy package as one zip, read without unpacking it to a disk
 - `fields`: checks received JSON, because its sender is not trusted
 - `metrics`: declares metrics as data: names, help texts, labels and buckets
 - `numbers`: parses the numbers of command-line options

@@ -1,4 +1,4 @@
-"""The policy package: a folder with a policy, and a manifest that describes its files.
+"""The policy package: a folder or a zip with a policy, and a manifest that describes its files.
 
 A reader checks the whole package before it uses a file of it, because a policy with other observations,
 another rate or damaged weights moves a robot in a wrong way.
@@ -9,12 +9,15 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Final, cast
+from typing import IO, Any, Final, Protocol, cast
 
 from palaestra_protocol.fields import MOST_COUNT, MOST_NAME, Fields, ProtocolError, decoded
+from palaestra_protocol.package_archive import FILE_NAME, MEMBER_ERRORS, has_member, opened
 
 MANIFEST: Final = "manifest.json"
 FORMAT: Final = 1
@@ -24,13 +27,16 @@ TRAINING: Final = "training.yaml"
 
 MOST_MANIFEST_BYTES: Final = 2**22
 MOST_FILES: Final = 64
+MOST_PACKAGE_BYTES: Final = 2**31
 
 _DIGEST: Final = re.compile(r"[0-9a-f]{64}")
-_FILE_NAME: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
+_PIECE_BYTES: Final = 2**20
+_NO_PACKAGE: Final = "name a folder or a zip of `palaestra export`"
+_INCOMPLETE: Final = "copy the whole package"
 
 
 class PackageError(ProtocolError):
-    """A folder is not a policy package, or a file of the package is not the one that was exported."""
+    """A place is not a policy package, or a file of the package is not the one that was exported."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,7 +67,7 @@ class PackageFile:
         """
         fields = Fields(content, path)
         name, sha256 = fields.text("name", MOST_NAME), fields.text("sha256")
-        if not _FILE_NAME.fullmatch(name):
+        if not FILE_NAME.fullmatch(name):
             raise ProtocolError(f"{path}.name: {name[:40]!r} is not the name of a file in the package")
         if not _DIGEST.fullmatch(sha256):
             raise ProtocolError(f"{path}.sha256: is not a SHA-256")
@@ -80,32 +86,81 @@ def manifest_text(description: Mapping[str, Any], files: Mapping[str, bytes]) ->
     return (json.dumps(content, indent=2, allow_nan=False) + "\n").encode()
 
 
-def read_package(folder: Path, *needed: str) -> dict[str, Any]:
-    """Return the manifest of the package in a folder, after a check of every file.
+def read_package(place: Path, *needed: str) -> dict[str, Any]:
+    """Return the manifest of a package, after a check of every file.
 
     Args:
-        folder: the folder.
+        place: the folder or the zip of the package.
         needed: the names of the files that the caller uses.
 
     Raises:
-        PackageError: the folder has no manifest, the manifest has another format or lacks a needed file, or a
+        PackageError: the place has no manifest, the manifest has another format or lacks a needed file, or a
             file is missing or has changed.
     """
-    manifest = folder / MANIFEST
+    return _read(place, needed, frozenset())[0]
+
+
+def read_files(place: Path, *needed: str) -> tuple[dict[str, Any], dict[str, bytes]]:
+    """Return the manifest of a package, and the contents of the needed files, after a check of every file.
+
+    The contents are those that were checked, even if another program replaces the files meanwhile.
+
+    Raises:
+        PackageError: as in `read_package`.
+    """
+    return _read(place, needed, frozenset(needed))
+
+
+def is_package(place: Path) -> bool:
+    """Return whether a folder or a zip has a manifest; its files are not checked."""
+    return (place / MANIFEST).is_file() if place.is_dir() else has_member(place, MANIFEST)
+
+
+class _Files(Protocol):
+    def open(self, name: str) -> IO[bytes]:
+        """Open a file of the package for reading; raise OSError or KeyError without it."""
+        ...
+
+
+class _Folder:
+    def __init__(self, path: Path) -> None:
+        self._path = path
+
+    def open(self, name: str) -> IO[bytes]:
+        """Open a file of the folder."""
+        return (self._path / name).open("rb")
+
+
+@contextmanager
+def _opened(place: Path) -> Iterator[_Files]:
+    if place.is_dir():
+        yield _Folder(place)
+        return
     try:
-        with manifest.open("rb") as file:
-            text = file.read(MOST_MANIFEST_BYTES + 1)
+        with opened(place) as archive:
+            yield archive
     except OSError as error:
-        raise PackageError(f"{manifest}: {error.strerror}; name a folder of `palaestra export`") from error
-    try:
-        content, files = _parsed(text)
+        raise PackageError(f"{place}: {error.strerror}; name a package of `palaestra export`") from error
+    except PackageError:
+        raise
     except ProtocolError as error:
-        raise PackageError(f"{manifest}: {error}; export the package again") from error
-    if lacking := sorted(set(needed) - {each.name for each in files}):
-        raise PackageError(f"{manifest}: does not list {lacking[0]}; export the package again")
-    for each in files:
-        _check(folder / each.name, each)
-    return content
+        raise PackageError(f"{place}: {error}; export the package again") from error
+
+
+def _read(
+    place: Path, needed: Sequence[str], kept: AbstractSet[str]
+) -> tuple[dict[str, Any], dict[str, bytes]]:
+    with _opened(place) as files:
+        manifest = place / MANIFEST
+        text = b"".join(_pieces(files, place, MANIFEST, MOST_MANIFEST_BYTES + 1, _NO_PACKAGE))
+        try:
+            content, described = _parsed(text)
+        except ProtocolError as error:
+            raise PackageError(f"{manifest}: {error}; export the package again") from error
+        if lacking := sorted(set(needed) - {each.name for each in described}):
+            raise PackageError(f"{manifest}: does not list {lacking[0]}; export the package again")
+        contents = {each.name: _checked(files, place, each, keep=each.name in kept) for each in described}
+        return content, {name: contents[name] for name in kept}
 
 
 def _parsed(text: bytes) -> tuple[dict[str, Any], tuple[PackageFile, ...]]:
@@ -114,16 +169,46 @@ def _parsed(text: bytes) -> tuple[dict[str, Any], tuple[PackageFile, ...]]:
     fields = Fields(content)
     if (found := fields.whole("format")) != FORMAT:
         raise ProtocolError(f"format: is {found}, but this release reads {FORMAT}")
-    return cast("dict[str, Any]", content), fields.parts("files", PackageFile.read, MOST_FILES)
+    files = fields.parts("files", PackageFile.read, MOST_FILES)
+    if (total := sum(each.size for each in files)) > MOST_PACKAGE_BYTES:
+        raise ProtocolError(f"files: have {total} bytes, more than the {MOST_PACKAGE_BYTES} of a package")
+    return cast("dict[str, Any]", content), files
 
 
-def _check(path: Path, described: PackageFile) -> None:
-    """Raise PackageError unless a file has the described size and digest."""
+def _checked(files: _Files, place: Path, described: PackageFile, *, keep: bool) -> bytes:
+    """Return the content of a file if it has the described size and digest; b"" unless `keep`.
+
+    Raises:
+        PackageError: the file is missing or has changed.
+    """
+    digest, size, kept = hashlib.sha256(), 0, list[bytes]()
+    for piece in _pieces(files, place, described.name, described.size + 1, _INCOMPLETE):
+        digest.update(piece)
+        size += len(piece)
+        if keep:
+            kept.append(piece)
+    if size != described.size or digest.hexdigest() != described.sha256:
+        raise PackageError(
+            f"{place / described.name}: is not the file that was exported; {_INCOMPLETE} again"
+        )
+    return b"".join(kept)
+
+
+def _pieces(files: _Files, place: Path, name: str, most_bytes: int, remedy: str) -> Iterator[bytes]:
+    """Yield at most `most_bytes` bytes of a file in pieces.
+
+    Raises:
+        PackageError: the file cannot be read; the message ends with the remedy.
+    """
+    left = most_bytes
     try:
-        with path.open("rb") as file:
-            same = path.stat().st_size == described.size
-            same = same and hashlib.file_digest(file, "sha256").hexdigest() == described.sha256
+        with files.open(name) as file:
+            while left > 0 and (piece := file.read(min(left, _PIECE_BYTES))):
+                left -= len(piece)
+                yield piece
     except OSError as error:
-        raise PackageError(f"{path}: {error.strerror}; copy the whole package") from error
-    if not same:
-        raise PackageError(f"{path}: is not the file that was exported; copy the whole package again")
+        raise PackageError(f"{place / name}: {error.strerror}; {remedy}") from error
+    except KeyError as error:
+        raise PackageError(f"{place}: has no {name}; {remedy}") from error
+    except MEMBER_ERRORS as error:
+        raise PackageError(f"{place / name}: cannot be unpacked ({error}); {remedy}") from error

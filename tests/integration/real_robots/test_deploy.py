@@ -56,8 +56,12 @@ def decisions(log):
 
 
 def test_the_robot_drives_from_target_to_target(deploy, mock, tmp_path):
-    """Each further episode begins where the one before ended; odometry and truth agree."""
-    done = deploy("--target=1.2,0.3", "--target", "-0.5,0.2", *HANDS_OFF)
+    """Each further episode begins where the one before ended; odometry and truth agree.
+
+    The package is a zip, as a person sends it to the robot's computer.
+    """
+    sent = write_package(tmp_path / "package.zip")
+    done = deploy("--target=1.2,0.3", "--target", "-0.5,0.2", *HANDS_OFF, package=sent)
 
     assert done.returncode == 0, done.stderr
     assert done.stdout.count("dry run: forward +0.") == 10

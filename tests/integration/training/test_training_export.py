@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -196,6 +197,30 @@ def test_a_package_has_all_that_a_robot_and_a_reader_need(trained):
 
     assert read_package(again.path)["policy"] == manifest["policy"]
     assert list(written.path.glob(".*")) == []
+
+
+def test_a_package_as_a_zip_begins_another_run_and_has_the_same_bytes_again(trained, play, write_job):
+    """A person sends one file; its checksum must not depend on the time of the export."""
+    run = trained(**CASES["PPO-continuous"])
+    first, second = run.parent / "first.zip", run.parent / "second.zip"
+
+    for place in (first, second):
+        exporting.export(run, "package", place)
+    shutil.rmtree(run)
+    code, output = play(write_job(**CASES["PPO-continuous"], steps=64, initialPolicy=str(first)))
+
+    assert first.read_bytes() == second.read_bytes()
+    assert read_package(first)["robot"]["class"] == "Robotino"
+    assert code == 0, output
+    assert "begins from a policy" in output
+
+
+def test_a_zip_that_is_no_package_is_not_replaced(trained):
+    """The zip next to the run may be a person's only copy of a model."""
+    run = trained(**CASES["A2C"])
+
+    with pytest.raises(ConfigurationError, match=r"model\.zip: is no package; name a new file with --output"):
+        exporting.export(run, "package", run / "model.zip")
 
 
 def test_a_folder_that_is_no_package_is_not_replaced(trained, tmp_path):

@@ -6,6 +6,7 @@ import pytest
 import yaml
 
 from palaestra.cli import main
+from palaestra_protocol.package_archive import archived
 from palaestra_protocol.policy_package import MANIFEST, manifest_text
 from palaestra_sim.world import builtin, robots
 
@@ -400,12 +401,17 @@ def test_export_without_the_trainer_is_refused(tmp_path, monkeypatch, capsys):
     assert "palaestra-none is not a program on this machine; install it" in capsys.readouterr().err
 
 
-def test_a_run_does_not_begin_with_a_damaged_package(job, tmp_path, capsys):
+@pytest.mark.parametrize("name", ["package", "package.zip"])
+def test_a_run_does_not_begin_with_a_damaged_package(job, tmp_path, capsys, name):
     """A policy with one wrong weight would train on without a word."""
-    package = tmp_path / "package"
-    package.mkdir()
-    (package / "model.zip").write_bytes(b"another model")
-    (package / MANIFEST).write_bytes(manifest_text({}, {"model.zip": b"the model"}))
+    package = tmp_path / name
+    files = {"model.zip": b"another model", MANIFEST: manifest_text({}, {"model.zip": b"the model"})}
+    if package.suffix:
+        package.write_bytes(archived(files))
+    else:
+        package.mkdir()
+        for file, content in files.items():
+            (package / file).write_bytes(content)
 
     code = main(["run", str(job), "--dir", str(tmp_path / "runs"), "--initial-policy", str(package)])
 

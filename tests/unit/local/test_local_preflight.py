@@ -10,6 +10,8 @@ from palaestra.api import validate
 from palaestra.local import preflight
 from palaestra.local.errors import RunRefused
 from palaestra.local.preflight import PreflightRequest
+from palaestra_protocol.package_archive import archived
+from palaestra_protocol.policy_package import MANIFEST, manifest_text
 from palaestra_sim.world import builtin
 from tests.failing import failing
 
@@ -223,6 +225,22 @@ def test_an_initial_policy_must_be_a_model_on_this_machine(request_for, tmp_path
         f"{field}{tmp_path}/text.zip: is not a model of Stable-Baselines3; name a model.zip"
     ]
     assert problems(f"{tmp_path}/model.zip") == []
+
+
+def test_a_package_as_an_initial_policy_must_be_whole(request_for, tmp_path):
+    """A job may name a package of another person as a zip."""
+    place, model = tmp_path / "package.zip", {"model.zip": b"the model"}
+
+    def problems(files):
+        place.write_bytes(archived(files))
+        wanted = request_for(trainer={"initialPolicy": {"path": str(place)}})
+        return list(preflight.initial_policy_is_there(wanted))
+
+    whole = problems(model | {MANIFEST: manifest_text({}, model)})
+    [problem] = problems({"model.zip": b"another", MANIFEST: manifest_text({}, model)})
+
+    assert whole == []
+    assert "model.zip: is not the file that was exported; copy the whole package again" in problem
 
 
 def test_an_initial_policy_may_be_gone_once_the_run_has_a_checkpoint(request_for):

@@ -92,5 +92,7 @@ def test_a_name_outside_of_the_folder_is_refused(tmp_path, name):
 
 def test_a_folder_without_a_manifest_is_no_package(tmp_path):
     """The message must say how a package is made."""
-    with pytest.raises(PackageError, match=r"No such file or directory; name a folder of `palaestra export`"):
+    with pytest.raises(
+        PackageError, match=r"No such file or directory; name a folder or a zip of `palaestra export`"
+    ):
         read_package(tmp_path)

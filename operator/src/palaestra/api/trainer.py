@@ -185,9 +185,9 @@ class InitialPolicy(ApiModel):
     Absent: the file is in the trainer's image (`palaestra run`: on this machine)."""
 
     path: Annotated[str, Field(min_length=1, max_length=1024, pattern=POLICY_FILE)]
-    """Path of a `model.zip`: relative to the claim, such as `<job UID>/<replica>/model.zip`, or absolute
-    without a claim. Only the tensors and the statistics of the normalization are read, so the file must have
-    the same networks as the job's policy."""
+    """Path of a `model.zip`, or of a policy package as a zip: relative to the claim, such as
+    `<job UID>/<replica>/model.zip`, or absolute without a claim. Only the tensors and the statistics of
+    the normalization are read, so the file must have the same networks as the job's policy."""
 
     rules = (
         Rule(

@@ -36,14 +36,15 @@ def add(commands: Commands) -> None:
         choices=("onnx", "safetensors", "package", "mcap"),
         required=True,
         help="onnx runs by itself; safetensors has the tensors for a network that you build. A package is a "
-        "folder with the ONNX file, the model, the job, and a manifest with a checksum of each. The format "
-        "mcap is a ROS 2 bag of the recorded episodes",
+        "folder or zip with the ONNX file, the model, the job, and a manifest with a checksum of each. The "
+        "format mcap is a ROS 2 bag of the recorded episodes",
     )
     parser.add_argument(
         "--output",
         metavar="FILE",
         type=Path,
-        help="default: RUN/policy.<format>, RUN/package or RUN/episodes.mcap",
+        help="default: RUN/policy.<format>, RUN/package or RUN/episodes.mcap. With a name that ends in .zip, "
+        "a package is one file",
     )
 
 

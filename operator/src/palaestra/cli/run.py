@@ -13,7 +13,7 @@ from palaestra.job_input import changed
 from palaestra.live_view.view_process import viewed
 from palaestra.local.run import RunOptions, run
 from palaestra_protocol.numbers import MOST_PORT, whole
-from palaestra_protocol.policy_package import MANIFEST, MODEL, PackageError, read_package
+from palaestra_protocol.policy_package import MODEL, PackageError, is_package, read_package
 
 RUN = """\
 Trains as the TrainingJob in FILE specifies, and prints a line about its progress every 10 s. Writes
@@ -38,7 +38,8 @@ def add(commands: Commands) -> None:
         "--initial-policy",
         metavar="PATH",
         type=Path,
-        help="run directory, package or model.zip with the policy of a new run, as trainer.initialPolicy",
+        help="run directory, package (folder or zip) or model.zip with the policy of a new run, as "
+        "trainer.initialPolicy",
     )
     parser.add_argument(
         "--ros-port",
@@ -78,7 +79,7 @@ def _wanted(options: argparse.Namespace) -> TrainingJob:
     given, policy = job(options.file), options.initial_policy
     if policy is None:
         return given
-    if (policy / MANIFEST).is_file():
+    if is_package(policy):
         try:
             read_package(policy, MODEL)
         except PackageError as error:

@@ -16,6 +16,7 @@ from palaestra.local.files import without_locks
 from palaestra.local.run_directory import job_directory
 from palaestra.local.simulators import PROGRAMS, lack
 from palaestra_protocol.linux import lack_of_linux
+from palaestra_protocol.policy_package import MODEL, PackageError, is_package, read_package
 from palaestra_protocol.shadowing import shadows
 from palaestra_sim import world
 from palaestra_sim.errors import RootError, WorldError
@@ -97,7 +98,9 @@ def worlds_are_right(request: PreflightRequest) -> Iterator[str]:
 
 
 def initial_policy_is_there(request: PreflightRequest) -> Iterator[str]:
-    """The file of the initial policy is a zip with a policy's tensors; the trainer checks their shapes.
+    """The file of the initial policy is a package, or a zip with a policy's tensors.
+
+    The trainer checks the shapes of the tensors.
 
     The file may be missing if every replica has a checkpoint, because replicas then resume from their
     checkpoints.
@@ -106,8 +109,13 @@ def initial_policy_is_there(request: PreflightRequest) -> Iterator[str]:
     if initial is None:
         return
     try:
+        if is_package(Path(initial.path)):
+            read_package(Path(initial.path), MODEL)
+            return
         with zipfile.ZipFile(initial.path) as archive:
             archive.getinfo(POLICY)
+    except PackageError as error:
+        yield f"spec.trainer.initialPolicy.path: {error}"
     except OSError as error:
         if not _all_have_learned(request):
             yield f"spec.trainer.initialPolicy.path: {initial.path}: {error.strerror}; name a model.zip"

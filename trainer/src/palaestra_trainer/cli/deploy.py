@@ -35,7 +35,8 @@ DEPLOY = """\
 Drive a real Robotino with a policy package.
 
 reads:
-  PACKAGE, a folder of `palaestra export RUN --to package`; every file is checked before the robot moves
+  PACKAGE, a folder or a zip of `palaestra export RUN --to package`; every file is checked before the robot
+  moves
 writes:
   a record of poses, readings, commands and decisions as a ROS 2 bag, by default deployment-<time>.mcap
 
@@ -144,7 +145,7 @@ def arguments_parser() -> argparse.ArgumentParser:
     """Return the parser of the program's arguments."""
     options = parser("palaestra-deploy", DEPLOY, EXIT_CODES)
     add = options.add_argument
-    add("package", type=Path, metavar="PACKAGE", help="folder of the package")
+    add("package", type=Path, metavar="PACKAGE", help="folder or zip of the package")
     add("--robot", required=True, metavar="ADDRESS", help=_ROBOT)
     add("--target", type=_point, action="append", default=[], metavar="X,Y", help=_TARGET)
     add("--start", type=_pose, default=Pose(0.0, 0.0, 0.0), metavar="X,Y,HEADING", help=_START)

@@ -24,9 +24,9 @@ Write the best policy of a run, or its recorded episodes, as one file for other 
 reads:
   RUN_DIR/model.zip, RUN_DIR/training.yaml; for mcap only RUN_DIR/replays.json
 writes:
-  the file, or the folder of a package, once it has acted as the policy on 1,000 observations: discrete
-  actions are equal, continuous ones within 1e-5; its path and its largest difference as one JSON object to
-  standard output
+  the file, or the folder or zip of a package, once it has acted as the policy on 1,000 observations:
+  discrete actions are equal, continuous ones within 1e-5; its path and its largest difference as one JSON
+  object to standard output
   mcap is a ROS 2 bag of the recorded episodes; the object has the number of episodes and messages
 
 The extra `export` of palaestra-trainer has the libraries, and the extra `deploy` has those for mcap.
@@ -51,7 +51,8 @@ def export(arguments: Sequence[str] | None = None) -> int:
         "--output",
         type=Path,
         metavar="FILE",
-        help="default: RUN_DIR/policy.FORMAT, RUN_DIR/package or RUN_DIR/episodes.mcap",
+        help="default: RUN_DIR/policy.FORMAT, RUN_DIR/package or RUN_DIR/episodes.mcap; a package is one "
+        "file if the name ends in .zip",
     )
     chosen = options.parse_args(arguments)
     configure_logs()

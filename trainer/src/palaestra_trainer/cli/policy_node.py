@@ -198,7 +198,7 @@ def _subscribe(node: Ros2Node, link: Ros2Link, goals: Goals, fence: Fence | None
 def _parser() -> argparse.ArgumentParser:
     options = parser("palaestra-policy-node", ABOUT, EXIT_CODES)
     options.usage = "palaestra-policy-node PACKAGE [--ros-args ...]"
-    options.add_argument("package", type=Path, metavar="PACKAGE", help="folder of the package")
+    options.add_argument("package", type=Path, metavar="PACKAGE", help="folder or zip of the package")
     return options
 
 

@@ -8,12 +8,13 @@ from pathlib import Path
 from typing import Any, Final
 
 import gymnasium
+import yaml
 
-from palaestra_protocol.policy_package import MANIFEST, NETWORK, TRAINING, PackageError, read_package
+from palaestra_protocol.policy_package import MANIFEST, NETWORK, TRAINING, PackageError, read_files
 from palaestra_trainer.deployment.onnx_policy import OnnxPolicy
 from palaestra_trainer.environments.data_sheet import environment_sheet, parts_of
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.job.configuration import Environment, load
+from palaestra_trainer.job.configuration import Environment, parse
 
 ROBOT: Final = "Robotino"
 _PERIODS_S: Final = (0.02, 2.0)
@@ -53,32 +54,40 @@ class CheckedPackage:
                 )
 
 
-def read(folder: Path) -> CheckedPackage:
-    """Return the package in a folder, after a check of every file.
+def read(place: Path) -> CheckedPackage:
+    """Return the package in a folder or a zip, after a check of every file.
 
     Raises:
         ConfigurationError: a file is missing or has changed, the policy drives another robot, or its rate
             is unknown.
     """
     try:
-        manifest = read_package(folder, NETWORK, TRAINING)
+        manifest, contents = read_files(place, NETWORK, TRAINING)
     except PackageError as error:
         raise ConfigurationError(str(error)) from error
     match manifest.get("robot"):
         case {"class": str(name), "period_s": float() | int() as period_s}:
             pass
         case other:
-            raise ConfigurationError(f"{folder / MANIFEST}: robot: {other!r} names no class and period_s")
+            raise ConfigurationError(f"{place / MANIFEST}: robot: {other!r} names no class and period_s")
     if name != ROBOT:
-        raise ConfigurationError(f"{folder}: the policy drives a {name}; only a {ROBOT} can be deployed to")
+        raise ConfigurationError(f"{place}: the policy drives a {name}; only a {ROBOT} can be deployed to")
     if not _PERIODS_S[0] <= period_s <= _PERIODS_S[1]:
         raise ConfigurationError(
-            f"{folder}: the policy acts every {period_s:g} s, but a robot is driven with"
+            f"{place}: the policy acts every {period_s:g} s, but a robot is driven with"
             f" {_PERIODS_S[0]} to {_PERIODS_S[1]} s; train one with another rate"
         )
     return CheckedPackage(
-        policy=OnnxPolicy(folder / NETWORK, manifest.get("policy") or {}),
-        environment=load(folder / TRAINING).environment,
+        policy=OnnxPolicy(contents[NETWORK], place / NETWORK, manifest.get("policy") or {}),
+        environment=_environment(contents[TRAINING], place / TRAINING),
         period_s=float(period_s),
         manifest=manifest,
     )
+
+
+def _environment(text: bytes, file: Path) -> Environment:
+    try:
+        content = yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        raise ConfigurationError(f"{file}: is not YAML: {error}") from error
+    return parse(content, source=TRAINING).environment

@@ -21,15 +21,16 @@ class OnnxPolicy:
     """The deterministic policy of a package, with its recurrent state.
 
     Args:
-        file: the ONNX file, as `palaestra export` writes it.
+        network: the content of the ONNX file, as `palaestra export` writes it.
+        file: the path of this file, for messages.
         sheet: the data sheet in the package's manifest.
 
     Raises:
-        ConfigurationError: onnxruntime does not load the file.
+        ConfigurationError: onnxruntime does not load the network.
     """
 
-    def __init__(self, file: Path, sheet: Mapping[str, Any]) -> None:
-        self._session = _session(file)
+    def __init__(self, network: bytes, file: Path, sheet: Mapping[str, Any]) -> None:
+        self._session = _session(network, file)
         self._state_shape: tuple[int, int] | None = None
         if (shape := sheet.get("state_shape")) is not None:
             self._state_shape = (int(shape[0]), int(shape[1]))
@@ -66,11 +67,11 @@ class OnnxPolicy:
         return results["action"][0]
 
 
-def _session(file: Path) -> Any:
+def _session(network: bytes, file: Path) -> Any:
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = 1  # a small network; idle threads would spin beside the robot's programs
     try:
-        return onnxruntime.InferenceSession(str(file), options, providers=["CPUExecutionProvider"])
+        return onnxruntime.InferenceSession(network, options, providers=["CPUExecutionProvider"])
     except Exception as error:  # onnxruntime raises classes of its own, without a common base
         raise ConfigurationError(
             f"{file}: onnxruntime does not load it ({error}); export it again"

@@ -19,7 +19,7 @@ from palaestra_trainer.job.configuration import load
 from palaestra_trainer.job.run_directory import RunDirectory, replace_file
 from palaestra_trainer.run.policies import load_policy
 
-PACKAGE = "package"  # a folder, in which the policy is an ONNX file
+PACKAGE = "package"  # a folder or a zip, in which the policy is an ONNX file
 BAG = "mcap"  # the recorded episodes, without the policy
 FORMATS: Mapping[str, str] = {"onnx": "onnx_file", "safetensors": "safetensors_file"}
 
@@ -41,7 +41,7 @@ class Exported:
     """The result of an export.
 
     Attributes:
-        path: the file, or the folder of the package, that was written.
+        path: the file, or the folder or zip of the package, that was written.
         observations: number of observations in the comparison of the file with the policy.
         largest_difference: the largest difference between a number in an action of the file and the same
             number in the policy's action; for continuous actions, as a share of the range.
@@ -70,11 +70,11 @@ class ExportedEpisodes:
 def export(run: Path, to: str, file: Path | None = None) -> Exported:
     """Write the best policy of a run in the format `to`; by default to `policy.<to>` in its directory.
 
-    A package is a folder, by default `package` in the run directory.
+    A package is a folder, by default `package` in the run directory; or a zip if `file` ends in `.zip`.
 
     Raises:
-        ConfigurationError: the model or a library of the extra `export` is missing, or the folder exists and
-            is not a package.
+        ConfigurationError: the model or a library of the extra `export` is missing, or the place of the
+            package exists and is no package.
         ExportError: the file would act differently from the policy, so it was not written.
         OSError: the file could not be written.
     """

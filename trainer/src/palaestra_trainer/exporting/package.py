@@ -8,8 +8,16 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from palaestra_protocol.package_archive import archived
 from palaestra_protocol.pod.enums import Role
-from palaestra_protocol.policy_package import MANIFEST, MODEL, NETWORK, TRAINING, manifest_text
+from palaestra_protocol.policy_package import (
+    MANIFEST,
+    MODEL,
+    NETWORK,
+    TRAINING,
+    is_package,
+    manifest_text,
+)
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.exporting.onnx_file import sheet_of
 from palaestra_trainer.job.configuration import DEFAULT_ROBOT, Configuration
@@ -20,28 +28,41 @@ from palaestra_trainer.run.summary import measured
 JOB = "job.yaml"  # the TrainingJob; only a run of `palaestra run` has this file
 _OURS = frozenset({NETWORK, MODEL, JOB, TRAINING, MANIFEST})
 _MS = 1000.0
+_ZIP = ".zip"
 
 
-def write_package(folder: Path, network: bytes, configuration: Configuration, run: RunDirectory) -> None:
-    """Write a package into a new or an empty folder, or replace an older package.
-
-    The manifest is written last. Until then, a reader refuses the package, because the older manifest has
-    other checksums.
+def write_package(place: Path, network: bytes, configuration: Configuration, run: RunDirectory) -> None:
+    """Write a package, or replace an older package.
 
     Args:
-        folder: the folder of the package.
+        place: the folder of the package; or its zip, if the name ends in `.zip`.
         network: the exported policy, as the content of an ONNX file with its data sheet.
         configuration: the configuration of the run.
         run: the run directory.
 
     Raises:
-        ConfigurationError: the folder contains another file, or the robot's class is unknown.
+        ConfigurationError: the place is no package, or the robot's class is unknown.
         OSError: a file cannot be read or written.
     """
     files = {NETWORK: network, MODEL: run.model.read_bytes(), TRAINING: run.configuration.read_bytes()}
     if (job := run.path / JOB).is_file():
         files[JOB] = job.read_bytes()
     files[MANIFEST] = manifest_text(_description(sheet_of(network), configuration, run), files)
+    if place.suffix == _ZIP:
+        _write_zip(place, files)
+    else:
+        _write_folder(place, files)
+
+
+def _write_zip(path: Path, files: Mapping[str, bytes]) -> None:
+    if path.exists() and not is_package(path):
+        raise ConfigurationError(f"{path}: is no package; name a new file with --output")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    replace_file(path, partial(_write, archived(files)))
+
+
+def _write_folder(folder: Path, files: Mapping[str, bytes]) -> None:
+    """Write the manifest last: until then, a reader refuses an older manifest with other checksums."""
     folder.mkdir(parents=True, exist_ok=True)
     if others := sorted({path.name for path in folder.iterdir()} - _OURS):
         raise ConfigurationError(

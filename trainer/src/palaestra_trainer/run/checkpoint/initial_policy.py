@@ -1,7 +1,8 @@
 """Begin a run with the policy of another run: load its tensors, and the statistics of its normalizer.
 
-The file is the zip of any model of Stable-Baselines3. This module does not unpickle, so the file may come
-from an untrusted source. The run has new optimizers, and all its counts start at 0.
+The file is the zip of any model of Stable-Baselines3, or a policy package as a zip. This module does not
+unpickle, so the file may come from an untrusted source. The run has new optimizers, and all its
+counts start at 0.
 """
 
 from __future__ import annotations
@@ -12,12 +13,13 @@ import pickle
 import zipfile
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import structlog
 import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 
+from palaestra_protocol.policy_package import MODEL, PackageError, is_package, read_files
 from palaestra_trainer.algorithms.normalization import normalizer_of
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.run.checkpoint.tensors import NORMALIZE
@@ -54,7 +56,7 @@ def _most_bytes(own: Mapping[str, torch.Tensor]) -> int:
 def _read(path: Path, device: torch.device, most: int) -> tuple[Any, dict[str, Any]]:
     """Return the tensors and the statistics in a zip; refuse more than `most` bytes in total."""
     try:
-        with zipfile.ZipFile(path) as archive:
+        with _model(path) as file, zipfile.ZipFile(file) as archive:
             statistics = [NORMALIZE] if NORMALIZE in archive.namelist() else []
             _refuse_larger(path, map(archive.getinfo, [POLICY, *statistics]), most)
             content = io.BytesIO(archive.read(POLICY))
@@ -75,6 +77,16 @@ def _read(path: Path, device: torch.device, most: int) -> tuple[Any, dict[str, A
     except (OSError, KeyError, EOFError, RuntimeError, ValueError, zipfile.BadZipFile) as error:
         fact = f"cannot be read as a model of Stable-Baselines3 ({error}); name a model.zip"
         raise _refused(path, fact) from error
+
+
+def _model(path: Path) -> BinaryIO:
+    """Open the model: the file itself, or the model in a package, after a check of the whole package."""
+    if not is_package(path):
+        return path.open("rb")
+    try:
+        return io.BytesIO(read_files(path, MODEL)[1][MODEL])
+    except PackageError as error:
+        raise ConfigurationError(f"initialPolicy: {error}") from error
 
 
 def _refuse_larger(path: Path, members: Iterable[zipfile.ZipInfo], most: int) -> None:
