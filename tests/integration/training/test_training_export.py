@@ -178,6 +178,9 @@ def test_the_example_drives_a_simulated_robot_without_pytorch(trained):
 def test_a_package_has_all_that_a_robot_and_a_reader_need(trained):
     """A program on the robot reads the rate and the limits; a person reads the success."""
     run = trained(**CASES["PPO-continuous"])
+    source = {"of": "lab_task", "commit": "0" * 40, "dirty": False}
+    for _ in range(2):
+        RunDirectory(run).begin_attempt("", "resumed", source=source)
 
     written = exporting.export(run, "package")
     manifest = read_package(written.path)
@@ -189,6 +192,7 @@ def test_a_package_has_all_that_a_robot_and_a_reader_need(trained):
     assert manifest["policy"]["environment"]["id"] == CONTINUOUS["id"]
     assert manifest["policy"]["actions"]["space"]["low"] == -1.0
     assert manifest["evaluated"][0]["simulators"] == ["stub"]
+    assert manifest["commit"][-1] == source
     assert (written.path / "model.zip").read_bytes() == (run / "model.zip").read_bytes()
     session = onnxruntime.InferenceSession(written.path / "policy.onnx")
     assert [it.name for it in session.get_inputs()] == manifest["policy"]["inputs"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
@@ -85,6 +85,7 @@ def _description(sheet: Mapping[str, Any], configuration: Configuration, run: Ru
     attempts = list(read_lines(run.attempts))
     return {
         "palaestra": version("palaestra-trainer"),
+        "commit": _commits(attempts),
         "versions": attempts[-1].get("versions", {}) if attempts else {},
         "job": configuration.job,
         "replica": configuration.replica,
@@ -93,6 +94,15 @@ def _description(sheet: Mapping[str, Any], configuration: Configuration, run: Ru
         "evaluated": _evaluated(configuration, run),
         "reproduce": f"palaestra run {JOB}" if (run.path / JOB).is_file() else None,
     }
+
+
+def _commits(attempts: Sequence[Mapping[str, Any]]) -> list[Any]:
+    """Return the states of the job's own code, each once, in the order of the attempts."""
+    found: list[Any] = []
+    for source in (attempt.get("source") for attempt in attempts):
+        if source is not None and source not in found:
+            found.append(source)
+    return found
 
 
 def _evaluated(configuration: Configuration, run: RunDirectory) -> list[dict[str, Any]]:

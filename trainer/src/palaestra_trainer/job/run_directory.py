@@ -105,11 +105,25 @@ class RunDirectory:
         """The ids of this run in the experiment trackers of the job."""
         return self.path / "trackers.json"
 
-    def begin_attempt(self, pod_uid: str, reason: str, versions: Mapping[str, str] | None = None) -> int:
-        """Record the start of an attempt and the versions of its software; return its number, from 1."""
+    def begin_attempt(
+        self,
+        pod_uid: str,
+        reason: str,
+        versions: Mapping[str, str] | None = None,
+        source: Mapping[str, Any] | None = None,
+    ) -> int:
+        """Record the start of an attempt, and return its number, from 1.
+
+        Args:
+            pod_uid: the uid of the pod.
+            reason: why the attempt begins.
+            versions: the versions of its software.
+            source: the commit of the job's own code.
+        """
         started = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
-        with_versions = {} if versions is None else {"versions": dict(versions)}
-        append_line(self.attempts, {"pod": pod_uid, "started": started, "reason": reason} | with_versions)
+        known = {"versions": versions, "source": source}
+        facts = {name: dict(value) for name, value in known.items() if value is not None}
+        append_line(self.attempts, {"pod": pod_uid, "started": started, "reason": reason} | facts)
         return sum(1 for _ in read_lines(self.attempts))
 
 

@@ -42,6 +42,7 @@ from palaestra_trainer.run.journal import Journal
 from palaestra_trainer.run.logger import CurvesLogger, hide_points
 from palaestra_trainer.run.resume import rejoin
 from palaestra_trainer.run.signals import Interruption
+from palaestra_trainer.run.source_commit import source_commit
 from palaestra_trainer.run.summary import finished, last_word_of, summarise, write_summary
 from palaestra_trainer.run.telemetry.fault_log import FaultLog
 from palaestra_trainer.run.telemetry.metrics import constants
@@ -334,7 +335,8 @@ class Attempt:
         self._directory.summary.unlink(missing_ok=True)  # exists if a finished run gets more steps
         algorithms.keep(self._algorithm, self._directory)
         pod = self._around.environment.get("PALAESTRA_POD_UID", "")
-        self._progress.attempt = attempt = self._directory.begin_attempt(pod, reason, versions())
+        source = source_commit(self._configuration.environment.id)
+        self._progress.attempt = attempt = self._directory.begin_attempt(pod, reason, versions(), source)
         self._progress.fault_log = FaultLog(self._directory.faults, attempt)
         link_curves(self._directory, self._configuration)
         log.info("training", attempt=attempt, reason=reason, target=self._configuration.steps)
