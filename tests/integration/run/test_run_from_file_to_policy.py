@@ -1,5 +1,6 @@
 """`palaestra run` leads from the file of a TrainingJob to a policy on one machine."""
 
+import hashlib
 import json
 import os
 import re
@@ -226,7 +227,10 @@ def test_a_policy_can_be_measured_afterwards(finished):
         check=True,
     )
 
-    assert json.loads(result.stdout)["episodes"] == 3
+    found = json.loads(result.stdout)
+    assert found["episodes"] == 3
+    assert found["simulators"] == ["stub"]
+    assert found["model"] == hashlib.sha256((finished.run.directory / "model.zip").read_bytes()).hexdigest()
 
 
 def test_a_policy_is_measured_on_the_same_episodes_in_each_simulator(finished):

@@ -1,5 +1,6 @@
 """An exported policy is one file, and its actions equal those of the policy in its run."""
 
+import hashlib
 import json
 import os
 import shutil
@@ -19,6 +20,7 @@ from palaestra_trainer import exporting, load_policy
 from palaestra_trainer.cli.export import export
 from palaestra_trainer.errors import ConfigurationError, ExportError
 from palaestra_trainer.exporting import onnx_file
+from palaestra_trainer.job.run_directory import RunDirectory
 from palaestra_trainer.testing import fake_arena, fake_seeing
 
 PPO = {"name": "PPO", "hyperparameters": {"n_steps": 64, "batch_size": 32, "n_epochs": 2}}
@@ -201,6 +203,39 @@ def test_a_package_has_all_that_a_robot_and_a_reader_need(trained):
 
     assert read_package(again.path)["policy"] == manifest["policy"]
     assert list(written.path.glob(".*")) == []
+
+
+def test_a_package_has_the_results_of_its_policy_in_several_simulators(trained, tmp_path):
+    """A person judges whether the policy depends on one simulator; another policy's results would mislead."""
+    run = trained(**CASES["PPO-continuous"])
+    mujoco = {
+        "simulators": ["mujoco"],
+        "worlds": ["arena.wbt"],
+        "episodes": 100,
+        "success_rate": 0.9,
+        "success_interval": {"low": 0.82, "high": 0.95, "episodes": 100},
+        "seeds": "B",
+        "versions": {"mujoco": "3.3.0"},
+    }
+    known = mujoco | {"model": hashlib.sha256((run / "model.zip").read_bytes()).hexdigest(), "seconds": 3.1}
+    results = tmp_path / "results.jsonl"
+    results.write_text(json.dumps(known))
+
+    written = exporting.export(run, "package", results=results)
+
+    own, other = read_package(written.path)["evaluated"]
+    assert (own["simulators"], own["episodes"]) == (["stub"], 3)
+    assert own["success_interval"]["episodes"] == 3
+    assert "palaestra-trainer" in own["versions"]
+    assert other == mujoco
+    for text, fact in (
+        (json.dumps(known | {"model": "0" * 64}), "line 1: is a result of another policy than model.zip"),
+        (json.dumps(known | {"success_rate": 90}), "line 1: is no result of a policy"),
+        ("", "is empty; write the file with `palaestra-eval"),
+    ):
+        results.write_text(text)
+        with pytest.raises(ConfigurationError, match=fact):
+            exporting.export(run, "package", results=results)
 
 
 def test_a_package_as_a_zip_begins_another_run_and_has_the_same_bytes_again(trained, play, write_job):

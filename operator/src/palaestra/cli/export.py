@@ -46,8 +46,16 @@ def add(commands: Commands) -> None:
         help="default: RUN/policy.<format>, RUN/package or RUN/episodes.mcap. With a name that ends in .zip, "
         "a package is one file",
     )
+    parser.add_argument(
+        "--evaluated",
+        metavar="FILE",
+        type=Path,
+        help="with --to package: further results of the policy for the manifest, as `palaestra-eval RUN --in "
+        "stub,mujoco --json` prints them",
+    )
 
 
 def _export(options: argparse.Namespace) -> int:
-    chosen = [] if options.output is None else ["--output", str(options.output)]
+    given = {"--output": options.output, "--evaluated": options.evaluated}
+    chosen = [word for name, path in given.items() if path is not None for word in (name, str(path))]
     return run_program([PROGRAM, str(options.run), "--to", options.to, *chosen])

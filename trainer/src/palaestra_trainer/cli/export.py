@@ -54,7 +54,15 @@ def export(arguments: Sequence[str] | None = None) -> int:
         help="default: RUN_DIR/policy.FORMAT, RUN_DIR/package or RUN_DIR/episodes.mcap; a package is one "
         "file if the name ends in .zip",
     )
+    options.add_argument(
+        "--evaluated",
+        type=Path,
+        metavar="FILE",
+        help="with --to package: further results of the policy, from `palaestra-eval --in NAMES --json`",
+    )
     chosen = options.parse_args(arguments)
+    if chosen.evaluated is not None and chosen.to != "package":
+        options.error("--evaluated: only a package has results of evaluations; use --to package")
     configure_logs()
     with without_collections():
         from palaestra_trainer import exporting
@@ -63,7 +71,7 @@ def export(arguments: Sequence[str] | None = None) -> int:
         written = (
             exporting.export_episodes(chosen.run, chosen.output)
             if chosen.to == exporting.BAG
-            else exporting.export(chosen.run, chosen.to, chosen.output)
+            else exporting.export(chosen.run, chosen.to, chosen.output, chosen.evaluated)
         )
     except (TrainerError, OSError) as error:
         return refuse_without_run(error)

@@ -67,10 +67,11 @@ class ExportedEpisodes:
     messages: int
 
 
-def export(run: Path, to: str, file: Path | None = None) -> Exported:
+def export(run: Path, to: str, file: Path | None = None, results: Path | None = None) -> Exported:
     """Write the best policy of a run in the format `to`; by default to `policy.<to>` in its directory.
 
     A package is a folder, by default `package` in the run directory; or a zip if `file` ends in `.zip`.
+    Its manifest also has the results in `results`, a file of JSON lines of `palaestra-eval`.
 
     Raises:
         ConfigurationError: the model or a library of the extra `export` is missing, or the place of the
@@ -94,7 +95,7 @@ def export(run: Path, to: str, file: Path | None = None) -> Exported:
     if to == PACKAGE:
         path = file or run / PACKAGE
         package: Any = import_module(f"{__package__}.package")  # it imports the library for ONNX
-        package.write_package(path, content, configuration, directory)
+        package.write_package(path, content, configuration, directory, results)
     else:
         path = file or run / f"policy.{to}"
         replace_file(path, lambda name: name.write_bytes(content))

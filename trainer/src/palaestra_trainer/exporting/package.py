@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from palaestra_protocol.package_archive import archived
-from palaestra_protocol.pod.enums import Role
 from palaestra_protocol.policy_package import (
     MANIFEST,
     MODEL,
@@ -19,11 +18,11 @@ from palaestra_protocol.policy_package import (
     manifest_text,
 )
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.exporting.measurements import own_result, results_of
 from palaestra_trainer.exporting.onnx_file import sheet_of
 from palaestra_trainer.job.configuration import DEFAULT_ROBOT, Configuration
 from palaestra_trainer.job.run_directory import RunDirectory, read_lines, replace_file
 from palaestra_trainer.robots.registry import robot_class
-from palaestra_trainer.run.summary import measured
 
 JOB = "job.yaml"  # the TrainingJob; only a run of `palaestra run` has this file
 _OURS = frozenset({NETWORK, MODEL, JOB, TRAINING, MANIFEST})
@@ -31,7 +30,9 @@ _MS = 1000.0
 _ZIP = ".zip"
 
 
-def write_package(place: Path, network: bytes, configuration: Configuration, run: RunDirectory) -> None:
+def write_package(
+    place: Path, network: bytes, configuration: Configuration, run: RunDirectory, results: Path | None = None
+) -> None:
     """Write a package, or replace an older package.
 
     Args:
@@ -39,15 +40,20 @@ def write_package(place: Path, network: bytes, configuration: Configuration, run
         network: the exported policy, as the content of an ONNX file with its data sheet.
         configuration: the configuration of the run.
         run: the run directory.
+        results: a file with further results of the policy, as `palaestra-eval --json` prints them.
 
     Raises:
-        ConfigurationError: the place is no package, or the robot's class is unknown.
+        ConfigurationError: the place is no package, the robot's class is unknown, or a result is that of
+            another policy.
         OSError: a file cannot be read or written.
     """
     files = {NETWORK: network, MODEL: run.model.read_bytes(), TRAINING: run.configuration.read_bytes()}
     if (job := run.path / JOB).is_file():
         files[JOB] = job.read_bytes()
-    files[MANIFEST] = manifest_text(_description(sheet_of(network), configuration, run), files)
+    description = _description(sheet_of(network), configuration, run)
+    if results is not None:
+        description["evaluated"] += results_of(results, run.model)
+    files[MANIFEST] = manifest_text(description, files)
     if place.suffix == _ZIP:
         _write_zip(place, files)
     else:
@@ -91,7 +97,7 @@ def _description(sheet: Mapping[str, Any], configuration: Configuration, run: Ru
         "replica": configuration.replica,
         "robot": {"class": name, "definition": robot.definition, "period_s": robot.period_ms / _MS},
         "policy": dict(sheet),
-        "evaluated": _evaluated(configuration, run),
+        "evaluated": own_result(configuration, run),
         "reproduce": f"palaestra run {JOB}" if (run.path / JOB).is_file() else None,
     }
 
@@ -103,19 +109,3 @@ def _commits(attempts: Sequence[Mapping[str, Any]]) -> list[Any]:
         if source is not None and source not in found:
             found.append(source)
     return found
-
-
-def _evaluated(configuration: Configuration, run: RunDirectory) -> list[dict[str, Any]]:
-    """Return the success of the policy, and the simulators that evaluated it; empty without evaluation."""
-    result = measured(run)
-    if not result:
-        return []
-    judges = [it for it in configuration.simulators if it.role is Role.EVALUATE]
-    return [
-        {
-            "simulators": sorted({it.driver for it in judges}),
-            "worlds": sorted({Path(it.world).name for it in judges}),
-            "success_rate": result.get("success_rate"),
-            "success_interval": result.get("success_interval"),
-        }
-    ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -20,6 +21,7 @@ from palaestra_trainer.job.configuration import Configuration, SimulatorConfigur
 from palaestra_trainer.job.run_directory import RunDirectory
 from palaestra_trainer.run import checkpoint
 from palaestra_trainer.run.attempt import STOPPED_S, MakeMembers, use_threads
+from palaestra_trainer.run.versions import SIMULATING, versions
 from palaestra_trainer.simulators.drivers import in_driver
 from palaestra_trainer.simulators.fleet import Fleet
 from palaestra_trainer.simulators.interface import NullWatcher
@@ -107,6 +109,10 @@ def measure(
         interval = evaluation.success_interval
         result = evaluation.summary() | {
             "success_interval": None if interval is None else interval.to_json(),
+            "simulators": sorted({each.driver for each in only.simulators}),
+            "worlds": sorted({Path(each.world).name for each in only.simulators}),
+            "model": hashlib.sha256(model.read_bytes()).hexdigest(),
+            "versions": _simulating(),
             "seeds": stream,
             "run_seed": configuration.seed,
             "seconds": round(evaluation.seconds, 2),
@@ -144,6 +150,11 @@ def evaluating(configuration: Configuration) -> tuple[SimulatorConfiguration, ..
     if found := configuration.with_role(Role.EVALUATE):
         return found
     return (configuration.with_role(Role.COLLECT)[0].model_copy(update={"role": Role.EVALUATE}),)
+
+
+def _simulating() -> dict[str, str]:
+    """Return the versions of the programs on which a result depends, as far as they are installed here."""
+    return {name: known for name, known in versions().items() if name in SIMULATING}
 
 
 def _warned(configuration: Configuration) -> tuple[SimulatorConfiguration, ...]:

@@ -8,7 +8,17 @@ from importlib.metadata import PackageNotFoundError, version
 
 import torch
 
-PACKAGES = ("palaestra-trainer", "torch", "stable-baselines3", "sb3-contrib", "gymnasium", "numpy")
+PACKAGES = (
+    "palaestra-trainer",
+    "palaestra-sim",
+    "torch",
+    "stable-baselines3",
+    "sb3-contrib",
+    "gymnasium",
+    "numpy",
+    "mujoco",
+)
+SIMULATING = ("palaestra-trainer", "palaestra-sim", "mujoco")  # an evaluation depends on these
 
 
 def versions() -> dict[str, str]:
