@@ -13,7 +13,9 @@ from palaestra_trainer.real_robots.robotino import RealRobotino
 from palaestra_trainer.real_robots.ros1 import Ros1Link
 from palaestra_trainer.real_robots.safety import SafetyRules
 from palaestra_trainer.robots.geometry import Pose
-from palaestra_trainer.ros import Master
+from palaestra_trainer.ros import Master, RosSubscriber
+from palaestra_trainer.ros.publisher import RosPublisher
+from palaestra_trainer.ros.topic_node import TopicNode
 from palaestra_trainer.testing.conformance import check_robot
 from tests.mock_robots import DEADLINE_S, drive, ended, started
 from tests.waiting import eventually
@@ -218,7 +220,8 @@ def test_without_a_master_the_robot_is_refused():
 
 def test_without_a_driver_the_robot_is_refused(master):
     """A master alone drives nothing, and a wrong namespace looks the same."""
-    message = r"/nowhere: no node that this computer reaches publishes /nowhere/odom; start robotino_node"
+    topics = "publishes /nowhere/odom and subscribes to /nowhere/cmd_vel"
+    message = f"/nowhere: no node that this computer reaches {topics}; start robotino_node"
     with pytest.raises(RobotUnfit, match=message):
         real(address(master, "/nowhere")).connect()
 
@@ -227,9 +230,52 @@ def test_a_command_that_nobody_receives_is_an_error(master):
     """The loop of commands then knows that zero was not confirmed."""
     link = Ros1Link(address(master))
 
-    with pytest.raises(LinkError, match="/cmd_vel: no subscriber is connected"):
+    with pytest.raises(LinkError, match="/cmd_vel: the driver is not connected"):
         link.send((0.1, 0.0, 0.0))
     link.close()
+
+
+@pytest.fixture
+def other_node(master):
+    """Yield a node of another person."""
+    node = TopicNode("/joystick", master)
+    yield node
+    node.close()
+
+
+def test_another_publisher_of_commands_is_refused_before_the_robot_moves(master, mock, other_node):
+    """The driver obeys every publisher, so two of them would pull the robot to and fro."""
+    before = mock.get("/mock/truth")["commands"]
+    message = r"/joystick publishes /cmd_vel, so it can move the robot; end this node"
+    with (
+        contextlib.closing(RosPublisher(other_node, "/cmd_vel", "geometry_msgs/Twist")),
+        pytest.raises(RobotUnfit, match=message),
+        real(address(master)) as refused,
+    ):
+        refused.connect()
+
+    Ros1Link(address(master)).refuse_unfit(0.5, 1.0)
+    assert mock.get("/mock/truth")["commands"] == before
+
+
+def test_a_recorder_of_commands_is_not_the_driver(master, link, other_node):
+    """`rosbag record -a` subscribes to all topics; without the driver, nothing confirms a command."""
+    topic = "/lab/recorded/cmd_vel"
+    with mock_in("lab/recorded"):
+        connected, _ = link("/lab/recorded")
+        with contextlib.closing(RosSubscriber(topic, "geometry_msgs/Twist", node=other_node)) as recorder:
+            recorder.connect()
+            driver_uri = other_node.master.node_uri("/lab/recorded/robotino_node")
+            with xmlrpc.client.ServerProxy(driver_uri) as driver:
+                driver.shutdown("/test", "the driver alone")
+            with pytest.raises(LinkError, match="the driver is not connected"):
+                keep(connected, (0.0, 0.0, 0.0), lambda: False)
+            heard = eventually(recorder.arrived, pace_s=PACE_S)
+
+            with pytest.raises(RobotUnfit, match="no node that this computer reaches publishes"):
+                Ros1Link(address(master, "/lab/recorded")).refuse_unfit(0.2, 1.0)
+
+    assert heard
 
 
 def test_a_driver_that_starts_again_is_found(link):

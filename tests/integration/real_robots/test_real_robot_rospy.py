@@ -17,6 +17,7 @@ DRIVER = """
 import sys, rospy
 from geometry_msgs.msg import Twist
 rospy.init_node("robotino_node", disable_signals=True)
+odometry = rospy.Publisher("odom", Twist, queue_size=1)  # nav_msgs may be missing
 rospy.Subscriber("cmd_vel", Twist, lambda it: print(it.linear.x, it.linear.y, it.angular.z, flush=True))
 print("ready", flush=True)
 sys.stdin.read()

@@ -1,7 +1,9 @@
 """The connection to a Robotino over ROS 1, through its driver `robotino_node`.
 
-The connection needs no installed ROS. Three facts about the driver matter:
+The connection needs no installed ROS. Four facts about the driver matter:
 
+- The driver is the node that publishes `odom` and subscribes to `cmd_vel`. Other subscribers, such as a
+  recorder, confirm no command; and the driver obeys every publisher of `cmd_vel`, so there must be no other.
 - It forwards each command once, up to 33 ms late, and has no watchdog. So the base's own dead man stops the
   robot.
 - It clips each axis of a command to its limits, and raises a small speed to its minimum, without a notice.
@@ -79,35 +81,38 @@ class Ros1Link:
         self._clock = clock or RobotClock()
         self._bumped = False
         self._commands: RosPublisher | None = None
+        self._driver: str | None = None
         self._over = threading.Event()
         self._open = ExitStack()
 
     def refuse_unfit(self, speed_m_s: float, turn_rad_s: float) -> None:
-        """Refuse a robot without a running driver, or whose driver clips the speed.
+        """Refuse a robot without a running driver, or with another client, or whose driver clips the speed.
 
         The driver does not report the charger, so a charging robot is not refused.
 
         Raises:
-            RobotUnfit: no master responds, no driver publishes odometry, or its limit is below the speed.
+            RobotUnfit: no master responds, no driver runs, another node publishes commands, or the driver's
+                limit is below the speed.
         """
-        odom = self._name("odom")
         master = Master(self._name("palaestra"), _CHECK_S, self._master_uri)
+        commands = self._name("cmd_vel")
         try:
             master.ping()
-            runs = any(master.runs(node) for node in sorted(master.publishers(odom)))
-            limits = {name: master.parameter(self._name(f"robotino_node/{name}")) for name in _LIMITS}
+            self._driver = driver = self._found_driver(master)
+            others = [node for node in sorted(master.publishers(commands)) if master.runs(node)]
+            limits = {name: master.parameter(f"{driver}/{name}") for name in _LIMITS}
         except (MasterLost, UnreadableAnswer) as error:
             raise RobotUnfit(
                 f"{self.address}: {error}; check the address, and that the robot is switched on"
             ) from error
-        if not runs:
-            fact = f"{self.address}: no node that this computer reaches publishes {odom}"
-            raise RobotUnfit(f"{fact}; start robotino_node, with ROS_IP set to the robot's address")
+        if others:
+            fact = f"{self.address}: {others[0]} publishes {commands}, so it can move the robot"
+            raise RobotUnfit(f"{fact}; end this node")
         for (name, (default, unit)), wanted in zip(_LIMITS.items(), (speed_m_s, turn_rad_s), strict=True):
             most = default if limits[name] is None else limits[name]
             if not isinstance(most, int | float) or most < wanted:
                 note = " by default" if limits[name] is None else ""
-                fact = f"{self.address}: {self._name(f'robotino_node/{name}')} is {most!r} {unit}{note}"
+                fact = f"{self.address}: {driver}/{name} is {most!r} {unit}{note}"
                 raise RobotUnfit(
                     f"{fact}, below {wanted:g} {unit}; set the parameter and restart the driver, or lower the"
                     " limit"
@@ -117,18 +122,21 @@ class Ros1Link:
         """Begin to receive readings, after the driver has connected to the topic of commands.
 
         Raises:
-            RobotUnfit: the master is gone, or the driver does not connect.
+            RobotUnfit: the master or the driver is gone, or the driver does not connect.
         """
         topic = self._name("cmd_vel")
         try:
+            driver = self._driver = self._driver or self._found_driver(
+                Master(self._name("palaestra"), _CHECK_S, self._master_uri)
+            )
             node = TopicNode(self._name(f"palaestra_{os.getpid()}_{next(_numbers)}"), self._master_uri)
             self._open.callback(node.close)
             self._commands = RosPublisher(node, topic, "geometry_msgs/Twist")
             self._open.callback(self._commands.close)
         except (MasterLost, UnreadableAnswer) as error:
             raise RobotUnfit(f"{self.address}: {error}; check the network, and try again") from error
-        if not self._commands.wait_for_subscriber(_DRIVER_CONNECTS_S):
-            fact = f"{self.address}: the driver has not connected to {topic} at {node.host}"
+        if not self._commands.wait_for_subscriber(_DRIVER_CONNECTS_S, driver):
+            fact = f"{self.address}: the driver {driver} has not connected to {topic} at {node.host}"
             raise RobotUnfit(f"{fact}; set ROS_IP to an address of this computer that the robot reaches")
         thread = threading.Thread(target=self._listen, args=(node, store), name="robot-topics", daemon=True)
         self._open.callback(thread.join, _END_S)
@@ -138,10 +146,13 @@ class Ros1Link:
         """Send one velocity to all subscribers of `cmd_vel`; the driver itself confirms nothing.
 
         Raises:
-            LinkError: no subscriber is connected.
+            LinkError: the driver is not connected.
         """
-        if self._commands is None or not self._commands.publish(**fields_of(twist)):
-            raise LinkError(f"{self._name('cmd_vel')}: no subscriber is connected")
+        if self._commands is not None:
+            self._commands.publish(**fields_of(twist))
+            if self._driver in self._commands.subscribers:  # a subscriber that took no message was dropped
+                return
+        raise LinkError(f"{self._name('cmd_vel')}: the driver is not connected")
 
     def close(self) -> None:
         """Unregister, end the thread, and close the connections."""
@@ -150,6 +161,27 @@ class Ros1Link:
 
     def _name(self, name: str) -> str:
         return f"{self._namespace}/{name}"
+
+    def _found_driver(self, master: Master) -> str:
+        """Return the name of the running node that publishes odometry and subscribes to commands.
+
+        Raises:
+            RobotUnfit: there is no such node, or more than one.
+            MasterLost: the master does not respond.
+            UnreadableAnswer: the master's response is invalid.
+        """
+        odom, commands = self._name("odom"), self._name("cmd_vel")
+        known = sorted(master.publishers(odom) & master.subscribers(commands))
+        match [node for node in known if master.runs(node)]:
+            case [driver]:
+                return driver
+            case []:
+                fact = f"no node that this computer reaches publishes {odom} and subscribes to {commands}"
+                remedy = "start robotino_node, with ROS_IP set to the robot's address"
+            case several:
+                fact = f"{' and '.join(several)} each publish {odom} and subscribe to {commands}"
+                remedy = "end all drivers except one"
+        raise RobotUnfit(f"{self.address}: {fact}; {remedy}")
 
     def _listen(self, node: TopicNode, store: ReadingStore) -> None:
         """Receive messages; after a failure, connect all topics again, so that a latched message returns."""

@@ -84,6 +84,11 @@ class Master:
         published, _, _ = self._registered()
         return published.get(topic, set())
 
+    def subscribers(self, topic: str) -> set[str]:
+        """Return the full names of the nodes that subscribe to a topic."""
+        _, subscribed, _ = self._registered()
+        return subscribed.get(topic, set())
+
     def heard_topics(self) -> set[str]:
         """Return the full names of the topics that have a publisher and a subscriber."""
         published, subscribed, _ = self._registered()

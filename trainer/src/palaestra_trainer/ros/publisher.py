@@ -49,7 +49,7 @@ class RosPublisher:
         self._topic = topic
         self._type = known_type(message_type, type_name)
         self._changed = Condition()
-        self._subscribers: list[socket.socket] = []
+        self._subscribers: dict[socket.socket, str] = {}  # the names of the nodes, as their headers have them
         self._server = _Server((bind_address(node.host), 0), self)
         self._server.start()
         try:
@@ -57,6 +57,12 @@ class RosPublisher:
         except (MasterLost, UnreadableAnswer):
             self._server.close()
             raise
+
+    @property
+    def subscribers(self) -> frozenset[str]:
+        """The full names of the nodes that are connected."""
+        with self._changed:
+            return frozenset(self._subscribers.values())
 
     def publish(self, **fields: Any) -> int:
         """Send a message to all connected subscribers, and return their number.
@@ -71,10 +77,18 @@ class RosPublisher:
                     self._drop(connection)
             return len(self._subscribers)
 
-    def wait_for_subscriber(self, timeout_s: float) -> bool:
-        """Wait until a subscriber is connected; return False after the timeout."""
+    def wait_for_subscriber(self, timeout_s: float, node: str | None = None) -> bool:
+        """Wait until the node with this full name is connected; None stands for any node.
+
+        Returns:
+            False after the timeout.
+        """
+
+        def connected() -> bool:
+            return node in self._subscribers.values() or (node is None and bool(self._subscribers))
+
         with self._changed:
-            return self._changed.wait_for(lambda: bool(self._subscribers), timeout_s)
+            return self._changed.wait_for(connected, timeout_s)
 
     def close(self) -> None:
         """Unregister the topic, and close the connections; further calls have no effect."""
@@ -101,7 +115,7 @@ class RosPublisher:
         connection.sendall(encode_header(ours))
         slots.answering(connection, now=True)  # so a new connection cannot take the slot of a subscriber
         with self._changed:
-            self._subscribers.append(connection)
+            self._subscribers[connection] = theirs.get("callerid", "")
             self._changed.notify_all()
         try:
             while connection.recv(sockets.FIRST_BYTES):
@@ -113,7 +127,7 @@ class RosPublisher:
     def _drop(self, connection: socket.socket) -> None:
         """Remove a subscriber, if it is one, and end its thread, which then closes the connection."""
         if connection in self._subscribers:
-            self._subscribers.remove(connection)
+            del self._subscribers[connection]
             with contextlib.suppress(OSError):  # the subscriber may have closed the connection
                 connection.shutdown(socket.SHUT_RDWR)
 
