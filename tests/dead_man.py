@@ -71,7 +71,7 @@ def after(what):
 def robot(*, over_ros):
     """Yield the address of a mock robot, a client that sees its truth, and a function that cuts its network.
 
-    The network of a robot with the ROS driver cannot be cut, because nodes of ROS name their own addresses.
+    The network of a robot with the ROS driver cannot be cut here; `tests.cut_network` cuts it.
     """
     with contextlib.ExitStack() as stack:
         master = stack.enter_context(ros_master()) if over_ros else None
@@ -86,9 +86,9 @@ def robot(*, over_ros):
 
 
 @contextlib.contextmanager
-def ros_master():
+def ros_master(listen="127.0.0.1:0"):
     """Yield the address of a new ROS master."""
-    program = [sys.executable, "-m", "palaestra_trainer.ros_master", "--listen", "127.0.0.1:0"]
+    program = [sys.executable, "-m", "palaestra_trainer.ros_master", "--listen", listen]
     master = subprocess.Popen(program, stdout=subprocess.PIPE, text=True)
     try:
         yield re.search(r"http://\S+", master.stdout.readline())[0]

@@ -17,6 +17,7 @@ from palaestra_trainer.ros import Master, RosSubscriber
 from palaestra_trainer.ros.publisher import RosPublisher
 from palaestra_trainer.ros.topic_node import TopicNode
 from palaestra_trainer.testing.conformance import check_robot
+from tests import cut_network
 from tests.mock_robots import DEADLINE_S, drive, ended, started
 from tests.waiting import eventually
 
@@ -276,6 +277,15 @@ def test_a_recorder_of_commands_is_not_the_driver(master, link, other_node):
                 Ros1Link(address(master, "/lab/recorded")).refuse_unfit(0.2, 1.0)
 
     assert heard
+
+
+@pytest.mark.skipif(cut_network.lack() is not None, reason="this machine has no network namespaces")
+@pytest.mark.parametrize("time", range(3))
+def test_the_robot_stands_soon_after_its_network_was_cut(time):
+    """The driver has no watchdog, and sees no end of the connection, so only the base's dead man is left."""
+    del time
+
+    assert cut_network.after_cut_s() < cut_network.LIMIT_S
 
 
 def test_a_driver_that_starts_again_is_found(link):

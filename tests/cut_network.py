@@ -1,0 +1,76 @@
+"""A robot and a computer with addresses of their own in a network namespace, whose network can be cut.
+
+Nodes of ROS name their own addresses to each other, so a proxy between two nodes cannot cut them off. In a
+namespace, both addresses can be removed: then no packet between them arrives, and no connection is closed.
+The addresses of loopback stay, and by these a client still sees the mock robot.
+
+`python -m tests.cut_network` cuts the network of a robot with the ROS 1 driver while a program drives it, and
+prints the robot's seconds from its last command until it stands.
+"""
+
+import os
+import subprocess
+import sys
+from functools import cache
+
+from tests.dead_man import driver, ros_master, standing_s
+from tests.mock_robots import ended, started
+from tests.waiting import eventually
+
+ROBOT, COMPUTER = "10.97.42.1", "10.97.42.2"
+LIMIT_S = 0.4  # up to 33 ms more than over REST, in the loop of the driver
+DEADLINE_S = 100.0
+SEPARATE = ("unshare", "--user", "--map-root-user", "--net")
+
+
+@cache
+def lack():
+    """Return why this machine has no network namespaces; None if it has them."""
+    try:
+        done = subprocess.run([*SEPARATE, "ip", "link", "set", "lo", "up"], capture_output=True, check=False)
+    except OSError:
+        return "unshare is not installed"
+    return f"{done.stderr.decode().strip()} in a network namespace" if done.returncode else None
+
+
+def after_cut_s():
+    """Return the robot's seconds from its last command until it stands, after a cut over ROS 1."""
+    command = [*SEPARATE, sys.executable, "-m", "tests.cut_network"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=DEADLINE_S)
+    assert done.returncode == 0, done.stderr
+    return float(done.stdout)
+
+
+def main():
+    """Measure once, within a namespace of its own."""
+    ip("link", "set", "lo", "up")
+    for address in (ROBOT, COMPUTER):
+        ip("address", "add", f"{address}/32", "dev", "lo")
+    os.environ.pop("ROS_HOSTNAME", None)
+    os.environ["ROS_IP"] = ROBOT
+    with ros_master(f"{ROBOT}:0") as master:
+        process, client = started("--drift=0", "--ros1", "--max-speed=0.5", ROS_MASTER_URI=master)
+        os.environ["ROS_IP"] = COMPUTER
+        try:
+            with driver(master.replace("http://", "ros1://").rstrip("/")):
+                cut(client)
+                print(standing_s(client))  # noqa: T201
+        finally:
+            ended(process, client)
+
+
+def cut(client):
+    """Remove both addresses; no command may arrive from then on."""
+    before = client.get("/mock/truth")["commands"]
+    eventually(lambda: client.get("/mock/truth")["commands"] > before, pace_s=0.005)  # it was being driven
+    for address in (ROBOT, COMPUTER):
+        ip("address", "delete", f"{address}/32", "dev", "lo")
+
+
+def ip(*words):
+    """Change the network of this namespace."""
+    subprocess.run(["ip", *words], check=True, capture_output=True)
+
+
+if __name__ == "__main__":
+    main()
