@@ -1,6 +1,7 @@
 """Policy packages without a training: a network of one layer that drives to the target."""
 
 import json
+import math
 
 import numpy as np
 import onnx
@@ -11,7 +12,7 @@ from palaestra_protocol.policy_package import MANIFEST, NETWORK, TRAINING, manif
 from palaestra_trainer.environments.data_sheet import environment_sheet, parts_of
 from palaestra_trainer.environments.make import make_environment
 from palaestra_trainer.job.configuration import Environment, dump, parse
-from palaestra_trainer.testing import fake_arena
+from palaestra_trainer.testing import fake_arena, fake_seeing
 
 NUMBERS, TARGET = 16, (13, 14)  # numbers of the observation of MoveToTargetEnv, and those of the target
 
@@ -39,18 +40,58 @@ def linear_network(gain=1.0):
     return model.SerializeToString()
 
 
+def seeing_network(shape, speed=0.4, gain=20.0):
+    """Return an ONNX file that drives forward, and turns toward the red part of an image.
+
+    The turn is the mean of `gain` times the redness of each pixel times its place, 1 at the left edge.
+    """
+    rows, columns, _ = shape
+    red = np.array([1.0, -0.5, -0.5], np.float32) / 255.0
+    left = np.linspace(1.0, -1.0, columns, dtype=np.float32)
+    weights = np.zeros((math.prod(shape), 3), np.float32)
+    turns = gain * left[None, :, None] * red[None, None, :] / (rows * columns)
+    weights[:, 2] = np.broadcast_to(turns, shape).ravel()
+    image = helper.make_tensor_value_info("observation", TensorProto.UINT8, ["batch", *shape])
+    action = helper.make_tensor_value_info("action", TensorProto.FLOAT, ["batch", 3])
+    parts = {"weights": weights, "bias": np.array([speed, 0.0, 0.0], np.float32)}
+    bounds = {"l": np.array(-1, np.float32), "h": np.array(1, np.float32)}
+    nodes = [
+        helper.make_node("Cast", ["observation"], ["floats"], to=TensorProto.FLOAT),
+        helper.make_node("Flatten", ["floats"], ["flat"], axis=1),
+        helper.make_node("MatMul", ["flat", "weights"], ["turned"]),
+        helper.make_node("Add", ["turned", "bias"], ["wanted"]),
+        helper.make_node("Clip", ["wanted", "l", "h"], ["action"]),
+    ]
+    constants = [numpy_helper.from_array(value, name) for name, value in (parts | bounds).items()]
+    graph = helper.make_graph(nodes, "seeing", [image], [action], constants)
+    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8)
+    onnx.checker.check_model(model)
+    return model.SerializeToString()
+
+
+def write_seeing_package(place):
+    """Write a package whose policy sees only the image of a camera, and drives to a red pole."""
+    environment = {"id": "SeeTarget-v0", "options": {"actions": "continuous"}}
+    return _written(place, environment, fake_seeing(), seeing_network((48, 64, 3)))
+
+
 def write_package(place, *, gain=1.0, robot="Robotino", period_s=0.192, options=None):
     """Write a package whose policy drives to the target, as a folder or a zip, and return its place."""
     environment = {"id": "MoveToTargetEnv-v0", "options": {"actions": "continuous"} | (options or {})}
+    drives = {"class": robot, "period_s": period_s}
+    return _written(place, environment, fake_arena(), linear_network(gain), drives)
+
+
+def _written(place, environment, fake, network, robot=None):
     simulators = [{"name": "collect-0", "group": "collect", "index": 0, "role": "Collect"}]
     wanted = Environment(**environment)
-    arena = make_environment(wanted, *fake_arena())
+    arena = make_environment(wanted, *fake)
     sheet = environment_sheet(parts_of(arena.observation_space), arena.action_space, wanted)
     job = {"job": "linear", "environment": environment, "steps": 1, "simulators": simulators}
-    files = {NETWORK: linear_network(gain), TRAINING: dump(parse(job)).encode()}
+    files = {NETWORK: network, TRAINING: dump(parse(job)).encode()}
     about = {
         "job": "linear",
-        "robot": {"class": robot, "period_s": period_s},
+        "robot": robot or {"class": "Robotino", "period_s": 0.192},
         "policy": sheet,
     }
     files[MANIFEST] = manifest_text(about, files)

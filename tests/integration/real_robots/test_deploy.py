@@ -8,11 +8,12 @@ import subprocess
 import sys
 import time
 
+import numpy as np
 import pytest
 
 from palaestra_trainer.bags.reader import read_bag
 from tests.mock_robots import DEADLINE_S, SPEED
-from tests.packages import changed_manifest, write_package
+from tests.packages import changed_manifest, write_package, write_seeing_package
 from tests.waiting import eventually
 
 HANDS_OFF = ("--yes", "--no-hold", "--speed-limit=0.5")
@@ -92,6 +93,31 @@ def test_the_record_has_poses_commands_and_readings(deploy, tmp_path):
     ways = [each.content["pose"]["pose"]["position"]["x"] for each in topics["/odom"]]
     assert ways[0] == pytest.approx(0.0, abs=0.01)
     assert ways[-1] == pytest.approx(0.5, abs=0.15)
+
+
+def test_a_policy_that_sees_only_a_camera_drives_to_what_it_sees(mock, tmp_path):
+    """The picture of the robot is reduced to the image that the policy learned with, and recorded."""
+    mock.send("/mock/place", [-1.3, 0.3, 0.2])
+    package, log = write_seeing_package(tmp_path / "package"), tmp_path / "log.mcap"
+    command = [sys.executable, "-m", "palaestra_trainer.cli.deploy", package, f"--mock-speed={SPEED:g}"]
+    command += [f"--robot=http://{mock.address}", f"--log={log}", "--start=-1.3,0.3,0.2", "--target=0,0"]
+    done = subprocess.run(
+        [*command, *HANDS_OFF], check=False, capture_output=True, text=True, timeout=DEADLINE_S
+    )
+
+    assert done.returncode == 0, done.stderr
+    assert "reached after" in done.stdout
+    truth = mock.get("/mock/truth")
+    assert (truth["x"] ** 2 + truth["y"] ** 2) ** 0.5 == pytest.approx(0.45, abs=0.15)
+    first, *_, last = (each.content for each in read_bag(log).topics["/camera/image"])
+    assert (first["height"], first["width"], first["encoding"]) == (48, 64, "rgb8")
+    assert redness(last) > 3.0 * redness(first)
+
+
+def redness(image):
+    """Return the mean of red minus green of a recorded image."""
+    pixels = np.frombuffer(bytes(image["data"]), np.uint8).reshape(48, 64, 3).astype(float)
+    return (pixels[:, :, 0] - pixels[:, :, 1]).mean()
 
 
 def test_a_dry_run_moves_nothing(deploy, mock):

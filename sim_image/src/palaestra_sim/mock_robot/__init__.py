@@ -6,6 +6,7 @@ People try the program that deploys a policy with this mock, before they use a r
 - `base`: the firmware of the base: the dead man's switch and the limits of the acceleration
 - `odometry`: the pose that the robot computes from its wheels, with drift
 - `infrared`: the distance that a sensor reports, from its voltage
+- `camera`: the test picture of its camera
 - `robot`: one robot: its scene, its base, its odometry and its sensors
 - `pace`: the robot's clock, and the thread that advances the robot
 - `driver`: the habits of the robot's driver for ROS 1; `ros1`: the node of this driver

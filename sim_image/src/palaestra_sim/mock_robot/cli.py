@@ -35,6 +35,7 @@ _MASTER_URI: Final = "http://localhost:11311"
 _EPILOG = """\
 prints  one line, http://HOST:PORT, when the robot is ready
 serves  /data/...: the REST interface of a Robotino; the robot stops 200 ms after the last command
+        /cam0: a test picture with a red pole at the origin of the world; it needs palaestra-sim[pictures]
         GET /mock/truth: the true pose and motion; POST /mock/place [X, Y, HEADING]: carry the robot;
         POST /mock/charger {"connected": true}: connect the charger
 --ros1  registers the node robotino_node at the ROS master of ROS_MASTER_URI, as a Robotino's driver does: it

@@ -10,6 +10,7 @@ wiki.openrobotino.org, Rest_api. Values that public documents do not state, such
 | GET /data/distancesensorarray | nine distances in meters, counter-clockwise from the front |
 | GET /data/powermanagement | battery and charger |
 | GET /data/imageversion, /data/controllerinfo | versions |
+| GET /cam0 | the test picture of `camera`, as a JPEG file |
 | GET /data/festoolcharger, /data/scan0 | empty |
 | PUT or POST /data/omnidrive | takes `[vx, vy, omega]` in m/s and rad/s |
 | GET /mock/truth | the fields of `Truth` |
@@ -27,9 +28,11 @@ from collections.abc import Callable
 from random import Random
 from typing import Any, Final
 
+from palaestra_sim.mock_robot.camera import picture
 from palaestra_sim.mock_robot.pace import Clock
 from palaestra_sim.mock_robot.robot import MockRobot, MockRobotError
 from palaestra_sim.mock_robot.server import BadRequestError, Routes
+from palaestra_sim.ros_interfaces import UnsimulatedError
 
 TIMEOUT_S: Final = 1.0
 """Robot time by which a lost response comes late; clients of a Robotino give up after 0.1 to 0.2 s."""
@@ -56,7 +59,7 @@ class PoorNetwork:
 
     def wait_s(self, path: str) -> float:
         """Return the seconds of real time by which the next response comes late."""
-        if not path.startswith("/data/"):
+        if path.startswith("/mock/"):
             return 0.0
         if self._timeouts and self._random.random() < self._timeouts:
             return self._timeout_s
@@ -85,7 +88,15 @@ def routes(robot: MockRobot, clock: Clock) -> Routes:
             case _:
                 raise BadRequestError('charger: the body is wrong; send {"connected": true} or false')
 
+    def camera() -> bytes:
+        truth = robot.truth()
+        try:
+            return picture(truth.x, truth.y, truth.heading)
+        except UnsimulatedError as error:
+            raise BadRequestError(f"cam0: {error}") from None
+
     return {
+        ("GET", "/cam0"): get(camera),
         ("GET", "/data/odometry"): get(robot.odometry),
         ("GET", "/data/bumper"): get(lambda: {"value": robot.bumped()}),
         ("GET", "/data/distancesensorarray"): get(robot.distances_m),

@@ -21,10 +21,14 @@ from palaestra_protocol.tcp_server import TcpServer
 
 MOST_BODY_BYTES: Final = 4096
 IDLE_S: Final = 30.0
-_OK: Final = b"HTTP/1.1 200 OK\r\nContent-Type: application/json\r\nContent-Length: %d\r\n\r\n"
+_OK: Final = b"HTTP/1.1 200 OK\r\nContent-Type: %s\r\nContent-Length: %d\r\n\r\n"
 
 Route = Callable[[bytes], Any]
-"""Takes the body of a request; returns the content of the JSON response, or None for an empty response."""
+"""Takes the body of a request.
+
+Returns:
+    The content of the JSON response, the bytes of a JPEG picture, or None for an empty response.
+"""
 Routes = Mapping[tuple[str, str], Route]
 """The route for each method and path."""
 
@@ -129,8 +133,10 @@ class _Handler(BaseHTTPRequestHandler):
             content = route(body)
         except BadRequestError as error:
             return _error(HTTPStatus.BAD_REQUEST, str(error))
+        if isinstance(content, bytes):
+            return _OK % (b"image/jpeg", len(content)) + content
         data = b"" if content is None else json.dumps(content).encode()
-        return _OK % len(data) + data
+        return _OK % (b"application/json", len(data)) + data
 
     def _refuse(self, status: HTTPStatus, fact: str) -> None:
         """Refuse a request whose body the server does not read; the connection cannot be used again."""

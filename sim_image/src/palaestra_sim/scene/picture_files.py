@@ -41,7 +41,7 @@ def save(
     if ending == ".png":
         data = png.encode(size, pixels, alpha=alpha)
     elif ending in _JPEG:
-        data = _jpeg(size, pixels, quality)
+        data = jpeg(size, pixels, quality)
     else:
         raise UnsimulatedError(f"{path}: is not a PNG or JPEG file; use a name that ends in .png or .jpg")
     try:
@@ -96,7 +96,12 @@ def pillow(module: str) -> Any:
         ) from error
 
 
-def _jpeg(size: tuple[int, int], pixels: Pixels, quality: int) -> bytes:
+def jpeg(size: tuple[int, int], pixels: Pixels, quality: int) -> bytes:
+    """Return the bytes of a JPEG file; the arguments are those of `save`.
+
+    Raises:
+        UnsimulatedError: Pillow is missing.
+    """
     image = pillow("Image").frombuffer("RGB", size, bytes(pixels), "raw", "BGRX", 0, 1)
     written = BytesIO()
     image.save(written, "JPEG", quality=max(1, min(100, quality)))

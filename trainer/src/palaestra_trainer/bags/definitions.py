@@ -16,13 +16,14 @@ from palaestra_protocol.ros.syntax import BUILT_IN, parse
 
 BOOL: Final = "std_msgs/msg/Bool"
 FLOATS: Final = "std_msgs/msg/Float32MultiArray"
+IMAGE: Final = "sensor_msgs/msg/Image"
 LASER_SCAN: Final = "sensor_msgs/msg/LaserScan"
 ODOMETRY: Final = "nav_msgs/msg/Odometry"
 POSE: Final = "geometry_msgs/msg/PoseStamped"
 STRING: Final = "std_msgs/msg/String"
 TRANSFORMS: Final = "tf2_msgs/msg/TFMessage"
 TWIST: Final = "geometry_msgs/msg/Twist"
-TYPES: Final = (BOOL, FLOATS, LASER_SCAN, ODOMETRY, POSE, STRING, TRANSFORMS, TWIST)
+TYPES: Final = (BOOL, FLOATS, IMAGE, LASER_SCAN, ODOMETRY, POSE, STRING, TRANSFORMS, TWIST)
 
 # Types that ROS 1 lacks, or that have other fields there.
 _OF_ROS_2 = {

@@ -12,6 +12,9 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from palaestra_trainer.errors import ConfigurationError
 
 Content = dict[str, Any]
@@ -21,6 +24,7 @@ Velocity = tuple[float, float, float]  # forward in m/s, to the left in m/s, tur
 BASE = "base_link"  # Source: https://www.ros.org/reps/rep-0105.html, as the other frames
 ODOM = "odom"
 MAP = "map"
+CAMERA = "camera"
 _NS = 1_000_000_000
 _LATEST_S = 2**31  # builtin_interfaces/Time counts seconds in 31 bits and a sign
 _COVARIANCE = [0.0] * 36
@@ -88,6 +92,20 @@ def ranges(stamp_s: float, distances_m: Sequence[float], within_m: tuple[float, 
         "range_max": high,
         "ranges": [_range(distance, low, high) for distance in distances_m],
         "intensities": [],
+    }
+
+
+def image(stamp_s: float, pixels: NDArray[np.uint8]) -> Content:
+    """Return an Image of the frame `camera` with RGB pixels, shape (height, width, 3)."""
+    height, width, colors = pixels.shape
+    return {
+        "header": header(stamp_s, CAMERA),
+        "height": height,
+        "width": width,
+        "encoding": "rgb8",
+        "is_bigendian": 0,
+        "step": colors * width,
+        "data": pixels.tobytes(),
     }
 
 

@@ -36,6 +36,21 @@ class CheckedPackage:
     period_s: float
     manifest: dict[str, Any]
 
+    @property
+    def image_size(self) -> tuple[int, int] | None:
+        """Width and height of the images that the policy sees; None if it sees none."""
+        for space in self._spaces():
+            match space:
+                case {"dtype": "uint8", "shape": [int(height), int(width), int()]}:
+                    return width, height
+        return None
+
+    def _spaces(self) -> list[Any]:
+        match self.manifest.get("policy"):
+            case {"observations": {"spaces": dict(spaces)}}:
+                return list(spaces.values())
+        return []
+
     def refuse_other(self, env: gymnasium.Env[Any, Any]) -> None:
         """Refuse an environment whose numbers differ from those that the policy learned with.
 

@@ -55,6 +55,7 @@ class Deployment:
         self._robot = robot
         self._record = record
         self._show = show
+        robot.image_size = package.image_size or robot.image_size
         self._scene = RealScene(robot, _refuse_to_carry)
         self._env = make_environment(package.environment, robot, self._scene)
         package.refuse_other(self._env)
@@ -82,6 +83,8 @@ class Deployment:
         while not over:
             action = self._act(observation)
             self._record.step(self._robot.distances(), observation, action)
+            if (image := self._robot.seen_image()) is not None:
+                self._record.image(image)
             observation, _, terminated, truncated, info = self._env.step(action)
             steps, over = steps + 1, terminated or truncated
             self._show_step(steps)

@@ -9,6 +9,7 @@ from typing import Final
 
 from palaestra_trainer.deployment.deploy import Deployment
 from palaestra_trainer.errors import ConfigurationError, RobotStopped, TrainerError
+from palaestra_trainer.real_robots.camera import ImageSize
 from palaestra_trainer.real_robots.frames import OdometryFrame
 from palaestra_trainer.real_robots.link import RobotLink
 from palaestra_trainer.real_robots.readings import ReadingStore
@@ -78,6 +79,10 @@ class QuietLink:
     def start(self, store: ReadingStore) -> None:
         """Begin to put readings into `store`."""
         self._link.start(store)
+
+    def use_camera(self, store: ReadingStore, size: ImageSize) -> None:
+        """Begin to put images into `store`."""
+        self._link.use_camera(store, size)
 
     def send(self, twist: Twist) -> None:
         """Send one velocity, unless the connection is quiet."""

@@ -22,6 +22,7 @@ from palaestra_trainer.bags import messages
 from palaestra_trainer.bags.definitions import (
     BOOL,
     FLOATS,
+    IMAGE,
     LASER_SCAN,
     ODOMETRY,
     POSE,
@@ -99,7 +100,7 @@ class DeploymentRecord:
     def step(self, distances_m: Floats, observation: Any, action: Any) -> None:
         """Record a step of the policy: the distances, and the numbers that it saw and returned.
 
-        Observations that are no array of at most `MOST_NUMBERS` numbers, such as images, are left out.
+        Observations that are no array of at most `MOST_NUMBERS` numbers are left out; `image` records images.
         """
         now_s = time.time()
         scan = messages.ranges(now_s, distances_m.tolist(), SENSOR_RANGE_M)
@@ -108,6 +109,11 @@ class DeploymentRecord:
             if not isinstance(values, Mapping) and np.size(values) <= MOST_NUMBERS:
                 numbers = messages.numbers(np.ravel(values).tolist(), topic)
                 self._put(f"/palaestra/{topic}", FLOATS, numbers, now_s)
+
+    def image(self, pixels: NDArray[np.uint8]) -> None:
+        """Record the image that the policy saw."""
+        now_s = time.time()
+        self._put("/camera/image", IMAGE, messages.image(now_s, pixels), now_s)
 
     def target(self, x_m: float, y_m: float) -> None:
         """Record the target of an episode."""

@@ -9,6 +9,7 @@
 - `ros2`: the connection over ROS 2; `ros2_messages`: its scan of distances as a reading
 - `ros2_clock`: the time of a simulation that publishes /clock
 - `connect`: the connection for an address
+- `camera`: pictures of the camera as images of the size that a policy learned with
 - `command_loop`: sends the command of a policy at 20 Hz, as far as the safety rules allow
 - `robotino`: the robot; `scene`: its floor, on which a person places it
 - `robot_clock`: the time of a robot, which may run faster than real time in a mock robot

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
+from palaestra_trainer.real_robots.camera import ImageSize
 from palaestra_trainer.real_robots.readings import ReadingStore
 from palaestra_trainer.robots.geometry import Twist
 
@@ -31,6 +32,14 @@ class RobotLink(Protocol):
 
     def start(self, store: ReadingStore) -> None:
         """Begin to put readings into `store`, in threads of the connection, until `close`."""
+        ...
+
+    def use_camera(self, store: ReadingStore, size: ImageSize) -> None:
+        """Begin to put images of a size into `store`; further calls have no effect.
+
+        Raises:
+            NoSuchSensor: this connection has no camera.
+        """
         ...
 
     def send(self, twist: Twist) -> None:

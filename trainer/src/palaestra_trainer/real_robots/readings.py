@@ -29,7 +29,9 @@ class Readings:
         odometry: the newest odometry.
         distances_m: meters to the nearest obstacle, shape (9,), counter-clockwise from forward.
         bumped: whether the bumper touches something.
-        odometry_s, distances_s, bumped_s: the times of these readings on the robot's clock.
+        image: the newest image of the camera, RGB; None if no camera is in use.
+        odometry_s, distances_s, bumped_s, image_s: the times of these readings on the robot's clock. Without
+            a camera in use, `image_s` is infinite.
     """
 
     odometry: Odometry | None = None
@@ -38,11 +40,13 @@ class Readings:
     odometry_s: float = -math.inf
     distances_s: float = -math.inf
     bumped_s: float = -math.inf
+    image: NDArray[np.uint8] | None = None
+    image_s: float = math.inf
 
     @property
     def oldest_s(self) -> float:
         """The time of the oldest reading; minus infinity if a kind has not arrived."""
-        return min(self.odometry_s, self.distances_s, self.bumped_s)
+        return min(self.odometry_s, self.distances_s, self.bumped_s, self.image_s)
 
 
 class ReadingStore:
@@ -75,3 +79,9 @@ class ReadingStore:
         with self._lock:
             if at_s >= self._newest.bumped_s:
                 self._newest = replace(self._newest, bumped=bumped, bumped_s=at_s)
+
+    def set_image(self, image: NDArray[np.uint8], at_s: float) -> None:
+        """Store an image of a time; from the first one on, its age counts as that of the other readings."""
+        with self._lock:
+            if self._newest.image is None or at_s >= self._newest.image_s:
+                self._newest = replace(self._newest, image=image, image_s=at_s)

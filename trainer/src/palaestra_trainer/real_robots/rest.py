@@ -18,6 +18,8 @@ import httpx
 import structlog
 
 from palaestra_trainer.errors import ConfigurationError, LinkError, RobotUnfit
+from palaestra_trainer.real_robots.camera import MOST_BYTES as MOST_PICTURE_BYTES
+from palaestra_trainer.real_robots.camera import ImageSize, decoded
 from palaestra_trainer.real_robots.readings import ReadingStore
 from palaestra_trainer.real_robots.rest_answers import (
     MOST_BYTES,
@@ -38,6 +40,8 @@ SocketOption = tuple[int, int, int] | tuple[int, int, bytes]
 TIMEOUT_S: Final = 0.1  # of a request; the dead man of the robot leaves time for one more
 _FIRST_TIMEOUT_S: Final = 2.0  # before the robot moves, a slow network may take longer
 _POLL_S: Final = 0.05
+_CAMERA: Final = "/cam0"
+_CAMERA_S: Final = 0.2  # a picture is longer than a reading; the policy stops if it is older than 0.3 s
 _HTTP: Final = 80
 _CLIENT: Final = {"sid": "palaestra"}  # clients of the official example name themselves so
 # A command that was not confirmed must not arrive later, when the robot has been told to stand. So the system
@@ -81,8 +85,8 @@ class RestLink:
         self._resolve()
         with self._client(_FIRST_TIMEOUT_S) as client:
             try:
-                odometry_of(self._got(client, "odometry"))
-                charging = charges(self._got(client, "powermanagement"))
+                odometry_of(self._got(client, "/data/odometry"))
+                charging = charges(self._got(client, "/data/powermanagement"))
             except LinkError as error:
                 raise RobotUnfit(
                     f"{self.address}: {error}; check the address, and that the robot is switched on"
@@ -102,9 +106,23 @@ class RestLink:
         }
         for route, read in readers.items():
             name = f"robot-{route}"
-            thread = threading.Thread(target=self._poll, args=(route, read), name=name, daemon=True)
+            thread = threading.Thread(
+                target=self._poll, args=(f"/data/{route}", read), name=name, daemon=True
+            )
             thread.start()
             self._threads.append(thread)
+
+    def use_camera(self, store: ReadingStore, size: ImageSize) -> None:
+        """Begin to request pictures of /cam0; each replaces the one before."""
+        if any(thread.name == _CAMERA for thread in self._threads):
+            return
+
+        def look() -> None:
+            self._poll(_CAMERA, lambda body, at_s: store.set_image(decoded(body, size), at_s), _CAMERA_S)
+
+        thread = threading.Thread(target=look, name=_CAMERA, daemon=True)
+        thread.start()
+        self._threads.append(thread)
 
     def send(self, twist: Twist) -> None:
         """Send one velocity."""
@@ -115,7 +133,7 @@ class RestLink:
                 "PUT", "/data/omnidrive", params=_CLIENT, json=list(twist)
             ) as response:
                 response.raise_for_status()
-                self._read(response, "omnidrive")
+                self._read(response, "/data/omnidrive")
         except httpx.HTTPError as error:
             raise LinkError(f"/data/omnidrive: {_fact(error)}") from error
 
@@ -144,34 +162,34 @@ class RestLink:
         self._newest = (number, odometry.velocity)
         store.set_odometry(odometry, at_s)
 
-    def _poll(self, route: str, read: Reader) -> None:
+    def _poll(self, path: str, read: Reader, timeout_s: float = TIMEOUT_S) -> None:
         """Request a reading again and again; the age of the newest reading shows a failure."""
         due_s = self._clock.now_s()
-        with self._client(TIMEOUT_S) as client:
+        with self._client(timeout_s) as client:
             while not self._clock.wait(self._over, due_s):
                 begin_s = self._clock.now_s()
                 try:
-                    body = self._got(client, route)
+                    body = self._got(client, path)
                     # The robot measured between request and response.
                     read(body, 0.5 * (begin_s + self._clock.now_s()))
                 except LinkError as error:
-                    log.debug("no reading", route=route, error=str(error))
+                    log.debug("no reading", path=path, error=str(error))
                 due_s = max(due_s + _POLL_S, self._clock.now_s())
 
-    def _got(self, client: httpx.Client, route: str) -> bytes:
+    def _got(self, client: httpx.Client, path: str) -> bytes:
         """Return the body of a response.
 
         Raises:
             LinkError: the robot did not respond in time, or responded with an error or too much.
         """
         try:
-            with client.stream("GET", f"/data/{route}", params=_CLIENT) as response:
+            with client.stream("GET", path, params=_CLIENT) as response:
                 response.raise_for_status()
-                return self._read(response, route)
+                return self._read(response, path, MOST_PICTURE_BYTES if path == _CAMERA else MOST_BYTES)
         except httpx.HTTPError as error:
-            raise LinkError(f"/data/{route}: {_fact(error)}") from error
+            raise LinkError(f"{path}: {_fact(error)}") from error
 
-    def _read(self, response: httpx.Response, route: str) -> bytes:
+    def _read(self, response: httpx.Response, path: str, most_bytes: int = MOST_BYTES) -> bytes:
         """Return the body of a response, of a bounded size and within a bounded time.
 
         Raises:
@@ -179,12 +197,12 @@ class RestLink:
             httpx.HTTPError: the connection failed.
         """
         end_s = self._clock.now_s() + _FIRST_TIMEOUT_S
-        body = b""
+        body = bytearray()
         for part in response.iter_raw():
             body += part
-            if len(body) > MOST_BYTES or self._clock.now_s() > end_s:
-                raise LinkError(f"/data/{route}: returned more than {MOST_BYTES} bytes, or too slowly")
-        return body
+            if len(body) > most_bytes or self._clock.now_s() > end_s:
+                raise LinkError(f"{path}: returned more than {most_bytes} bytes, or too slowly")
+        return bytes(body)
 
     def _client(self, timeout_s: float) -> httpx.Client:
         # A proxy of the environment, or a redirection, must not come between a robot and its commands.

@@ -10,7 +10,8 @@ from typing import Final, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from palaestra_trainer.errors import NoReading, RobotStopped, RobotUnfit
+from palaestra_trainer.errors import NoReading, NoSuchSensor, RobotStopped, RobotUnfit
+from palaestra_trainer.real_robots.camera import ImageSize
 from palaestra_trainer.real_robots.command_loop import CommandLoop, Hooks
 from palaestra_trainer.real_robots.frames import OdometryFrame, extrapolated
 from palaestra_trainer.real_robots.link import RobotLink
@@ -26,8 +27,10 @@ from palaestra_trainer.real_robots.safety import (
     stands,
 )
 from palaestra_trainer.robots.base import RobotinoAbc
+from palaestra_trainer.robots.capabilities import Cameras
 from palaestra_trainer.robots.geometry import Pose
 
+IMAGE_SIZE: Final = (64, 48)  # of the cameras in the worlds that ship
 _FIRST_READINGS_S: Final = 5.0
 _STAND_S: Final = 3.0  # a Robotino brakes in a fraction of a second
 _LOOK_S: Final = 0.01
@@ -35,7 +38,7 @@ _CHECK_S: Final = 0.05
 _MOST_HELD_BACK_S: Final = 600.0
 
 
-class RealRobotino(RobotinoAbc):
+class RealRobotino(RobotinoAbc, Cameras):
     """A Robotino on a real floor.
 
     Odometry stands for the pose, so the pose drifts. `advance` waits for the end of the period in real time.
@@ -52,6 +55,7 @@ class RealRobotino(RobotinoAbc):
 
     Attributes:
         rules: the safety rules.
+        image_size: width and height of the color image; set it before `use_cameras`.
         commanded: the newest velocity of the policy, within the limits of the rules.
     """
 
@@ -76,6 +80,7 @@ class RealRobotino(RobotinoAbc):
         self._seen = Readings()
         self._pose: Pose | None = None
         self._tick_s = 0.0
+        self.image_size: ImageSize = IMAGE_SIZE
         self.commanded = STANDING
 
     @property
@@ -209,6 +214,42 @@ class RealRobotino(RobotinoAbc):
         if self._seen.bumped is None:
             raise NoReading("the bumper's state has not arrived; call connect() first")
         return self._seen.bumped
+
+    def use_cameras(self, *, color: bool = False, depth: bool = False) -> None:
+        """Begin to receive images, and wait for the first one; call it after `connect`.
+
+        From then on, an old image holds the robot back as any other old reading does.
+
+        Raises:
+            NoSuchSensor: a depth camera is chosen, or no image of this size arrives.
+        """
+        if depth:
+            raise NoSuchSensor(f"{self._link.address}: a Robotino has no depth camera")
+        if not color:
+            return
+        self._link.use_camera(self._store, self.image_size)
+        end_s = time.monotonic() + _FIRST_READINGS_S  # of real time, also for a fast mock robot
+        while self._store.newest.image is None:
+            if time.monotonic() > end_s:
+                width, height = self.image_size
+                fact = f"the camera sent no JPEG picture that can be reduced to {width} x {height} pixels"
+                raise NoSuchSensor(f"{self._link.address}: {fact}; check the camera, and its resolution")
+            self._wait(_LOOK_S)
+        self._look(self._clock.now_s())
+
+    def color_image(self) -> NDArray[np.uint8]:
+        """Return the newest image of the camera, shape (height, width, 3), RGB."""
+        if self._seen.image is None:
+            raise NoSuchSensor("the camera is not in use; call use_cameras(color=True) after connect()")
+        return self._seen.image
+
+    def depth_image(self) -> NDArray[np.float32]:
+        """Refuse: a Robotino has no depth camera."""
+        raise NoSuchSensor(f"{self._link.address}: a Robotino has no depth camera")
+
+    def seen_image(self) -> NDArray[np.uint8] | None:
+        """Return the newest image; None if no camera is in use."""
+        return self._seen.image
 
     def _wait(self, robot_s: float) -> None:
         """Wait for some seconds of the robot's time, or less; the check of the hooks may raise."""

@@ -31,10 +31,12 @@ from palaestra_trainer.errors import (
     ConfigurationError,
     LinkError,
     MasterLost,
+    NoSuchSensor,
     RobotUnfit,
     SimulatorFault,
     UnreadableAnswer,
 )
+from palaestra_trainer.real_robots.camera import ImageSize
 from palaestra_trainer.real_robots.readings import ReadingStore
 from palaestra_trainer.real_robots.robot_clock import RobotClock
 from palaestra_trainer.real_robots.ros1_messages import distances_of, fields_of, odometry_of
@@ -141,6 +143,13 @@ class Ros1Link:
         thread = threading.Thread(target=self._listen, args=(node, store), name="robot-topics", daemon=True)
         self._open.callback(thread.join, _END_S)
         thread.start()
+
+    def use_camera(self, store: ReadingStore, size: ImageSize) -> None:
+        """Refuse: this connection has no camera."""
+        del store, size
+        raise NoSuchSensor(
+            f"{self.address}: the camera of a ROS 1 driver is not read; use the REST interface"
+        )
 
     def send(self, twist: Twist) -> None:
         """Send one velocity to all subscribers of `cmd_vel`; the driver itself confirms nothing.

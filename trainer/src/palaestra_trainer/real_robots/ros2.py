@@ -30,7 +30,8 @@ import numpy as np
 import structlog
 from numpy.typing import NDArray
 
-from palaestra_trainer.errors import ConfigurationError, LinkError, RobotUnfit
+from palaestra_trainer.errors import ConfigurationError, LinkError, NoSuchSensor, RobotUnfit
+from palaestra_trainer.real_robots.camera import ImageSize
 from palaestra_trainer.real_robots.readings import Odometry, ReadingStore
 from palaestra_trainer.real_robots.robot_clock import RobotClock
 from palaestra_trainer.real_robots.ros1_messages import distances_of as distances_of_points
@@ -114,6 +115,13 @@ class Ros2Link:
     def start(self, store: ReadingStore) -> None:
         """Put readings into `store` from now on."""
         self._store = store
+
+    def use_camera(self, store: ReadingStore, size: ImageSize) -> None:
+        """Refuse: this connection has no camera."""
+        del store, size
+        raise NoSuchSensor(
+            f"{self.address}: the camera of a ROS 2 driver is not read; use the REST interface"
+        )
 
     def send(self, twist: Twist) -> None:
         """Publish one velocity; ROS 2 does not confirm that the robot has taken it."""
