@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Final
 
@@ -155,17 +156,18 @@ class CommandLoop:
 
     def _run(self) -> None:
         due_s = self._clock.now_s()
-        try:
-            while not self._clock.wait(self._over, due_s):
-                self._send(self._decided())
-                due_s = max(due_s + PERIOD_S, self._clock.now_s())
-        except Exception as error:  # a hook or a connection may raise anything; then the robot must stand
-            log.exception("no more commands are sent")
-            with self._lock:
-                fact = f"{type(error).__name__}: {error}; report this error"
-                self._failed = StopCause("internal error", fact, stops=True)
-        finally:
-            self._stand()
+        with ExitStack() as ending:
+            ending.callback(self._stand)
+            try:
+                while not self._clock.wait(self._over, due_s):
+                    self._send(self._decided())
+                    due_s = max(due_s + PERIOD_S, self._clock.now_s())
+            except Exception as error:  # a hook or a connection may raise anything; then the robot must stand
+                with self._lock:
+                    fact = f"{type(error).__name__}: {error}; report this error"
+                    self._failed = StopCause("internal error", fact, stops=True)
+                ending.close()  # a log may wait for a disk or a terminal, so the zeros come first
+                log.exception("no more commands are sent")
 
     def _decided(self) -> SafetyDecision:
         """Decide, and return what to send now and why."""
