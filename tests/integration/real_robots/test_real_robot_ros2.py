@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from palaestra_trainer.bags.reader import read_bag
 from tests import ros2
 from tests.mock_robots import DEADLINE_S, ended, started
 from tests.packages import write_package
@@ -144,14 +145,14 @@ def test_a_latched_bump_from_before_the_connection_is_noticed(mock):
     assert found["bumped"] is True
 
 
-def test_the_policy_node_drives_to_goals_in_the_time_of_clock(mock, package):
+def test_the_policy_node_drives_to_goals_in_the_time_of_clock(mock, package, tmp_path):
     """A simulation is often faster than real time, and then the node's period must be shorter too."""
     x_m, y_m = of_odometry(mock, 0.0, 0.0)
     fence = [x_m - 1.8, y_m - 1.8, x_m + 1.8, y_m + 1.8]
-    fenced = ("-p", f"fence:={fence}")
+    fenced, bag = ("-p", f"fence:={fence}"), tmp_path / "node.mcap"
     with (
         driver(mock, "/robot1", "--clock") as robot,
-        node(package, "in-a-simulation", *fenced) as (program, log),
+        node(package, "in-a-simulation", *fenced, "--", "--record", bag) as (program, log),
     ):
         send(robot, "map", (x_m, y_m))
         wait_for(log, "goal ignored: its frame is map, that of odometry is odom")
@@ -171,6 +172,12 @@ def test_the_policy_node_drives_to_goals_in_the_time_of_clock(mock, package):
 
         program.send_signal(signal.SIGINT)
         assert program.wait(DEADLINE_S) == 0
+    topics = read_bag(bag).topics
+    ends = [
+        each.content["data"] for each in topics["/palaestra/decisions"] if "reached" in each.content["data"]
+    ]
+    assert len(ends) == 1
+    assert topics["/palaestra/cmd_vel"][-1].content["linear"]["x"] == 0.0
 
 
 def test_the_policy_node_is_quiet_without_a_goal_and_opens_no_network(package):

@@ -65,7 +65,7 @@ def policy_node(arguments: Sequence[str] | None = None) -> int:
     configure_logs()
     try:
         with Interruption() as interruption:
-            _serve(options.package, ros, interruption)
+            _serve(options, ros, interruption)
     except Interrupted:
         return ExitCode.DONE
     except (TrainerError, OSError) as error:
@@ -85,7 +85,7 @@ def separated(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
     return own, ros
 
 
-def _serve(folder: Path, ros_arguments: Sequence[str], interruption: Interruption) -> None:
+def _serve(options: argparse.Namespace, ros_arguments: Sequence[str], interruption: Interruption) -> None:
     from palaestra_trainer.deployment import checked_package
     from palaestra_trainer.deployment.deploy import Deployment
     from palaestra_trainer.deployment.goals import GoalDriver, Goals, NewGoal, QuietLink
@@ -94,7 +94,7 @@ def _serve(folder: Path, ros_arguments: Sequence[str], interruption: Interruptio
     from palaestra_trainer.real_robots.robotino import RealRobotino
     from palaestra_trainer.real_robots.ros2 import Ros2Link
 
-    package = checked_package.read(folder)
+    package = checked_package.read(options.package)
     goals = Goals()
 
     def check() -> None:
@@ -110,13 +110,18 @@ def _serve(folder: Path, ros_arguments: Sequence[str], interruption: Interruptio
         clock = RobotClock() if simulation is None else SimulationClock(time=simulation)
         link = Ros2Link(f"ros2:{node.ros.get_namespace()}", None, clock, node, interruption.check)
         quiet = QuietLink(link)
-        robot = RealRobotino(quiet, rules, package.period_s, clock, Hooks(check=check))
+        about = {"package": str(options.package), "robot": link.address}
+        record = DeploymentRecord(options.record or Path(), about)
+        if options.record is not None:
+            stack.enter_context(record)  # it is closed last, so it also has how the robot stops
+        hooks = Hooks(check=check, decided=record.decided)
+        robot = RealRobotino(quiet, rules, package.period_s, clock, hooks)
         stack.callback(robot.close)
         if simulation is not None:
             stack.callback(simulation.leave)
         say, warn = node.ros.get_logger().info, node.ros.get_logger().warning
         _connect(robot, simulation, interruption.check, warn)
-        deployment = Deployment(package, robot, DeploymentRecord(Path(), {}), node.ros.get_logger().debug)
+        deployment = Deployment(package, robot, record, node.ros.get_logger().debug)
         _subscribe(node, link, goals, rules.fence)
         say(f"ready; waiting for a goal on {node.ros.resolve_topic_name('goal_pose')}")
         driver = GoalDriver(robot, quiet, deployment, goals)
@@ -197,8 +202,11 @@ def _subscribe(node: Ros2Node, link: Ros2Link, goals: Goals, fence: Fence | None
 
 def _parser() -> argparse.ArgumentParser:
     options = parser("palaestra-policy-node", ABOUT, EXIT_CODES)
-    options.usage = "palaestra-policy-node PACKAGE [--ros-args ...]"
+    options.usage = "palaestra-policy-node PACKAGE [--record FILE] [--ros-args ...]"
     options.add_argument("package", type=Path, metavar="PACKAGE", help="folder or zip of the package")
+    options.add_argument(
+        "--record", type=Path, metavar="FILE", help="also write a bag, as palaestra-deploy does"
+    )
     return options
 
 
