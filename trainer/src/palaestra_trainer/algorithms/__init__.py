@@ -8,7 +8,6 @@ from palaestra_trainer.algorithms.registry import ALGORITHMS, entry_of
 from palaestra_trainer.algorithms.reinforce import REINFORCE
 from palaestra_trainer.algorithms.saved_hyperparameters import begin_with, begun_with, keep
 from palaestra_trainer.algorithms.space_compat import refuse_spaces
-from palaestra_trainer.algorithms.valid_rows import refuse_asynchronous
 
 __all__ = [
     "ALGORITHMS",
@@ -24,7 +23,6 @@ __all__ = [
     "normalizer_of",
     "policy_of",
     "predict_allowed",
-    "refuse_asynchronous",
     "refuse_spaces",
     "refuse_without_masks",
     "takes_masks",

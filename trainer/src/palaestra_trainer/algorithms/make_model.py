@@ -23,6 +23,7 @@ from palaestra_trainer.algorithms.inputs import give_copies
 from palaestra_trainer.algorithms.normalization import ValidNormalize
 from palaestra_trainer.algorithms.registry import ARENA_ENVIRONMENTS, RegisteredAlgorithm, entry_of
 from palaestra_trainer.algorithms.space_compat import named_policy, policy_of_spaces
+from palaestra_trainer.algorithms.valid_rows import refuse_asynchronous
 from palaestra_trainer.errors import ConfigurationError, fact_of
 from palaestra_trainer.job.configuration import Algorithm, Device
 
@@ -145,6 +146,7 @@ def make_model(algorithm: Algorithm, env: VecEnv, seed: int, device: Device = "c
             f"({fact_of(error)}); change them, or use another algorithm"
         ) from error
     _refuse_dropping_all(model)
+    refuse_asynchronous(model)
     give_copies(model)
     return model
 

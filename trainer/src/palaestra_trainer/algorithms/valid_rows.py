@@ -193,12 +193,12 @@ class OnPolicyRows(ValidRowsCounted, OnPolicyAlgorithm):
 
 
 def refuse_asynchronous(model: BaseAlgorithm) -> None:
-    """Check that a model learns from single rows, which may come in any order.
+    """Check that the model of an asynchronous environment learns from single rows, which come in any order.
 
     Raises:
         ConfigurationError: the model learns from rollouts, which need a row of every simulator in each step.
     """
-    if not isinstance(model, OffPolicyRows):
+    if _is_asynchronous(model.env) and not isinstance(model, OffPolicyRows):
         raise ConfigurationError(
             "collection: Asynchronous needs an off-policy algorithm, such as DQN or SAC, and "
             f"{type(model).__name__} learns from rollouts; remove the field, or use another algorithm"

@@ -249,8 +249,6 @@ class Attempt:
         replay = replay_size(self._algorithm, env.observation_space, env.action_space, wanted.steps)
         refuse_what_does_not_fit(replay, wanted.checkpoint, capacity_now(self._directory))
         model = algorithms.make_model(self._algorithm, env, wanted.seed, wanted.device)
-        if env.asynchronous:
-            algorithms.refuse_asynchronous(model)
         for line in algorithms.futile(model, wanted.steps):
             log.warning(line)
         if found is None and wanted.initial_policy is not None:
