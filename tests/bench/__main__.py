@@ -45,6 +45,7 @@ PARTS = {
     "newcomer": newcomer.measure,
     "plain": plain.measure,
     "learning": learning.measure,
+    "navigating": learning.measure_navigate,
     "sparse": learning.measure_sparse,
     "transfer": abroad.measure_transfer,
     "seeing": abroad.measure_seeing,

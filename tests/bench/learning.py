@@ -1,9 +1,11 @@
 """The success rates of the examples' policies by training seed, on episodes that chose no policy."""
 
 import json
+import resource
 import subprocess
 import sys
 import tempfile
+import time
 from pathlib import Path
 
 import yaml
@@ -16,6 +18,7 @@ from tests.bench.sizes import scaled
 from tests.jobs import example
 from tests.local_run import PALAESTRA
 
+NEW, OLD = "move-to-target", "paper-dqn"
 SEEDS = (1, 2, 3, 4, 5)
 SPARSE_SEEDS = (1, 2, 3)
 NAVIGATE_SEEDS = (1, 2, 3)
@@ -27,16 +30,26 @@ EVAL = Path(sys.executable).with_name("palaestra-eval")
 
 
 def measure(scale=1.0):
-    """Return the success rates of both tasks by seed, and of two policies without training."""
-    trained = by_seed("move-to-target", SEEDS, scale)
-    navigating = by_seed("navigate", NAVIGATE_SEEDS, scale)
+    """Return success and seconds of move-to-target and paper-dqn by seed, and the share of the seconds.
+
+    The two examples train in turns, so that both have the same load of the machine. Each result also goes to
+    standard error, because all seeds take more than half an hour.
+    """
+    trained = {str(seed): _pair(seed, scale) for seed in SEEDS[: scaled(len(SEEDS), scale)]}
+    pairs = trained.values()
     return {
-        "success": trained,
-        "seeds_at_95": sum(rate >= 0.95 for rate in trained.values()),
-        "navigate": navigating,
-        "navigate_seeds_at_90": sum(rate >= 0.9 for rate in navigating.values()),
+        "seeds": trained,
+        "seeds_at_95": sum(pair[NEW]["success"] >= 0.95 for pair in pairs),
+        "seconds_share": _share(pairs, "seconds"),
+        "processor_share": _share(pairs, "processor_seconds"),
         **measure_baselines(scale),
     }
+
+
+def measure_navigate(scale=1.0):
+    """Return the success rate of navigate by training seed."""
+    trained = by_seed("navigate", NAVIGATE_SEEDS, scale)
+    return {"success": trained, "seeds_at_90": sum(rate >= 0.9 for rate in trained.values())}
 
 
 def measure_sparse(scale=1.0):
@@ -59,6 +72,40 @@ def train_and_measure(name, seed, scale=1.0):
     job["spec"]["seed"] = seed
     with tempfile.TemporaryDirectory() as folder:
         return success_rate(train(job, Path(folder)), scaled(EPISODES, scale))
+
+
+def _pair(seed, scale):
+    """Return success and seconds of both examples with a training seed."""
+    pair = {name: _timed(name, seed, scale) for name in (NEW, OLD)}
+    sys.stderr.write(json.dumps({"seed": seed, **pair}) + "\n")
+    sys.stderr.flush()
+    return pair
+
+
+def _timed(name, seed, scale):
+    """Return the success of an example's policy, and the wall and processor seconds of `palaestra run`."""
+    job = shortened(example(name), scale)
+    job["spec"]["seed"] = seed
+    with tempfile.TemporaryDirectory() as folder:
+        started, used = time.monotonic(), _processor_seconds()
+        run = train(job, Path(folder))
+        seconds, processor = time.monotonic() - started, _processor_seconds() - used
+        return {
+            "success": success_rate(run, scaled(EPISODES, scale)),
+            "seconds": round(seconds, 1),
+            "processor_seconds": round(processor, 1),
+        }
+
+
+def _processor_seconds():
+    """Return the processor time of all ended processes that this process started."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+def _share(pairs, name):
+    """Return the seconds of all trainings of move-to-target, as a share of those of paper-dqn."""
+    return round(sum(pair[NEW][name] for pair in pairs) / sum(pair[OLD][name] for pair in pairs), 3)
 
 
 def shortened(job, scale):

@@ -29,7 +29,7 @@ SMALL = (
 )
 OF_A_CLUSTER = ("hostile",)
 # These parts run the examples in MEASURED of test_run_from_file_to_policy.py.
-OF_WHOLE_RUNS = ("learning", "plain", "seeing", "sparse", "transfer")
+OF_WHOLE_RUNS = ("learning", "navigating", "plain", "seeing", "sparse", "transfer")
 ELSEWHERE = ("memory", "operator", "recovery", "shutdown")
 DEADLINE_S = 800  # the work takes a minute or two on an idle machine
 
