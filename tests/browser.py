@@ -23,7 +23,7 @@ QUIET = (
     *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
     *("--remote-debugging-port=0", "--remote-allow-origins=*", "about:blank"),
 )
-FLAT: Final = ("--disable-gpu",)
+FLAT: Final = ("--disable-gpu", "--disable-3d-apis")  # no WebGL
 DRAWING: Final = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")  # WebGL on the processor
 
 

@@ -8,7 +8,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from tests.browser import browser
+from tests.browser import DRAWING, browser
 from tests.local_run import ROOT
 
 PICTURE = ROOT / "docs/images/report.png"
@@ -17,13 +17,17 @@ WIDTH, HEIGHT = 1100, 1010
 
 def main(run: str) -> int:
     """Take the picture."""
-    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile, browser(Path(profile)) as page:
+    with (
+        tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile,
+        browser(Path(profile), DRAWING) as page,
+    ):
         page.show_as(width=WIDTH, height=HEIGHT, scheme="light")
         page.open(Path(run).absolute() / "report.html")
         page.evaluate(
             "document.querySelectorAll('.at').forEach(one => {"
             "  one.value = one.max * 0.4; one.dispatchEvent(new Event('input')); })"
         )
+        page.evaluate("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
         PICTURE.write_bytes(base64.b64decode(page.ask("Page.captureScreenshot")["data"]))
     return 0
 

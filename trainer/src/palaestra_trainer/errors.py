@@ -18,6 +18,7 @@ TrainerError
 ├── Paused               a step was requested while the simulation is paused
 ├── RobotStopped         a safety rule stopped a real robot; a person decides
 ├── NewGoal              a person sent another goal (deployment.goals)
+├── NotFilmed            an episode has no recording in 3D (episodes.scene_film)
 ├── LinkError            a real robot did not respond in time, or not as a robot
 └── SimulatorFault       one simulator failed; restart it and continue
     ├── SimulatorDead    its connections are refused or were closed

@@ -6,6 +6,7 @@ import pytest
 
 from palaestra_trainer.episodes.evaluation import evaluate
 from palaestra_trainer.episodes.film import MOST_FRAMES, Filming
+from palaestra_trainer.episodes.scene_film import NotFilmed
 from palaestra_trainer.job.run_directory import RunDirectory
 from palaestra_trainer.robots.geometry import Pose
 from palaestra_trainer.robots.layout import FloorLayout, Obstacle
@@ -43,6 +44,11 @@ class RightWalker:
         """Return the action, and the state unchanged."""
         del episode_start, deterministic
         return int(round(float(observation[1]) * 10) % 2 == 0), state
+
+
+def no_space(_game):
+    """Refuse a recording in three dimensions."""
+    raise NotFilmed("a test")
 
 
 def record(member, looks):
@@ -102,7 +108,7 @@ def test_the_best_a_median_and_a_failed_episode_are_kept(make_member, tmp_path):
     member.sight = Walked().sight
     evaluation = evaluate(RightWalker(), member, [10, 12, 21])
 
-    keep_replays(RunDirectory(tmp_path), evaluation, "a test")
+    keep_replays(RunDirectory(tmp_path), evaluation, "a test", no_space)
 
     assert [title for title, _ in chosen(evaluation.episodes)] == ["best", "median", "failed"]
     assert [episode.success for _, episode in chosen(evaluation.episodes)] == [True, True, False]
@@ -119,6 +125,6 @@ def test_no_episode_is_kept_twice(make_member):
 
 def test_an_evaluation_without_recordings_writes_no_file(make_member, tmp_path):
     """The report then has no section for films."""
-    keep_replays(RunDirectory(tmp_path), evaluate(RightWalker(), make_member(), [10]), "a test")
+    keep_replays(RunDirectory(tmp_path), evaluate(RightWalker(), make_member(), [10]), "a test", no_space)
 
     assert not RunDirectory(tmp_path).replays.exists()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import json
 import re
 from dataclasses import replace
 from functools import cache
@@ -12,11 +13,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from palaestra_protocol.scene import ShapeKind, Triangles, VisibleNode, VisibleScene, VisualShape
 from palaestra_trainer.reporting import page as pages
 from palaestra_trainer.reporting.charts import ticks
 from palaestra_trainer.reporting.elements import element, own_code
 from palaestra_trainer.reporting.page import MOST_BYTES, page
-from palaestra_trainer.reporting.run_data import Evaluated, Replay, ReportedFault, RunData
+from palaestra_trainer.reporting.run_data import Evaluated, Replay, ReportedFault, RunData, SpaceReplay
 
 REFERENCES = re.compile(
     r"\b(src|href|srcset|action|data|poster|xlink:href)\s*=|url\(|@import|import\s*\(|fetch\("
@@ -28,6 +30,21 @@ texts = st.text(st.characters(), max_size=30) | st.sampled_from(
 numbers = st.floats(-1e15, 1e15)
 steps = st.floats(0, 1e12)
 shares = st.floats(0, 1)
+
+
+def in_space(scene, frames):
+    """Return a replay in three dimensions, in which the first node of the scene moves."""
+    poses = tuple(((0.01 * frame, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0),) for frame in range(frames))
+    return SpaceReplay(scene=scene, nodes=(0,), frames=poses)
+
+
+@st.composite
+def scenes(draw):
+    """Draw a scene whose names may be any texts."""
+    shape = VisualShape(kind=ShapeKind.BOX, size=(1.0, 1.0, 1.0))
+    return VisibleScene(
+        world=draw(texts), revision=1, nodes=(VisibleNode(name=draw(texts), shapes=(shape,)),)
+    )
 
 
 @st.composite
@@ -44,6 +61,8 @@ def replays(draw):
         low=draw(corner),
         high=draw(corner),
         outlines=tuple(draw(st.lists(st.tuples(*[numbers] * 6), max_size=2))),
+        space=draw(st.none() | scenes().map(lambda scene: in_space(scene, 2))),
+        not_in_space=draw(texts),
     )
 
 
@@ -122,7 +141,11 @@ def large_parts():
         for step in range(300)
     )
     poses = tuple((0.001 * step, 0.002 * step, 0.1) for step in range(2000))
-    replay = Replay(title="best", facts=long, poses=poses, frame_s=0.1)
+    mesh = Triangles(points=tuple((x / 7, 0.0, 0.0) for x in range(6_000)), triangles=((0, 1, 2),) * 12_000)
+    shape = VisualShape(kind=ShapeKind.MESH, size=(1.0, 1.0, 1.0), mesh=0)
+    node = VisibleNode(name="robot", shapes=(shape,))
+    scene = VisibleScene(world="large", revision=1, nodes=(node,), meshes=(mesh,))
+    replay = Replay(title="best", facts=long, poses=poses, frame_s=0.1, space=in_space(scene, 500))
     fault = ReportedFault(time="now", step=1, simulator=long, kind="dead", fact=long, seconds=1.5)
     names = {f"{index} {long}": long for index in range(50)}
     points = tuple((step, step) for step in range(300))
@@ -158,7 +181,7 @@ def test_no_text_of_a_run_becomes_an_element_or_a_reference(drawn):
 
     found = elements_of(text)
     assert not {"link", "img", "iframe", "object", "embed", "form", "base", "audio", "video"} & {*found.names}
-    assert found.names.count("script") <= 1 + sum(len(run.replays) for run in drawn)
+    assert found.names.count("script") <= 2 + sum(len(run.replays) + bool(run.replays) for run in drawn)
     assert found.names.count("style") == 1
     assert not {"src", "href", "srcset", "action", "poster", "data"} & {*found.attributes}
     assert not [name for name in found.attributes if name.startswith("on")]
@@ -205,6 +228,28 @@ def test_only_so_many_runs_are_shown():
     text = page([RunData(name=f"run {index}") for index in range(pages.MOST_RUNS + 1)])
 
     assert f"The first {pages.MOST_RUNS} are shown." in text
+
+
+def test_the_replays_of_a_run_share_one_scene():
+    """A scene with meshes has hundreds of kilobytes, and the three episodes have the same world."""
+    [replay, *_] = large_parts().replays
+    whole, bare = (
+        page([RunData(name="one", replays=(one,) * 3)]) for one in (replay, replace(replay, space=None))
+    )
+
+    scene = len(json.dumps(replay.space.scene.to_json(), separators=(",", ":")))
+    assert whole.count("<canvas") == 3
+    assert whole.count('class="scenes"') == 1
+    assert scene < len(whole) - len(bare) < 1.5 * scene
+
+
+def test_an_episode_that_is_not_shown_in_three_dimensions_has_the_reason():
+    """Without it, a reader would look for the picture."""
+    replay = Replay(
+        title="best", facts="", poses=((0, 0, 0),), frame_s=0.2, not_in_space="the robot drove differently"
+    )
+
+    assert "Not in 3D: the robot drove differently." in page([RunData(name="one", replays=(replay,))])
 
 
 def test_everything_about_a_run_is_on_its_page():

@@ -9,9 +9,9 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import wait
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from statistics import fmean
 from typing import Any, Protocol
@@ -234,8 +234,9 @@ class _Games:
                 return
             place, seed = self._waiting.popleft()
         rewards: list[float] = []
+        filming = Filming(restarter.member if place < MOST_FILMS else None)
         try:
-            episode = _play(self._policy, restarter, (place, seed), check, rewards)
+            episode = play(self._policy, restarter, (place, seed), check, rewards, filming.look)
         except SimulatorFault as fault:
             restarter.begin_restart(fault, len(rewards))
             with self._changed:
@@ -244,7 +245,7 @@ class _Games:
                 self._changed.notify_all()
         else:
             with self._changed:
-                self._played[place] = episode
+                self._played[place] = replace(episode, film=filming.film())
                 self._changed.notify_all()
 
 
@@ -252,17 +253,30 @@ def _play_at_once(games: _Games, restarters: Sequence[Restarter], check: Check) 
     at_once([partial(games.play_on, restarter) for restarter in restarters], check, "evaluate")
 
 
-def _play(
-    policy: ActingPolicy, restarter: Restarter, game: tuple[int, int], check: Check, rewards: list[float]
+def play(
+    policy: ActingPolicy,
+    restarter: Restarter,
+    game: tuple[int, int],
+    check: Check,
+    rewards: list[float],
+    look: Callable[[], None],
 ) -> Episode:
-    """Play one episode to its end; `game` holds the number and the seed of the episode.
+    """Play one episode to its end, and return its result without a film.
 
-    If an error ends the episode, `rewards` holds the reward of each step before the error.
+    Args:
+        policy: the policy, which chooses the actions.
+        restarter: the simulator.
+        game: the number of the episode in its evaluation, and the seed of the episode.
+        check: called before each step; it raises to cancel the episode.
+        rewards: receives the reward of each step, also if an error ends the episode.
+        look: called after the reset and after each step.
+
+    Raises:
+        SimulatorFault: the simulator failed; call `begin_restart`.
     """
     number, seed = game
     observation, _ = restarter.reset(seed, reset_options(EVALUATING, number), check)
-    filming = Filming(restarter.member if number < MOST_FILMS else None)
-    filming.look()
+    look()
     info: dict[str, Any] = {}
     memory: Any = None  # the state of a recurrent policy
     over, end, masked = False, EpisodeEnd("an evaluation"), takes_masks(policy)
@@ -277,7 +291,7 @@ def _play(
         observation, reward, terminated, truncated, info = restarter.step(np.asarray(action)[()])
         restarter.watcher.stepped(1)
         rewards.append(float(reward))
-        filming.look()
+        look()
         over = terminated or truncated
     return Episode(
         seed=seed,
@@ -285,5 +299,4 @@ def _play(
         length=len(rewards),
         success=bool(info["is_success"]) if "is_success" in info else None,
         outcome=outcome if isinstance(outcome := info.get("outcome"), str) else None,
-        film=filming.film(),
     )

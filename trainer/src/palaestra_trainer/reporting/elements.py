@@ -43,12 +43,15 @@ def element(name: str, /, *children: str, **attributes: str | float | None) -> M
     return Markup(start if name in _VOID else f"{start}{joined(*children)}</{name}>")
 
 
-def json_script(content: Any) -> Markup:
-    """Return a script element with JSON data for the page; the data cannot end the element."""
+def json_script(content: Any, name: str = "data") -> Markup:
+    """Return a script element of class `name` with JSON data for the page.
+
+    The data cannot end the element.
+    """
     text = json.dumps(content, separators=(",", ":"), allow_nan=False)  # the text contains only ASCII
     for character in "<>&":
         text = text.replace(character, f"\\u{ord(character):04x}")
-    return Markup(f'<script type="application/json">{text}</script>')
+    return Markup(f'<script type="application/json" class="{escaped(name)}">{text}</script>')
 
 
 def own_code(name: str, text: str) -> Markup:

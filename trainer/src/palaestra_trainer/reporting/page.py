@@ -30,10 +30,10 @@ NAME = 120  # most characters of a run's name
 COMPARISONS = ((120, 120), (20, 40), (4, 12))
 # A page uses the first of these entries that keeps the page within its size limit.
 DETAILS: tuple[Detail | None, ...] = (
-    Detail(curves=24, points=240, replays=3, faults=300, rows=100, text=60_000),
-    Detail(curves=24, points=120, replays=3, faults=60, rows=40, text=8_000),
-    Detail(curves=8, points=60, replays=1, faults=20, rows=30, text=0),
-    Detail(curves=0, points=30, replays=0, faults=5, rows=15, text=0),
+    Detail(curves=24, points=240, replays=3, space=True, faults=300, rows=100, text=60_000),
+    Detail(curves=24, points=120, replays=3, space=True, faults=60, rows=40, text=8_000),
+    Detail(curves=8, points=60, replays=1, space=False, faults=20, rows=30, text=0),
+    Detail(curves=0, points=30, replays=0, space=False, faults=5, rows=15, text=0),
     None,  # only the comparison of runs
 )
 
@@ -86,7 +86,8 @@ def _document(
         content = joined(element("h1", cut(runs[0].name, NAME)), *sections)
     else:
         content = _several(runs, number, sections, size)
-    body = element("body", element("main", content), own_code("script", _part("page.js")))
+    scripts = [own_code("script", _part(name)) for name in ("space.js", "page.js")]
+    body = element("body", element("main", content), *scripts)
     return element("html", head, body, lang="en")
 
 

@@ -1,21 +1,27 @@
 """Draw a recorded episode from above as SVG: floor, obstacles, target, and the path of the robot.
 
-The picture is complete without a script. The script of the page moves the robot along its path.
+The picture is complete without a script. The script of the page moves the robot along its path, and shows
+the episode in three dimensions instead if it was recorded so and the browser has WebGL.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
-from palaestra_protocol.scene import TARGET_M
+from palaestra_protocol.scene import TARGET_M, VisibleScene
 from palaestra_trainer.reporting.elements import Markup, element, joined, json_script
 from palaestra_trainer.reporting.run_data import Replay
+from palaestra_trainer.reporting.space import in_space, space_data
 
 MARGIN_M = 0.15
 
 
-def replay_figure(replay: Replay) -> Markup:
-    """Return a recorded episode as a figure with a picture, a button and a slider."""
+def replay_figure(replay: Replay, scenes: Sequence[VisibleScene]) -> Markup:
+    """Return a recorded episode as a figure with a picture, buttons and a slider.
+
+    `scenes` has the scenes of the page's section, and among them the scene of the replay, if it has one.
+    """
     low_x, low_y, width, height = view_of(replay)
     first_x, first_y = replay.poses[0][:2] if replay.poses else (0.0, 0.0)
     size = max(width, height)
@@ -39,8 +45,9 @@ def replay_figure(replay: Replay) -> Markup:
         "figure",
         element("figcaption", element("b", replay.title), f" {replay.facts}"),
         picture,
+        in_space(replay),
         _controls(replay),
-        json_script(_for_script(replay)),
+        json_script(_for_script(replay) | space_data(replay, scenes)),
         class_="replay",
     )
 
@@ -134,6 +141,7 @@ def _controls(replay: Replay) -> Markup:
             aria_label=f"time in the {replay.title} episode",
         ),
         element("output", f"0.0 of {last * replay.frame_s:.1f} s"),
+        element("button", "3D", type="button", class_="view", hidden="") if replay.space else joined(),
         class_="controls",
     )
 

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from palaestra_protocol.scene import PoseNumbers, VisibleScene
+
 Points = tuple[tuple[float, float], ...]  # step and value
 
 
@@ -55,6 +57,21 @@ class ReportedFault:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class SpaceReplay:
+    """A recorded episode in three dimensions.
+
+    Attributes:
+        scene: the visible shapes of the world.
+        nodes: the numbers of the scene's nodes that move in the episode.
+        frames: for each frame, the pose of each of these nodes, at equal intervals of simulated time.
+    """
+
+    scene: VisibleScene
+    nodes: tuple[int, ...]
+    frames: tuple[tuple[PoseNumbers, ...], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Replay:
     """One recorded episode of an evaluation.
 
@@ -70,6 +87,8 @@ class Replay:
         outlines: obstacles, each as x, y, half length, half width and radius of the rounding in meters, and
             heading in radians.
         radius_m: radius of the circle that stands for the robot.
+        space: the episode in three dimensions; None: it was not recorded.
+        not_in_space: the reason for which the episode was not recorded in three dimensions; "" if unknown.
     """
 
     title: str
@@ -81,6 +100,8 @@ class Replay:
     high: tuple[float, float] | None = None
     outlines: tuple[tuple[float, float, float, float, float, float], ...] = ()
     radius_m: float = 0.1
+    space: SpaceReplay | None = None
+    not_in_space: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from statistics import fmean, stdev
 
+from palaestra_protocol.scene import VisibleScene
 from palaestra_trainer.reporting.charts import Series, chart, thinned
 from palaestra_trainer.reporting.elements import Markup, element, joined
 from palaestra_trainer.reporting.replay import replay_figure
 from palaestra_trainer.reporting.run_data import Evaluated, ReportedFault, RunData
+from palaestra_trainer.reporting.space import scenes_script
 
 NUMBER = re.compile(r"-?[0-9][0-9,]*(\.[0-9]+)?%?")
 DEVIATIONS = 1.96  # half width of a 95 % interval, in standard deviations of a mean
@@ -28,6 +30,7 @@ class Detail:
         curves: number of training curves.
         points: number of points of one curve.
         replays: number of recorded episodes.
+        space: whether the recorded episodes are shown in three dimensions.
         faults: number of rows in the table of faults.
         rows: number of rows in other tables, and of names in lists.
         text: number of characters of each file.
@@ -36,6 +39,7 @@ class Detail:
     curves: int
     points: int
     replays: int
+    space: bool
     faults: int
     rows: int
     text: int
@@ -113,8 +117,17 @@ def _section(title: str, *content: Markup) -> Iterator[Markup]:
 
 
 def _replays(run: RunData, detail: Detail) -> Markup:
-    shown = [replay_figure(replay) for replay in run.replays[: detail.replays]]
-    return element("div", *shown, class_="grid") if shown else joined()
+    replays = run.replays[: detail.replays]
+    if not detail.space:
+        replays = tuple(replace(replay, space=None) for replay in replays)
+    scenes: list[VisibleScene] = []
+    for replay in replays:
+        if replay.space is not None and replay.space.scene not in scenes:
+            scenes.append(replay.space.scene)
+    shown = [replay_figure(replay, scenes) for replay in replays]
+    if not shown:
+        return joined()
+    return joined(scenes_script(scenes) if scenes else joined(), element("div", *shown, class_="grid"))
 
 
 def _curves(run: RunData, detail: Detail) -> Markup:

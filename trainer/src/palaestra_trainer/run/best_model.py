@@ -22,7 +22,9 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 
 from palaestra_protocol.pod.status import Cause
 from palaestra_trainer import algorithms
-from palaestra_trainer.episodes.evaluation import EvaluationResult, evaluate_on_all
+from palaestra_trainer.episodes.evaluation import Episode, EvaluationResult, evaluate_on_all
+from palaestra_trainer.episodes.scene_film import SceneFilm
+from palaestra_trainer.episodes.second_play import record_again
 from palaestra_trainer.episodes.seeds import CONFIRM, EVALUATE, episode_seeds
 from palaestra_trainer.errors import ConfigurationError, TrainerError
 from palaestra_trainer.job.run_directory import (
@@ -161,15 +163,27 @@ class Selection:
     def _measure(self, stream: str, episodes: int, first: int = 0) -> EvaluationResult:
         run = self._run
         seeds = episode_seeds(run.configuration.seed, stream, episodes, first)
+        with self._playing():
+            policy = algorithms.policy_of(self._model)
+            evaluation = evaluate_on_all(policy, run.fleet.evaluating, seeds, run.interruption.check)
+        run.progress.evaluated(evaluation)
+        return evaluation
+
+    def _record_again(self, game: tuple[int, Episode]) -> SceneFilm:
+        with self._playing():
+            policy, run = algorithms.policy_of(self._model), self._run
+            return record_again(policy, run.fleet.evaluating, game, run.interruption.check)
+
+    @contextmanager
+    def _playing(self) -> Iterator[None]:
+        """Let the evaluating simulators play in the context, and the collecting simulators rest."""
+        run = self._run
         with (
             run.progress.spending(Cause.EVALUATING),
             resting(run.fleet.collecting),
             running(run.fleet.evaluating, run.interruption.check),
         ):
-            policy = algorithms.policy_of(self._model)
-            evaluation = evaluate_on_all(policy, run.fleet.evaluating, seeds, run.interruption.check)
-        run.progress.evaluated(evaluation)
-        return evaluation
+            yield
 
     def _log(self, kind: str, step: int, evaluation: EvaluationResult, **fields: Any) -> None:
         logger = self._model.logger
@@ -203,10 +217,10 @@ class Selection:
         if self._best is None:
             return
         step, confirmation = self._confirmation or (-1, evaluation)
+        shown, name = evaluation, f"the evaluation at step {self._best.step:,}"
         if step == self._best.step:
-            kept = keep_replays(self._directory, confirmation, f"the confirmation of step {step:,}")
-        else:
-            kept = keep_replays(self._directory, evaluation, f"the evaluation at step {self._best.step:,}")
+            shown, name = confirmation, f"the confirmation of step {step:,}"
+        kept = keep_replays(self._directory, shown, name, self._record_again)
         logger = self._model.logger
         if isinstance(logger, CurvesLogger):  # a callback may have set another logger
             logger.show({f"episodes/{title}": film for title, film in films_of(kept).items()}, now)

@@ -11,6 +11,7 @@ from typing import Any, Protocol, runtime_checkable
 import gymnasium
 
 from palaestra_protocol.pod.status import Cause
+from palaestra_protocol.scene import SceneState, VisibleScene
 from palaestra_trainer.errors import SimulatorFault
 from palaestra_trainer.robots.sight import Sight
 
@@ -103,6 +104,19 @@ class Located(Protocol):
 
         The result is None if the robot does not drive on a floor.
         """
+        ...
+
+
+@runtime_checkable
+class Viewed(Protocol):
+    """A member whose simulator can describe its visible world; each method sends a request to it."""
+
+    def visible_scene(self) -> VisibleScene | None:
+        """Return the visible shapes of the world; None: the simulator, such as Webots, cannot list them."""
+        ...
+
+    def visible_state(self) -> SceneState:
+        """Return the poses after the last step, for a scene that `visible_scene` returned before."""
         ...
 
 

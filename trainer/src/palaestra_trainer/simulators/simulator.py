@@ -11,6 +11,7 @@ from typing import Any
 import gymnasium
 
 from palaestra_protocol.control import RobotName
+from palaestra_protocol.scene import SceneState, VisibleScene
 from palaestra_trainer.errors import ConfigurationError, SimulatorFault
 from palaestra_trainer.job.configuration import Recycle
 from palaestra_trainer.robots.base import RobotAbc, Scene
@@ -105,6 +106,14 @@ class Simulator:
     def sight(self) -> Sight | None:
         """Return the positions of robot and target after the last step; None without a floor."""
         return self.scene.sight()
+
+    def visible_scene(self) -> VisibleScene | None:
+        """Return the visible shapes of the world; None: the simulator, such as Webots, cannot list them."""
+        return self.webots.observer.scene()
+
+    def visible_state(self) -> SceneState:
+        """Return the poses after the last step, for a scene that `visible_scene` returned before."""
+        return self.webots.observer.scene_state()
 
     def due(self, episodes: int = 1) -> str | None:
         """Return the reason to recycle the simulator before the next `episodes`, as text; None: no reason."""

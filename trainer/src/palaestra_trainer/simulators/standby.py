@@ -20,6 +20,7 @@ from concurrent.futures import Future, wait
 import structlog
 
 from palaestra_protocol.pod.status import StandbyState
+from palaestra_protocol.scene import SceneState, VisibleScene
 from palaestra_trainer.errors import (
     FaultBudgetSpent,
     SimulatorDead,
@@ -84,6 +85,14 @@ class Standby:
     def sight(self) -> Sight | None:
         """Return the positions of robot and target in the active simulator; None without a floor."""
         return self._active.simulator.sight()
+
+    def visible_scene(self) -> VisibleScene | None:
+        """Return the visible shapes of the active simulator's world; None if it cannot list them."""
+        return self._active.simulator.visible_scene()
+
+    def visible_state(self) -> SceneState:
+        """Return the poses in the active simulator after the last step."""
+        return self._active.simulator.visible_state()
 
     def due(self, episodes: int = 1) -> str | None:
         """Return the reason to recycle the active simulator before the next `episodes`; None: no reason."""
