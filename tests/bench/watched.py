@@ -1,4 +1,8 @@
-"""The effect of a viewer on a simulator's steps: equal rounds with and without a viewer, in turns."""
+"""The effect of a viewer on the steps of a simulator and of a training: rounds with and without a viewer.
+
+On a busy machine, the steps per second vary more than a viewer changes them. So the processor time that the
+viewer's requests cost the programs of the training is measured too.
+"""
 
 import os
 import select
@@ -7,40 +11,99 @@ import subprocess
 import sys
 import time
 from contextlib import contextmanager
-from http.client import HTTPConnection
+from pathlib import Path
+from urllib.parse import urlsplit
 
-from palaestra_protocol.fields import decoded
-from palaestra_protocol.scene import SceneState
+from palaestra.live_view.local_run import LocalRun
+from palaestra.live_view.source import SidecarSource, at_address
+from tests import local_run
 from tests.bench.arena import running
 from tests.bench.sizes import scaled
-from tests.local_run import ROOT
+from tests.jobs import example
 
 ROUNDS = 60  # many short rounds, because the load of the machine varies
 STEPS = 400
-PER_SECOND = 30.0  # the rate at which the page requests scenes
+TRAINING_ROUNDS = 20
+TRAINING_S = 4.0
+WARM_STEPS = 1500  # the policy learns from each further batch of steps
+MOST_STEPS = 1_000_000
+PATIENCE_S = 180
+PERIOD_S = 1.0 / 20.0  # of the page
+PROGRAMS = ("palaestra-train", "palaestra-sidecar", "palaestra-stub")
+TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 
 
 def measure(scale=1.0):
-    """Return the steps per second with and without a viewer, and the median of the rounds' ratios."""
-    with running() as (robot, _, launcher), viewing(launcher.address.removeprefix("http://")) as viewer:
+    """Return the share of the steps per second that remains with a viewer, for a simulator and a training."""
+    return {**measure_simulator(scale), **measure_training(scale)}
+
+
+def measure_simulator(scale=1.0):
+    """Return the steps per second of a simulator alone, which steps as fast as it can."""
+    with running() as (robot, _, launcher), viewing(launcher.address) as viewer:
         robot.connect()
-        pairs = [(stepped(robot, STEPS), watched(robot, STEPS, viewer)) for _ in range(scaled(ROUNDS, scale))]
+        pairs = compared(scaled(ROUNDS, scale), viewer, lambda: stepped(robot, STEPS))
         robot.close()
+    return medians(pairs)
+
+
+def measure_training(scale=1.0):
+    """Return the steps per second of a training, which also learns, and the cost of watching it.
+
+    `training_processor_share` is the processor time that a second of watching costs trainer, sidecar and
+    simulator together, in seconds.
+    """
+    job = example("move-to-target")
+    job["spec"]["trainer"] |= {"steps": MOST_STEPS, "evaluation": {"everySteps": 0}}
+    with local_run.running(job) as run:
+        run.wait_for_step(scaled(WARM_STEPS, scale), PATIENCE_S)
+        pids = [pid for program in PROGRAMS for pid in run.pids(program)]
+        with viewing(run.directory) as viewer:
+            samples = compared(scaled(TRAINING_ROUNDS, scale), viewer, lambda: trained(run, TRAINING_S, pids))
+    found = medians([(alone[0], seen[0]) for alone, seen in samples])
+    found["processor_share"] = round(statistics.median(_extra(*pair) for pair in samples), 4)
+    return {f"training_{name}": value for name, value in found.items()}
+
+
+def _extra(alone, seen):
+    """Return the processor seconds per second of a watched round that its steps do not explain."""
+    (speed, busy), (seen_speed, seen_busy) = alone, seen
+    return seen_busy - busy / speed * seen_speed
+
+
+def compared(rounds, viewer, measured):
+    """Return pairs of results of `measured`: without the viewer, and with it.
+
+    Each second round begins with the viewer, so a load that grows or shrinks cancels out.
+    """
+    pairs = []
+    for number in range(rounds):
+        order = (False, True) if number % 2 else (True, False)
+        found = {seen: watched(viewer, measured) if seen else measured() for seen in order}
+        pairs.append((found[False], found[True]))
+    return pairs
+
+
+def medians(pairs):
+    """Return the medians of the speeds without and with the viewer, and the median of the rounds' ratios."""
     return {
         "steps_per_second": round(statistics.median(alone for alone, _ in pairs)),
         "watched_steps_per_second": round(statistics.median(seen for _, seen in pairs)),
         "watched_share": round(statistics.median(seen / alone for alone, seen in pairs), 3),
+        "rounds": len(pairs),
     }
 
 
 @contextmanager
-def viewing(address):
-    """Start a viewer and yield it; like a page, it is a separate process.
+def viewing(what):
+    """Start a viewer of a run directory or of a sidecar's address, and yield it.
 
-    The viewer requests scenes only between the commands `1` and `0`.
+    Like a page, the viewer is a separate process. It sends requests only between the commands `1` and `0`.
     """
-    command = [sys.executable, "-m", "tests.bench.watched", address]
-    with subprocess.Popen(command, cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as viewer:
+    command = [sys.executable, "-m", "tests.bench.watched", what]
+    with subprocess.Popen(
+        command, cwd=local_run.ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    ) as viewer:
         viewer.stdout.readline()  # the viewer has started
         yield viewer
         viewer.stdin.close()
@@ -48,11 +111,11 @@ def viewing(address):
             raise RuntimeError("the viewer failed")
 
 
-def watched(robot, steps, viewer):
-    """Return the steps per second of a robot while a viewer watches it."""
+def watched(viewer, measured):
+    """Return the result of `measured` while the viewer watches."""
     os.write(viewer.stdin.fileno(), b"1")
     try:
-        return stepped(robot, steps)
+        return measured()
     finally:
         os.write(viewer.stdin.fileno(), b"0")
 
@@ -67,26 +130,48 @@ def stepped(robot, steps):
     return steps / (time.perf_counter() - started)
 
 
-def watch(address):
-    """Between the commands `1` and `0`, request the newest state as often as a page does.
+def trained(run, seconds, pids):
+    """Return the steps per second of a training during some seconds, and the processor time per second."""
+    first, used, started = run.ask()["step"], processor_s(pids), time.perf_counter()
+    time.sleep(seconds)
+    last, passed = run.ask()["step"], time.perf_counter() - started
+    return (last - first) / passed, (processor_s(pids) - used) / passed
+
+
+def processor_s(pids):
+    """Return the processor time of processes, in seconds."""
+    fields = (Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split() for pid in pids)
+    return sum(int(user) + int(system) for user, system in (each[11:13] for each in fields)) / TICKS_PER_S
+
+
+def source_of(what):
+    """Return the first simulator of a run directory, or the simulator of a sidecar's address."""
+    if Path(what).is_dir():
+        return LocalRun(Path(what)).sources()[0]
+    parts = urlsplit(what)
+    return SidecarSource(name=what, fetch=at_address(parts.hostname, parts.port))
+
+
+def watch(source):
+    """Between the commands `1` and `0`, send the requests of a page, as often as a page does.
 
     The function returns when standard input closes.
     """
     sys.stdout.write("watches\n")
     sys.stdout.flush()
-    asks = False
+    asks, due = False, 0.0
     while True:
-        if select.select([sys.stdin], [], [], 1.0 / PER_SECOND if asks else None)[0]:
+        left = max(0.0, due - time.monotonic()) if asks else None
+        if select.select([sys.stdin], [], [], left)[0]:
             told = os.read(sys.stdin.fileno(), 1)
             if not told:
                 return
             asks = told == b"1"
-        if asks:
-            connection = HTTPConnection(address, timeout=10.0)
-            connection.request("GET", "/watch")
-            SceneState.from_json(decoded(connection.getresponse().read()))
-            connection.close()
+        elif asks:
+            due = time.monotonic() + PERIOD_S
+            source.state()
+            source.progress()
 
 
 if __name__ == "__main__":
-    watch(sys.argv[1])
+    watch(source_of(sys.argv[1]))
