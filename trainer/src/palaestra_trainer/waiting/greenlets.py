@@ -4,6 +4,7 @@ A step of an environment is one function that sends, waits and reads. Each step 
 the waits of many environments overlap. After a greenlet has sent a long request to its simulator, it lets the
 other greenlets run before it waits for the response. `take_turns` runs the greenlets, and a greenlet's turn
 ends only in `let_others`. The response of one simulator is read while the other simulators still compute.
+A single work needs no greenlet, unless its caller runs in a turn itself.
 Threads need more processor time, see docs/decisions/0006-turns-instead-of-threads.md.
 """
 
