@@ -311,9 +311,7 @@ def test_a_world_in_a_project_finds_its_protos(ros, tmp_path):
     (tmp_path / "protos").mkdir()
     (tmp_path / "worlds").mkdir()
     (tmp_path / "protos" / "Stool.proto").write_text(HEAD + STOOL)
-    (tmp_path / "protos" / "Lamp.proto").write_text(
-        f"{HEAD}PROTO Lamp [ ] {{ %< let a = 1; >% Solid {{ }} }}"
-    )
+    (tmp_path / "protos" / "Lamp.proto").write_text(f"{HEAD}PROTO Lamp [ ] {{ %< call(1); >% Solid {{ }} }}")
     world = tmp_path / "worlds" / "mine.wbt"
     world.write_text(f'{HEAD}EXTERNPROTO "../protos/Stool.proto"\nStool {{ }}')
 

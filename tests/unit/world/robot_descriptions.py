@@ -6,11 +6,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 import palaestra_sim.world
-from palaestra_sim.world import Node, World, parse
+from palaestra_sim.world import Node, World, parse, parse_proto
 
 PROTOS = Path(palaestra_sim.world.__file__).parent / "protos"
 ROBOTS = ("E-puck", "Pioneer3at", "Pioneer3dx", "Robotino3", "TurtleBot3Burger")
-CARS = ("BmwX5",)
+CARS = ("BmwX5", "TeslaModel3")
+ARMS = ("UR3e", "UR5e", "UR10e")
 LIDARS = {
     "HokuyoUrg04lx": (240, 667, 0.06, 4.095),
     "HokuyoUrg04lxug01": (240, 667, 0.2, 5.6),
@@ -30,13 +31,22 @@ INFRARED = {
     "SharpGP2Y0A41SK0F": ((0.04, 2.72), (0.3, 0.42)),
     "SharpGP2Y0A710K0F": ((1.0, 2.5), (5.5, 1.37)),
 }
-PARTS = ("CharacterSkin", "E-puckGroundSensors", "Robotino3Webcam", "RobotisLds01", *LIDARS, *INFRARED)
+PARTS = (
+    "CharacterSkin",
+    "E-puckGroundSensors",
+    "Kinect",
+    "Robotino3Webcam",
+    "RobotisLds01",
+    *LIDARS,
+    *INFRARED,
+)
 
 _FILE = re.compile(r"PROTO (?P<name>\S+) \[\n(?P<fields>.*?)\n\]\n\{\n(?P<body>.*)\}\n\Z", re.DOTALL)
 _FIELD = re.compile(
     r"field\s+\w+(?:\{[^}]*\})?\s+(?P<name>\w+)\s+(?P<default>[^\n]*?)(?:\s{2}#[^\n]*)?$", re.MULTILINE
 )
 _IS = re.compile(r"\bIS (\w+)")
+_IN_TEMPLATE = re.compile(r"\bfields\.(\w+)\.value\b")
 
 
 class Description(NamedTuple):
@@ -49,8 +59,10 @@ class Description(NamedTuple):
 
 
 def described(name: str) -> Description:
-    """Return a description, in whose body each `IS` is replaced by the default of the field."""
-    text = (PROTOS / f"{name}.proto").read_text()
+    """Return a description, in whose body each `IS` and output is replaced by the default of the field."""
+    path = PROTOS / f"{name}.proto"
+    written = path.read_text()
+    text = parse_proto(path.read_bytes(), path.name).source.data.decode()  # without its template
     header, _, _ = text.partition("\n")
     found = _FILE.search(text)
     assert found, name
@@ -59,7 +71,7 @@ def described(name: str) -> Description:
     return Description(
         name=found["name"],
         defaults=defaults,
-        used=set(_IS.findall(found["body"])),
+        used={*_IS.findall(found["body"]), *_IN_TEMPLATE.findall(written)},
         body=parse(f"{header}\n{body}".encode(), name),
     )
 

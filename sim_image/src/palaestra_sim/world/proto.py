@@ -11,16 +11,18 @@
 
 This module does not expand instances. An instance of the type is a copy of `body` in which every `IS` is
 replaced by the instance's value of the field, or else by the default. For any bytes the result is a Proto or
-a WorldError. A template, from which Webots generates the file with Lua or JavaScript, is refused.
+a WorldError. If the file has a template, `body` is that of the default values, and `with_values` returns the
+PROTO for the values of an instance; a template that `templates` does not expand is refused.
 """
 
-import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 from palaestra_sim.errors import WorldError, refusal
 from palaestra_sim.world.reader import Reader, shown
 from palaestra_sim.world.source import Source
+from palaestra_sim.world.template_code import Result, TemplateError
+from palaestra_sim.world.templates import Template, first_piece, parse_template
 from palaestra_sim.world.tokens import Token, tokenize
 from palaestra_sim.world.tree import Is, Item, Node, Value, walk
 
@@ -28,8 +30,8 @@ _ACCESSES = (b"field", b"hiddenField", b"vrmlField", b"unconnectedField", b"depr
 _NUMBERS = {"Float": 1, "Int32": 1, "Vec2f": 2, "Vec3f": 3, "Color": 3, "Rotation": 4}
 _OTHERS: dict[str, tuple[type, ...]] = {"Bool": (bool,), "String": (str,), "Node": (Node, type(None))}
 _TYPES = frozenset(f"{many}F{kind}" for many in "SM" for kind in (*_NUMBERS, *_OTHERS))
-_NOT_CODE = re.compile(rb'\#(?P<comment>[^\n]*) | " (?: [^"\\\n]++ | \\[^\n] )*+ "? | %[<{]', re.VERBOSE)
-_LANGUAGE = re.compile(rb"\s*template\s+language\b")
+# The names of the numbers of a vector in the code of a template.
+_AXES = {"Vec2f": "xy", "Vec3f": "xyz", "Color": "rgb", "Rotation": "xyza"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,7 +52,8 @@ class ProtoField:
 class Proto:
     """A parsed PROTO file: its type, its fields in source order, and its node.
 
-    `externs` are the string tokens of its EXTERNPROTO lines. Every span refers to `source`.
+    `externs` are the string tokens of its EXTERNPROTO lines. Every span refers to `source`. `template` is the
+    template of the file, if it has one.
     """
 
     name: str
@@ -58,24 +61,84 @@ class Proto:
     fields: dict[str, ProtoField]
     body: Node
     source: Source = field(repr=False)
+    template: Template | None = field(default=None, repr=False)
+
+    def with_values(self, values: Mapping[str, Value]) -> "Proto":
+        """Return this PROTO with the body that its template has for these values of its fields.
+
+        Raises:
+            WorldError: the template needs another value, or its result is not a PROTO file.
+        """
+        template = self.template
+        if template is None:
+            return self
+        used = {
+            name: result
+            for name in template.fields & self.fields.keys()
+            if (result := _result(self.fields[name].type, values.get(name, self.fields[name].default)))
+            is not None
+        }
+        try:
+            data = template.expanded(used)
+        except TemplateError as error:
+            raise _unexpanded(self.source, error, template.start) from None
+        return _proto(Source(data=data, name=self.source.name, kind="PROTO"), template)
 
 
 def parse_proto(data: bytes, name: str) -> Proto:
     """Return the PROTO that `data` declares; `name` is the name of its file in errors.
 
     Raises:
-        WorldError: the bytes are not a PROTO file, or they have a template; the message has the position,
-            the fact and the remedy.
+        WorldError: the bytes are not a PROTO file, or they have a template that is not expanded; the message
+            has the position, the fact and the remedy.
     """
     source = Source(data=data, name=name, kind="PROTO")
     source.header()
-    for place in _templates(data):
-        remedy = "templates are not expanded; add this type to a file of stand-ins, or leave it out"
-        raise source.error(place, "this PROTO has a template", remedy)
-    proto = _ProtoReader(source, tokenize(source)).proto()
+    piece = first_piece(data)
+    if piece is None:
+        return _proto(source, None)
+    start, head_end = piece
+    head = Source(data=data[:head_end], name=name, kind="PROTO")
+    try:
+        template = parse_template(data, start)
+        fields = _ProtoReader(head, tokenize(head)).head()
+    except TemplateError as error:
+        raise _unexpanded(source, error, start) from None
+    except WorldError as error:
+        fact = TemplateError(f"code before the body: {error.fact}")
+        raise _unexpanded(source, fact, start) from None
+    bare = Proto(name=name, externs=(), fields=fields, body=_NO_BODY, source=source, template=template)
+    return bare.with_values({})
+
+
+def _proto(source: Source, template: Template | None) -> Proto:
+    """Return the PROTO of a file without code."""
+    proto = _ProtoReader(source, tokenize(source)).proto(template)
     if error := refusal(_undeclared(proto)):
         raise error
     return proto
+
+
+def _unexpanded(source: Source, error: TemplateError, start: int) -> WorldError:
+    """Return the error for a template that is not expanded; `start` is the offset of its first code."""
+    fact = f"this PROTO has a template with code that is not expanded ({error})"
+    remedy = (
+        "only if, else, declarations and outputs are; add this type to a file of stand-ins, or leave it out"
+    )
+    return source.error(start, fact, remedy)
+
+
+def _result(kind: str, value: Value) -> Result | None:
+    """Return a value as the code of a template sees it; None for a node or a list."""
+    items = value.items
+    if kind[0] == "M" or not all(isinstance(item, float | bool | str) for item in items):
+        return None
+    axes = _AXES.get(kind[2:])
+    if axes is not None:
+        numbers = [item for item in items if isinstance(item, float)]
+        return dict(zip(axes, numbers, strict=True)) if len(numbers) == len(axes) else None
+    (only,) = items if len(items) == 1 else (None,)
+    return only if isinstance(only, float | bool | str) else None
 
 
 def parse_fields(text: str, name: str) -> dict[str, ProtoField]:
@@ -86,18 +149,6 @@ def parse_fields(text: str, name: str) -> dict[str, ProtoField]:
     """
     source = Source(data=text.encode(), name=name, kind="PROTO")
     return _ProtoReader(source, tokenize(source)).fields(name)
-
-
-def _templates(data: bytes) -> Iterator[int]:
-    """Yield the offset of each opening of a template, and of each comment that names its language.
-
-    Only the first offset is reliable, because the code of the template has other comments and strings.
-    """
-    for match in _NOT_CODE.finditer(data):
-        comment = match.group("comment")
-        opening = re.search(rb"%[<{]", match.group()) if comment is None else _LANGUAGE.match(comment)
-        if opening is not None:
-            yield match.start()
 
 
 def _undeclared(proto: Proto) -> Iterator[WorldError]:
@@ -111,13 +162,20 @@ def _undeclared(proto: Proto) -> Iterator[WorldError]:
                     yield proto.source.error(value.span[0], fact, remedy)
 
 
+_NO_BODY = Node(type_name="", def_name=None, uses=None, fields={}, span=(0, 0))
+
+
 class _ProtoReader(Reader):
     """The grammar rules of a PROTO file, in addition to the rules for its nodes."""
 
     _access_needed = True
 
-    def proto(self) -> Proto:
-        """Read `file := extern* "PROTO" name "[" declaration* "]" "{" node "}"`."""
+    def head(self) -> dict[str, ProtoField]:
+        """Return the fields of a PROTO, whose text may end in its body."""
+        return self._head()[2]
+
+    def _head(self) -> tuple[list[Token], str, dict[str, ProtoField]]:
+        """Read `extern* "PROTO" name "[" declaration* "]" "{"`."""
         self._is_refused = "found IS outside the body of the PROTO"
         externs = []
         while self._peek().text in (b"IMPORTABLE", b"EXTERNPROTO"):
@@ -126,12 +184,24 @@ class _ProtoReader(Reader):
         name = self._name("the type of the PROTO")
         fields = self._declarations(name)
         self._expect(b"{", "the body of a PROTO is written { Type { … } }")
+        return externs, name, fields
+
+    def proto(self, template: Template | None) -> Proto:
+        """Read `file := head node "}"`."""
+        externs, name, fields = self._head()
         self._is_refused = None
         self._last_counts = True  # some published PROTOs repeat fields
         body = self._body(name)
         self._expect(b"}", "a PROTO has one node")
         self._end()
-        return Proto(name=name, externs=tuple(externs), fields=fields, body=body, source=self._source)
+        return Proto(
+            name=name,
+            externs=tuple(externs),
+            fields=fields,
+            body=body,
+            source=self._source,
+            template=template,
+        )
 
     def fields(self, proto: str) -> dict[str, ProtoField]:
         """Read `declaration*` to the end of the text."""

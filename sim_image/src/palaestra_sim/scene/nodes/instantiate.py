@@ -14,6 +14,7 @@ from typing import Final
 
 from palaestra_sim.errors import WorldError
 from palaestra_sim.scene.extrusion import faces
+from palaestra_sim.scene.nodes.expansions import Expansions
 from palaestra_sim.scene.nodes.scene_node import Content, FieldContent, Origin, SceneNode
 from palaestra_sim.scene.nodes.scope import Scope, definitions
 from palaestra_sim.scene.nodes.types import is_base_type
@@ -38,7 +39,7 @@ class Descriptions:
     """The definitions of node types that are not base types.
 
     Attributes:
-        protos: PROTOs without templates, by name.
+        protos: PROTOs, by name.
         stand_ins: simple solids that replace PROTOs, by name; a stand-in overrides a PROTO of its name.
         unusable: the errors of local PROTOs that cannot be expanded, by name.
     """
@@ -59,6 +60,7 @@ class Instantiator:
 
     def __init__(self, descriptions: Descriptions) -> None:
         self._descriptions = descriptions
+        self._expansions = Expansions()
         self.nodes: dict[int, SceneNode] = {}
         self._numbers = itertools.count()
         self._twins: dict[tuple[Scope, int], list[SceneNode]] = {}
@@ -93,12 +95,15 @@ class Instantiator:
             proto = self._descriptions.protos.get(source.type_name)
             if proto is not None:
                 return self._instance(proto, source, scope, parent)
+        return self._plain(source, scope, parent, self._descriptions.unusable.get(source.type_name))
+
+    def _plain(self, source: Node, scope: Scope, parent: SceneNode, why: WorldError | None) -> SceneNode:
+        """Return the node of a base type, or of a type that cannot be expanded; `why` has the reason."""
         node = self._new(source.type_name, Origin(source, scope.source), parent)
         node.def_name = source.def_name or ""
-        if source.type_name == "Extrusion" and source.type_name not in self._descriptions.unusable:
+        if source.type_name == "Extrusion" and why is None:
             self._fill(node, source, scope)
             return self._extruded(node)
-        why = self._descriptions.unusable.get(source.type_name)
         if why is not None:
             node.unusable = f"{source.type_name} is not expanded ({why.world}:{why.line}: {why.fact})"
         node.twins = self._twins.setdefault((scope, source.span[0]), [])
@@ -131,13 +136,18 @@ class Instantiator:
         for name in unknown:
             fact = f"the PROTO {proto.name} has no field {name}"
             self.ignored.append(scope.error(source, fact, "ignored, as by Webots"))
+        bindings = _bindings(proto, source, scope)
+        try:
+            expanded = self._expansions.of(proto, bindings)
+        except WorldError as error:
+            return self._plain(source, scope, parent, error)
         inner = Scope(
-            source=proto.source,
-            defs=definitions((proto.body,)),
+            source=expanded.source,
+            defs=definitions((expanded.body,)),
             depth=scope.depth + 1,
-            bindings=_bindings(proto, source, scope),
+            bindings=bindings,
         )
-        node = self._grow(proto.body, inner, parent)
+        node = self._grow(expanded.body, inner, parent)
         if node is not None:
             node.proto_name = proto.name
             node.shipped = builtin_protos().get(proto.name) is proto
