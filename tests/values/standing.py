@@ -91,6 +91,12 @@ ROWS = (
         lambda sensor, setting: 0.5 * np.round(_gravity(sensor, setting) / 0.5),
     ),
     Row(
+        "accelerometer axes",
+        ("Accelerometer",),
+        "Accelerometer {{ {place} xAxis FALSE zAxis FALSE }}",
+        lambda sensor, setting: _gravity(sensor, setting) * [np.nan, 1.0, np.nan],
+    ),
+    Row(
         "altimeter",
         ("Altimeter",),
         "Altimeter {{ {place} }}",
@@ -109,6 +115,12 @@ ROWS = (
         "Compass {{ {place} yAxis FALSE }}",
         lambda sensor, setting: (sensor.rotation.T @ setting.north) * [1.0, np.nan, 1.0],
     ),
+    Row(
+        "compass other axes",
+        ("Compass",),
+        "Compass {{ {place} xAxis FALSE zAxis FALSE }}",
+        lambda sensor, setting: (sensor.rotation.T @ setting.north) * [np.nan, 1.0, np.nan],
+    ),
     Row("gps", ("GPS",), "GPS {{ {place} }}", lambda sensor, _: sensor.position + REFERENCE),
     Row(
         "gps at rest",
@@ -118,6 +130,7 @@ ROWS = (
         read=lambda device: [device.speed.value, *device.speed_vector.value],
     ),
     Row("gyro", ("Gyro",), "Gyro {{ {place} }}", lambda *_: np.zeros(3)),
+    Row("gyro axes", ("Gyro",), "Gyro {{ {place} xAxis FALSE }}", lambda *_: np.array([np.nan, 0.0, 0.0])),
     Row(
         "inertial unit",
         ("InertialUnit",),

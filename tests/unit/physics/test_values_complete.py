@@ -8,6 +8,7 @@ import pytest
 from palaestra_sim.errors import WorldError
 from palaestra_sim.scene.devices import DEVICES
 from palaestra_sim.scene.devices.distance_sensor import DistanceSensorType
+from palaestra_sim.scene.tree.field_types import field_kinds
 from palaestra_sim.scene.visuals import drawn
 from tests.values.shapes import SHAPES
 from tests.values.worlds import PHYSICS, Setting
@@ -19,13 +20,36 @@ WITHOUT_VALUES = {
     "Pen": "draws nothing",
     "Display": "has pixels, which tests/unit/stub/test_stub_display.py compares",
     "Skin": "has no bones",
-    "VacuumGripper": "holds nothing",
 }
 GEOMETRIES = (
     "Box", "Capsule", "Cone", "Cylinder", "ElevationGrid", "IndexedFaceSet", "IndexedLineSet", "Mesh",
     "Plane", "PointSet", "Sphere",
 )  # fmt: skip
 HERE = Path(__file__).parent
+# Fields that other tests compare with values, by the file of the test.
+ELSEWHERE = {
+    "controlPID": "physics/test_gains.py",
+    "multiplier": "physics/test_gains.py",
+    "minPosition": "physics/test_steering.py",
+    "maxPosition": "physics/test_steering.py",
+    "speedNoise": "stub/test_stub_gps.py",
+    "speedResolution": "stub/test_stub_gps.py",
+    "spherical": "mujoco/test_mujoco_renderer.py",
+    "near": "mujoco/test_mujoco_renderer.py",
+    "zoom": "stub/test_stub_arms.py",
+    "minAbsoluteRadialSpeed": "physics/test_radar.py",
+    "rangeNoise": "physics/test_radar.py",
+    "angularNoise": "physics/test_radar.py",
+    "minDetectableSignal": "physics/test_radar.py",
+    "bufferSize": "stub/test_stub_talking.py",
+    "write": "stub/test_stub_devices.py",
+}
+# Fields of every Solid, fields for people, and fields that Webots ignores.
+OF_SOLIDS = {"translationStep", "rotationStep", "description", "locked", "GPS.type", "radarCrossSection"} | {
+    "recognitionColors",
+    "contactMaterial",
+    "immersionProperties",
+}
 ROWS = "".join(
     path.read_text(encoding="utf-8")
     for path in (*HERE.glob("test_values_[!c]*.py"), *(HERE.parents[1] / "values").glob("*.py"))
@@ -59,6 +83,19 @@ def test_each_type_of_distance_and_touch_sensor_has_rows():
     kinds = {kind.name.lower().replace("_", "-") for kind in DistanceSensorType}
 
     assert [kind for kind in (*kinds, "bumper", "force", "force-3d") if f'"{kind}"' not in ROWS] == []
+
+
+@pytest.mark.parametrize("name", [name for name in DEVICES if name not in WITHOUT_VALUES])
+def test_each_field_with_an_effect_has_a_value_in_a_test(name):
+    """A field that is read and then forgotten would pass every test that only asks whether it is read."""
+    fields = set(field_kinds(name)) - OF_SOLIDS - set(DEVICES[name].without_effect.split())
+    fields = {field for field in fields if f"{name}.{field}" not in OF_SOLIDS}
+    unnamed = {field for field in fields if re.search(rf"\b{field}\b", ROWS) is None}
+
+    assert unnamed <= ELSEWHERE.keys()
+    for field in unnamed:
+        text = (HERE.parent / ELSEWHERE[field]).read_text(encoding="utf-8")
+        assert re.search(rf"\b{field}\b", text), field
 
 
 @pytest.mark.parametrize("physics", PHYSICS)
