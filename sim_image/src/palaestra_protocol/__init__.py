@@ -4,6 +4,7 @@
 - `pod`: the reports of a trainer to the operator: `/status`, the termination message, exit codes
 - `ros`: ROS 1 between trainer and simulator: connections, types and values
 - `scene`: the visible shapes of a world and their poses, for viewers and replays
+- `batch`: the requests of a trainer to a simulator with many copies of its world
 - `camera_picture`: the newest picture of a robot's camera, for viewers
 - `foreign_words`: options of other projects, and the TrainingJob fields that replace them
 - `messages`: derives the reader and the writer of a JSON message from its declaration

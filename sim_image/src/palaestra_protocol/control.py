@@ -26,6 +26,7 @@ from typing import Annotated
 
 from palaestra_protocol.fields import MOST_NAME, ProtocolError, decoded
 from palaestra_protocol.messages import (
+    AddedLater,
     Choice,
     Flag,
     JsonMessage,
@@ -53,6 +54,7 @@ STANDBY = "/standby"  # prefix of the paths for the second simulator
 LEFT_OUT_FILE = "PALAESTRA_SIMULATOR_LEFT_OUT"
 VIEW_SOCKET = "PALAESTRA_SIMULATOR_VIEW"
 VIEW_SCENE, VIEW_STATE, VIEW_CAMERA = b"scene", b"state", b"camera"
+BATCH_FILE = "PALAESTRA_SIMULATOR_BATCH"  # names the file to which a simulator writes the address `batch`
 MOST_LEFT_OUT = 16  # maximum number of lines in a report
 LONGEST_LEFT_OUT = 200  # maximum number of characters in a line of a report
 MOST_DEADLINE_S = 3600.0
@@ -118,6 +120,8 @@ class SimulatorState(JsonMessage):
         rss_bytes: the memory of the simulator's processes. It is set only in responses to GET while the
             simulator is ready; otherwise None.
         left_out: the nodes that the simulator left out of its world at its last start, in lines for people.
+        batch: the address on which a simulator with many copies of its world serves them; None until it does,
+            and for any other simulator. See `palaestra_protocol.batch`.
     """
 
     state: Annotated[SidecarState, Choice(SidecarState)]
@@ -131,6 +135,7 @@ class SimulatorState(JsonMessage):
     detail: Annotated[str, Text()] = ""
     rss_bytes: Annotated[int | None, Maybe(Whole())] = None
     left_out: Annotated[tuple[str, ...], Maybe(Lines(LONGEST_LEFT_OUT, MOST_LEFT_OUT))] = ()
+    batch: Annotated[str | None, AddedLater(Text(MOST_NAME))] = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

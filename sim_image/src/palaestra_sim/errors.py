@@ -15,6 +15,7 @@
     ├── OptionError             the controllerArgs of a robot in Webots are wrong (webots.options)
     ├── UnknownHandleError      no service has returned the handle of a node or field (webots.services)
     ├── MissingLibraryError     a simulator needs a package that is not installed (mujoco.library)
+    ├── BatchRefusedError       --batch cannot simulate the world: retrying cannot help (mujoco.batched)
     ├── MockRobotError          a mock robot cannot do what was requested (mock_robot.robot)
     └── UnsimulatedError        Webots supports the request, this simulator does not (ros_interfaces)
 

@@ -16,8 +16,9 @@ from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 
+from palaestra_protocol.batch import MOST_ROWS
 from palaestra_protocol.control import LEFT_OUT_FILE, VIEW_SOCKET
-from palaestra_protocol.numbers import milliseconds
+from palaestra_protocol.numbers import milliseconds, whole
 from palaestra_sim import faults
 from palaestra_sim.errors import SimError, StandInError, WorldError, WorldRefusedError
 from palaestra_sim.ros import LocalSocket, Loop, MasterUnreachable, RosNode
@@ -74,6 +75,9 @@ class Program:
     description: str
     physics: Callable[[], Physics]
     mjcf: Callable[[Path, Mode, LeaveOut, Path | None], Backend] | None = None
+    batched: Callable[[], Physics] | None = None
+    check_batch: Callable[[Backend, Path], None] | None = None
+    serve_batch: Callable[[Backend, Path, int, int], int] | None = None
 
     def run(self, arguments: Sequence[str] | None = None) -> int:
         """Run the simulator until a client or a signal ends it; return the exit code."""
@@ -107,14 +111,30 @@ class Program:
         simulation = load(options.world.absolute(), _MODES[options.mode])
         for line in summary(simulation, chosen=bool(options.leave_out)):
             sys.stdout.write(f"{line}\n")
+        if self.check_batch is not None and options.batch is not None:
+            self.check_batch(self._batched_world(options), options.world)
         return _WRONG_WORLD if lacks(simulation) and not options.leave_out else 0
 
     def _simulate(self, options: argparse.Namespace) -> int:
+        if self.serve_batch is not None and options.batch is not None:
+            if faults.read_options(options, os.environ) is not None:
+                raise faults.FaultError("--batch: injects no faults; remove --fault, or remove --batch")
+            simulation = self._batched_world(options)
+            return self.serve_batch(simulation, options.world, options.batch, options.batch_threads)
         return _Process(options, self._loader(options, _leave_out(options.leave_out))).run()
 
-    def _loader(self, options: argparse.Namespace, leave_out: LeaveOut) -> Load:
+    def _batched_world(self, options: argparse.Namespace) -> Backend:
+        """Return the world with the physics of a batch."""
+        load = self._loader(options, _leave_out(options.leave_out), self.batched)
+        return load(options.world.absolute(), Mode.FAST)
+
+    def _loader(
+        self, options: argparse.Namespace, leave_out: LeaveOut, physics: Callable[[], Physics] | None = None
+    ) -> Load:
         """Return the function that loads a world; the loader treats a file that begins with `<` as MJCF."""
-        wbt = Loader(physics=self.physics, stand_ins=_stand_ins(options.stand_ins), leave_out=leave_out)
+        wbt = Loader(
+            physics=physics or self.physics, stand_ins=_stand_ins(options.stand_ins), leave_out=leave_out
+        )
 
         def load(world_path: Path, mode: Mode) -> Backend:
             if not is_mjcf(read_bounded(world_path)):
@@ -306,6 +326,14 @@ def _parser(program: Program) -> argparse.ArgumentParser:
             metavar="DIR",
             help="folder that holds all files that an MJCF model names (default: the nearest such one)",
         )
+    if program.serve_batch is not None:
+        add(
+            "--batch",
+            type=whole(1, MOST_ROWS),
+            metavar="N",
+            help=f"simulate N copies, at most {MOST_ROWS}, for a trainer, without ROS",
+        )
+        add("--batch-threads", type=whole(0), default=0, metavar="N", help="0: one for each processor")
     faults.add_options(add)
     return parser
 

@@ -39,11 +39,44 @@ def _mjcf(world_path: Path, mode: Mode, leave_out: LeaveOut, root: Path | None) 
     return simulation
 
 
+def _batched() -> Physics:
+    """Return the physics of a world for `_serve_batch`: with a contact sensor for each part of a robot.
+
+    Raises:
+        MissingLibraryError: MuJoCo is not installed.
+    """
+    physics: Physics = importlib.import_module("palaestra_sim.mujoco.physics").MujocoPhysics(feeling=True)
+    return physics
+
+
+def _check_batch(simulation: Backend, world: Path) -> None:
+    """Check that copies of a world can be simulated.
+
+    Raises:
+        BatchRefusedError: the world has parts that the batch form does not simulate.
+    """
+    importlib.import_module("palaestra_sim.mujoco.batched.program").batch_of(simulation, world.name, 1, 1)
+
+
+def _serve_batch(simulation: Backend, world: Path, rows: int, threads: int) -> int:
+    """Serve copies of a world until a signal; return the exit code.
+
+    Raises:
+        BatchRefusedError: the world has parts that the batch form does not simulate.
+    """
+    serving = importlib.import_module("palaestra_sim.mujoco.batched.program")
+    code: int = serving.serve(simulation, world, rows, threads)
+    return code
+
+
 MUJOCO = Program(
     name="palaestra-mujoco",
     description="Simulate a world in MuJoCo with the ROS 1 interface of Webots' `ros` controller.",
     physics=_physics,
     mjcf=_mjcf,
+    batched=_batched,
+    check_batch=_check_batch,
+    serve_batch=_serve_batch,
 )
 
 

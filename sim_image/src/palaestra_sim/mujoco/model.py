@@ -10,15 +10,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
+from palaestra_sim.mujoco.base_model import add_base, add_contact_sensors, begin_spec
 from palaestra_sim.mujoco.body import MujocoBody, servo
 from palaestra_sim.mujoco.free_bodies import FreeBody
 from palaestra_sim.mujoco.friction import set_frictions
 from palaestra_sim.mujoco.geoms import (
-    FRICTION,
     LOOSE,
     ROBOTS,
     SEEN,
@@ -40,11 +40,6 @@ from palaestra_sim.scene.links import Link
 from palaestra_sim.scene.physics import Figure, Push
 from palaestra_sim.scene.physics_settings import PhysicsSettings, material_of
 from palaestra_sim.scene.shapes import Shape
-
-MASS_KG: Final = 23.0  # mass of a robot without Physics: the mass of a Robotino 3 with batteries
-STANDING_KG: Final = 1e5  # mass of a robot without a drive, so that other robots cannot push it
-_LEAST_KG: Final = 1e-6
-_LEAST_KG_M2: Final = 1e-9
 
 
 @dataclass(slots=True, eq=False)
@@ -173,8 +168,16 @@ class Contents:
         return [(it, it.body) for it in self.figures if isinstance(it.body, MujocoBody)]
 
 
-def build(contents: Contents, surroundings: PhysicsSettings, moved: frozenset[Frame] = frozenset()) -> Built:
+def build(
+    contents: Contents,
+    surroundings: PhysicsSettings,
+    moved: frozenset[Frame] = frozenset(),
+    *,
+    feeling: bool = False,
+) -> Built:
     """Return the model of robots, obstacles, dynamic solids and links, in their current state.
+
+    With `feeling`, the model has one contact sensor for each part of a robot, in the order of `Built.geoms`.
 
     To save time, MuJoCo does not simulate bodies at rest: they sleep. But a body that touches a movable
     obstacle never sleeps. So if the world has bodies that can sleep, obstacles are fixed in the model, except
@@ -189,9 +192,11 @@ def build(contents: Contents, surroundings: PhysicsSettings, moved: frozenset[Fr
     roots = {figure.place: body for figure, body in robots.items()}
     roots.update((thing.place, body) for thing, body in things.items())
     links = _add_all_links(Ground(spec, roots, stands), contents, marks)
-    floors = _begin_spec(spec, surroundings)
+    floors = begin_spec(spec, surroundings)
     surfaces = [(geom, material_of(shape.node)) for geom, shape, _, _ in marks.entries]
     set_frictions(spec, [*((it, surroundings.floor) for it in floors), *surfaces], surroundings)
+    if feeling:
+        add_contact_sensors(spec, marks)
     model = spec.compile()
     data = mujoco.MjData(model)
     built = Built(
@@ -216,29 +221,6 @@ def build(contents: Contents, surroundings: PhysicsSettings, moved: frozenset[Fr
     built.take()
     built.settle()
     return built
-
-
-def _begin_spec(spec: Any, surroundings: PhysicsSettings) -> list[Any]:
-    """Set the options of the whole model, and add the floors; return the geoms of the floors."""
-    spec.option.gravity = [0.0, 0.0, -surroundings.gravity_m_s2]
-    spec.compiler.degree = False
-    spec.compiler.balanceinertia = True  # Webots accepts any inertia matrix
-    spec.compiler.boundmass, spec.compiler.boundinertia = _LEAST_KG, _LEAST_KG_M2
-    # MuJoCo's faster integrator ignores the coupling of x and y. With that integrator, a robot would be
-    # slower in diagonal directions than along the axes.
-    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICIT
-    spec.option.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
-    return [
-        spec.worldbody.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_PLANE,
-            pos=[0.0, 0.0, height_m],
-            size=[0, 0, 1],
-            contype=STANDING,
-            conaffinity=0,
-            friction=FRICTION,
-        )
-        for height_m in surroundings.heights_m()
-    ]
 
 
 def _add_all_links(ground: Ground, contents: Contents, marks: Marks) -> dict[Figure | None, list[Added]]:
@@ -335,28 +317,7 @@ def _add_robot(
     index: int,
     marks: Marks,
 ) -> Any:
-    added = spec.worldbody.add_body(pos=[0.0, 0.0, figure.place.height_m], name=f"base {index}")
-    added.explicitinertial = True
-    mass = sum(matter.mass_kg for matter in body.build.matter) or MASS_KG
-    if body.base.drive is None:
-        mass = STANDING_KG
-    added.mass = mass
-    turning = 0.5 * mass * body.radius_m**2
-    added.inertia = [turning, turning, turning]
-    for direction in ([1, 0, 0], [0, 1, 0]):
-        added.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=direction)
-    added.add_joint(type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 0, 1])
-    added.add_site(name=f"base {index}")
-    for axis, (gear, inertia) in enumerate(((0, mass), (1, mass), (5, turning))):
-        gain, force = servo(axis, inertia)
-        actuator = spec.add_actuator(
-            trntype=mujoco.mjtTrn.mjTRN_SITE,
-            target=f"base {index}",
-            gear=[float(at == gear) for at in range(6)],
-            forcelimited=True,
-            forcerange=[-force, force],
-        )
-        actuator.set_to_velocity(kv=gain)
+    added = add_base(spec, body, figure.place.height_m, index)
     touch = Touch(ROBOTS, own_bit(index) | ROBOTS | LOOSE)
     for number, (shape, pose) in enumerate(zip(body.build.outline, body.poses, strict=True)):
         marks.note(add_geom(spec, added, shape, pose, touch), shape, body, 1 << number)

@@ -36,11 +36,16 @@ LONGEST_STEP_S: Final = 0.004  # maximum duration of MuJoCo's step; with longer 
 
 
 class MujocoPhysics:
-    """Computes the motion, the sensor rays and the images of one world; see `Physics`."""
+    """Computes the motion, the sensor rays and the images of one world; see `Physics`.
+
+    Args:
+        feeling: whether the model has a contact sensor for each part of a robot; see `model.build`.
+    """
 
     abilities = Abilities(name="MuJoCo", loose=True, leaning=True, forces=True, joints=True)
 
-    def __init__(self) -> None:
+    def __init__(self, *, feeling: bool = False) -> None:
+        self._feeling = feeling
         self._surroundings = PhysicsSettings()
         self._floors = self._surroundings.heights_m()
         self._contents = Contents()
@@ -93,7 +98,7 @@ class MujocoPhysics:
     def advance(self, step_s: float) -> None:
         """Move the bodies by one basic step."""
         built = self._fresh()
-        steps = math.ceil(step_s / LONGEST_STEP_S - 1e-9)
+        steps = mujoco_steps(step_s)
         built.model.opt.timestep = step_s / steps
         built.take()
         for target, push in self._pushes:
@@ -173,17 +178,26 @@ class MujocoPhysics:
                 x, y, z = position
                 yield ContactPoint((x, y, z), (_solid(sides[0][0].node), _solid(sides[1][0].node)))
 
+    def built(self) -> Built:
+        """Return the compiled model with its current state."""
+        return self._fresh()
+
     def _fresh(self) -> Built:
         """Return the model; build it again if objects were added or removed, or if a fixed obstacle moved."""
         if self._stale:
             self._stale = False
-            self._built = build(self._contents, self._surroundings, self._moved)
+            self._built = build(self._contents, self._surroundings, self._moved, feeling=self._feeling)
         return self._built
 
     def _settle(self) -> None:
         if self._fresh().take() or not self._settled:
             self._built.settle()
             self._settled = True
+
+
+def mujoco_steps(step_s: float) -> int:
+    """Return how many of MuJoCo's steps a basic step has."""
+    return math.ceil(step_s / LONGEST_STEP_S - 1e-9)
 
 
 def _solid(node: SceneNode) -> SceneNode:

@@ -15,7 +15,7 @@ from palaestra_sim.mujoco.model import Built
 from palaestra_sim.scene.physics import Figure
 from palaestra_sim.scene.sensor_rays import Beam
 
-_GROUPS: Final = np.array([int(group == SEEN) for group in range(mujoco.mjNGROUP)], dtype=np.uint8)
+GROUPS: Final = np.array([int(group == SEEN) for group in range(mujoco.mjNGROUP)], dtype=np.uint8)
 
 
 class Beams:
@@ -62,7 +62,7 @@ class Beams:
             built.data,
             origin,
             directions,
-            _GROUPS,
+            GROUPS,
             True,
             own,
             self._hits[part],

@@ -45,6 +45,16 @@ class LookupTable:
         return self._distances[-1]
 
     @property
+    def noisy(self) -> bool:
+        """Whether a response has noise."""
+        return self._noisy
+
+    @property
+    def intervals(self) -> tuple[list[float], list[tuple[float, float]], list[tuple[float, float]]]:
+        """The distances between the intervals; base and slope of (value, noise) in each interval."""
+        return self._distances, self._bases, self._slopes
+
+    @property
     def limits(self) -> tuple[float, float]:
         """The smallest and the largest response, without noise."""
         values = [row[1] for row in self.rows]

@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
-from palaestra_protocol.control import LEFT_OUT_FILE, VIEW_SOCKET, SidecarState, SimulatorState
+from palaestra_protocol.control import BATCH_FILE, LEFT_OUT_FILE, VIEW_SOCKET, SidecarState, SimulatorState
 from palaestra_protocol.temporary_folder import temporary_folder
 from palaestra_sim.errors import SidecarError, SimError
 from palaestra_sim.sidecar import metrics, process, project, signals, world_files
@@ -134,12 +134,15 @@ def _simulator(given: argparse.Namespace, driver: Driver, slot: str) -> Supervis
     view = _view_socket(given, driver, world)
     own |= {VIEW_SOCKET: str(view)} if view else {}
     own |= _controller_project(given) if _has_own_controller(given) else {}
+    batch = _batch_file(given, driver, world)
+    own |= {BATCH_FILE: str(batch)} if batch else {}
     started = command(driver, launch, os.environ | own)
     return SupervisedSimulator(
         replace(started, mark=f"{slot}: ") if given.standby else started,
         SimulatorState(state=SidecarState.IDLE, driver=driver.value, world=str(world), robots=robots),
         left_out,
         Viewing.without(_nothing_to_see(driver)) if view is None else Viewing(view),
+        batch,
     )
 
 
@@ -239,6 +242,13 @@ def _view_socket(given: argparse.Namespace, driver: Driver, world: Path) -> Path
     if given.work is None or driver not in SHOWN:
         return None
     return Path(given.work).absolute() / f"{world.stem}.view"
+
+
+def _batch_file(given: argparse.Namespace, driver: Driver, world: Path) -> Path | None:
+    """Return the file for the address of a MuJoCo with many copies of its world; None without a folder."""
+    if given.work is None or driver is not Driver.MUJOCO:
+        return None
+    return Path(given.work).absolute() / f"{world.stem}.batch"
 
 
 def _nothing_to_see(driver: Driver) -> str:

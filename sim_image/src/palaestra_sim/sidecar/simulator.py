@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from palaestra_protocol.control import LastExit, SidecarState, SimulatorState
+from palaestra_protocol.fields import MOST_NAME
 from palaestra_sim.sidecar import lifecycle
 from palaestra_sim.sidecar.left_out import read_left_out
 from palaestra_sim.sidecar.lifecycle import Action, LifecycleEvent
@@ -61,6 +62,7 @@ class SupervisedSimulator:
         left_out: the file in which the simulator reports the nodes that it leaves out; None without such a
             file.
         viewing: see Attributes; None if the simulator has no socket for viewers.
+        batch: the file to which the simulator writes the address of its copies; None without such a file.
         clock: returns seconds, from any origin.
     """
 
@@ -70,6 +72,7 @@ class SupervisedSimulator:
         state: SimulatorState,
         left_out: Path | None = None,
         viewing: Viewing | None = None,
+        batch: Path | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.state = state
@@ -77,6 +80,7 @@ class SupervisedSimulator:
         self.viewing = viewing or Viewing.without("this simulator was started without a socket for viewers")
         self._command = command
         self._left_out = left_out
+        self._batch = batch
         self._clock = clock
         self._inbox: queue.SimpleQueue[_Message | Started] = queue.SimpleQueue()
         self._process: SimulatorProcess | None = None
@@ -113,10 +117,19 @@ class SupervisedSimulator:
         self._inbox.put(_Message(event=LifecycleEvent.SHUTDOWN))
 
     def as_answered(self) -> SimulatorState:
-        """Return the state, with the memory in use if the simulator is ready."""
-        state = self.state
+        """Return the state, with the address of the copies, and the memory in use if it is ready."""
+        state = replace(self.state, batch=self._address())
         ready = state.state is SidecarState.READY
         return replace(state, rss_bytes=self.usage().rss_bytes) if ready else state
+
+    def _address(self) -> str | None:
+        """Return the address of the copies that the running process serves; None while there is none."""
+        if self._batch is None or self._process is None:
+            return None
+        try:
+            return self._batch.read_text(encoding="ascii")[:MOST_NAME].strip() or None
+        except (OSError, ValueError):
+            return None
 
     def usage(self) -> Usage:
         """Return the resource usage of the simulator's processes; zero if no process runs.
@@ -161,8 +174,9 @@ class SupervisedSimulator:
     def _spawn(self, state: SimulatorState, _: _Message) -> SimulatorState:
         start = state.starts + 1
         try:
-            if self._left_out is not None:
-                self._left_out.unlink(missing_ok=True)
+            for report in (self._left_out, self._batch):
+                if report is not None:
+                    report.unlink(missing_ok=True)
             self._process = SimulatorProcess.start(self._numbered(start), self._report)
         except OSError as error:
             self._report(Ended(problem=f"it could not be run: {error.strerror}"))

@@ -68,6 +68,11 @@ class ActuatorMotor(Motor):
         super().__init__(spec)
         self.forceful = True  # MuJoCo moves all bodies by forces
 
+    @property
+    def control(self) -> tuple[Control, float]:
+        """The quantity that the actuator's control sets, and `ModelActuator.scale`."""
+        return self._actuator.control, self._actuator.scale
+
     def reset(self) -> None:
         """Discard all commands; call this method after the model was reset."""
         super().reset()

@@ -33,6 +33,7 @@ class Equipment:
     Attributes:
         devices: all devices, by the name of the device.
         joints: for each device on a joint, the id of that joint, by the name of the device.
+        numbers: the number in the model of each actuator and sensor, by the name of the device.
         motors: the actuators that are motors.
         actuators: the actuators that are not motors.
         samples: functions that set the values of the sensors.
@@ -43,6 +44,7 @@ class Equipment:
 
     devices: Devices = field(default_factory=Devices)
     joints: dict[str, int] = field(default_factory=dict)
+    numbers: dict[str, int] = field(default_factory=dict)
     motors: list[ActuatorMotor] = field(default_factory=list)
     actuators: list[MujocoActuator] = field(default_factory=list)
     samples: list[Sample] = field(default_factory=list)
@@ -123,6 +125,7 @@ class _Fitter:
         turns = joint is not None and model.jnt_type[joint] == HINGE
         if self._add(_ACTUATOR, ROTATIONAL_MOTOR if turns else LINEAR_MOTOR, motor, joint):
             self._found.motors.append(motor)
+            self._found.numbers[name] = index
 
     def _add_own_actuator(self, index: int, name: str) -> None:
         model = self._model.model
@@ -132,6 +135,7 @@ class _Fitter:
         actuator = generic_devices.actuator_of(model, self._model.data, index, name)
         if self._add(_ACTUATOR, generic_devices.MUJOCO_ACTUATOR, actuator, None):
             self._found.actuators.append(actuator)
+            self._found.numbers[name] = index
 
     def _add_sensor(self, index: int) -> None:
         model = self._model.model
@@ -156,6 +160,7 @@ class _Fitter:
         )
         if self._add(_SENSOR, found.kind, found.device, None if folder else joint):
             self._found.samples.append(found.sample)
+            self._found.numbers[name] = index
 
     def _add(self, section: str, kind: DeviceType[Any], device: Any, joint: int | None) -> bool:
         name: str = device.name

@@ -37,6 +37,9 @@ class MjcfSimulation:
         robot: the robot itself.
         basic_step_ms: the basic step in milliseconds, a whole number of MuJoCo's steps.
         mode: the simulation mode at the start.
+
+    Attributes:
+        model, nodes, equipment: the model, its nodes and its devices.
     """
 
     def __init__(
@@ -61,9 +64,9 @@ class MjcfSimulation:
         self.motion = BodyMotion(model, tree.bodies)
         self.movies = Movies(lambda _size: None, lambda _movie: None, basic_step_ms)
         self.appearance = ModelAppearance(model, tree.bodies[tree.robot])
-        self._model = model
-        self._nodes = tree
-        self._equipment = equipment
+        self.model = self._model = model
+        self.nodes = self._nodes = tree
+        self.equipment = self._equipment = equipment
         self._states = BodyStates(model, tree.bodies)
         self._step_s = basic_step_ms / 1000.0
         self._steps = round(self._step_s / float(model.model.opt.timestep))
