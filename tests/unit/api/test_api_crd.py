@@ -200,7 +200,8 @@ def test_deadlines_ttl_and_suspend_may_change(path) -> None:
         *(
             f"spec.simulators[].{name}"
             for name in ("name", "role", "count", "image", "driver", "command", "world", "recycle",
-                         "minSimulators", "reset", "standby", "options", "restart", "env", "resources")
+                         "minSimulators", "reset", "standby", "batch", "options", "restart", "env",
+                         "resources")
         ),
     ],
 )  # fmt: skip

@@ -14,6 +14,8 @@ from palaestra.api.model_walk import fields_of, walk
 
 ROLES = ("Collect", "Collect", "Evaluate")
 
+COPIES = {"simulators.0.driver": "mujoco", "simulators.0.batch": 8}
+
 # For each rule: changes that break it, and the message that reports them.
 BROKEN = {
     "no group collects": (
@@ -46,6 +48,38 @@ BROKEN = {
         (
             "spec.suspend: cannot be true with queueName, because Kueue then suspends and resumes the job; "
             "remove one of them"
+        ),
+    ),
+    "copies next to other simulators": (
+        {
+            "simulators": [
+                {"name": "many", "role": "Collect", "driver": "mujoco", "batch": 8},
+                {"name": "one", "role": "Collect"},
+                {"name": "evaluate", "role": "Evaluate"},
+            ]
+        },
+        "spec.simulators: a group with batch must be the only one with role Collect; remove the others",
+    ),
+    "copies for a program of the user": (
+        {**COPIES, "trainer.command": ["train"]},
+        "spec.trainer.command: cannot be combined with simulators[].batch; remove one of them",
+    ),
+    "copies of a task without a batched form": (
+        {**COPIES, "trainer.environment": {"id": "Deliver-v0"}},
+        (
+            "spec.trainer.environment.id: has no batched form; choose MoveToTargetEnv-v0 or a batched "
+            "environment of your own, or remove simulators[].batch"
+        ),
+    ),
+    "copies in another simulator": (
+        {"simulators.0.batch": 8},
+        "spec.simulators[0].batch: needs driver mujoco and role Collect; set them, or remove batch",
+    ),
+    "copies in several simulators": (
+        {**COPIES, "simulators.0.standby": True},
+        (
+            "spec.simulators[0].batch: excludes count, standby, reset and recycle; remove them, "
+            "or remove batch"
         ),
     ),
     "a driver without its command": (

@@ -35,6 +35,9 @@ FRUITLESS_PODS = 6  # Equal to Kubernetes' default backoffLimit.
 
 MOST_SIMULATORS = 32  # The limit for one pod. Simulator k of a pod uses the ports 7100+k and 7200+k.
 
+# Shipped environments without a batched form; the trainer refuses those of users before a simulator starts.
+NOT_BATCHED = ("SeeTarget-v0", "MoveToTargetGoalEnv-v0", "Deliver-v0", "Navigate-v0")
+
 MOST_INLINE = 900_000  # Characters of all inline worlds together; the plan also limits their bytes.
 
 
@@ -242,6 +245,33 @@ class Spec(ApiModel):
             holds=lambda spec: spec.trainer.initial_policy is None or spec.storage.resume_from is None,
             cel="!has(self.trainer.initialPolicy) || !has(self.storage.resumeFrom)",
             message="cannot be combined with storage.resumeFrom; remove one of them",
+        ),
+        Rule(
+            field="simulators",
+            holds=lambda spec: (
+                not any(group.batch for group in spec.simulators)
+                or sum(group.role is Role.COLLECT for group in spec.simulators) == 1
+            ),
+            cel="!self.simulators.exists(group, has(group.batch))"
+            " || self.simulators.filter(group, group.role == 'Collect').size() == 1",
+            message="a group with batch must be the only one with role Collect; remove the others",
+        ),
+        Rule(
+            field="trainer.command",
+            holds=lambda spec: not (spec.trainer.command and any(group.batch for group in spec.simulators)),
+            cel="size(self.trainer.command) == 0 || !self.simulators.exists(group, has(group.batch))",
+            message="cannot be combined with simulators[].batch; remove one of them",
+        ),
+        Rule(
+            field="trainer.environment.id",
+            holds=lambda spec: (
+                spec.trainer.environment.id not in NOT_BATCHED
+                or not any(group.batch for group in spec.simulators)
+            ),
+            cel=f"!(self.trainer.environment.id in {list(NOT_BATCHED)})"
+            " || !self.simulators.exists(group, has(group.batch))",
+            message="has no batched form; choose MoveToTargetEnv-v0 or a batched environment of your own, or"
+            " remove simulators[].batch",
         ),
         Rule(
             field="suspend",

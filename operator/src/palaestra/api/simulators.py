@@ -22,6 +22,7 @@ from palaestra.api.fields import (
 )
 from palaestra.api.model import ApiModel, Rule
 from palaestra.api.passwords import NO_PASSWORD_IN_COMMAND, NO_PASSWORD_IN_WORDS
+from palaestra_protocol.batch import MOST_ROWS
 from palaestra_protocol.pod.enums import Role
 
 
@@ -206,6 +207,11 @@ class SimulatorGroup(ApiModel):
     """`true` runs a second simulator in the same container. The second simulator takes over at once when the
     first one is recycled or fails. The container then has twice the memory."""
 
+    batch: Annotated[int, Field(ge=1, le=MOST_ROWS)] | None = None
+    """Number of copies of the world that one simulator steps together, in one process and without ROS. This
+    needs driver `mujoco`, role `Collect` and an environment with a batched form. Absent: one world, over
+    ROS."""
+
     options: Words = ()
     """Options for the simulator's command line, one word per item."""
 
@@ -254,6 +260,26 @@ class SimulatorGroup(ApiModel):
             holds=lambda group: group.min_simulators is None or group.min_simulators <= group.count,
             cel="!has(self.minSimulators) || self.minSimulators <= self.count",
             message="is more than count; lower it or raise count",
+        ),
+        Rule(
+            field="batch",
+            holds=lambda group: (
+                group.batch is None or (group.driver is Driver.MUJOCO and group.role is Role.COLLECT)
+            ),
+            cel="!has(self.batch) || (self.driver == 'mujoco' && self.role == 'Collect')",
+            message="needs driver mujoco and role Collect; set them, or remove batch",
+        ),
+        Rule(
+            field="batch",
+            holds=lambda group: (
+                group.batch is None
+                or (group.count == 1 and not group.standby and group.reset is None and group.recycle is None)
+            ),
+            cel=(
+                "!has(self.batch) || (self.count == 1 && !self.standby && !has(self.reset)"
+                " && !has(self.recycle))"
+            ),
+            message="excludes count, standby, reset and recycle; remove them, or remove batch",
         ),
     )
     guards = (NO_PASSWORD_IN_COMMAND, NO_PASSWORD_IN_WORDS)

@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from palaestra.api import Driver
+from palaestra.api import Driver, SimulatorGroup
 from palaestra.api.container import Resources, Variable
 from palaestra.plan import resources as planned
 from palaestra.plan.claim import INITIAL, initial_volume
@@ -91,10 +91,15 @@ def _arguments(replica: Replica, simulator: PlannedSimulator, world: str) -> lis
         f"--control={LOOPBACK}:{layout.ports.control[simulator.place]}",
         f"--health={layout.health_host}:{layout.ports.health[simulator.place]}",
         *_identity(simulator),
-        *(f"--option={option}" for option in group.options),
+        *(f"--option={option}" for option in options_of(group)),
         *(("--", *group.command) if group.command else ()),
     ]
     return [literal(word) for word in words]
+
+
+def options_of(group: SimulatorGroup) -> tuple[str, ...]:
+    """Return the options of a simulator: those of the job, and the number of copies."""
+    return group.options if group.batch is None else (*group.options, f"--batch={group.batch}")
 
 
 def trainer(replica: Replica) -> Container:

@@ -87,6 +87,8 @@ def _simulator(replica: Replica, simulator: PlannedSimulator, files: Mapping[str
         described["reset"] = group.reset.value
     if group.standby:
         described["standby"] = True
+    if group.batch is not None:
+        described["batch"] = group.batch
     described["restart"] = {
         "limit": group.restart.limit,
         "withinSeconds": group.restart.within_seconds,
