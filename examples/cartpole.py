@@ -4,6 +4,7 @@
 
 `CartPole` names the devices of the model, and `BalanceEnv` is the task. The job names them as
 `cartpole:CartPole` and `cartpole:Balance-v0`; Palaestra imports this module from PYTHONPATH.
+`BatchedBalanceEnv` is the same task with arrays, for jobs with `simulators[].batch`.
 """
 
 from typing import Any
@@ -11,7 +12,9 @@ from typing import Any
 import gymnasium
 import numpy as np
 
+from palaestra_trainer.environments.batched import BatchedEnv, generator
 from palaestra_trainer.robots import Joints
+from palaestra_trainer.robots.batched_base import BatchedJointsAbc
 from palaestra_trainer.robots.joints import JointRobot
 
 FARTHEST_M, STEEPEST_RAD = 1.5, 0.3
@@ -62,4 +65,40 @@ class BalanceEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         return np.clip(self.robot.joints(), -10.0, 10.0).astype(np.float32)
 
 
-gymnasium.register(id="Balance-v0", entry_point=BalanceEnv)
+class BatchedBalanceEnv(BatchedEnv):
+    """Many cart-poles: row i of each array is one of them, and equals a `BalanceEnv` with the same seeds."""
+
+    needs = (BatchedJointsAbc,)
+
+    def __init__(self, robot: Any, scene: Any) -> None:
+        super().__init__(robot.rows, BalanceEnv.observation_space, BalanceEnv.action_space)
+        self.robot, self.scene = robot, scene
+        self.steps = np.zeros(robot.rows)
+        scene.use_joints("hinge")
+
+    def begin(self, rows: Any, seeds: Any, options: dict[str, Any]) -> np.ndarray:
+        """Begin an episode in these rows; return the observations of all rows."""
+        del options
+        random = [generator(seed) for seed in seeds]
+        noise = [int(one.integers(2**31)) for one in random]
+        angles = np.array([[one.uniform(-0.1, 0.1)] for one in random])
+        self.scene.begin(rows, noise, joints=angles, commands=np.zeros((len(rows), 1)))
+        self.steps[rows] = 0
+        return self.observe()
+
+    def step(self, actions: np.ndarray) -> Any:
+        """Push every cart for one step."""
+        self.robot.command(actions * self.robot.greatest)
+        self.robot.advance()
+        self.steps += 1
+        seen = self.observe()
+        fell = (np.abs(seen[:, 0]) > FARTHEST_M) | (np.abs(seen[:, 2]) > STEEPEST_RAD)
+        over = self.steps == LONGEST
+        return seen, (~fell).astype(float), fell, over, {"is_success": over & ~fell}
+
+    def observe(self) -> np.ndarray:
+        """Return a row for each cart: its position and speed, then angle and angular speed of its pole."""
+        return np.clip(self.robot.joints(), -10.0, 10.0).astype(np.float32)
+
+
+gymnasium.register(id="Balance-v0", entry_point=BalanceEnv, vector_entry_point=BatchedBalanceEnv)

@@ -36,7 +36,11 @@ __all__ = [
 # Entry points are text, because the modules that they name import simulators, and this package must not
 # import simulators. The environments count their steps themselves instead of setting max_episode_steps,
 # because the reward `Sparse` depends on whether time is up.
-gymnasium.register(id="MoveToTargetEnv-v0", entry_point="palaestra_trainer.simulators.entry_point:make")
+gymnasium.register(
+    id="MoveToTargetEnv-v0",
+    entry_point="palaestra_trainer.simulators.entry_point:make",
+    vector_entry_point="palaestra_trainer.simulators.entry_point:make_batched",
+)
 gymnasium.register(id="SeeTarget-v0", entry_point="palaestra_trainer.simulators.entry_point:make_seeing")
 gymnasium.register(
     id="MoveToTargetGoalEnv-v0", entry_point="palaestra_trainer.simulators.entry_point:make_goal"

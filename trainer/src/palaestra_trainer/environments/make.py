@@ -18,12 +18,14 @@ from gymnasium.envs.registration import (
 )
 
 from palaestra_trainer.environments import wrappers
+from palaestra_trainer.environments.batched import BatchedEnv
 from palaestra_trainer.environments.env_checker import held
 from palaestra_trainer.errors import ConfigurationError, TrainerError, fact_of
 from palaestra_trainer.job.configuration import DEFAULT_REWARD, Environment
 from palaestra_trainer.job.user_code import imports
 from palaestra_trainer.job.user_code.kwargs import AcceptedArguments
 from palaestra_trainer.robots.base import RobotAbc, Scene
+from palaestra_trainer.robots.batched_base import BatchedRobotAbc, BatchedSceneAbc
 from palaestra_trainer.robots.capabilities import require
 
 _OF_MAKE = ("max_episode_steps",)  # this argument belongs to gymnasium.make, not to the environment
@@ -50,6 +52,67 @@ def make_environment(wanted: Environment, robot: RobotAbc, scene: Scene) -> gymn
             "fix it, or change environment.options"
         ) from error
     return held(wrappers.wrapped(env, wanted), wanted.id)
+
+
+def make_batched(wanted: Environment, robot: BatchedRobotAbc, scene: BatchedSceneAbc) -> BatchedEnv:
+    """Return the batched form of a job's environment, which is its `vector_entry_point`.
+
+    Raises:
+        ConfigurationError: the environment has no batched form, or it does not fit the job or the robot.
+    """
+    creator = _batched_creator(wanted)
+    taken = AcceptedArguments(creator, wanted.id)
+    offered = {"robot": robot, "scene": scene, "reward": wanted.reward}
+    arguments = {name: value for name, value in offered.items() if taken.accepts(name)}
+    arguments |= wanted.options
+    if mistakes := [*_mistakes(wanted, taken, set(arguments))]:
+        raise ConfigurationError("\n".join(mistakes))
+    try:
+        env = creator(**arguments)
+    except TrainerError:
+        raise
+    except Exception as error:  # the constructor is code of the user, which may raise anything
+        raise ConfigurationError(
+            f"environment.id: the batched form of {wanted.id} cannot be created ({fact_of(error)}); fix it"
+        ) from error
+    if not isinstance(env, BatchedEnv):
+        raise ConfigurationError(
+            f"environment.id: the vector_entry_point of {wanted.id} is not a BatchedEnv; derive it from "
+            "palaestra_trainer.environments.batched.BatchedEnv"
+        )
+    if not isinstance(robot, env.needs or (object,)):
+        raise ConfigurationError(
+            f"trainer.robot: the batched form of {wanted.id} needs {env.needs[0].__name__}, which the robot's"
+            f" form {type(robot).__name__} is not; choose another robot"
+        )
+    return env
+
+
+def _batched_creator(wanted: Environment) -> Callable[..., Any]:
+    """Return the function or class that creates the batched form.
+
+    Raises:
+        ConfigurationError: the environment has no batched form, or the job changes its steps.
+    """
+    spec = _spec(wanted.id)
+    creator = spec.vector_entry_point
+    if isinstance(creator, str):
+        creator = imports.object_named(creator, f"environment.id: the vector_entry_point of {wanted.id}")
+    if creator is None or not getattr(getattr(creator, "environment_class", creator), "batched", False):
+        raise ConfigurationError(
+            f"environment.id: {wanted.id} has no batched form, which simulators[].batch needs; register a "
+            "vector_entry_point with batched = True, or remove batch"
+        )
+    changes = {
+        "environment.wrappers": wanted.wrappers,
+        "environment.frameStack": wanted.frame_stack,
+        "environment.options.max_episode_steps": wanted.options.get("max_episode_steps"),
+        "environment.id, max_episode_steps of its registration": spec.max_episode_steps,
+    }
+    for field, value in changes.items():
+        if value:
+            raise ConfigurationError(f"{field}: has no batched form; remove it, or remove simulators[].batch")
+    return creator
 
 
 def keywords(wanted: Environment) -> dict[str, Any]:

@@ -21,6 +21,7 @@ from palaestra_protocol.scene import SceneState
 from palaestra_trainer.environments.copies import copied
 from palaestra_trainer.environments.infos import is_valid
 from palaestra_trainer.environments.masks import ACTION_MASKS, gives_masks
+from palaestra_trainer.episodes.collecting import CollectingVecEnv
 from palaestra_trainer.episodes.collector import CollectedRow, Collector
 from palaestra_trainer.episodes.episode_state import EpisodeState
 from palaestra_trainer.errors import fact_of
@@ -35,7 +36,7 @@ log = structlog.get_logger(__name__)
 COMPUTE_REWARD = "compute_reward"  # the method of goal environments
 
 
-class SimulatorsVecEnv(MembersVecEnv):
+class SimulatorsVecEnv(MembersVecEnv, CollectingVecEnv):
     """The collecting simulators of a run, for Stable-Baselines3.
 
     Args:

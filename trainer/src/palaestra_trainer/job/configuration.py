@@ -26,8 +26,10 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from pydantic.alias_generators import to_camel
 from pydantic_core import ErrorDetails
 
+from palaestra_protocol.batch import MOST_ROWS
 from palaestra_protocol.pod.enums import Role
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.job.batch_rules import batch_mistake
 from palaestra_trainer.job.run_directory import RunDirectory
 
 log = structlog.get_logger(__name__)
@@ -201,6 +203,7 @@ class SimulatorConfiguration(_Section):
         reset: `Reload`: the simulator loads its world again before each episode but the first; None: it only
             resets its world.
         standby: whether the sidecar also runs a standby for this simulator.
+        batch: number of copies of the world that the simulator steps together; None: one, over ROS.
         start_deadline_seconds: seconds within which the simulator must respond after its start.
     """
 
@@ -216,6 +219,7 @@ class SimulatorConfiguration(_Section):
     recycle: Recycle | None = None
     reset: Literal["Reload"] | None = None
     standby: bool = False
+    batch: Annotated[int, Field(ge=1, le=MOST_ROWS)] | None = None
     restart: Restart = Field(default_factory=Restart)
     start_deadline_seconds: Annotated[float, Field(gt=0)] = 60
 
@@ -270,6 +274,8 @@ class Configuration(_Section):
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
             raise ValueError(f"simulators: the name {twice[0]} is used twice; make names unique")
+        if mistake := batch_mistake(self):
+            raise ValueError(mistake)
         if not self.with_role(Role.COLLECT):
             raise ValueError("simulators: none has role Collect; give one of them that role")
         return self

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import ClassVar
+from typing import ClassVar, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +28,7 @@ from palaestra_trainer.webots import (
 _WHEEL_RADIUS_M = 0.063
 _WHEEL_DISTANCE_M = 0.1826
 _SIN_60 = math.sqrt(0.75)
+_Speed = TypeVar("_Speed", float, NDArray[np.float64])
 
 
 class Robotino(MobileRobot, RobotinoAbc, Cameras, Scanner, Gripper, Forklift):
@@ -148,8 +148,11 @@ class Robotino(MobileRobot, RobotinoAbc, Cameras, Scanner, Gripper, Forklift):
         self._fork.set(min(max(height_m, least), most))
 
 
-def wheel_speeds(vx: float, vy: float, omega: float) -> Sequence[float]:
-    """Return the speeds (rad/s) of rear, front-right and front-left wheel for a twist in m/s and rad/s."""
+def wheel_speeds(vx: _Speed, vy: _Speed, omega: _Speed) -> tuple[_Speed, _Speed, _Speed]:
+    """Return the speeds (rad/s) of rear, front-right and front-left wheel for a twist in m/s and rad/s.
+
+    The arguments are numbers, or arrays of one shape.
+    """
     turn = omega * _WHEEL_DISTANCE_M
     return (
         (vy - turn) / _WHEEL_RADIUS_M,

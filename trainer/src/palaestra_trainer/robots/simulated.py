@@ -54,6 +54,7 @@ class SimulatedRobot(RobotAbc):
     """
 
     definition: str = ""
+    batched: ClassVar[type | None] = None  # the batched form of the class, see `robots.batched`
     period_ms: int = PERIOD_MS
     target: ClassVar[str | None] = "TARGET"
 
@@ -202,14 +203,10 @@ class SimulatedScene(Scene, JointScene):
             WorldMisfit: the world has no floor.
             SimulatorDead, SimulatorHung, WrongData
         """
-        low, high, obstacles = (0.0, 0.0), (0.0, 0.0), list[Obstacle]()
-        for thing in self.observer.things():
-            if thing.name == FLOOR:
-                (x, y, _), half = thing.place, thing.shapes[0].half
-                low, high = (x - half[0], y - half[1]), (x + half[0], y + half[1])
-            else:
-                obstacles += _obstacles(thing._replace(place=self._put.get(thing.name, thing.place)))
-        self._floor = FloorLayout(low=low, high=high, obstacles=tuple(obstacles))
+        self._floor = layout_of(
+            thing if thing.name == FLOOR else thing._replace(place=self._put.get(thing.name, thing.place))
+            for thing in self.observer.things()
+        )
         return self._floor
 
     def place(self, start: Pose, target: Point) -> None:
@@ -272,6 +269,18 @@ class SimulatedScene(Scene, JointScene):
             WrongData: the world lacks the joint, or the simulator refuses to move it.
         """
         self.supervisor.set_joint(name, position)
+
+
+def layout_of(things: Iterable[Thing]) -> FloorLayout:
+    """Return the layout of objects, of which one is the floor."""
+    low, high, obstacles = (0.0, 0.0), (0.0, 0.0), list[Obstacle]()
+    for thing in things:
+        if thing.name == FLOOR:
+            (x, y, _), half = thing.place, thing.shapes[0].half
+            low, high = (x - half[0], y - half[1]), (x + half[0], y + half[1])
+        else:
+            obstacles += _obstacles(thing)
+    return FloorLayout(low=low, high=high, obstacles=tuple(obstacles))
 
 
 def _obstacles(thing: Thing) -> list[Obstacle]:

@@ -24,8 +24,8 @@ from palaestra_trainer.algorithms import her
 from palaestra_trainer.algorithms.divergence import Learner
 from palaestra_trainer.algorithms.replay_size import replay_size
 from palaestra_trainer.environments.env_checker import refuse_statistics
-from palaestra_trainer.episodes.asynchronous_vec_env import AsynchronousVecEnv
-from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
+from palaestra_trainer.episodes.collecting import CollectingVecEnv
+from palaestra_trainer.episodes.collecting_env import collecting_env
 from palaestra_trainer.errors import ConfigurationError, Diverged, TrainerError, fact_of
 from palaestra_trainer.job.configuration import Configuration, dump
 from palaestra_trainer.job.run_directory import RunDirectory, replace_file
@@ -139,7 +139,7 @@ def _logged(error: BaseException) -> End:
 class Learning(NamedTuple):
     """A model and the environment in which it learns."""
 
-    env: SimulatorsVecEnv
+    env: CollectingVecEnv
     model: BaseAlgorithm
 
 
@@ -242,8 +242,7 @@ class Attempt:
         refuse_statistics(task, wanted.environment.id)
         algorithms.refuse_without_masks(self._algorithm, task, wanted.environment.id)
         judge = make_judge(wanted) if her.wanted(self._algorithm) else None
-        made = AsynchronousVecEnv if wanted.collection == "Asynchronous" else SimulatorsVecEnv
-        env = made(fleet.collecting, wanted.seed, check=interruption.check, judge=judge)
+        env = collecting_env(fleet.collecting, wanted, interruption.check, judge)
         stack.callback(env.close)
         self._progress.moments = env.moments
         replay = replay_size(self._algorithm, env.observation_space, env.action_space, wanted.steps)
@@ -315,7 +314,7 @@ class Attempt:
         if curves.exists():
             hide_points(curves, after=step)
 
-    def _resume(self, model: BaseAlgorithm, env: SimulatorsVecEnv, found: SavedCheckpoint) -> Resumed:
+    def _resume(self, model: BaseAlgorithm, env: CollectingVecEnv, found: SavedCheckpoint) -> Resumed:
         """Bring model and simulators back to the state of the checkpoint."""
         saved = checkpoint.restore(found, model)
         env.set_training_progress(min(1.0, found.manifest.step / self._configuration.steps))

@@ -14,14 +14,14 @@ import numpy as np
 import structlog
 
 from palaestra_trainer.algorithms.observations import Observations, equal_rows
+from palaestra_trainer.episodes.collecting import CollectingVecEnv
 from palaestra_trainer.episodes.episode_state import EpisodeState
-from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.run.checkpoint import TrainingState
 
 log = structlog.get_logger(__name__)
 
 
-def rejoin(env: SimulatorsVecEnv, saved: TrainingState, *, masked: bool = False) -> TrainingState:
+def rejoin(env: CollectingVecEnv, saved: TrainingState, *, masked: bool = False) -> TrainingState:
     """Bring each simulator back to the saved state if possible; return the resulting state.
 
     A simulator begins its next episode if it was down at the save, fails now, or is new in the run. If

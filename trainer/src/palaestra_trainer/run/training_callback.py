@@ -18,7 +18,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from palaestra_protocol.pod.status import Cause
 from palaestra_trainer.algorithms.buffers import valid_rows
 from palaestra_trainer.algorithms.divergence import Learner
-from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
+from palaestra_trainer.episodes.collecting import CollectingVecEnv
 from palaestra_trainer.run import checkpoint
 from palaestra_trainer.run.best_model import Selection, last_evaluated
 from palaestra_trainer.run.checkpoint import SavedCheckpoint, Tensors, TrainingState
@@ -46,7 +46,7 @@ class Resumed:
 class TrainingCallback(BaseCallback):
     """The Stable-Baselines3 callback that runs one attempt."""
 
-    def __init__(self, run: RunContext, env: SimulatorsVecEnv, resumed: Resumed | None = None) -> None:
+    def __init__(self, run: RunContext, env: CollectingVecEnv, resumed: Resumed | None = None) -> None:
         super().__init__()
         self._run = run
         self._env = env

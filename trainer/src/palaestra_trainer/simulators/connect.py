@@ -27,6 +27,7 @@ from palaestra_trainer.job.configuration import (
 )
 from palaestra_trainer.robots.registry import robot_class
 from palaestra_trainer.robots.simulated import SimulatedRobot, SimulatedScene
+from palaestra_trainer.simulators.batch_simulator import BatchSimulator
 from palaestra_trainer.simulators.fleet import limit_of
 from palaestra_trainer.simulators.interface import Member
 from palaestra_trainer.simulators.simulator import Simulator
@@ -58,13 +59,26 @@ def connect_members(configuration: Configuration) -> list[Member]:
     Raises:
         The same errors as `connect`.
     """
-    simulators = connect(configuration)
+    if not any(entry.batch for entry in configuration.simulators):
+        return [_member(simulator, configuration) for simulator in connect(configuration)]
+    single = tuple(entry for entry in configuration.simulators if not entry.batch)
+    rest = configuration.model_copy(update={"simulators": single})
+    others = [_member(simulator, rest) for simulator in connect(rest)] if single else []
+    many = (entry for entry in configuration.simulators if entry.batch)
     return [
-        Standby(simulator, simulator_at(simulator.sidecar.standby(), configuration, entry), limit_of(entry))
-        if entry.standby
-        else simulator
-        for entry, simulator in zip(configuration.simulators, simulators, strict=True)
+        *(BatchSimulator(Sidecar(entry.control, entry.name), configuration, entry) for entry in many),
+        *others,
     ]
+
+
+def _member(simulator: Simulator, configuration: Configuration) -> Member:
+    """Return the simulator, or with its standby if it has one."""
+    entry = next(entry for entry in configuration.simulators if entry.name == simulator.name)
+    if not entry.standby:
+        return simulator
+    return Standby(
+        simulator, simulator_at(simulator.sidecar.standby(), configuration, entry), limit_of(entry)
+    )
 
 
 def connect_here(configuration: Configuration, run: Path) -> list[Simulator]:

@@ -7,6 +7,7 @@ from contextlib import ExitStack
 from typing import Any, Generic, NamedTuple, TypeVar
 
 from palaestra_protocol.pod.enums import Role
+from palaestra_trainer.environments.batched_move_to_target import BatchedMoveToTargetEnv
 from palaestra_trainer.environments.deliver import DeliverEnv
 from palaestra_trainer.environments.move_to_target import MoveToTargetEnv
 from palaestra_trainer.environments.move_to_target_goal import MoveToTargetGoalEnv
@@ -22,6 +23,7 @@ from palaestra_trainer.environments.options import (
 from palaestra_trainer.environments.see_target import SeeTargetEnv
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.robots.base import RobotAbc, Scene
+from palaestra_trainer.robots.batched_base import BatchedRobotAbc, BatchedSceneAbc
 
 _Made = TypeVar("_Made")
 _Options = type[MoveToTargetOptions | SeeOptions | NavigateOptions]
@@ -92,7 +94,32 @@ class EntryPoint(Generic[_Made]):
         return made
 
 
+class BatchedEntryPoint(Generic[_Made]):
+    """Creates the batched form of a shipped environment, for `make_batched`.
+
+    Args:
+        kind: the class of the batched form.
+        options: the class of the environment's options.
+
+    Attributes:
+        environment_class: the class of the batched form.
+    """
+
+    def __init__(self, kind: Callable[..., _Made], options: _Options) -> None:
+        self.environment_class = kind
+        self._options = options
+
+    def __call__(self, robot: BatchedRobotAbc, scene: BatchedSceneAbc, **options: Any) -> _Made:
+        """Create and return the batched form.
+
+        Raises:
+            ConfigurationError: an option is wrong.
+        """
+        return self.environment_class(robot, scene, parse_as(self._options, options))
+
+
 make = EntryPoint("MoveToTargetEnv-v0", MoveToTargetEnv, MoveToTargetOptions)
+make_batched = BatchedEntryPoint(BatchedMoveToTargetEnv, MoveToTargetOptions)
 make_goal = EntryPoint("MoveToTargetGoalEnv-v0", MoveToTargetGoalEnv, GoalOptions)
 make_seeing = EntryPoint("SeeTarget-v0", SeeTargetEnv, SeeOptions)
 make_delivering = EntryPoint("Deliver-v0", DeliverEnv, DeliverOptions)
