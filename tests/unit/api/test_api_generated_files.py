@@ -19,6 +19,7 @@ EXAMPLES = [
     "imprecise",
     "minimal",
     "move-to-target",
+    "move-to-target-batch",
     "move-to-target-mujoco",
     "navigate",
     "paper-dqn",
