@@ -12,6 +12,7 @@ import time
 
 from tests.bench import (
     abroad,
+    batch,
     collection,
     hostile,
     learning,
@@ -31,6 +32,7 @@ from tests.bench import (
 PARTS = {
     "stepping": stepping.measure,
     "floor": step_floor.measure,
+    "batch": batch.measure,
     "simulators": simulators.measure,
     "webots": webots.measure,
     "watched": watched.measure,

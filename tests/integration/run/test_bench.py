@@ -17,6 +17,7 @@ from tests.local_run import ROOT
 from tests.soak import chaos
 
 SMALL = (
+    "batch",
     "collection",
     "floor",
     "newcomer",
