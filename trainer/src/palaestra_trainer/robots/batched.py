@@ -145,6 +145,7 @@ class BatchedRobotino(BatchedRobot, BatchedRobotinoAbc):
     """The copies of a Robotino; the arguments are those of `BatchedRobot`."""
 
     kind: type[Robotino]
+    _meters: NDArray[np.float32] | None = None
 
     def request(self) -> BatchRequest:
         """Return the wheels, the distance sensors and the bumper."""
@@ -171,10 +172,28 @@ class BatchedRobotino(BatchedRobot, BatchedRobotinoAbc):
         """Set the velocities until the next command: forward, left (m/s), counter-clockwise (rad/s)."""
         self._commands = np.stack(wheel_speeds(vx, vy, omega), axis=1)
 
+    def advance(self) -> None:
+        """Simulate one period of all rows; see `BatchedRobot`."""
+        super().advance()
+        self._meters = None
+
+    def restart(self, reset: BatchReset) -> None:
+        """Reset rows and simulate one period of these rows; see `BatchedRobot`."""
+        super().restart(reset)
+        if self._meters is not None:  # the other rows keep their distances
+            self._meters = self._meters.copy()
+            self._meters[reset.rows] = self._converted(self.values()[reset.rows, :-1])
+
     def distances(self) -> NDArray[np.float32]:
         """Return meters to the nearest obstacles, (rows, 9), counter-clockwise from forward."""
+        if self._meters is None:
+            self._meters = self._converted(self.values()[:, :-1])
+        return self._meters
+
+    @staticmethod
+    def _converted(readings: Floats) -> NDArray[np.float32]:
         # A message of a DistanceSensor has 32 bits for its value.
-        volts = np.maximum(self.values()[:, :-1].astype(np.float32).astype(np.float64), LEAST_VOLTS)
+        volts = np.maximum(readings.astype(np.float32).astype(np.float64), LEAST_VOLTS)
         # Python's power, because NumPy's power may differ in the last bit.
         powers = np.fromiter(map(pow, volts.ravel().tolist(), repeat(RANGE_EXPONENT)), float, volts.size)
         meters = RANGE_SCALE * powers.reshape(volts.shape) + RANGE_OFFSET_M
