@@ -64,6 +64,13 @@ BROKEN = {
         {**COPIES, "trainer.command": ["train"]},
         "spec.trainer.command: cannot be combined with simulators[].batch; remove one of them",
     ),
+    "copies that are collected from asynchronously": (
+        {**COPIES, "trainer.algorithm.name": "DQN", "trainer.collection": "Asynchronous"},
+        (
+            "spec.trainer.collection: Asynchronous is for several simulators; remove it, or remove "
+            "simulators[].batch"
+        ),
+    ),
     "copies of a task without a batched form": (
         {**COPIES, "trainer.environment": {"id": "Deliver-v0"}},
         (

@@ -23,7 +23,7 @@ from palaestra.api.scheduling import Scheduling
 from palaestra.api.simulators import SimulatorGroup
 from palaestra.api.status import Status
 from palaestra.api.storage import Storage
-from palaestra.api.trainer import Trainer
+from palaestra.api.trainer import Collection, Trainer
 from palaestra_protocol.pod.enums import Role
 
 API_VERSION: Final = "palaestra.dev/v1alpha1"
@@ -261,6 +261,16 @@ class Spec(ApiModel):
             holds=lambda spec: not (spec.trainer.command and any(group.batch for group in spec.simulators)),
             cel="size(self.trainer.command) == 0 || !self.simulators.exists(group, has(group.batch))",
             message="cannot be combined with simulators[].batch; remove one of them",
+        ),
+        Rule(
+            field="trainer.collection",
+            holds=lambda spec: (
+                spec.trainer.collection is not Collection.ASYNCHRONOUS
+                or not any(group.batch for group in spec.simulators)
+            ),
+            cel="!has(self.trainer.collection) || self.trainer.collection != 'Asynchronous'"
+            " || !self.simulators.exists(group, has(group.batch))",
+            message="Asynchronous is for several simulators; remove it, or remove simulators[].batch",
         ),
         Rule(
             field="trainer.environment.id",

@@ -53,7 +53,7 @@ def cut(code: str) -> list[str]:
     return tokens
 
 
-class Tokens:
+class CodeTokens:
     """A position in a list of tokens, and the rules of expressions."""
 
     def __init__(self, tokens: list[str], fields: set[str]) -> None:
@@ -197,7 +197,7 @@ def _joined(mark: str, left: Computed, right: Computed) -> Computed:
 def _applied(mark: str, left: Result, right: Result) -> Result:
     """Return the value of an operator for two values."""
     if mark in ("==", "!=", "===", "!=="):
-        if type(left) is not type(right) and len(mark) == 2:  # noqa: PLR2004 - == and != convert, === not
+        if type(left) is not type(right) and mark in ("==", "!="):  # these two would convert a value
             raise TemplateError(f"{left!r} {mark} {right!r}")
         return (type(left) is type(right) and left == right) == mark.startswith("=")
     if mark == "+" and str in (type(left), type(right)):

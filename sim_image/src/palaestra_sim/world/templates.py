@@ -19,10 +19,10 @@ from typing import Final, TypeAlias
 
 from palaestra_sim.world.template_code import (
     MAX_DEPTH,
+    CodeTokens,
     Computed,
     Result,
     TemplateError,
-    Tokens,
     cut,
     text,
     truth,
@@ -107,7 +107,7 @@ def _tokens(data: bytes, parts: list[bytes | Computed], fields: set[str]) -> lis
         at = match.end()
         code = cut(match["code"].decode())
         if match["out"]:
-            inner = Tokens(code, fields)
+            inner = CodeTokens(code, fields)
             tokens.append(_part(parts, inner.expression()))
             inner.expect("")
         else:
@@ -122,7 +122,7 @@ def _part(parts: list[bytes | Computed], part: bytes | Computed) -> str:
     return f"{_TEXT}{len(parts) - 1}"
 
 
-class _Reader(Tokens):
+class _Reader(CodeTokens):
     """The rules of statements."""
 
     def __init__(self, tokens: list[str], fields: set[str], parts: list[bytes | Computed]) -> None:

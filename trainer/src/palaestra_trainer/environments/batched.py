@@ -41,11 +41,11 @@ class BatchedEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
 
     batched: ClassVar[bool] = True
     needs: ClassVar[tuple[type, ...]] = ()
-    metadata: ClassVar[dict[str, Any]] = {"autoreset_mode": AutoresetMode.DISABLED}  # type: ignore[misc]  # gymnasium declares an attribute of objects
 
     def __init__(
         self, rows: int, observation_space: spaces.Space[Any], action_space: spaces.Space[Any]
     ) -> None:
+        self.metadata = {"autoreset_mode": AutoresetMode.DISABLED}
         self.num_envs = rows
         self.single_observation_space, self.single_action_space = observation_space, action_space
         self.observation_space = batch_space(observation_space, rows)

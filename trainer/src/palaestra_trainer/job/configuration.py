@@ -29,8 +29,8 @@ from pydantic_core import ErrorDetails
 from palaestra_protocol.batch import MOST_ROWS
 from palaestra_protocol.pod.enums import Role
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.job.batch_rules import batch_mistake
 from palaestra_trainer.job.run_directory import RunDirectory
+from palaestra_trainer.job.simulator_rules import simulator_mistake
 
 log = structlog.get_logger(__name__)
 
@@ -270,14 +270,8 @@ class Configuration(_Section):
 
     @model_validator(mode="after")
     def _simulators_fit_together(self) -> Self:
-        names = [simulator.name for simulator in self.simulators]
-        twice = sorted({name for name in names if names.count(name) > 1})
-        if twice:
-            raise ValueError(f"simulators: the name {twice[0]} is used twice; make names unique")
-        if mistake := batch_mistake(self):
+        if mistake := simulator_mistake(self):
             raise ValueError(mistake)
-        if not self.with_role(Role.COLLECT):
-            raise ValueError("simulators: none has role Collect; give one of them that role")
         return self
 
 

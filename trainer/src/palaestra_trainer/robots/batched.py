@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import repeat
 from typing import Any, Final
 
@@ -331,7 +331,7 @@ def _overridden(robot: type[Any], single: type[Any]) -> str:
     """Return a method or property that a class between `robot` and `single` defines; "" without one."""
     between = robot.__mro__[: robot.__mro__.index(single)]
     members = ((name, value) for each in between for name, value in vars(each).items())
-    return next((name for name, value in members if isinstance(value, Callable | property)), "")  # type: ignore[arg-type]  # mypy lacks isinstance of Callable in a union
+    return next((name for name, value in members if callable(value) or isinstance(value, property)), "")
 
 
 def _layout(shapes: Sequence[BatchShape]) -> FloorLayout:

@@ -34,7 +34,7 @@ class Noise:
     """
 
     def __init__(self, count: int, draws: int) -> None:
-        self._generators = [random.Random(0) for _ in range(count)]  # noqa: S311 - noise, not secrets
+        self._generators = [random.Random(0) for _ in range(count)]
         self._draws = range(draws)
 
     def sow(self, rows: Any, seeds: Any) -> None:
