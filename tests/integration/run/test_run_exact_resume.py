@@ -61,6 +61,20 @@ def seeing() -> Variant:
     return Variant(job=job, asked_at=100)
 
 
+def copies() -> Variant:
+    """Return a PPO training in four copies of the arena, whose episodes are longer than a rollout."""
+    job = tiny_job(
+        collect={"driver": "mujoco", "batch": 4},
+        evaluate={"driver": "mujoco"},
+        environment={"id": "MoveToTargetEnv-v0", "options": {"max_steps": 40}},
+        algorithm={"name": "PPO", "hyperparameters": PPO},
+        steps=640,
+        evaluation={"everySteps": 320, **FEW},
+        checkpoint={"everySteps": 128, "keep": 3},
+    )
+    return Variant(job=job, asked_at=300)
+
+
 VARIANTS = {
     "the page's scattered cylinders": learning(
         yaml.safe_load(PAGE["yaml"])["spec"]["trainer"]["environment"], 360, "stub"
@@ -70,6 +84,7 @@ VARIANTS = {
         {"id": "curriculum:Curriculum-v0", "options": {"max_steps": 40}}, 240, "mujoco"
     ),
     "pictures of MuJoCo": seeing(),
+    "copies in one MuJoCo": copies(),
 }
 
 
