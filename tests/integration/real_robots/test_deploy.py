@@ -20,7 +20,7 @@ HANDS_OFF = ("--yes", "--no-hold", "--speed-limit=0.5")
 # Imports of these fail, as on a robot's computer that has only the extra `deploy`.
 LEAN = """
 import sys
-ABSENT = {"PIL", "rospy", "sb3_contrib", "stable_baselines3", "tensorboard", "torch"}
+ABSENT = {"rospy", "sb3_contrib", "stable_baselines3", "tensorboard", "torch"}
 class Absent:
     def find_spec(self, name, path=None, target=None):
         if name.partition(".")[0] in ABSENT:
