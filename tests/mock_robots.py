@@ -2,12 +2,16 @@
 
 import contextlib
 import http.client
+import io
 import json
 import os
 import socket
 import subprocess
 import sys
 import threading
+
+import numpy as np
+from PIL import Image
 
 from tests.waiting import eventually
 
@@ -27,15 +31,25 @@ class Client:
         """Return status and JSON content of a response; None if the body is empty."""
         text = body if body is None or isinstance(body, str) else json.dumps(body)
         self.connection.request(method, path, body=text)
-        response = self.connection.getresponse()
-        content = response.read()
-        return response.status, json.loads(content) if content else None
+        status, content = self._response()
+        return status, json.loads(content) if content else None
 
     def get(self, path):
         """Return the content of a path."""
         status, content = self.ask("GET", path)
         assert status == 200
         return content
+
+    def picture(self, size):
+        """Return the picture of the camera, reduced to a size, shape (height, width, 3), RGB."""
+        self.connection.request("GET", "/cam0")
+        status, content = self._response()
+        assert status == 200
+        return np.asarray(Image.open(io.BytesIO(content)).convert("RGB").resize(size))
+
+    def _response(self):
+        response = self.connection.getresponse()
+        return response.status, response.read()
 
     def send(self, path, body):
         """Send a body with PUT or POST, as the path wants it."""

@@ -1,8 +1,9 @@
 """A small ROS 2 driver of a mock robot, with the topics and the QoS of rto_node.
 
 Arguments: the address of the mock robot, its speed, and options. `--clock` publishes /clock; `--best-effort`
-publishes odometry and the scan so; `--latched` keeps the bumper's last state for later subscribers. A line
-`FRAME X Y` on standard input publishes a goal. The driver writes `ready` first.
+publishes odometry and the scan so; `--latched` keeps the bumper's last state for later subscribers;
+`--camera` publishes pictures, as sensors in ROS 2 do it. A line `FRAME X Y` on standard input publishes a
+goal. The driver writes `ready` first.
 """
 
 import math
@@ -12,15 +13,16 @@ import threading
 import rclpy
 from geometry_msgs.msg import PoseStamped, Twist
 from nav_msgs.msg import Odometry
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
 from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import LaserScan
+from sensor_msgs.msg import Image, LaserScan
 from std_msgs.msg import Bool
 
 from tests.mock_robots import Client
 
 RATE_HZ = 30.0
 CLOCK_HZ = 100.0
+PICTURE = (160, 120)
 RADIUS_M = 0.225  # rto_node measures the ranges of its scan from the center of the robot
 
 
@@ -42,6 +44,9 @@ class Driver:
         self.times = node.create_publisher(Clock, "/clock", 10)
         node.create_subscription(Twist, "cmd_vel", self.command, 10)
         node.create_timer(1.0 / RATE_HZ / speed, self.read)
+        if "--camera" in options:
+            self.images = node.create_publisher(Image, "image_raw", qos_profile_sensor_data)
+            node.create_timer(1.0 / RATE_HZ / speed, self.look)
         if "--clock" in options:
             node.create_timer(1.0 / CLOCK_HZ / speed, self.tick)
 
@@ -68,6 +73,14 @@ class Driver:
         if bumped != self.bumped and not (self.bumped is None and not bumped):
             self.bumper.publish(Bool(data=bumped))
         self.bumped = bumped
+
+    def look(self):
+        """Publish a picture."""
+        width, height = PICTURE
+        pixels = self.robot.picture(PICTURE)[:, :, ::-1]
+        self.images.publish(
+            Image(width=width, height=height, encoding="bgr8", step=3 * width, data=pixels.tobytes())
+        )
 
     def tick(self):
         """Publish the robot's time."""

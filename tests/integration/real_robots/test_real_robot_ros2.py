@@ -2,6 +2,7 @@
 
 import cmath
 import json
+import math
 import shlex
 import signal
 import subprocess
@@ -9,12 +10,13 @@ import sys
 from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from palaestra_trainer.bags.reader import read_bag
 from tests import ros2
 from tests.mock_robots import DEADLINE_S, ended, started
-from tests.packages import write_package
+from tests.packages import write_package, write_seeing_package
 from tests.pages import blocks
 from tests.waiting import TooLate, eventually
 
@@ -178,6 +180,33 @@ def test_the_policy_node_drives_to_goals_in_the_time_of_clock(mock, package, tmp
     ]
     assert len(ends) == 1
     assert topics["/palaestra/cmd_vel"][-1].content["linear"]["x"] == 0.0
+
+
+def test_a_policy_that_sees_acts_on_published_images(mock, tmp_path):
+    """The pictures have another size and order of colors than the images that the policy learned with."""
+    package, bag = write_seeing_package(tmp_path / "package"), tmp_path / "node.mcap"
+    mock.send("/mock/place", [-1.3, 0.3, 0.2])
+    record = ("--", "--record", bag)
+    with (
+        driver(mock, "/robot1", "--clock", "--camera") as robot,
+        node(package, "in-a-simulation", *record) as (program, log),
+    ):
+        send(robot, "odom", of_odometry(mock, 0.0, 0.0))
+        wait_for(log, "reached after")
+        truth = mock.get("/mock/truth")
+        program.send_signal(signal.SIGINT)
+        assert program.wait(DEADLINE_S) == 0
+
+    assert math.hypot(truth["x"], truth["y"]) == pytest.approx(0.45, abs=0.15)
+    first, *_, last = (each.content for each in read_bag(bag).topics["/camera/image"])
+    assert (first["width"], first["height"], first["encoding"]) == (64, 48, "rgb8")
+    assert redness(last) > 3.0 * redness(first)
+
+
+def redness(image):
+    """Return the mean of red minus green of a recorded image."""
+    pixels = np.frombuffer(bytes(image["data"]), np.uint8).reshape(-1, 3).astype(float)
+    return (pixels[:, 0] - pixels[:, 1]).mean()
 
 
 def test_the_policy_node_is_quiet_without_a_goal_and_opens_no_network(package):

@@ -3,6 +3,7 @@
 TrainerError
 ├── ConfigurationError   the configuration is wrong; retrying cannot help     exit 2
 │   └── RobotUnfit       a real robot must not be driven now                  exit 2
+│       └── CameraUnfit  a NoSuchSensor too: no fitting picture arrives       exit 2
 ├── UnreadableAnswer     the ROS master or a node sent an invalid ROS response
 ├── MasterLost           the ROS master is gone; nothing re-registers         exit 75
 ├── Interrupted          a signal asked the run to end (run.signals)          exit 75
@@ -114,6 +115,10 @@ class Paused(TrainerError, RuntimeError):
 
 class RobotUnfit(ConfigurationError):
     """A real robot must not be driven now: it does not respond, charges, or another client drives it."""
+
+
+class CameraUnfit(RobotUnfit, NoSuchSensor):
+    """No picture arrives from the camera of a real robot, or none that becomes an image of the policy."""
 
 
 class RobotStopped(TrainerError, RuntimeError):

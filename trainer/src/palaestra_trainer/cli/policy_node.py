@@ -17,7 +17,7 @@ import_without("rich", "structlog")
 
 from palaestra_protocol.pod.status import ExitCode
 from palaestra_trainer.cli.program import leaving, parser, refuse_without_run
-from palaestra_trainer.errors import ConfigurationError, RobotUnfit, TrainerError
+from palaestra_trainer.errors import CameraUnfit, ConfigurationError, RobotUnfit, TrainerError
 from palaestra_trainer.real_robots.robot_clock import RobotClock
 from palaestra_trainer.real_robots.ros2_clock import SimulationClock, SimulationTime
 from palaestra_trainer.real_robots.safety import Fence, SafetyRules
@@ -29,6 +29,7 @@ from palaestra_trainer.waiting.check import Check
 
 if TYPE_CHECKING:
     from palaestra_trainer.deployment.goals import Goals
+    from palaestra_trainer.real_robots.camera import ImageSize
     from palaestra_trainer.real_robots.robotino import RealRobotino
     from palaestra_trainer.real_robots.ros2 import Ros2Link
 
@@ -38,6 +39,7 @@ Drive a Robotino to goals in ROS 2, with a policy package. rclpy must be install
 subscribes:
   goal_pose (geometry_msgs/msg/PoseStamped), in the frame of odometry; each goal begins an episode
   odom, irsensor_scan or distance_sensors, bumper, as the robot's driver publishes them
+  image_raw (sensor_msgs/msg/Image), if the policy sees images
 publishes:
   cmd_vel (geometry_msgs/msg/Twist), 20 times a second while it drives to a goal; otherwise nothing
 parameters:
@@ -121,6 +123,7 @@ def _serve(options: argparse.Namespace, ros_arguments: Sequence[str], interrupti
             stack.callback(simulation.leave)
         say, warn = node.ros.get_logger().info, node.ros.get_logger().warning
         _connect(robot, simulation, interruption.check, warn)
+        _wait_for_images(robot, package.image_size, warn)
         deployment = Deployment(package, robot, record, node.ros.get_logger().debug)
         _subscribe(node, link, goals, rules.fence)
         say(f"ready; waiting for a goal on {node.ros.resolve_topic_name('goal_pose')}")
@@ -139,6 +142,20 @@ def _connect(
             robot.connect()
         except RobotUnfit as error:
             warn(f"{error}; waiting for the robot")
+        else:
+            return
+
+
+def _wait_for_images(robot: RealRobotino, size: ImageSize | None, warn: Callable[[str], object]) -> None:
+    """Wait for the camera of a policy that sees images, because its node may start later than this one."""
+    if size is None:
+        return
+    robot.image_size = size
+    while True:
+        try:
+            robot.use_cameras(color=True)
+        except CameraUnfit as error:
+            warn(f"{error}; waiting for the camera")
         else:
             return
 

@@ -11,6 +11,7 @@
 - `connect`: the connection for an address
 - `camera`: pictures of the camera as images of the size that a policy learned with
 - `command_loop`: sends the command of a policy at 20 Hz, as far as the safety rules allow
+- `ros_images`: pictures in messages of both ROS
 - `robotino`: the robot; `scene`: its floor, on which a person places it
 - `robot_clock`: the time of a robot, which may run faster than real time in a mock robot
 """

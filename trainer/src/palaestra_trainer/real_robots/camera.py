@@ -1,17 +1,21 @@
 """Pictures of a robot's camera as images of the size that a policy learned with.
 
-Pillow decodes a picture. It is imported with the first picture, because most policies need no camera.
+Pillow decodes and reduces a picture. It is imported with the first picture, because most policies need no
+camera.
 """
 
 from __future__ import annotations
 
 import io
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from palaestra_trainer.errors import LinkError
+
+if TYPE_CHECKING:
+    from PIL.Image import Image as Picture
 
 MOST_BYTES: Final = 2**22
 _MOST_PIXELS: Final = 2**24
@@ -21,27 +25,37 @@ ImageSize = tuple[int, int]  # width and height in pixels
 
 
 def decoded(content: bytes, size: ImageSize) -> NDArray[np.uint8]:
-    """Return a JPEG picture as an RGB image of a size, shape (height, width, 3).
-
-    Each pixel of the image is the mean of the pixels of the picture that it covers.
+    """Return a JPEG picture as an RGB image of a size; see `reduced`.
 
     Raises:
         LinkError: the content is no JPEG picture, is too large, or has another ratio of width to height.
     """
     from PIL import Image
 
-    width, height = size
     try:
         with Image.open(io.BytesIO(content), formats=("JPEG",)) as picture:
-            wide, high = picture.size
-            if wide * high > _MOST_PIXELS:
-                raise LinkError(f"camera: a picture of {wide} x {high} pixels is too large")
-            if abs(wide * height / (high * width) - 1.0) > _ASPECT_SLACK:
-                raise LinkError(
-                    f"camera: a picture of {wide} x {high} pixels has another shape than the policy's "
-                    f"{width} x {height}; set the camera to that ratio"
-                )
-            image = picture.convert("RGB").resize(size, Image.Resampling.BOX)
-            return np.asarray(image, np.uint8).copy()
+            return reduced(picture, size)
     except (OSError, SyntaxError, ValueError) as error:
         raise LinkError(f"camera: returned no JPEG picture ({error})") from error
+
+
+def reduced(picture: Picture, size: ImageSize) -> NDArray[np.uint8]:
+    """Return a picture as an RGB image of a size, shape (height, width, 3).
+
+    Each pixel of the image is the mean of the pixels of the picture that it covers.
+
+    Raises:
+        LinkError: the picture is too large, or has another ratio of width to height.
+        OSError: the content of the picture cannot be read.
+    """
+    from PIL import Image
+
+    (wide, high), (width, height) = picture.size, size
+    if wide * high > _MOST_PIXELS:
+        raise LinkError(f"camera: a picture of {wide} x {high} pixels is too large")
+    if abs(wide * height / (high * width) - 1.0) > _ASPECT_SLACK:
+        raise LinkError(
+            f"camera: a picture of {wide} x {high} pixels has another shape than the policy's "
+            f"{width} x {height}; set the camera to that ratio"
+        )
+    return np.asarray(picture.convert("RGB").resize(size, Image.Resampling.BOX), np.uint8).copy()

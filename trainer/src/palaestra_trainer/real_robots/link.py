@@ -35,10 +35,10 @@ class RobotLink(Protocol):
         ...
 
     def use_camera(self, store: ReadingStore, size: ImageSize) -> None:
-        """Begin to put images of a size into `store`; further calls have no effect.
+        """Begin to put images of a size into `store`, after `start`; further calls have no effect.
 
-        Raises:
-            NoSuchSensor: this connection has no camera.
+        Until the first image, and after each picture that does not become one, `store.image_fault` has the
+        reason.
         """
         ...
 

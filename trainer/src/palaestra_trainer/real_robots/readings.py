@@ -7,10 +7,13 @@ import threading
 from dataclasses import dataclass, replace
 
 import numpy as np
+import structlog
 from numpy.typing import NDArray
 
 from palaestra_trainer.real_robots.safety import STANDING
 from palaestra_trainer.robots.geometry import Pose, Twist
+
+log = structlog.get_logger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,9 +53,14 @@ class Readings:
 
 
 class ReadingStore:
-    """Holds the newest readings; any thread may read and write."""
+    """Holds the newest readings; any thread may read and write.
+
+    Attributes:
+        image_fault: the reason that no image has arrived, or that a picture did not become an image.
+    """
 
     def __init__(self) -> None:
+        self.image_fault = "no camera is in use"
         self._lock = threading.Lock()
         self._newest = Readings()
 
@@ -85,3 +93,9 @@ class ReadingStore:
         with self._lock:
             if self._newest.image is None or at_s >= self._newest.image_s:
                 self._newest = replace(self._newest, image=image, image_s=at_s)
+
+    def refuse_image(self, fault: str) -> None:
+        """Set the reason that a picture does not become an image; each new reason is logged once."""
+        if fault != self.image_fault:
+            log.warning("no image", error=fault)
+        self.image_fault = fault

@@ -117,10 +117,16 @@ class RestLink:
         if any(thread.name == _CAMERA for thread in self._threads):
             return
 
-        def look() -> None:
-            self._poll(_CAMERA, lambda body, at_s: store.set_image(decoded(body, size), at_s), _CAMERA_S)
+        def read(body: bytes, at_s: float) -> None:
+            try:
+                store.set_image(decoded(body, size), at_s)
+            except LinkError as error:
+                store.refuse_image(str(error))
 
-        thread = threading.Thread(target=look, name=_CAMERA, daemon=True)
+        store.image_fault = f"no picture arrives from {_CAMERA}; check the camera"
+        thread = threading.Thread(
+            target=self._poll, args=(_CAMERA, read, _CAMERA_S), name=_CAMERA, daemon=True
+        )
         thread.start()
         self._threads.append(thread)
 

@@ -10,7 +10,7 @@ from typing import Final, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from palaestra_trainer.errors import NoReading, NoSuchSensor, RobotStopped, RobotUnfit
+from palaestra_trainer.errors import CameraUnfit, NoReading, NoSuchSensor, RobotStopped, RobotUnfit
 from palaestra_trainer.real_robots.camera import ImageSize
 from palaestra_trainer.real_robots.command_loop import CommandLoop, Hooks
 from palaestra_trainer.real_robots.frames import OdometryFrame, extrapolated
@@ -221,7 +221,8 @@ class RealRobotino(RobotinoAbc, Cameras):
         From then on, an old image holds the robot back as any other old reading does.
 
         Raises:
-            NoSuchSensor: a depth camera is chosen, or no image of this size arrives.
+            NoSuchSensor: a depth camera is chosen.
+            CameraUnfit: no image of this size arrives.
         """
         if depth:
             raise NoSuchSensor(f"{self._link.address}: a Robotino has no depth camera")
@@ -231,9 +232,7 @@ class RealRobotino(RobotinoAbc, Cameras):
         end_s = time.monotonic() + _FIRST_READINGS_S  # of real time, also for a fast mock robot
         while self._store.newest.image is None:
             if time.monotonic() > end_s:
-                width, height = self.image_size
-                fact = f"the camera sent no JPEG picture that can be reduced to {width} x {height} pixels"
-                raise NoSuchSensor(f"{self._link.address}: {fact}; check the camera, and its resolution")
+                raise CameraUnfit(f"{self._link.address}: {self._store.image_fault}")
             self._wait(_LOOK_S)
         self._look(self._clock.now_s())
 

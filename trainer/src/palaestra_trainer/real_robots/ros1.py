@@ -15,6 +15,7 @@ The connection needs no installed ROS. Four facts about the driver matter:
 from __future__ import annotations
 
 import itertools
+import math
 import os
 import re
 import select
@@ -31,7 +32,6 @@ from palaestra_trainer.errors import (
     ConfigurationError,
     LinkError,
     MasterLost,
-    NoSuchSensor,
     RobotUnfit,
     SimulatorFault,
     UnreadableAnswer,
@@ -40,6 +40,8 @@ from palaestra_trainer.real_robots.camera import ImageSize
 from palaestra_trainer.real_robots.readings import ReadingStore
 from palaestra_trainer.real_robots.robot_clock import RobotClock
 from palaestra_trainer.real_robots.ros1_messages import distances_of, fields_of, odometry_of
+from palaestra_trainer.real_robots.ros_images import TOPIC as IMAGES
+from palaestra_trainer.real_robots.ros_images import image_of
 from palaestra_trainer.real_robots.sensor_layout import UNITS, SensorLayout
 from palaestra_trainer.robots.geometry import Twist
 from palaestra_trainer.ros.master import Master
@@ -60,6 +62,7 @@ _ADDRESS: Final = re.compile(r"ros1://[^/@?#]+(/[A-Za-z][A-Za-z0-9_]*)*/?")
 _numbers: Final = itertools.count()  # the nodes of one process need different names
 
 Reader = Callable[[Any, float], None]
+Readers = dict[RosSubscriber, Reader]
 
 
 class Ros1Link:
@@ -82,6 +85,8 @@ class Ros1Link:
         self._sensors = replace(sensors or SensorLayout(), unit=UNITS[0])
         self._clock = clock or RobotClock()
         self._bumped = False
+        self._node: TopicNode | None = None
+        self._sees = False
         self._commands: RosPublisher | None = None
         self._driver: str | None = None
         self._over = threading.Event()
@@ -131,7 +136,9 @@ class Ros1Link:
             driver = self._driver = self._driver or self._found_driver(
                 Master(self._name("palaestra"), _CHECK_S, self._master_uri)
             )
-            node = TopicNode(self._name(f"palaestra_{os.getpid()}_{next(_numbers)}"), self._master_uri)
+            node = self._node = TopicNode(
+                self._name(f"palaestra_{os.getpid()}_{next(_numbers)}"), self._master_uri
+            )
             self._open.callback(node.close)
             self._commands = RosPublisher(node, topic, "geometry_msgs/Twist")
             self._open.callback(self._commands.close)
@@ -140,16 +147,31 @@ class Ros1Link:
         if not self._commands.wait_for_subscriber(_DRIVER_CONNECTS_S, driver):
             fact = f"{self.address}: the driver {driver} has not connected to {topic} at {node.host}"
             raise RobotUnfit(f"{fact}; set ROS_IP to an address of this computer that the robot reaches")
-        thread = threading.Thread(target=self._listen, args=(node, store), name="robot-topics", daemon=True)
-        self._open.callback(thread.join, _END_S)
-        thread.start()
+        self._listen_in_thread("robot-topics", self._readers(node, store), lambda: store.newest.oldest_s)
 
     def use_camera(self, store: ReadingStore, size: ImageSize) -> None:
-        """Refuse: this connection has no camera."""
-        del store, size
-        raise NoSuchSensor(
-            f"{self.address}: the camera of a ROS 1 driver is not read; use the REST interface"
-        )
+        """Begin to receive pictures of `image_raw`, apart from the other topics; each replaces the last.
+
+        Another node than the driver may publish them, and its failure must not delay the driver's readings.
+        """
+        if self._sees or self._node is None:
+            return
+        self._sees = True
+
+        def read(message: Any, at_s: float) -> None:
+            try:
+                store.set_image(image_of(message, size), at_s)
+            except LinkError as error:
+                store.refuse_image(str(error))
+
+        def newest_s() -> float:
+            seen = store.newest
+            return -math.inf if seen.image is None else seen.image_s
+
+        topic = self._name(IMAGES)
+        store.image_fault = f"no picture arrives on {topic}; start the camera's node"
+        pictures = RosSubscriber(topic, "sensor_msgs/Image", node=self._node)
+        self._listen_in_thread("robot-camera", {pictures: read}, newest_s)
 
     def send(self, twist: Twist) -> None:
         """Send one velocity to all subscribers of `cmd_vel`; the driver itself confirms nothing.
@@ -192,19 +214,24 @@ class Ros1Link:
                 remedy = "end all drivers except one"
         raise RobotUnfit(f"{self.address}: {fact}; {remedy}")
 
-    def _listen(self, node: TopicNode, store: ReadingStore) -> None:
+    def _listen_in_thread(self, name: str, readers: Readers, newest_s: Callable[[], float]) -> None:
+        """Receive messages until `close`; `newest_s` returns the time since which no kind has arrived."""
+        thread = threading.Thread(target=self._listen, args=(readers, newest_s), name=name, daemon=True)
+        self._open.callback(thread.join, _END_S)
+        thread.start()
+
+    def _listen(self, readers: Readers, newest_s: Callable[[], float]) -> None:
         """Receive messages; after a failure, connect all topics again, so that a latched message returns."""
-        readers = self._readers(node, store)
         while not self._over.is_set():
             try:
-                self._receive(readers, store)
+                self._receive(readers, newest_s)
             except (SimulatorFault, MasterLost) as error:
                 log.debug("no readings", error=str(error))
             self._clock.wait(self._over, self._clock.now_s() + _RETRY_S)
         for topic in readers:
             topic.close()
 
-    def _readers(self, node: TopicNode, store: ReadingStore) -> dict[RosSubscriber, Reader]:
+    def _readers(self, node: TopicNode, store: ReadingStore) -> Readers:
         """Return the topics in the order in which their messages are read."""
 
         def bumper(message: Any, at_s: float) -> None:
@@ -225,7 +252,7 @@ class Ros1Link:
             RosSubscriber(self._name("odom"), "nav_msgs/Odometry", node=node): odometry,
         }
 
-    def _receive(self, readers: dict[RosSubscriber, Reader], store: ReadingStore) -> None:
+    def _receive(self, readers: Readers, newest_s: Callable[[], float]) -> None:
         """Connect all topics and read their messages, until a reading is older than `_SILENCE_S`.
 
         Raises:
@@ -235,7 +262,7 @@ class Ros1Link:
         for topic in readers:
             topic.connect()
         at_s = begin_s = self._clock.now_s()
-        while not self._over.is_set() and at_s - max(begin_s, store.newest.oldest_s) < _SILENCE_S:
+        while not self._over.is_set() and at_s - max(begin_s, newest_s()) < _SILENCE_S:
             select.select(list(readers), [], [], self._clock.real_s(_SILENCE_S))
             at_s = self._clock.now_s()
             # A topic that is not ready may have a message too: a latched one, which came with the header.

@@ -6,6 +6,7 @@
 | irsensor_scan | sensor_msgs/msg/LaserScan, a ray for each of the nine sensors | read |
 | distance_sensors | sensor_msgs/msg/PointCloud, as a bridge to the ROS 1 driver publishes it | read |
 | bumper | std_msgs/msg/Bool | read |
+| image_raw | sensor_msgs/msg/Image | read if the policy sees images |
 | cmd_vel | geometry_msgs/msg/Twist | published |
 
 A best-effort subscription matches reliable publishers too, and an old reading is of no use.
@@ -30,13 +31,15 @@ import numpy as np
 import structlog
 from numpy.typing import NDArray
 
-from palaestra_trainer.errors import ConfigurationError, LinkError, NoSuchSensor, RobotUnfit
+from palaestra_trainer.errors import ConfigurationError, LinkError, RobotUnfit
 from palaestra_trainer.real_robots.camera import ImageSize
 from palaestra_trainer.real_robots.readings import Odometry, ReadingStore
 from palaestra_trainer.real_robots.robot_clock import RobotClock
 from palaestra_trainer.real_robots.ros1_messages import distances_of as distances_of_points
 from palaestra_trainer.real_robots.ros1_messages import odometry_of
 from palaestra_trainer.real_robots.ros2_messages import distances_of as distances_of_scan
+from palaestra_trainer.real_robots.ros_images import TOPIC as IMAGES
+from palaestra_trainer.real_robots.ros_images import image_of
 from palaestra_trainer.real_robots.sensor_layout import UNITS, SensorLayout
 from palaestra_trainer.robots.geometry import Twist
 from palaestra_trainer.ros2.node import Ros2Node, require
@@ -92,6 +95,7 @@ class Ros2Link:
         self._bumped = False
         self._heard_bumpers: list[tuple[Any, Any]] = []
         self._open = True
+        self._sees = False
         self._twist = require("geometry_msgs.msg").Twist
         self._commands = self._subscribe()
         self._node.start()
@@ -117,11 +121,21 @@ class Ros2Link:
         self._store = store
 
     def use_camera(self, store: ReadingStore, size: ImageSize) -> None:
-        """Refuse: this connection has no camera."""
-        del store, size
-        raise NoSuchSensor(
-            f"{self.address}: the camera of a ROS 2 driver is not read; use the REST interface"
-        )
+        """Begin to receive pictures of `image_raw`; each replaces the one before."""
+        if self._sees:
+            return
+        self._sees = True
+
+        def read(message: Any) -> None:
+            at_s = self._clock.now_s()
+            try:
+                store.set_image(image_of(message, size), at_s)
+            except LinkError as error:
+                store.refuse_image(str(error))
+
+        topic = self._resolved(IMAGES)
+        store.image_fault = f"no picture arrives on {topic}; start the camera's node, or remap the topic"
+        self._node.ros.create_subscription(require("sensor_msgs.msg").Image, IMAGES, read, _newest())
 
     def send(self, twist: Twist) -> None:
         """Publish one velocity; ROS 2 does not confirm that the robot has taken it."""
@@ -140,17 +154,15 @@ class Ros2Link:
     def _subscribe(self) -> Any:
         """Subscribe all readings, and return the publisher of the commands."""
         qos = require("rclpy.qos")
-        best_effort, reliable = qos.ReliabilityPolicy.BEST_EFFORT, qos.ReliabilityPolicy.RELIABLE
-        newest = qos.QoSProfile(depth=1, reliability=best_effort)
         sensor_messages = require("sensor_msgs.msg")
         for kind, topic, read in (
             (require("nav_msgs.msg").Odometry, "odom", self._read_odometry),
             (sensor_messages.LaserScan, "irsensor_scan", self._distances(distances_of_scan)),
             (sensor_messages.PointCloud, "distance_sensors", self._distances(distances_of_points)),
         ):
-            self._node.ros.create_subscription(kind, topic, read, newest)
+            self._node.ros.create_subscription(kind, topic, read, _newest())
         return self._node.ros.create_publisher(
-            self._twist, "cmd_vel", qos.QoSProfile(depth=1, reliability=reliable)
+            self._twist, "cmd_vel", qos.QoSProfile(depth=1, reliability=qos.ReliabilityPolicy.RELIABLE)
         )
 
     def _read_odometry(self, message: Any) -> None:
@@ -209,6 +221,12 @@ class Ros2Link:
 
     def _resolved(self, topic: str) -> str:
         return str(self._node.ros.resolve_topic_name(topic))
+
+
+def _newest() -> Any:
+    """Return the quality of service for readings: best effort, and only the newest message."""
+    qos = require("rclpy.qos")
+    return qos.QoSProfile(depth=1, reliability=qos.ReliabilityPolicy.BEST_EFFORT)
 
 
 def _namespace(address: str) -> str:
