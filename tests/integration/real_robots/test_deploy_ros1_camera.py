@@ -1,4 +1,4 @@
-"""`palaestra-deploy` with a policy that sees, over ROS 1: a node publishes the pictures of a mock robot."""
+"""A policy that sees, over ROS 1: a node of ours publishes the pictures of a mock robot."""
 
 import contextlib
 import math
@@ -16,6 +16,7 @@ from tests.mock_robots import DEADLINE_S, Client, ended, started
 from tests.packages import write_seeing_package
 
 SPEED = 4.0
+TOPIC = "/usb_cam/image_raw"
 SIZE = (80, 60)  # RosPublisher is for short messages
 START = (-0.9, 0.1, 0.1)
 
@@ -36,6 +37,7 @@ def deploy(master, tmp_path):
     package = write_seeing_package(tmp_path / "package")
     command = [sys.executable, "-m", "palaestra_trainer.cli.deploy", package, "--start=-0.9,0.1,0.1"]
     command += [f"--robot={master.replace('http:', 'ros1:')}", "--target=0,0", "--yes", "--no-hold"]
+    command += [f"--topic=image_raw={TOPIC}"]
     command += [f"--mock-speed={SPEED:g}", f"--log={tmp_path / 'log.mcap'}"]
 
     def run(*arguments):
@@ -51,7 +53,7 @@ def camera(master, robot, encoding):
     """Publish the pictures of a mock robot in a thread, until the end of the context."""
     over, client = threading.Event(), Client(robot.address)
     node = TopicNode("/camera", master)
-    publisher = RosPublisher(node, "/image_raw", "sensor_msgs/Image")
+    publisher = RosPublisher(node, TOPIC, "sensor_msgs/Image")
 
     def publish():
         while not over.wait(0.01):
@@ -81,7 +83,7 @@ def encoded(pixels, encoding):
 
 
 def test_a_policy_that_sees_drives_over_ros(deploy, master, mock, tmp_path):
-    """The node of the camera is another one than the driver."""
+    """The node of the camera is another one than the driver, and has a namespace of its own."""
     with camera(master, mock, "bgra8"):
         done = deploy()
 

@@ -183,13 +183,14 @@ def test_the_policy_node_drives_to_goals_in_the_time_of_clock(mock, package, tmp
 
 
 def test_a_policy_that_sees_acts_on_published_images(mock, tmp_path):
-    """The pictures have another size and order of colors than the images that the policy learned with."""
+    """The pictures have another size, order of colors and topic than the policy expects."""
     package, bag = write_seeing_package(tmp_path / "package"), tmp_path / "node.mcap"
     mock.send("/mock/place", [-1.3, 0.3, 0.2])
-    record = ("--", "--record", bag)
+    front = ("--ros-args", "-r", "image_raw:=/front/image", "--")
+    own = ("--", "--record", bag, "--topic", "image_raw=/front/image")
     with (
-        driver(mock, "/robot1", "--clock", "--camera") as robot,
-        node(package, "in-a-simulation", *record) as (program, log),
+        driver(mock, "/robot1", "--clock", "--camera", *front) as robot,
+        node(package, "in-a-simulation", *own) as (program, log),
     ):
         send(robot, "odom", of_odometry(mock, 0.0, 0.0))
         wait_for(log, "reached after")
@@ -246,10 +247,17 @@ def test_a_robot_without_a_driver_is_refused(lonely):
     )
 
 
-def test_without_rclpy_the_message_names_the_remedy(package):
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ([], "rclpy is not installed; source the setup file of your ROS 2"),
+        (["--topic=pose=/p"], "--topic: 'pose' is neither read nor published; use one of bumper, cmd_vel"),
+    ],
+)
+def test_without_rclpy_or_with_an_unknown_topic_the_message_names_the_remedy(package, options, message):
     """Most users of this program have ROS 2, but have not sourced it in this terminal."""
     done = subprocess.run(
-        [sys.executable, "-m", "palaestra_trainer.cli.policy_node", package],
+        [sys.executable, "-m", "palaestra_trainer.cli.policy_node", package, *options],
         check=False,
         capture_output=True,
         text=True,
@@ -257,4 +265,4 @@ def test_without_rclpy_the_message_names_the_remedy(package):
     )
 
     assert done.returncode == 2
-    assert "rclpy is not installed; source the setup file of your ROS 2" in done.stderr
+    assert message in done.stderr

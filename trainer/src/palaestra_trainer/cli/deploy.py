@@ -23,6 +23,7 @@ from palaestra_trainer.errors import ConfigurationError, RobotStopped, TrainerEr
 from palaestra_trainer.real_robots.robot_clock import RobotClock
 from palaestra_trainer.real_robots.safety import Fence, SafetyRules
 from palaestra_trainer.real_robots.sensor_layout import ORDERS, UNITS, SensorLayout
+from palaestra_trainer.real_robots.topics import topics_of
 from palaestra_trainer.robots.geometry import TURN_RAD_S, Point, Pose
 from palaestra_trainer.run.signals import Interruption
 from palaestra_trainer.run.telemetry.logs import configure_logs
@@ -84,7 +85,8 @@ def _drive(options: argparse.Namespace, interruption: Interruption) -> int:
     rules = _rules(options)
     terminal = Terminal(None if options.no_hold or options.dry_run else HoldKey())
     clock = RobotClock(options.mock_speed)
-    link = link_to(options.robot, SensorLayout(order=options.sensor_order, unit=options.sensor_unit), clock)
+    sensors = SensorLayout(order=options.sensor_order, unit=options.sensor_unit)
+    link = link_to(options.robot, sensors, clock, topics_of(options.topic))
     path = options.log or Path(time.strftime("deployment-%Y%m%d-%H%M%S.mcap"))
     record = DeploymentRecord(path, {"package": str(options.package), "robot": options.robot})
     with ExitStack() as stack:
@@ -167,6 +169,7 @@ def arguments_parser() -> argparse.ArgumentParser:
     )
     add("--sensor-order", choices=ORDERS, default=ORDERS[0], help="order of the robot's distance sensors")
     add("--sensor-unit", choices=UNITS, default=UNITS[0], help="unit of the robot's distance sensors")
+    add("--topic", action="append", default=[], metavar="NAME=TOPIC", help=_TOPIC)
     add("--log", type=Path, metavar="FILE", help="the record; default: deployment-<time>.mcap")
     add("--mock-speed", type=seconds, default=1.0, metavar="N", help="speed of a mock robot, times real time")
     return options
@@ -176,6 +179,7 @@ _ROBOT = "http://HOST of the robot, ros1://HOST:PORT[/NAMESPACE] of its ROS mast
 _TARGET = "target of an episode in m; repeatable: each further episode begins where the one before ended"
 _START = "where the robot stands, in m and rad of the task's frame (default: 0,0,0)"
 _FENCE = "least x and y, then greatest, in m: the robot stays inside (default: 1 m around start and targets)"
+_TOPIC = "over ROS: topic in place of the driver's, such as odom=/robot/odom; repeatable"
 _NO_HOLD = "drive without a held key; use it only where the robot cannot hit a person"
 _NEGATIVE = ("--target", "--start", "--fence")
 

@@ -21,6 +21,7 @@ from palaestra_trainer.errors import CameraUnfit, ConfigurationError, RobotUnfit
 from palaestra_trainer.real_robots.robot_clock import RobotClock
 from palaestra_trainer.real_robots.ros2_clock import SimulationClock, SimulationTime
 from palaestra_trainer.real_robots.safety import Fence, SafetyRules
+from palaestra_trainer.real_robots.topics import ROS2, refuse_unknown, remaps, topics_of
 from palaestra_trainer.robots.geometry import TURN_RAD_S, Pose
 from palaestra_trainer.ros2.node import Ros2Node, require
 from palaestra_trainer.run.signals import Interrupted, Interruption
@@ -56,6 +57,7 @@ exit codes:
   2  the package, a parameter or an argument is wrong
 """
 NAME: Final = "palaestra_policy"
+GOAL: Final = "goal_pose"
 _CORNERS: Final = 4
 
 
@@ -96,6 +98,8 @@ def _serve(options: argparse.Namespace, ros_arguments: Sequence[str], interrupti
     from palaestra_trainer.real_robots.robotino import RealRobotino
     from palaestra_trainer.real_robots.ros2 import Ros2Link
 
+    topics = topics_of(options.topic)
+    refuse_unknown(topics, (*ROS2, GOAL))
     package = checked_package.read(options.package)
     goals = Goals()
 
@@ -105,12 +109,12 @@ def _serve(options: argparse.Namespace, ros_arguments: Sequence[str], interrupti
             raise NewGoal
 
     with ExitStack() as stack:
-        node = Ros2Node(NAME, arguments=ros_arguments)
+        node = Ros2Node(NAME, arguments=[*remaps(topics), *ros_arguments])
         stack.callback(node.close)
         rules = _rules(node)
         simulation = _simulation(node)
         clock = RobotClock() if simulation is None else SimulationClock(time=simulation)
-        link = Ros2Link(f"ros2:{node.ros.get_namespace()}", None, clock, node, interruption.check)
+        link = Ros2Link(f"ros2:{node.ros.get_namespace()}", clock=clock, node=node, check=interruption.check)
         quiet = QuietLink(link)
         about = {"package": str(options.package), "robot": link.address}
         record = DeploymentRecord(options.record or Path(), about)
@@ -126,7 +130,7 @@ def _serve(options: argparse.Namespace, ros_arguments: Sequence[str], interrupti
         _wait_for_images(robot, package.image_size, warn)
         deployment = Deployment(package, robot, record, node.ros.get_logger().debug)
         _subscribe(node, link, goals, rules.fence)
-        say(f"ready; waiting for a goal on {node.ros.resolve_topic_name('goal_pose')}")
+        say(f"ready; waiting for a goal on {node.ros.resolve_topic_name(GOAL)}")
         driver = GoalDriver(robot, quiet, deployment, goals)
         driver.run(interruption.check, say, warn)
 
@@ -214,15 +218,22 @@ def _subscribe(node: Ros2Node, link: Ros2Link, goals: Goals, fence: Fence | None
 
     qos = require("rclpy.qos")
     reliable = qos.QoSProfile(depth=1, reliability=qos.ReliabilityPolicy.RELIABLE)
-    node.ros.create_subscription(require("geometry_msgs.msg").PoseStamped, "goal_pose", take, reliable)
+    node.ros.create_subscription(require("geometry_msgs.msg").PoseStamped, GOAL, take, reliable)
 
 
 def _parser() -> argparse.ArgumentParser:
     options = parser("palaestra-policy-node", ABOUT, EXIT_CODES)
-    options.usage = "palaestra-policy-node PACKAGE [--record FILE] [--ros-args ...]"
+    options.usage = "palaestra-policy-node PACKAGE [--record FILE] [--topic NAME=TOPIC] [--ros-args ...]"
     options.add_argument("package", type=Path, metavar="PACKAGE", help="folder or zip of the package")
     options.add_argument(
         "--record", type=Path, metavar="FILE", help="also write a bag, as palaestra-deploy does"
+    )
+    options.add_argument(
+        "--topic",
+        action="append",
+        default=[],
+        metavar="NAME=TOPIC",
+        help="topic in place of one above, such as odom=/robot/odom; repeatable",
     )
     return options
 

@@ -8,7 +8,7 @@
 - `ros1`: the connection over ROS 1; `ros1_messages`: the messages of the robot's driver as readings
 - `ros2`: the connection over ROS 2; `ros2_messages`: its scan of distances as a reading
 - `ros2_clock`: the time of a simulation that publishes /clock
-- `connect`: the connection for an address
+- `connect`: the connection for an address; `topics`: topics with other names than those of the driver
 - `camera`: pictures of the camera as images of the size that a policy learned with
 - `command_loop`: sends the command of a policy at 20 Hz, as far as the safety rules allow
 - `ros_images`: pictures in messages of both ROS

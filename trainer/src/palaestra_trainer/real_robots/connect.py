@@ -12,28 +12,41 @@ from palaestra_trainer.real_robots.robot_clock import RobotClock
 from palaestra_trainer.real_robots.ros1 import Ros1Link
 from palaestra_trainer.real_robots.ros2 import Ros2Link
 from palaestra_trainer.real_robots.sensor_layout import SensorLayout
+from palaestra_trainer.real_robots.topics import Topics
 
-LINKS: Final[Mapping[str, Callable[[str, SensorLayout, RobotClock], RobotLink]]] = {
-    "http://": RestLink,
+
+def _over_rest(address: str, sensors: SensorLayout, clock: RobotClock, topics: Topics) -> RobotLink:
+    if topics:
+        raise ConfigurationError(
+            "--topic: the REST interface has no topics; omit it, or use an address of ROS"
+        )
+    return RestLink(address, sensors, clock)
+
+
+LINKS: Final[Mapping[str, Callable[[str, SensorLayout, RobotClock, Topics], RobotLink]]] = {
+    "http://": _over_rest,
     "ros1://": Ros1Link,
     "ros2:": Ros2Link,
 }
 
 
-def link_to(address: str, sensors: SensorLayout, clock: RobotClock) -> RobotLink:
+def link_to(
+    address: str, sensors: SensorLayout, clock: RobotClock, topics: Topics | None = None
+) -> RobotLink:
     """Return the connection to the robot at an address, such as http://192.168.0.1; it is not open yet.
 
     Args:
         address: the address of the robot; it begins with a key of `LINKS`.
         sensors: how the robot reports its distance sensors.
         clock: the robot's clock.
+        topics: topics with other names than those of the driver.
 
     Raises:
-        ConfigurationError: the scheme is not known, the address is not one of its scheme, or the
-            connection needs rclpy, which is not installed.
+        ConfigurationError: the scheme is not known, the address is not one of its scheme, the connection
+            does not have one of the topics, or it needs rclpy, which is not installed.
     """
     for scheme, link in LINKS.items():
         if address.startswith(scheme):
-            return link(address, sensors, clock)
+            return link(address, sensors, clock, topics or {})
     known = " or ".join(LINKS)
     raise ConfigurationError(f"robot: {address!r} has an unknown scheme; begin it with {known}")

@@ -43,6 +43,7 @@ from palaestra_trainer.real_robots.ros1_messages import distances_of, fields_of,
 from palaestra_trainer.real_robots.ros_images import TOPIC as IMAGES
 from palaestra_trainer.real_robots.ros_images import image_of
 from palaestra_trainer.real_robots.sensor_layout import UNITS, SensorLayout
+from palaestra_trainer.real_robots.topics import ROS1, Topics, refuse_unknown
 from palaestra_trainer.robots.geometry import Twist
 from palaestra_trainer.ros.master import Master
 from palaestra_trainer.ros.publisher import RosPublisher
@@ -72,15 +73,22 @@ class Ros1Link:
         address: the address of the ROS master, and the driver's namespace: ros1://HOST:PORT[/NAMESPACE].
         sensors: the order of the distance sensors; the driver's unit is always meters.
         clock: the robot's clock. The time of a reading is the time at which its message arrived.
+        topics: topics with other names than those of the driver; see `topics`.
 
     Raises:
-        ConfigurationError: the address does not have this form.
+        ConfigurationError: the address does not have this form, or a topic has an unknown name.
     """
 
     def __init__(
-        self, address: str, sensors: SensorLayout | None = None, clock: RobotClock | None = None
+        self,
+        address: str,
+        sensors: SensorLayout | None = None,
+        clock: RobotClock | None = None,
+        topics: Topics | None = None,
     ) -> None:
         self.address = address
+        self._topics = topics or {}
+        refuse_unknown(self._topics, ROS1)
         self._master_uri, self._namespace = _parts(address)
         self._sensors = replace(sensors or SensorLayout(), unit=UNITS[0])
         self._clock = clock or RobotClock()
@@ -169,7 +177,9 @@ class Ros1Link:
             return -math.inf if seen.image is None else seen.image_s
 
         topic = self._name(IMAGES)
-        store.image_fault = f"no picture arrives on {topic}; start the camera's node"
+        store.image_fault = (
+            f"no picture arrives on {topic}; start the camera's node, or give its topic with --topic"
+        )
         pictures = RosSubscriber(topic, "sensor_msgs/Image", node=self._node)
         self._listen_in_thread("robot-camera", {pictures: read}, newest_s)
 
@@ -191,7 +201,8 @@ class Ros1Link:
         self._open.close()
 
     def _name(self, name: str) -> str:
-        return f"{self._namespace}/{name}"
+        given = self._topics.get(name, name)
+        return given if given.startswith("/") else f"{self._namespace}/{given}"
 
     def _found_driver(self, master: Master) -> str:
         """Return the name of the running node that publishes odometry and subscribes to commands.

@@ -41,6 +41,7 @@ from palaestra_trainer.real_robots.ros2_messages import distances_of as distance
 from palaestra_trainer.real_robots.ros_images import TOPIC as IMAGES
 from palaestra_trainer.real_robots.ros_images import image_of
 from palaestra_trainer.real_robots.sensor_layout import UNITS, SensorLayout
+from palaestra_trainer.real_robots.topics import ROS2, Topics, refuse_unknown, remaps
 from palaestra_trainer.robots.geometry import Twist
 from palaestra_trainer.ros2.node import Ros2Node, require
 from palaestra_trainer.waiting.check import Check, go_on
@@ -63,6 +64,7 @@ class Ros2Link:
         address: `ros2:`, or `ros2:/NAMESPACE` for topics such as /NAMESPACE/odom.
         sensors: the order of the distance sensors; the driver's unit is always meters.
         clock: the robot's clock. The time of a reading is the time at which its message arrived.
+        topics: topics of a new node with other names than those of the driver; see `topics`.
         node: the node that subscribes and publishes, which its maker closes; None: a new one.
         check: called often while the connection waits for the robot; it may raise.
 
@@ -71,7 +73,7 @@ class Ros2Link:
         odometry: the newest odometry; None before it.
 
     Raises:
-        ConfigurationError: the address is wrong, or rclpy is not installed.
+        ConfigurationError: the address or a name of a topic is wrong, or rclpy is not installed.
     """
 
     def __init__(
@@ -79,6 +81,7 @@ class Ros2Link:
         address: str,
         sensors: SensorLayout | None = None,
         clock: RobotClock | None = None,
+        topics: Topics | None = None,
         node: Ros2Node | None = None,
         check: Check = go_on,
     ) -> None:
@@ -89,7 +92,8 @@ class Ros2Link:
         self._sensors = replace(sensors or SensorLayout(), unit=UNITS[0])
         self._clock = clock or RobotClock()
         self._check = check
-        self._node = node or Ros2Node("palaestra", namespace or None)
+        refuse_unknown(topics or {}, ROS2)
+        self._node = node or Ros2Node("palaestra", namespace or None, remaps(topics or {}))
         self._owned = node is None
         self._store = ReadingStore()
         self._bumped = False
@@ -134,7 +138,9 @@ class Ros2Link:
                 store.refuse_image(str(error))
 
         topic = self._resolved(IMAGES)
-        store.image_fault = f"no picture arrives on {topic}; start the camera's node, or remap the topic"
+        store.image_fault = (
+            f"no picture arrives on {topic}; start the camera's node, or give its topic with --topic"
+        )
         self._node.ros.create_subscription(require("sensor_msgs.msg").Image, IMAGES, read, _newest())
 
     def send(self, twist: Twist) -> None:
@@ -217,7 +223,8 @@ class Ros2Link:
                 f"no odometry arrives on {topic}; start the robot's driver, and compare the namespace and "
                 "ROS_DOMAIN_ID"
             )
-        return f"nobody subscribes {self._commands.topic_name}; start the robot's driver, or remap the topic"
+        fact = f"nobody subscribes {self._commands.topic_name}"
+        return f"{fact}; start the robot's driver, or give its topic with --topic"
 
     def _resolved(self, topic: str) -> str:
         return str(self._node.ros.resolve_topic_name(topic))
