@@ -10,10 +10,16 @@ import numpy as np
 import pytest
 
 from palaestra_trainer.bags.reader import read_bag
+from palaestra_trainer.real_robots.command_loop import Hooks
+from palaestra_trainer.real_robots.robot_clock import RobotClock
+from palaestra_trainer.real_robots.robotino import RealRobotino
+from palaestra_trainer.real_robots.ros1 import Ros1Link
+from palaestra_trainer.real_robots.safety import SafetyRules
 from palaestra_trainer.ros.publisher import RosPublisher
 from palaestra_trainer.ros.topic_node import TopicNode
 from tests.mock_robots import DEADLINE_S, Client, ended, started
 from tests.packages import write_seeing_package
+from tests.waiting import eventually
 
 SPEED = 4.0
 TOPIC = "/usb_cam/image_raw"
@@ -113,3 +119,25 @@ def test_a_camera_without_colors_is_refused_before_the_robot_moves(deploy, maste
     )
     truth = mock.get("/mock/truth")
     assert (truth["x"], truth["y"]) == pytest.approx(START[:2])
+
+
+def test_without_new_pictures_the_robot_is_held_back_until_the_camera_returns(master, mock):
+    """A policy that acts on an old picture is blind, and the node of a camera may start again."""
+    causes = []
+    clock, rules = RobotClock(SPEED), SafetyRules(lost_s=DEADLINE_S * SPEED)
+    hooks = Hooks(decided=lambda _, decision: causes.append(decision.cause and decision.cause.name))
+    link = Ros1Link(master.replace("http:", "ros1:"), clock=clock, topics={"image_raw": TOPIC})
+    with RealRobotino(link, rules, clock=clock, hooks=hooks) as robot:
+        with camera(master, mock, "bgra8"):
+            robot.connect()
+            robot.use_cameras(color=True)
+            before = robot.color_image()
+        eventually(lambda: "stale readings" in causes)
+        mock.send("/mock/place", [*START[:2], math.pi])
+
+        with camera(master, mock, "bgra8"):
+            held_back = robot.advance()
+        after = robot.color_image()
+
+    assert held_back > 0
+    assert before.tolist() != after.tolist()  # the robot has turned away from the pole
