@@ -203,12 +203,9 @@ def test_make_installs_again_only_for_another_index(set_up, tmp_path):
     assert [len(each) for each in commands] == [2, 0, 4, 0, 0]
 
 
-def test_the_page_names_the_pytorch_of_the_lock():
-    """The command on the page must install the version that the trainer requires."""
+def test_the_page_names_the_pytorch_that_the_trainer_accepts():
+    """If the command on the page installed another version, pip would replace it by the large build."""
     root = TOOLS.parent
+    required = re.search(r'"(torch[^"]+)"', (root / "trainer/pyproject.toml").read_text())
 
-    named = re.findall(r"torch==[0-9.]+", (root / "docs/start/laptop.md").read_text())
-
-    assert set(named) == set(
-        re.findall(r"^torch==[0-9.]+", (root / "requirements.lock").read_text(), re.MULTILINE)
-    )
+    assert f"pip install '{required[1]}' --index-url" in (root / "docs/start/laptop.md").read_text()

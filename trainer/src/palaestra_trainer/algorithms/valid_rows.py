@@ -119,7 +119,9 @@ class OffPolicyRows(ValidRowsCounted, OffPolicyAlgorithm):
 
     def _on_step(self) -> None:
         """Count a vector step, for example for the target network; with `n_envs` rows if asynchronous."""
-        if self.num_timesteps - self._counted_at >= self.n_envs or not _is_asynchronous(self.env):
+        if not _is_asynchronous(self.env):
+            super()._on_step()
+        elif abs(self.num_timesteps - self._counted_at) >= self.n_envs:  # a resume may also go back
             self._counted_at = self.num_timesteps
             super()._on_step()
 
