@@ -25,7 +25,7 @@ SEPARATE = ("unshare", "--user", "--map-root-user", "--net")
 
 @cache
 def lack():
-    """Return why this machine has no network namespaces; None if it has them."""
+    """Return the reason for which network namespaces fail here; None if they work."""
     try:
         done = subprocess.run([*SEPARATE, "ip", "link", "set", "lo", "up"], capture_output=True, check=False)
     except OSError:

@@ -55,7 +55,7 @@ def opened(path: Path) -> Iterator[ZipFile]:
     """Open a zip whose members are all plain files with plain names.
 
     Raises:
-        ProtocolError: the file is no zip, or has a member that no package has.
+        ProtocolError: the file is not a zip, or a member does not belong in a package.
         OSError: the file cannot be read.
     """
     with path.open("rb") as file:
@@ -101,7 +101,7 @@ def _refuse_members(members: list[ZipInfo]) -> None:
         if name in seen:
             raise ProtocolError(f"has {name} twice")
         if stat.S_IFMT(member.external_attr >> 16) not in {0, stat.S_IFREG}:
-            raise ProtocolError(f"has {name}, which is no plain file")
+            raise ProtocolError(f"has {name}, which is not a plain file")
         if member.flag_bits & _ENCRYPTED or member.compress_type not in {ZIP_STORED, ZIP_DEFLATED}:
             raise ProtocolError(f"has {name} encrypted, or compressed in another way than by deflate")
         seen.add(name)

@@ -230,7 +230,7 @@ def test_a_package_has_the_results_of_its_policy_in_several_simulators(trained, 
     assert other == mujoco
     for text, fact in (
         (json.dumps(known | {"model": "0" * 64}), "line 1: is a result of another policy than model.zip"),
-        (json.dumps(known | {"success_rate": 90}), "line 1: is no result of a policy"),
+        (json.dumps(known | {"success_rate": 90}), "line 1: is not a result of a policy"),
         ("", "is empty; write the file with `palaestra-eval"),
     ):
         results.write_text(text)
@@ -258,7 +258,9 @@ def test_a_zip_that_is_no_package_is_not_replaced(trained):
     """The zip next to the run may be a person's only copy of a model."""
     run = trained(**CASES["A2C"])
 
-    with pytest.raises(ConfigurationError, match=r"model\.zip: is no package; name a new file with --output"):
+    with pytest.raises(
+        ConfigurationError, match=r"model\.zip: is not a package; name a new file with --output"
+    ):
         exporting.export(run, "package", run / "model.zip")
 
 

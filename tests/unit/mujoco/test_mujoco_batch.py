@@ -113,7 +113,7 @@ def played(batch, reset, commands):
 
 
 def single(row, commands):
-    """Return what a client of the single simulation reads in the same episode."""
+    """Return the readings of a client of the single simulation in the same episode."""
     simulation = Loader(physics=MujocoPhysics)(builtin_path("arena"), Mode.FAST)
     robot = simulation.robots[0]
     robot.custom_data = json.dumps({"seed": row + 7})

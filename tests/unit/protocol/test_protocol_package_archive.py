@@ -59,7 +59,7 @@ def test_equal_files_make_equal_bytes():
         ([*WHOLE.items(), ("../model.zip", b"")], r"has '\.\./model\.zip', which is not the name of a file"),
         ([*WHOLE.items(), ("/etc/passwd", b"")], "which is not the name of a file"),
         ([*WHOLE.items(), ("folder/", b"")], "which is not the name of a file"),
-        ([*WHOLE.items(), (link("notes.txt"), b"/etc/passwd")], r"has notes\.txt, which is no plain file"),
+        ([*WHOLE.items(), (link("notes.txt"), b"/etc/passwd")], r"has notes\.txt, which is not a plain file"),
         ([*WHOLE.items(), *((f"note{each}", b"") for each in range(128))], "has more than 128 files"),
         ([(name, content) for name, content in WHOLE.items() if name != MANIFEST], r"has no manifest\.json"),
         ([(name, content) for name, content in WHOLE.items() if name != "model.zip"], r"has no model\.zip"),

@@ -196,7 +196,7 @@ class MujocoPhysics:
 
 
 def mujoco_steps(step_s: float) -> int:
-    """Return how many of MuJoCo's steps a basic step has."""
+    """Return the number of MuJoCo's steps in a basic step."""
     return math.ceil(step_s / LONGEST_STEP_S - 1e-9)
 
 

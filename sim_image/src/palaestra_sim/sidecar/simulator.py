@@ -123,7 +123,7 @@ class SupervisedSimulator:
         return replace(state, rss_bytes=self.usage().rss_bytes) if ready else state
 
     def _address(self) -> str | None:
-        """Return the address of the copies that the running process serves; None while there is none."""
+        """Return the address at which the running process serves its copies; None before it has one."""
         if self._batch is None or self._process is None:
             return None
         try:

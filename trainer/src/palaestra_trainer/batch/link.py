@@ -87,7 +87,7 @@ class BatchLink:
         self._rows = self._values = 0
 
     def open(self, address: str, request: BatchRequest) -> BatchDescription:
-        """Connect to `host:port` and request these devices; return what the simulator offers.
+        """Connect to `host:port` and request these devices; return the simulator's description of them.
 
         Raises:
             WorldMisfit: the world lacks a device or node, or cannot be simulated in this way.

@@ -100,7 +100,7 @@ class DeploymentRecord:
     def step(self, distances_m: Floats, observation: Any, action: Any) -> None:
         """Record a step of the policy: the distances, and the numbers that it saw and returned.
 
-        Observations that are no array of at most `MOST_NUMBERS` numbers are left out; `image` records images.
+        An observation with parts or more than `MOST_NUMBERS` numbers is left out; `image` records images.
         """
         now_s = time.time()
         scan = messages.ranges(now_s, distances_m.tolist(), SENSOR_RANGE_M)

@@ -117,7 +117,7 @@ def characters(scene: VisibleScene) -> int:
 
 
 def lightened(scene: VisibleScene, most_characters: int = MOST_SCENE_CHARACTERS) -> VisibleScene:
-    """Return a scene that is no longer than `most_characters` as JSON.
+    """Return the scene, shortened to at most `most_characters` of JSON.
 
     The largest meshes are replaced by their bounding boxes and counted in `simplified`.
 

@@ -75,7 +75,7 @@ def export(run: Path, to: str, file: Path | None = None, results: Path | None = 
 
     Raises:
         ConfigurationError: the model or a library of the extra `export` is missing, or the place of the
-            package exists and is no package.
+            package exists and is not a package.
         ExportError: the file would act differently from the policy, so it was not written.
         OSError: the file could not be written.
     """

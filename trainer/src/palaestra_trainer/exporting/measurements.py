@@ -105,7 +105,7 @@ def _result(line: bytes, place: str, digest: str) -> dict[str, Any]:
         result = Measurement.model_validate(content)
     except (ValidationError, ValueError, RecursionError) as error:
         raise ConfigurationError(
-            f"{place}: is no result of a policy ({type(error).__name__}); {_REMEDY}"
+            f"{place}: is not a result of a policy ({type(error).__name__}); {_REMEDY}"
         ) from error
     if content.get("model") != digest:
         raise ConfigurationError(

@@ -43,7 +43,7 @@ def write_package(
         results: a file with further results of the policy, as `palaestra-eval --json` prints them.
 
     Raises:
-        ConfigurationError: the place is no package, the robot's class is unknown, or a result is that of
+        ConfigurationError: the place is not a package, the robot's class is unknown, or a result is that of
             another policy.
         OSError: a file cannot be read or written.
     """
@@ -62,7 +62,7 @@ def write_package(
 
 def _write_zip(path: Path, files: Mapping[str, bytes]) -> None:
     if path.exists() and not is_package(path):
-        raise ConfigurationError(f"{path}: is no package; name a new file with --output")
+        raise ConfigurationError(f"{path}: is not a package; name a new file with --output")
     path.parent.mkdir(parents=True, exist_ok=True)
     replace_file(path, partial(_write, archived(files)))
 

@@ -86,7 +86,7 @@ def _outline(model: Any, data: Any, geom: int) -> tuple[float, ...]:
 
 
 def _reach(model: Any, geom: int) -> float:
-    """Return how far a part of the robot reaches from the robot's axis."""
+    """Return the greatest distance in meters of a part of the robot from the robot's axis."""
     x, y, _ = model.geom_pos[geom].tolist()
     flat = np.zeros(9)
     mujoco.mju_quat2Mat(flat, model.geom_quat[geom])

@@ -145,7 +145,7 @@ _ENDLESS: Final = (-math.inf, math.inf)
 
 
 def _lack_of_motor(device: object, commanded: str) -> str:
-    """Return why a device cannot be commanded in this way; "" if it can."""
+    """Return the reason that refuses a command of this kind for a device; "" if the device takes it."""
     if isinstance(device, MujocoActuator):
         return "" if commanded == "control" else "is commanded by control"
     if not isinstance(device, ActuatorMotor):

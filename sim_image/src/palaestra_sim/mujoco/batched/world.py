@@ -50,7 +50,7 @@ class BatchWorld(Protocol):
     """Many copies of one world."""
 
     def open(self, request: BatchRequest) -> BatchDescription:
-        """Use these devices from now on; return what the world offers.
+        """Use these devices from now on; return the number of copies, the basic step and the units.
 
         Raises:
             BatchRefusedError: the world lacks a device or node, or the period does not fit.
