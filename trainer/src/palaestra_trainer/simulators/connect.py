@@ -59,26 +59,20 @@ def connect_members(configuration: Configuration) -> list[Member]:
     Raises:
         The same errors as `connect`.
     """
-    if not any(entry.batch for entry in configuration.simulators):
-        return [_member(simulator, configuration) for simulator in connect(configuration)]
-    single = tuple(entry for entry in configuration.simulators if not entry.batch)
-    rest = configuration.model_copy(update={"simulators": single})
-    others = [_member(simulator, rest) for simulator in connect(rest)] if single else []
-    many = (entry for entry in configuration.simulators if entry.batch)
-    return [
-        *(BatchSimulator(Sidecar(entry.control, entry.name), configuration, entry) for entry in many),
-        *others,
-    ]
+    if not all(entry.batch for entry in configuration.simulators):
+        ensure_node(f"trainer_r{configuration.replica}")
+    return [_member(configuration, entry) for entry in configuration.simulators]
 
 
-def _member(simulator: Simulator, configuration: Configuration) -> Member:
-    """Return the simulator, or with its standby if it has one."""
-    entry = next(entry for entry in configuration.simulators if entry.name == simulator.name)
+def _member(configuration: Configuration, entry: SimulatorConfiguration) -> Member:
+    """Return the simulator of an entry: one with copies, a single one, or one with its standby."""
+    sidecar = Sidecar(entry.control, entry.name)
+    if entry.batch:
+        return BatchSimulator(sidecar, configuration, entry)
+    simulator = simulator_at(sidecar, configuration, entry)
     if not entry.standby:
         return simulator
-    return Standby(
-        simulator, simulator_at(simulator.sidecar.standby(), configuration, entry), limit_of(entry)
-    )
+    return Standby(simulator, simulator_at(sidecar.standby(), configuration, entry), limit_of(entry))
 
 
 def connect_here(configuration: Configuration, run: Path) -> list[Simulator]:
