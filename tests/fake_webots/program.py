@@ -59,13 +59,13 @@ class Webots:
         self.loop.watch(self.listener, self.accept)
         self.controllers = {}
         self.code = 0
-        self.ending = False
+        self.then = None  # what follows the end of all controllers, once it has begun
         self.mode = MODES[options.mode]
 
     def run(self):
         """Load the world, start the controllers, and serve them until the end."""
         self.loop.wake_on_signals()
-        signal.signal(signal.SIGTERM, lambda *_: self.loop.post(lambda: self.end(self.loop.stop)))
+        signal.signal(signal.SIGTERM, lambda *_: self.loop.post(self.end_program))
         try:
             self.load_world()
             self.loop.run()
@@ -77,7 +77,7 @@ class Webots:
 
     def load_world(self):
         """Load the world file, and start the controller of each robot, in the order of the file."""
-        self.ending = False
+        self.then = None
         load = Loader(physics=_physics(), leave_out=LeaveOut(names=True))
         self.simulation = load(self.world_path, self.mode)
         self.stepping = Stepping(self.simulation)
@@ -98,13 +98,24 @@ class Webots:
         connection, _ = self.listener.accept()
         Link(self, connection)
 
-    def end(self, then):
-        """End all controllers, and then go on."""
-        if self.ending:
+    def end_program(self):
+        """End all controllers and then the program, also instead of a load that has begun."""
+        if self.then is not None:
+            self.then = self.loop.stop
             return
-        self.ending = True
+        self.end(self.loop.stop)
+
+    def end(self, then):
+        """End all controllers, and then go on; do nothing if they are ending already."""
+        if self.then is not None:
+            return
+        self.then = then
         self.stepping.end()
-        self.end_controllers(list(self.controllers.values()), then)
+        self.end_controllers(list(self.controllers.values()), self.go_on)
+
+    def go_on(self):
+        """Do what follows the end of all controllers, which a quit may have changed by now."""
+        self.then()
 
     def end_controllers(self, controllers, then):
         """End controllers: -1 to their next step, SIGTERM after a second, and then go on."""
@@ -138,7 +149,7 @@ class Webots:
     def quit(self, status):
         """End the program with this exit code."""
         self.code = status
-        self.loop.later(0.0, lambda: self.end(self.loop.stop))
+        self.loop.later(0.0, self.end_program)
 
     def reload(self):
         """Load the world file again."""
@@ -155,7 +166,9 @@ class Webots:
         self.end_controllers([self.controllers[robot.name]], lambda: self.start_again(robot))
 
     def start_again(self, robot):
-        """Start the controller of a robot that has ended."""
+        """Start the controller of a robot that has ended, unless all are ending by now."""
+        if self.then is not None:
+            return
         self.stepping.leave(robot)
         self.start(robot)
 
