@@ -183,6 +183,35 @@ def test_a_write_that_would_be_read_back_and_change_nothing_is_refused(
         robot.call(f"supervisor/field/{setter}", field=handle, value=value)
 
 
+JOINT_OF_AN_ARM = """
+DEF JOINT {joint} {{
+  jointParameters {parameters} {{ minStop -1 maxStop 1 }}
+  endPoint DEF END Solid {{ name "end" }}
+}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("joint", "parameters"),
+    [
+        ("HingeJoint", "HingeJointParameters"),
+        ("SliderJoint", "JointParameters"),
+        ("Hinge2Joint", "HingeJointParameters"),
+        ("BallJoint", "BallJointParameters"),
+    ],
+)
+def test_the_limits_of_a_joint_cannot_be_written(ros, start, world, simple_robot, joint, parameters):
+    """The limits are read at the start, so a client that randomizes them would train with the first ones."""
+    text = JOINT_OF_AN_ARM.format(joint=joint, parameters=f"DEF LIMITS {parameters}")
+    start(world(robot=simple_robot.replace("children [", f"children [ {text}", 1)))
+    node = ros.node("robotino")
+    limits = node.get("supervisor/get_from_def", name="LIMITS")
+    stop = node.get("supervisor/node/get_field", node=limits, fieldName="minStop")
+
+    with pytest.raises(ServiceFailed, match=rf"{parameters}\.minStop cannot be changed while"):
+        node.call("supervisor/field/set_float", field=stop, value=-0.5)
+
+
 def test_the_sensor_of_a_robot_cannot_be_moved_by_field(robot, simple_robot, ros, start, world):
     """The rays of a sensor start at its position in the world file, so a write would have no effect."""
     del robot

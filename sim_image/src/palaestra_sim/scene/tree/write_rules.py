@@ -12,22 +12,17 @@ from typing import Final
 from palaestra_sim.ros_interfaces import UnsimulatedError
 from palaestra_sim.scene.devices import DEVICES
 from palaestra_sim.scene.nodes.scene_node import SceneNode
-from palaestra_sim.scene.nodes.types import is_base_type
 
-# Nodes that affect the physics. Other nodes are only visible, unless they are part of a boundingObject.
-_ACTING: Final = DEVICES.keys() | frozenset(
+# Base types of which Webots shows only the looks; the pictures and the rays here show them too. A write to a
+# node of another base type changes what moves or what a sensor measures. A part of a boundingObject has rules
+# of its own.
+_DRAWN: Final = frozenset(
     (
-        "ContactProperties",
-        "Group",
-        "HingeJoint",
-        "HingeJointParameters",
-        "Physics",
-        "Pose",
-        "Robot",
-        "Solid",
-        "Track",
-        "Transform",
-        "WorldInfo",
+        *("Appearance", "Background", "Billboard", "Box", "CadShape", "Capsule", "Color", "Cone", "Coordinate"),
+        *("Cylinder", "DirectionalLight", "ElevationGrid", "Fog", "ImageTexture", "IndexedFaceSet"),
+        *("IndexedLineSet", "LensFlare", "Material", "Mesh", "Muscle", "Normal", "PBRAppearance", "Plane"),
+        *("PointLight", "PointSet", "Shape", "Sphere", "SpotLight", "TextureCoordinate", "TextureTransform"),
+        "Viewpoint",
     )
 )
 # Fields that only people read. `name` is one of these fields, because a running controller has already read
@@ -127,7 +122,7 @@ def _require_no_client(nodes: Iterable[SceneNode], done: str) -> None:
 
 
 def _acts(node: SceneNode) -> bool:
-    return (node.type_name in _ACTING or not is_base_type(node.type_name)) and node.type_name not in _HOLDING
+    return node.type_name not in _DRAWN | _HOLDING
 
 
 def resizes(node: SceneNode, field: str) -> bool:
@@ -136,7 +131,7 @@ def resizes(node: SceneNode, field: str) -> bool:
 
 
 def _is_drawn_only(node: SceneNode, field: str) -> bool:
-    return node.type_name not in _ACTING or field in _FOR_PEOPLE
+    return node.type_name in _DRAWN or field in _FOR_PEOPLE
 
 
 def _reaches_robot(node: SceneNode, field: str) -> bool:
