@@ -30,7 +30,7 @@ def world_map(**labels):
 
 @pytest.mark.after_the_kills
 def test_a_simulator_that_never_comes_up_is_named_and_spends_the_trainers_budget(namespace, job):
-    """To Kubernetes the sidecar runs.
+    """Kubernetes reports that the sidecar runs.
 
     Only the trainer and the operator can detect that the simulator does not respond.
     """

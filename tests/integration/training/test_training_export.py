@@ -259,7 +259,7 @@ def test_a_zip_that_is_no_package_is_not_replaced(trained):
     run = trained(**CASES["A2C"])
 
     with pytest.raises(
-        ConfigurationError, match=r"model\.zip: is not a package; name a new file with --output"
+        ConfigurationError, match=r"model\.zip: exists and is not a package; choose another file"
     ):
         exporting.export(run, "package", run / "model.zip")
 

@@ -11,7 +11,7 @@ from palaestra.api.yaml_io import NotYaml, read
 from palaestra.errors import PalaestraError
 from palaestra_protocol.foreign_words import NO_ALGORITHM
 
-# Zoo names its files after these names of algorithms.
+# The names of Zoo's hyperparameter files, and the algorithms that they are for.
 OF_FILES: Mapping[str, str] = {
     "a2c": "A2C",
     "crossq": "CrossQ",

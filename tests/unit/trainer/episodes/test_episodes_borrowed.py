@@ -203,7 +203,7 @@ class Judge(Honest):
 
 
 def test_goals_whose_reward_was_computed_stay_as_they_are(restarter):
-    """Hindsight replay learns from the goals after their reward was computed."""
+    """Hindsight replay computes rewards from the goals and then stores them, so they must not change."""
     env = SimulatorsVecEnv([restarter(Honest)], 1, judge=Judge())
     achieved, desired = np.ones((4, 2)), np.zeros((4, 2))
 

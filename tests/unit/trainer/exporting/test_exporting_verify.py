@@ -167,7 +167,7 @@ def test_a_file_with_the_favorite_action_but_other_scores_is_refused():
     "acted", [FEW, spaces.Box(-1.0, 1.0, (2,), np.float32)], ids=["discrete", "continuous"]
 )
 def test_a_policy_that_sees_nothing_is_not_exported(acted):
-    """The policy acts in the same way on every observation, so any file would pass the comparison."""
+    """The policy always returns one action, so a file that ignores observations would pass the comparison."""
     policy = policy_of(sb3.PPO, acted=acted)
     with torch.no_grad():
         policy.model.policy.action_net.weight.zero_()

@@ -12,7 +12,7 @@ from palaestra_trainer.simulators.interface import Located
 
 MOST_FRAMES = 500
 MOST_OBSTACLES = 200
-MOST_FILMS = 200  # an evaluation records only its first episodes; a film takes 6 kB
+MOST_FILMS = 200  # an evaluation records only its first episodes; the poses of a film take at most 6 kB
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -62,7 +62,7 @@ def write_package(
 
 def _write_zip(path: Path, files: Mapping[str, bytes]) -> None:
     if path.exists() and not is_package(path):
-        raise ConfigurationError(f"{path}: is not a package; name a new file with --output")
+        raise ConfigurationError(f"{path}: exists and is not a package; choose another file with --output")
     path.parent.mkdir(parents=True, exist_ok=True)
     replace_file(path, partial(_write, archived(files)))
 

@@ -18,8 +18,16 @@ from palaestra_sim.scene.nodes.scene_node import SceneNode
 # of its own.
 _DRAWN: Final = frozenset(
     (
-        *("Appearance", "Background", "Billboard", "Box", "CadShape", "Capsule", "Color", "Cone", "Coordinate"),
-        *("Cylinder", "DirectionalLight", "ElevationGrid", "Fog", "ImageTexture", "IndexedFaceSet"),
+        *("Appearance", "Background", "Billboard", "Box", "CadShape", "Capsule", "Color", "Cone"),
+        *(
+            "Coordinate",
+            "Cylinder",
+            "DirectionalLight",
+            "ElevationGrid",
+            "Fog",
+            "ImageTexture",
+            "IndexedFaceSet",
+        ),
         *("IndexedLineSet", "LensFlare", "Material", "Mesh", "Muscle", "Normal", "PBRAppearance", "Plane"),
         *("PointLight", "PointSet", "Shape", "Sphere", "SpotLight", "TextureCoordinate", "TextureTransform"),
         "Viewpoint",
