@@ -28,7 +28,7 @@ _MOST_LIST_BYTES: Final = 2**17
 _ENCRYPTED: Final = 0x1
 _UNIX: Final = 3
 _EPOCH: Final = (1980, 1, 1, 0, 0, 0)  # the earliest time of the format, so that no clock changes the bytes
-# Source: APPNOTE.TXT of PKWARE, 4.3.16 and 4.3.15.
+# Source: APPNOTE.TXT of PKWARE, sections 4.3.16 and 4.3.15.
 _END: Final = struct.Struct("<4s4H2LH")
 _END_MARK: Final = b"PK\x05\x06"
 _LARGE_MARK: Final = b"PK\x06\x07"  # begins the 20 bytes before the end of an archive with 64-bit numbers

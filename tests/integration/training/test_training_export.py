@@ -229,7 +229,7 @@ def test_a_package_has_the_results_of_its_policy_in_several_simulators(trained, 
     assert "palaestra-trainer" in own["versions"]
     assert other == mujoco
     for text, fact in (
-        (json.dumps(known | {"model": "0" * 64}), "line 1: is a result of another policy than model.zip"),
+        (json.dumps(known | {"model": "0" * 64}), "line 1: is a result of another policy, not of model.zip"),
         (json.dumps(known | {"success_rate": 90}), "line 1: is not a result of a policy"),
         ("", "is empty; write the file with `palaestra-eval"),
     ):

@@ -54,7 +54,7 @@ def test_two_wheels_drive_a_robot(pair):
 
 
 def test_two_wheels_speed_up_as_three_do(pair):
-    """Friction limits the acceleration to 10 m/s2, whatever the number of wheels."""
+    """The acceleration forward is limited to 10 m/s2, whatever the number of wheels."""
     body, go = pair()
 
     go(60.0, 60.0, 1)

@@ -69,7 +69,7 @@ def fetch(
         into: the folder for results.
         deadline: the time on the monotonic clock by which the call must have ended.
         most_bytes: the greatest size of all files together, in bytes; None: `TIMES` times the volume that the
-            job requests.
+            job requests, or `OF_EXISTING_BYTES` if the claim existed before.
 
     Raises:
         NotFetched: the folder exists already, the run does not exist, or folder or run cannot be accessed.

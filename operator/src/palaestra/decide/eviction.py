@@ -32,7 +32,7 @@ STALL_GRACE_S = 120  # seconds in which the trainer's own watchdog should end th
 # Seconds after which the operator assumes that the kubelet will not start the trainer. The start normally
 # takes seconds, because the ROS master has the same image, which the node has already pulled.
 FORGOTTEN_S = 300
-OUTLIVED_S = 60  # seconds; a proxy that ends after the main process normally needs less time
+OUTLIVED_S = 60  # seconds that a proxy may run longer than the trainer; it usually ends sooner
 
 
 def marked(situation: ReplicaContext) -> Finding | None:

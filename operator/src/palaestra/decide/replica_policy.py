@@ -1,7 +1,8 @@
 """The decision on a replica: three ordered lists of checks, and the status and actions that follow from them.
 
-`make golden` writes the lists into docs/explain/judging.md. Each reconcile runs all checks, because a check
-may also return the time after which it will hold. In each list, the first check that holds now decides:
+`make golden` writes the lists into docs/explain/judging.md. In each list, the first check that holds now
+decides. Each reconcile runs all checks, also those after that one: a check that does not hold yet may return
+the seconds until it will, and the operator reconciles again then.
 
 - `ENDS`: the replica has ended for this reason; the other lists are ignored.
 - `STOPS`: the operator stops the replica for good, by a mark on its Job. These checks use the results of

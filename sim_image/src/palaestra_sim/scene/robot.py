@@ -3,8 +3,9 @@
 The robot's `customData` contains the seed of the noise, either as a whole number (`"7"`) or as JSON
 (`'{"seed": 7}'`). The seed is read when the world is loaded and at each `simulation_reset`. Any other text
 leaves the seed unchanged. The initial seed is WorldInfo.randomSeed. After a reset, the noise depends only on
-the seed and on the number of steps. For this reason every sensor with noise draws a random number at every
-step, even while the sensor is not enabled. The sensors draw in the order of their types in `DEVICES`, then in
+the seed and on the number of steps, because a sensor with noise draws its random numbers at every step, even
+while it is not enabled. Lidars and radars differ: they draw a number for each point or target that they
+measure, and only while they are enabled. The sensors draw in the order of their types in `DEVICES`, then in
 the order of the world file.
 """
 

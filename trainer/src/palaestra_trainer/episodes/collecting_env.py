@@ -1,4 +1,8 @@
-"""Choose the VecEnv of a run: simulators that a step awaits or not, or the copies in one simulator."""
+"""Choose the VecEnv of a run.
+
+A step of the first kind waits for all simulators, a step of `AsynchronousVecEnv` does not, and the third kind
+steps the copies inside one simulator.
+"""
 
 from __future__ import annotations
 

@@ -109,6 +109,6 @@ def _result(line: bytes, place: str, digest: str) -> dict[str, Any]:
         ) from error
     if content.get("model") != digest:
         raise ConfigurationError(
-            f"{place}: is a result of another policy than model.zip; measure this policy again"
+            f"{place}: is a result of another policy, not of model.zip; evaluate model.zip again"
         )
     return result.model_dump()
