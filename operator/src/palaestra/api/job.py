@@ -35,7 +35,8 @@ FRUITLESS_PODS = 6  # Equal to Kubernetes' default backoffLimit.
 
 MOST_SIMULATORS = 32  # The limit for one pod. Simulator k of a pod uses the ports 7100+k and 7200+k.
 
-# Shipped environments without a batched form; the trainer refuses those of users before a simulator starts.
+# Shipped environments without a batched form. If a user's environment lacks this form, the trainer refuses
+# the environment before a simulator starts.
 NOT_BATCHED = ("SeeTarget-v0", "MoveToTargetGoalEnv-v0", "Deliver-v0", "Navigate-v0")
 
 MOST_INLINE = 900_000  # Characters of all inline worlds together; the plan also limits their bytes.

@@ -30,5 +30,5 @@ def add(commands: Commands) -> None:
 
 
 def _deploy(options: argparse.Namespace) -> int:
-    # The program replaces this one: a stop by Ctrl-Z must reach the process that commands the robot.
+    # The program replaces this process: a stop by Ctrl-Z must reach the process that commands the robot.
     os.execv(require_program(PROGRAM), [PROGRAM, *options.arguments])

@@ -101,7 +101,7 @@ def _with_remedies(source: RunSource, target: Path, deadline: float) -> Iterator
         raise TookTooLong(
             f"{source.directory} in pod {source.pod}: was not copied in time; allow more time with --timeout"
         ) from error
-    except (ApiError, ClientError):  # some are OSErrors, but the clause for OSError is not for them
+    except (ApiError, ClientError):  # some are OSErrors too, but not about the folder
         raise
     except CommandFailed as error:
         raise NotFetched(
@@ -181,7 +181,7 @@ def _running(api: Api, job: TrainingJob, replica: int) -> str | None:
             f"pod {name}: is about to start, and no other pod may use its volume; "
             "run the same command again when the pod runs"
         )
-    if phase == "Running" and _trainer_ended(status):  # the pod still stops its simulators
+    if phase == "Running" and _trainer_ended(status):  # the pod is still stopping its simulators
         raise NotFetched(f"pod {name}: its trainer has just ended; run the same command again in a minute")
     if phase == "Running":
         return name

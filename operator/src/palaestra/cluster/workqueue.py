@@ -164,6 +164,6 @@ class WorkQueue(Generic[Item]):
     def _promote(self, now: float) -> None:
         while self._later and self._later[0][0] <= now:
             due, _, key = heapq.heappop(self._later)
-            if self._due.get(key) == due:  # otherwise `add_after` has set an earlier time since
+            if self._due.get(key) == due:  # otherwise `add_after` has meanwhile set an earlier time
                 del self._due[key]
                 self._add(key, due)

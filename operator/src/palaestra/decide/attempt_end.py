@@ -127,7 +127,8 @@ def deleted(attempt: EndedAttempt) -> Explanation | None:
         return stop
     if job is not None and (job.suspended or ended_by_suspension(attempt.situation.seen, pod)):
         return paused(attempt.situation)
-    # The trainer did not save and exit with 75 in time, so the Job counts a failure too.
+    # The trainer did not save and exit with 75 in time. The Job counts such an end as a failure, so this
+    # function does too.
     if attempt.code not in {None, ExitCode.INTERRUPTED} or failed_by_itself(pod):
         how = f"{how_it_failed(attempt.situation, pod)}; its pod was deleted, and it did not save in time"
         return explain(Reason.TRAINER_FAILED, how=how)

@@ -32,7 +32,9 @@ STALL_GRACE_S = 120  # seconds in which the trainer's own watchdog should end th
 # Seconds after which the operator assumes that the kubelet will not start the trainer. The start normally
 # takes seconds, because the ROS master has the same image, which the node has already pulled.
 FORGOTTEN_S = 300
-OUTLIVED_S = 60  # seconds that a proxy may run longer than the trainer; it usually ends sooner
+# Seconds for which foreign containers may keep the pod alive after the trainer's end. A proxy normally ends
+# sooner than that.
+OUTLIVED_S = 60
 
 
 def marked(situation: ReplicaContext) -> Finding | None:

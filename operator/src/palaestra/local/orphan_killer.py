@@ -23,7 +23,8 @@ import sys
 import time
 
 MARKER = "PALAESTRA_LOCAL_CONTAINER"  # environment variable with the value <pod uid>/<container>/
-# Consecutive rounds without a process that end the search; one round may miss a process during its exec.
+# The search ends after this number of consecutive rounds that find no process. One round is not enough,
+# because it may miss a process during its exec.
 QUIET_ROUNDS = 3
 ROUND_S = 0.02
 DEADLINE_S = 20.0  # a process that survives SIGKILL for this long hangs in the kernel

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
-# Consecutive pods without progress after which an ignored failure fails the replica.
+# After this number of consecutive pods without progress, even an ignored failure fails the replica.
 IDLE_PODS = 5
 # The first wait before the next pod; the wait doubles as in Kubernetes, where it starts at 10 s.
 FIRST_WAIT_S = 1.0

@@ -104,7 +104,7 @@ class Controller:
         self._layout = layout
         self._times = times
         self._records = ReconcileRecords()
-        self._terminating: set[Key] = set()  # jobs for which the log has "namespace terminates"
+        self._terminating: set[Key] = set()  # jobs whose "namespace terminates" is already logged
 
     def begin_anew(self) -> None:
         """Drop all records, which restarts all waiting times: another operator may have led meanwhile."""

@@ -18,8 +18,8 @@ from palaestra_sim.world import check
 MOST_BYTES_HERE = 16_384  # a worker itself checks worlds up to this total size, in less than 0.1 s
 AT_ONCE = 2  # checks that run at the same time, for all namespaces together
 REMEMBERED = 4000  # results in memory; the result of an invalid world has a message of at most 4 kB
-# Seconds from the start of a job's turn in which a reconcile must call `verdicts` with the job's worlds.
-# Otherwise the turn ends without a check.
+# Within this many seconds after the start of a job's turn, a reconcile must call `verdicts` with the job's
+# worlds. Otherwise the turn ends without a check.
 HANDED_S = 10.0
 PAUSE_S = 5.0  # pause in seconds after a check without a result: the node is busy or out of memory
 

@@ -13,7 +13,7 @@ from palaestra_sim.world import RunIdentity
 
 JOB_LABEL = "palaestra.dev/job"
 REPLICA_LABEL = "palaestra.dev/replica"
-UID_LABEL = "palaestra.dev/job-uid"  # it distinguishes jobs that had the same name one after the other
+UID_LABEL = "palaestra.dev/job-uid"  # this label distinguishes successive jobs of the same name
 # Annotation of a TrainingJob. If its value changes, replicas whose runs are lost start again at step 0.
 RESTART_LOST_RUNS = "palaestra.dev/restart-lost-runs"
 TRAINER = "trainer"

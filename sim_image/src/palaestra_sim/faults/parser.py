@@ -194,12 +194,12 @@ class _Reader:
         """Return the trigger, and remove its keys from `given`."""
         said = [it for it in ("every", "probability", *FaultEvent) if it in given]
         if len(said) > 1:
-            raise self._error(f"{said[0]} and {said[1]} each set when the fault occurs", "remove one")
+            raise self._error(f"{said[0]} and {said[1]} both determine when the fault occurs", "remove one")
         event = self._events[0]
         if "on" in given:
             event = self._event(given.pop("on"))
             if set(said) & set(FaultEvent):
-                raise self._error(f"on and {said[0]} each set the event that is counted", "remove on")
+                raise self._error(f"on and {said[0]} both determine the event that is counted", "remove on")
         if not said:
             return Trigger(event=event)
         key, text = said[0], given.pop(said[0])

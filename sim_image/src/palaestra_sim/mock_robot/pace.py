@@ -17,9 +17,10 @@ from palaestra_sim.mock_robot.robot import MockRobot
 
 log = logging.getLogger(__name__)
 
-MOST_BEHIND_S: Final = 0.1  # of robot time; half of the dead man's time
+MOST_BEHIND_S: Final = 0.1  # of robot time; half of the timeout of the dead man's switch
 _REPORT_S: Final = 10.0  # of real time, between two reports
-_OVERLOAD: Final = 0.05  # share of the time; less is lost on every machine
+# If the clock loses a larger share of the time, an overload is logged. Every machine loses a smaller share.
+_OVERLOAD: Final = 0.05
 
 
 class Clock:

@@ -24,7 +24,7 @@ from palaestra_protocol.xmlrpc.responses import address_of, response_of
 from palaestra_sim.ros.links import Endpoint, Lingering, RosLink
 from palaestra_sim.ros.loop import Loop
 
-CONNECT_S: Final = 5.0  # time limit for the address of a publisher, and for the connection to this address
+CONNECT_S: Final = 5.0  # time limit of the request for a publisher's address, and of the connection to it
 RETRY_S: Final = 1.0
 MOST_BYTES: Final = 1 << 20  # the longest message; commands of robots have a few hundred bytes
 

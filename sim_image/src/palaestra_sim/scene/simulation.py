@@ -231,7 +231,7 @@ class Simulation:
         added = self.tree.grow(text, field.node)
         try:
             require_room(field.node, field.name, added)
-            fresh = SceneContents(physics=self.scene.physics)  # remains so if the field is not children
+            fresh = SceneContents(physics=self.scene.physics)  # stays empty if the field is not children
             if field.name == "children":
                 fresh = read_added(self.tree, added, self.scene)
         except SimError:

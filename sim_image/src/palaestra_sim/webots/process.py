@@ -23,7 +23,7 @@ log = logging.getLogger(__name__)
 _CHECK_MASTER_S: Final = 1.0
 _NO_MASTER: Final = 1
 _DEFAULT_MASTER: Final = "http://localhost:11311"
-# robot_init sets handlers for these signals, which end the process without a word to the ROS master.
+# robot_init sets handlers for these signals, which end the process without a message to the ROS master.
 _SIGNALS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGQUIT, signal.SIGHUP)
 
 

@@ -197,7 +197,7 @@ def _joined(mark: str, left: Computed, right: Computed) -> Computed:
 def _applied(mark: str, left: Result, right: Result) -> Result:
     """Return the value of an operator for two values."""
     if mark in ("==", "!=", "===", "!=="):
-        if type(left) is not type(right) and mark in ("==", "!="):  # these two would convert a value
+        if type(left) is not type(right) and mark in ("==", "!="):  # both operators would convert
             raise TemplateError(f"{left!r} {mark} {right!r}")
         return (type(left) is type(right) and left == right) == mark.startswith("=")
     if mark == "+" and str in (type(left), type(right)):

@@ -121,7 +121,7 @@ class OffPolicyRows(ValidRowsCounted, OffPolicyAlgorithm):
         """Count a vector step, for example for the target network; with `n_envs` rows if asynchronous."""
         if not _is_asynchronous(self.env):
             super()._on_step()
-        elif abs(self.num_timesteps - self._counted_at) >= self.n_envs:  # a resume may also go back
+        elif abs(self.num_timesteps - self._counted_at) >= self.n_envs:  # a resume may lower the count
             self._counted_at = self.num_timesteps
             super()._on_step()
 

@@ -100,7 +100,7 @@ class BagWriter:
         self._bag.write_message(topic, schema, message, log_time=at)
         if self._first_waiting_ns is None:
             self._first_waiting_ns = at
-        # A robot's clock may be set back, which ends the second too.
+        # If a robot's clock is set back by a second or more, the waiting messages are flushed too.
         elif abs(at - self._first_waiting_ns) >= _FLUSH_EVERY_NS:
             self._flush()
 

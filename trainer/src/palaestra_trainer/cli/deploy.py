@@ -95,7 +95,7 @@ def _drive(options: argparse.Namespace, interruption: Interruption) -> int:
         stack.enter_context(robot)
         robot.connect(muted=True)
         stack.enter_context(record)
-        stack.callback(robot.close)  # the record also has how the robot stops
+        stack.callback(robot.close)  # before the record is closed, so the record contains the stop
         robot.stand_at(options.start)
         deployment = Deployment(package, robot, record, terminal.show)
         targets: list[Point | None] = list(options.target) or [None]
@@ -106,7 +106,7 @@ def _drive(options: argparse.Namespace, interruption: Interruption) -> int:
         if not options.yes and not terminal.confirms(options.robot, interruption.check):
             return STOPPED
         stack.enter_context(terminal.holding())
-        stack.callback(robot.close)  # before the terminal is restored, which may wait
+        stack.callback(robot.close)  # before the terminal is restored, because the restoring may wait
         robot.unmute()
         return _drive_all(deployment, targets, terminal)
 

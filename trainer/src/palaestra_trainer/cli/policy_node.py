@@ -119,7 +119,7 @@ def _serve(options: argparse.Namespace, ros_arguments: Sequence[str], interrupti
         about = {"package": str(options.package), "robot": link.address}
         record = DeploymentRecord(options.record or Path(), about)
         if options.record is not None:
-            stack.enter_context(record)  # it is closed last, so it also has how the robot stops
+            stack.enter_context(record)  # closed after the robot, so it contains the robot's stop
         hooks = Hooks(check=check, decided=record.decided)
         robot = RealRobotino(quiet, rules, package.period_s, clock, hooks)
         stack.callback(robot.close)

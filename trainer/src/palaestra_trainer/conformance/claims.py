@@ -14,10 +14,10 @@ Answer = Mapping[str, Any]
 Call = tuple[str, str, str, Mapping[str, Any]]  # name, path, type, request
 
 FAILED: Final = "failed"  # the key of the reason in the answer of a call that failed
-TRAINING: Final = "training"  # the claims that a simulator must keep so that a job can train in it
+TRAINING: Final = "training"  # the claims that a simulator must fulfill so that a job can train in it
 _FILE: Final = "interface.json"
 _INSERT: Final = "supervisor/field/insert_"
-_TOLERANCE: Final = 1e-6  # relative and absolute, of two numbers that are equal
+_TOLERANCE: Final = 1e-6  # relative and absolute; numbers within this tolerance count as equal
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -147,7 +147,8 @@ class GoalDriver:
         return f"{end.outcome} after {end.steps} steps"
 
     def _rest(self) -> None:
-        # After a safety rule, the robot may still move for a moment; a newer goal begins with a stop anyway.
+        # If a safety rule has stopped the robot, it may still move for a moment. A newer goal begins with a
+        # stop anyway.
         with suppress(NewGoal, RobotStopped):
             self._robot.stand()
         self._link.quiet = True

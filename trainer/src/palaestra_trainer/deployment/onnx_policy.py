@@ -14,7 +14,7 @@ from palaestra_trainer.errors import ConfigurationError
 
 _STATE: Final = ("hidden", "cell")
 _MASKS: Final = "action_masks"
-_ONE: Final = "observation"  # the input of a policy whose observations are no Dict
+_ONE: Final = "observation"  # the input of a policy whose observations are not a Dict
 
 
 class OnnxPolicy:

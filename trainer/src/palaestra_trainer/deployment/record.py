@@ -36,7 +36,7 @@ from palaestra_trainer.robots.base import SENSOR_RANGE_M
 
 log = structlog.get_logger(__name__)
 
-_MOST_WAITING: Final = 20_000  # over a minute of entries
+_MOST_WAITING: Final = 20_000  # the entries of more than a minute
 _END_S: Final = 10.0
 MOST_NUMBERS: Final = 4096
 Floats = NDArray[np.float32]

@@ -23,7 +23,7 @@ from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.job.configuration import Environment
 
 MOST_BOUNDS = 1_000  # for a space with more numbers, the sheet has only the least and the greatest bound
-OBSERVATION = "observation"  # the name of an observation that is no Dict
+OBSERVATION = "observation"  # the name of an observation that is not a Dict
 
 Table = list[dict[str, str]]
 

@@ -37,7 +37,7 @@ from palaestra_trainer.waiting.check import Check, go_on
 log = structlog.get_logger(__name__)
 
 MOST_TRIES = 3  # resets of a row that fails in its first period, before the simulator counts as faulty
-MOST_FAILURES = 100  # failed rows without an episode that ended, for each row of the batch
+MOST_FAILURES = 100  # failures since the last complete episode, for each row of the batch
 
 Rows = NDArray[np.int64]
 
@@ -283,7 +283,7 @@ class BatchVecEnv(CollectingVecEnv):
             self._training_progress = now
             if step:
                 over = self._repeat(taken, lengths, step)
-                lengths[over], progress[over] = 0, now  # such a row begins its next episode at the end
+                lengths[over], progress[over] = 0, now  # the last round begins the next episode of such rows
         self._running = True
 
     def _repeat(self, taken: Sequence[np.ndarray], lengths: Any, left: int) -> NDArray[np.bool_]:

@@ -23,7 +23,8 @@ from palaestra_trainer.errors import TrainerError
 from palaestra_trainer.simulators.interface import Viewed
 
 MOST_FRAMES: Final = 500
-MOST_NUMBERS: Final = 12_000  # of all poses of a recording; with three, replays.json stays below 1 MiB
+# Limit of the numbers in all poses of one recording. With three recordings, replays.json stays below 1 MiB.
+MOST_NUMBERS: Final = 12_000
 MOST_SCENE_CHARACTERS: Final = 400_000  # of the scene as JSON
 _POSE: Final = 7
 

@@ -21,7 +21,7 @@ from palaestra_trainer.reporting.run_data import Replay
 from palaestra_trainer.reporting.tolerant_files import json_file
 from palaestra_trainer.reporting.write_film import NO_EPISODE
 
-# The pause before each episode. Nothing has the time 0, which tf2 takes for "the newest transform".
+# The pause before each episode. It avoids the time 0, which tf2 takes for "the newest transform".
 PAUSE_S = 1.0
 _RESULTS = ("title", "seed", "outcome", "success", "return", "length")
 

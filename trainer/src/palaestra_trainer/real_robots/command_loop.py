@@ -39,7 +39,7 @@ log = structlog.get_logger(__name__)
 PERIOD_S: Final = 0.05
 _END_S: Final = 0.5  # at the end, zero is sent at least this long, and until the robot has confirmed it
 _MOST_END_S: Final = 2.0
-_STUCK_S: Final = 2.0  # of real time: a request has a timeout of 0.1 s
+_STUCK_S: Final = 2.0  # of real time; a request normally ends by its timeout of 0.1 s
 
 
 def _always() -> bool:

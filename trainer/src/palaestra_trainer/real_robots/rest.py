@@ -37,14 +37,18 @@ log = structlog.get_logger(__name__)
 
 SocketOption = tuple[int, int, int] | tuple[int, int, bytes]
 
-TIMEOUT_S: Final = 0.1  # of a request; the dead man of the robot leaves time for one more
+# Timeout of a request. After a failed request there is time for one more, before the robot's dead man stops
+# the robot.
+TIMEOUT_S: Final = 0.1
 _FIRST_TIMEOUT_S: Final = 2.0  # before the robot moves, a slow network may take longer
 _POLL_S: Final = 0.05
 _CAMERA: Final = "/cam0"
-_CAMERA_S: Final = 0.2  # a picture is longer than a reading; the policy stops if it is older than 0.3 s
+# Timeout of a request for a picture, which has more bytes than other readings. If the picture is older than
+# 0.3 s, the robot is held back.
+_CAMERA_S: Final = 0.2
 _HTTP: Final = 80
-_CLIENT: Final = {"sid": "palaestra"}  # clients of the official example name themselves so
-# A command that was not confirmed must not arrive later, when the robot has been told to stand. So the system
+_CLIENT: Final = {"sid": "palaestra"}  # the clients in the official example send a name as `sid`
+# A command that was not confirmed must not arrive later, after a command to stand. So the system
 # neither sends what a closed connection has not sent yet, nor repeats a packet for long.
 _SOCKET_OPTIONS: Final[list[SocketOption]] = [
     (socket.IPPROTO_TCP, socket.TCP_NODELAY, 1),
@@ -73,7 +77,7 @@ class RestLink:
         self.address, self._host, self._port = _parts(address)
         self._sensors = sensors or SensorLayout()
         self._clock = clock or RobotClock()
-        self._base = self.address  # with the address of the host, once it is known
+        self._base = self.address  # after `_resolve`, with the IP address of the host
         self._commands: httpx.Client | None = None
         self._newest = (-1.0, STANDING)  # number and velocity of the newest odometry
         self._over = threading.Event()

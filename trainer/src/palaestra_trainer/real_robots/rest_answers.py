@@ -21,7 +21,7 @@ from palaestra_trainer.robots.geometry import Pose
 
 MOST_BYTES: Final = 65_536  # the longest response, that of a laser scanner, has about 10,000 bytes
 
-_MOST: Final = 1e12  # also the number of a measurement is smaller for thousands of years
+_MOST: Final = 1e12  # the count of measurements reaches this after thousands of years
 _ODOMETRY: Final = 7  # x, y, rotation, vx, vy, omega, number
 
 

@@ -30,7 +30,7 @@ from palaestra_trainer.robots.base import RobotinoAbc
 from palaestra_trainer.robots.capabilities import Cameras
 from palaestra_trainer.robots.geometry import Pose
 
-IMAGE_SIZE: Final = (64, 48)  # of the cameras in the worlds that ship
+IMAGE_SIZE: Final = (64, 48)  # width and height in pixels, as in the shipped worlds
 _FIRST_READINGS_S: Final = 5.0
 _STAND_S: Final = 3.0  # a Robotino brakes in a fraction of a second
 _LOOK_S: Final = 0.01
@@ -168,7 +168,7 @@ class RealRobotino(RobotinoAbc, Cameras):
         begin_s = self._clock.now_s()
         while not self._stands_since(begin_s):
             if self._clock.now_s() > begin_s + _STAND_S:
-                raise RobotStopped(f"does not stand {_STAND_S:g} s after the command; use its emergency stop")
+                raise RobotStopped(f"did not stop within {_STAND_S:g} s; use its emergency stop")
             self._wait(_LOOK_S)
         self._look(self._clock.now_s())
 
@@ -229,7 +229,7 @@ class RealRobotino(RobotinoAbc, Cameras):
         if not color:
             return
         self._link.use_camera(self._store, self.image_size)
-        end_s = time.monotonic() + _FIRST_READINGS_S  # of real time, also for a fast mock robot
+        end_s = time.monotonic() + _FIRST_READINGS_S  # in real time, even if a mock robot is faster
         while self._store.newest.image is None:
             if time.monotonic() > end_s:
                 raise CameraUnfit(f"{self._link.address}: {self._store.image_fault}")

@@ -56,7 +56,7 @@ log = structlog.get_logger(__name__)
 _LIMITS: Final = {"max_linear_vel": (0.2, "m/s"), "max_angular_vel": (1.0, "rad/s")}
 _CHECK_S: Final = 2.0
 _DRIVER_CONNECTS_S: Final = 5.0
-_SILENCE_S: Final = 1.0  # with an older reading, all topics are connected again
+_SILENCE_S: Final = 1.0  # if a reading is older, all topics are connected again
 _RETRY_S: Final = 0.5
 _END_S: Final = 3.0
 _ADDRESS: Final = re.compile(r"ros1://[^/@?#]+(/[A-Za-z][A-Za-z0-9_]*)*/?")
@@ -191,7 +191,7 @@ class Ros1Link:
         """
         if self._commands is not None:
             self._commands.publish(**fields_of(twist))
-            if self._driver in self._commands.subscribers:  # a subscriber that took no message was dropped
+            if self._driver in self._commands.subscribers:  # `publish` drops one that takes no message
                 return
         raise LinkError(f"{self._name('cmd_vel')}: the driver is not connected")
 

@@ -146,7 +146,7 @@ class Ros2Link:
     def send(self, twist: Twist) -> None:
         """Publish one velocity; ROS 2 does not confirm that the robot has taken it."""
         if not self._open or not self._commands.get_subscription_count():
-            raise LinkError(f"nobody subscribes {self._commands.topic_name}")
+            raise LinkError(f"no node subscribes to {self._commands.topic_name}")
         message = self._twist()
         message.linear.x, message.linear.y, message.angular.z = map(float, twist)
         self._commands.publish(message)
@@ -223,7 +223,7 @@ class Ros2Link:
                 f"no odometry arrives on {topic}; start the robot's driver, and compare the namespace and "
                 "ROS_DOMAIN_ID"
             )
-        fact = f"nobody subscribes {self._commands.topic_name}"
+        fact = f"no node subscribes to {self._commands.topic_name}"
         return f"{fact}; start the robot's driver, or give its topic with --topic"
 
     def _resolved(self, topic: str) -> str:

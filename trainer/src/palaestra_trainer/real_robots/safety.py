@@ -22,11 +22,12 @@ STANDING: Final[Twist] = (0.0, 0.0, 0.0)
 
 # A robot may drive this long before a stop takes effect: one period of commands, a delayed request, braking.
 _REACTION_S: Final = 0.25
-_SETTLED_S: Final = 1.0  # at the latest after this time, a robot follows a command to move or to stand
-_ASLEEP_S: Final = 2.0  # a suspended computer or a stopped process must not drive on when it wakes
+_SETTLED_S: Final = 1.0  # within this time, a robot obeys a command to move or to stand
+_ASLEEP_S: Final = 2.0  # after a longer suspension of program or computer, the robot must not drive on
 # Source: ~min_linear_vel and ~min_angular_vel of robotino_node, which raises slower commands to these.
 _LEAST_M_S, _LEAST_RAD_S = 0.05, 0.1
-# The odometry of a standing robot may have some noise; faster than _MOVING, the robot moves.
+# The odometry of a standing robot may have some noise, up to _STANDING. A robot that is faster than _MOVING
+# moves.
 _STANDING: Final = (0.01, 0.01, 0.02)
 _MOVING: Final = (0.02, 0.02, 0.05)
 
@@ -181,7 +182,7 @@ def _lost(situation: Situation, rules: SafetyRules) -> StopCause | None:
 def _fence(situation: Situation, rules: SafetyRules) -> StopCause | None:
     if rules.fence is None or situation.pose is None:
         return None
-    # The robot has driven on since the reading, perhaps at the speed that was commanded since.
+    # Since the reading, the robot has driven on, perhaps at the speed of a newer command.
     speeds = (limited(situation.command or STANDING, rules), situation.velocity)
     speed = max(math.hypot(forward, left) for forward, left, _ in speeds)
     margin_m = rules.odometry_error * situation.driven_m

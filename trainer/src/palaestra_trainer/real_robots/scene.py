@@ -14,7 +14,7 @@ from palaestra_trainer.robots.layout import FloorLayout
 
 Ask = Callable[[Pose], None]  # asks a person to place the robot at a pose, and returns when that is done
 
-# With a smaller difference, the person need not place the robot; its odometry is no better.
+# If the robot is this near to the pose, the person need not place it: odometry is not more precise.
 _THERE_M: Final = 0.02
 _THERE_RAD: Final = 0.05
 _OPEN_FLOOR_M: Final = 1000.0
@@ -63,7 +63,7 @@ class RealScene(Scene):
         """Refuse: only a simulation can move objects."""
         del place
         raise RobotStopped(
-            f"the task moves {name}, which only a simulation can; deploy a policy whose task does not"
+            f"the task moves {name}, which only a simulation can do; deploy a policy whose task moves nothing"
         )
 
 

@@ -16,7 +16,7 @@ from palaestra_trainer.reporting.run_data import Replay
 GIF_PX = 360  # pixels of the longer side
 MOST_PICTURES = 60
 MOST_BYTES = 200_000
-# Limits of the time for which a picture is shown. Browsers show a picture with a shorter time for longer.
+# Limits of the time for which a picture is shown. Browsers prolong a shorter time.
 LONGEST_MS, SHORTEST_MS = 150, 20
 LAST_MS = 1500
 _COLORS = 32

@@ -87,7 +87,7 @@ class BatchedRobot(BatchedRobotAbc):
         if description.rows != self.rows:
             raise ConfigurationError(
                 f"{self._link.name}: simulates {description.rows} copies, and the configuration has"
-                f" {self.rows}; write one number"
+                f" {self.rows}; write the same number in both"
             )
         self._values = None
         self.failed, self.reasons = np.zeros(self.rows, dtype=bool), {}

@@ -18,7 +18,7 @@ from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.ros import slave_api
 from palaestra_trainer.ros.master import Master
 
-_MASTER_S: Final = 2.0  # a robot is in the same network
+_MASTER_S: Final = 2.0  # short, because the robot's master is in the same network
 
 
 class TopicNode:

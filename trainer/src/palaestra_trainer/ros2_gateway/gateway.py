@@ -76,7 +76,7 @@ class Gateway:
                 scene = _scene(robot)
                 node = shown_node(scene, robot.name)
             self._publishers.publish("/clock", "rosgraph_msgs/Clock", messages.clock(state.time_s))
-            # tf warns of each transform whose time it has already.
+            # For each transform whose time it already has, tf logs a warning.
             if (state.time_s, state.revision) != last:
                 last = (state.time_s, state.revision)
                 self._publish(scene, state, node)

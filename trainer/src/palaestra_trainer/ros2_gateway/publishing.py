@@ -27,7 +27,7 @@ class RobotPublishers:
         self.has_transforms = True
         try:
             self._transforms = require("tf2_msgs.msg").TFMessage
-        except ConfigurationError:  # no wheel on PyPI has it, but each installation of ROS 2
+        except ConfigurationError:  # every installation of ROS 2 has tf2_msgs, but no wheel on PyPI has it
             self.has_transforms = False
 
     def publish(self, topic: str, kind: str, content: Content) -> bool:

@@ -44,7 +44,7 @@ def source_commit(environment: str, folder: Path | None = None) -> dict[str, Any
 
 
 def _is_dirty(place: Path, file: Path | None) -> bool:
-    # The path `:/` is the root of the repository, because the module may import from its other folders.
+    # The path `:/` includes the whole repository, because the module may import from other folders of it.
     differs = _git(place, "diff", "--quiet", "--no-ext-diff", "--no-textconv", "HEAD", "--", ":/").returncode
     if differs or file is None:
         return bool(differs)

@@ -21,9 +21,9 @@ from greenlet import getcurrent, greenlet
 from palaestra_trainer.waiting import shutdown_deadline
 from palaestra_trainer.waiting.wait_time import count_wait
 
-# If no response has arrived after this time, the first greenlet waits alone and with its own deadline, so a
-# fault is attributed to the right simulator. The time is longer than a step, because a wait alone counts as a
-# turn of the waiting greenlet. The time is short compared with that deadline.
+# If no response has arrived after this time, only the first greenlet waits, with its own deadline, so a fault
+# is attributed to the right simulator. The time of that wait counts as a turn of this greenlet. So `_SOON_MS`
+# is longer than a step, but short compared with the deadline.
 _SOON_MS = 500
 
 

@@ -25,7 +25,8 @@ _QUANTITIES: Final = {
     Control.VELOCITY: ("velocity",),
     Control.POSITION: ("position",),
 }
-_CLIPPED: Final = int(mujoco.mjtSensor.mjSENS_RANGEFINDER)  # its device limits the value, this class does not
+# The device of such a sensor limits the value. This class does not limit it, and so refuses the sensor.
+_CLIPPED: Final = int(mujoco.mjtSensor.mjSENS_RANGEFINDER)
 
 
 class ModelBatch:
@@ -94,7 +95,8 @@ class ModelBatch:
         chosen = slice(None) if rows is None else rows
         self._rows.step(rows, self._steps)
         failed = self._rows.failed(rows)
-        # The sensors of the new state must not change the next step.
+        # `forward` computes the sensors of the new state, and changes the solver's start values. They are
+        # restored, so that the next step does not depend on `forward`.
         warm_start = self._warm_start[chosen].copy()
         self._rows.forward(rows, self._stage)
         self._warm_start[chosen] = warm_start

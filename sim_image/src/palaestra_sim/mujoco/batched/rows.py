@@ -10,7 +10,7 @@ import numpy as np
 from palaestra_sim.mujoco.library import mujoco
 
 _STATE: Final = mujoco.mjtState.mjSTATE_INTEGRATION
-_TIMES: Final = 1  # of a warning, the second number is how many times it came
+_TIMES: Final = 1  # the index, in a warning, of the number of its occurrences
 _BAD: Final = [
     int(kind)
     for kind in (

@@ -28,7 +28,8 @@ from palaestra_sim.scene.simulation import Simulation
 from palaestra_sim.scene.tree.fields import quaternion_to_axis_angle
 from palaestra_sim.scene.wheel_kinematics import Drive
 
-_SHARES: Final = 4  # a row is called free for a basic step, its half or its quarter
+# `_advance` checks whether a row is free for a whole basic step, then for each half, then for each quarter.
+_SHARES: Final = 4
 _NOTHING_TO_TOUCH: Final = int(mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
 _REMEDY: Final = "change the world, or remove batch from the job"
 

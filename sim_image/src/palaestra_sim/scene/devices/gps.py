@@ -23,7 +23,7 @@ from palaestra_sim.scene.utm import UtmZone
 _LOCAL, _WGS84 = 0, 1  # the values that `get_coordinate_system` returns
 _GPS_SERVICE = 1  # SERVICE_GPS of sensor_msgs/NavSatStatus
 _NOWHERE: Final = (math.nan, math.nan, math.nan)
-_MOST_LATITUDE, _MOST_LONGITUDE = 84.0, 180.0  # in degrees; the zones of UTM end at these values
+_MOST_LATITUDE, _MOST_LONGITUDE = 84.0, 180.0  # in degrees; in the north, the zones of UTM end here
 
 
 @dataclass(slots=True)

@@ -13,9 +13,9 @@ from palaestra_sim.ros_interfaces import UnsimulatedError
 from palaestra_sim.scene.devices import DEVICES
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 
-# Base types of which Webots shows only the looks; the pictures and the rays here show them too. A write to a
-# node of another base type changes what moves or what a sensor measures. A part of a boundingObject has rules
-# of its own.
+# In Webots, nodes of these base types affect only how things look, and the pictures and rays here take these
+# nodes into account. A write to a node of another base type changes what moves or what a sensor measures. A
+# part of a boundingObject has rules of its own.
 _DRAWN: Final = frozenset(
     (
         *("Appearance", "Background", "Billboard", "Box", "CadShape", "Capsule", "Color", "Cone"),
@@ -33,8 +33,8 @@ _DRAWN: Final = frozenset(
         "Viewpoint",
     )
 )
-# Fields that only people read. `name` is one of these fields, because a running controller has already read
-# the names of its devices.
+# Fields that only people and the recognition of cameras read. `name` is one of these fields, because a
+# running controller has already read the names of its devices.
 _FOR_PEOPLE: Final = frozenset(("description", "info", "model", "name", "recognitionColors", "title"))
 _ELSEWHERE: Final = "change the world file, or use driver webots"
 _HOLDING: Final = frozenset(("Group", "Pose", "Transform"))  # these nodes act only through their children

@@ -15,7 +15,7 @@ from palaestra_trainer.webots.launching.sidecar_command import SIDECAR
 
 HOST = "host"
 _LOOPBACK = "127.0.0.1"
-_CONTROL_PORT = 7100  # a container in a network of its own has all ports
+_CONTROL_PORT = 7100  # in a network of its own, a container can use any port
 _OF_ROS = ("ROS_MASTER_URI", "ROS_HOSTNAME", "ROS_IP")
 # Other nodes reach a container by its address, because they cannot resolve the name of a container.
 _WITH_ADDRESS = f'ROS_IP=$(hostname -i) && export ROS_IP && exec {SIDECAR} "$@"'

@@ -125,7 +125,7 @@ def _said(status: int, text: bytes) -> str:
         message = str(json.loads(text)["message"])
     except (ValueError, KeyError, TypeError):
         message = text.decode(errors="replace")[:200]
-    forbidden = status == HTTPStatus.FORBIDDEN and " cannot " in message  # an admission refuses with 403 too
+    forbidden = status == HTTPStatus.FORBIDDEN and " cannot " in message  # admission plugins send 403 too
     return f"the API server refused ({message}){f'; {_RIGHTS}' if forbidden else ''}"
 
 

@@ -27,11 +27,11 @@ from palaestra_trainer.webots.launching.sidecar import Sidecar
 from palaestra_trainer.webots.launching.sidecar_command import sidecar_options
 from palaestra_trainer.webots.launching.simulator_request import SimulatorRequest
 
-_OWN_POD = "PALAESTRA_POD"  # the chart sets it; HOSTNAME may be another name
+_OWN_POD = "PALAESTRA_POD"  # the chart sets it; HOSTNAME may differ from the pod's name
 _POLL_S = 0.25
 _REMOVED_S = 60.0
 _REACHED_S = 20.0
-_SIGNS_OF_LIFE = 4  # within the time after which the sidecar ends
+_SIGNS_OF_LIFE = 4  # requests within the time after which a sidecar without requests ends
 _MOST_WORLD_BYTES = 700_000  # a ConfigMap may have 1 MiB, and base64 needs a third more
 _session = secrets.token_hex(4)
 _pods = PodsByMaster()
@@ -83,7 +83,7 @@ class KubernetesLauncher(OwnedSidecar):
 
     def _end(self) -> None:
         removals = _pods.close(self._address)
-        if self._remove not in removals:  # another pod needs the ROS master in this one
+        if self._remove not in removals:  # another pod needs this pod's ROS master
             with suppress(SimulatorFault):  # the simulator may have ended
                 self.expect_stop(0.0)
         for remove in removals:
@@ -163,8 +163,8 @@ def _master_responds() -> bool:
         return False
     if is_loopback(str(urlsplit(master.uri).hostname)):
         raise ConfigurationError(
-            f"launcher kubernetes: a pod cannot reach the ROS master at {master.uri}; start the simulators "
-            "in pods first, or all in this pod"
+            f"launcher kubernetes: a pod cannot reach the ROS master at {master.uri}; start first "
+            "the simulators in other pods, or start all simulators in this pod"
         )
     return True
 
