@@ -36,7 +36,7 @@ def test_python_runs(text):
 
 @pytest.mark.parametrize("text", blocks("yaml"))
 def test_whole_jobs_are_right(text):
-    """A reader copies a complete job. The tests of each page check the parts of jobs on that page."""
+    """A reader copies a complete job. A block with a part of a job is checked by the tests of its page."""
     if "kind: TrainingJob" in text:
         palaestra.api.load(text, "page")
 

@@ -86,7 +86,7 @@ def test_the_table_of_folders_names_every_folder_with_something_to_read():
 
 
 def test_every_path_that_contributing_names_is_there():
-    """New contributors follow CONTRIBUTING.md. Of a file that they create, only the folder must exist."""
+    """New contributors follow CONTRIBUTING.md. If they create a file, only its folder must exist."""
     named = {whole or begun for whole, begun in PATH.findall(page("CONTRIBUTING.md"))}
 
     assert named >= NEW
@@ -126,7 +126,7 @@ def test_broad_excepts_are_rare_and_have_a_reason():
 
 
 def test_a_module_fits_into_a_head():
-    """A reader would look for some content of a longer module under another name."""
+    """A longer module has more than one subject, and its name can lead a reader to only one of them."""
     files = [file for folder in PACKAGES.values() for file in folder.rglob("*.py")]
 
     assert [file.name for file in files if len(read(file)) > MOST_LINES] == []

@@ -33,7 +33,7 @@ def test_every_name_on_the_page_can_be_imported(name):
 
 
 def test_no_class_or_method_of_the_paper_is_missing():
-    """The first column has a row for each of them."""
+    """A reader of the paper looks up its classes and methods in the first column of the page's table."""
     rows = " ".join(line.split("|")[1] for line in PAGE.splitlines() if line.startswith("| "))
     words = {*re.findall(r"[\w-]+", re.sub(r"`[^`]+`", "", rows)), *re.findall(r"`([^`]+)`", rows)}
 

@@ -14,7 +14,7 @@ pytestmark = [pytest.mark.beside, pytest.mark.comes_late]
 
 
 def test_simulators_start_in_containers_and_end_with_their_programs(namespace):
-    """test_launchers.py shows the same over a server that has no containers, and so no network of its own."""
+    """test_launchers.py tests the same with a server without containers, so it cannot test their network."""
     del namespace  # only the engine of the cluster is needed
     skip_without_archives()
     beside = ROOT / "tests/cluster/beside_containers.sh"

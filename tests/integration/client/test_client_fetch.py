@@ -297,7 +297,7 @@ def test_a_pod_that_does_not_start_is_deleted_and_the_error_has_the_reason(scene
 
 
 def test_the_command_writes_the_report_of_a_run_whose_trainer_was_killed(scene, tmp_path, capsys):
-    """Such a trainer writes neither `end.json` nor a report, but the person who fetches wants one."""
+    """Such a trainer writes neither `end.json` nor a report, but a user of `fetch` wants a report."""
     scene.execution = command(*tar({name: (FINISHED / name).read_bytes() for name in KEPT}), SUCCESS)
     kubeconfig = f"--kubeconfig={tmp_path / 'kubeconfig'}"
 

@@ -48,7 +48,8 @@ def runs(control_plane, installed):
 def test_a_disturbed_operator_brings_every_job_to_the_same_end(fault, runs):
     """A fault must leave no trace.
 
-    States and counters are the same, each replica has one pod, no orphan stays, and requests stop.
+    States and counters are the same, each replica has one pod, no orphan stays,
+    and the operator stops sending requests.
     """
     run = runs[fault].result()
 

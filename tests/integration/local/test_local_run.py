@@ -82,7 +82,7 @@ def test_a_run_ends_with_a_summary_and_is_reported_when_it_is_typed_again(desk):
 
 
 def test_a_finished_run_is_prolonged_by_more_steps_and_began_with_the_policy_of_another(desk):
-    """More steps do not change the policy with which the run began, and the trainer gets its path again.
+    """More steps do not change the initial policy of a run, so the trainer gets that policy's path again.
 
     A user types the path of the other run, or of a package, relative to the working directory.
     """
@@ -345,7 +345,7 @@ def _read_to_the_end(terminal: int) -> bytes:
 
 
 def test_a_differential_robot_drives_by_its_own_program(desk):
-    """Another project's world has no ROS name, no --synchronize, other wheel names, and PROTOs as URLs."""
+    """Another project's world has other wheel names and URLs of PROTOs, but no ROS name or --synchronize."""
     desk.write(
         DRIVE,
         simulators=[rover()],

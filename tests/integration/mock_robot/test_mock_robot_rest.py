@@ -60,7 +60,7 @@ def at_rest_after(robot, time_s):
 
 
 def test_carrying_the_robot_does_not_change_its_odometry(robot):
-    """Only a person knows where the robot is now."""
+    """Odometry counts the turns of the wheels, so a program cannot notice that a person carried the robot."""
     before = robot.get("/data/odometry")[:3]
     robot.send("/mock/place", [0.0, 1.0, 1.5])
 
@@ -132,7 +132,7 @@ def test_one_connection_serves_many_requests(robot):
 
 
 def test_the_network_delays_and_loses_responses():
-    """A program must survive a bad network, so the mock has one on demand; the truth has no delay."""
+    """A program must survive a bad network, which the mock imitates on request; /mock/truth has no delay."""
     process, client = started("--timeouts=1", "--start=-1,0,0", "--charging")
     client.connection.timeout = 0.05
     with pytest.raises(TimeoutError):

@@ -51,7 +51,7 @@ def test_clients_read_the_limits_as_parameters():
 
 
 def test_a_command_is_forwarded_once_and_the_robot_stops_itself(mock, commands):
-    """The driver has no watchdog, and does not repeat a command, so the robot's dead man stops the robot."""
+    """The driver has no watchdog and repeats no command, so the dead man's switch of the robot stops it."""
     before = mock.get("/mock/truth")["commands"]
     commands.publish(**FORWARD)
     eventually(lambda: mock.get("/mock/truth")["commands"] > before, pace_s=0.005)

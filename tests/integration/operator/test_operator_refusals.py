@@ -361,7 +361,7 @@ def test_a_queue_without_kueue_is_reported_until_kueue_is_there(place, start, re
 
 @pytest.mark.usefixtures("kueue")
 def test_what_kueue_does_to_a_job_is_never_undone(place, start):
-    """Only Kueue decides about the suspension of such a Job, and about the nodes of its quota."""
+    """Only Kueue decides whether such a Job is suspended, and on which nodes its pods may run."""
     operator = start()
     place.train(scheduling={"queueName": "robots"})
     eventually(lambda: place.get(JOBS, "job-0"))

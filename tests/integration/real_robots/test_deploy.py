@@ -96,7 +96,7 @@ def test_the_record_has_poses_commands_and_readings(deploy, tmp_path):
 
 
 def test_a_policy_that_sees_only_a_camera_drives_to_what_it_sees(mock, tmp_path):
-    """The picture of the robot is reduced to the image that the policy learned with, and recorded."""
+    """The robot's picture is reduced to the image size of the training. The log contains the small image."""
     mock.send("/mock/place", [-1.3, 0.3, 0.2])
     package, log = write_seeing_package(tmp_path / "package"), tmp_path / "log.mcap"
     command = [sys.executable, "-m", "palaestra_trainer.cli.deploy", package, f"--mock-speed={SPEED:g}"]
@@ -208,7 +208,7 @@ def test_ctrl_c_at_the_question_ends_the_program(mock, package, tmp_path):
 
 
 def test_a_safety_rule_ends_the_deployment(deploy, mock, tmp_path):
-    """A policy that drives away from its target reaches the fence, and the exit code tells it."""
+    """A policy that drives away from its target reaches the fence, which a script sees by the exit code."""
     astray = write_package(tmp_path / "astray", gain=-1.0)
     done = deploy("--target=0.5,0", *HANDS_OFF, package=astray)
 
@@ -219,7 +219,7 @@ def test_a_safety_rule_ends_the_deployment(deploy, mock, tmp_path):
 
 
 def test_the_robot_drives_only_while_a_key_is_held(mock, package, tmp_path):
-    """Hold-to-run is the default; Ctrl-C ends, and the terminal is as before."""
+    """Hold-to-run is the default. Ctrl-C ends the program, which then restores the terminal's mode."""
     leader, follower = pty.openpty()
     command = [sys.executable, "-c", LEAN, package, f"--robot=http://{mock.address}", "--target=1.2,0"]
     command += [f"--mock-speed={SPEED:g}", f"--log={tmp_path / 'log.mcap'}"]

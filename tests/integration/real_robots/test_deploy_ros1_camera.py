@@ -89,7 +89,7 @@ def encoded(pixels, encoding):
 
 
 def test_a_policy_that_sees_drives_over_ros(deploy, master, mock, tmp_path):
-    """The node of the camera is another one than the driver, and has a namespace of its own."""
+    """The camera has its own node, in another namespace than the driver's node."""
     with camera(master, mock, "bgra8"):
         done = deploy()
 
@@ -109,7 +109,7 @@ def redness(image):
 
 
 def test_a_camera_without_colors_is_refused_before_the_robot_moves(deploy, master, mock):
-    """Gray in place of colors would be another input than the one that the policy learned with."""
+    """The policy learned with colors, so a gray picture would be a different input."""
     with camera(master, mock, "mono8"):
         done = deploy()
 
@@ -122,7 +122,7 @@ def test_a_camera_without_colors_is_refused_before_the_robot_moves(deploy, maste
 
 
 def test_without_new_pictures_the_robot_is_held_back_until_the_camera_returns(master, mock):
-    """A policy that acts on an old picture is blind, and the node of a camera may start again."""
+    """A policy must not act on an old picture. If the camera's node restarts, the drive must continue."""
     causes = []
     clock, rules = RobotClock(SPEED), SafetyRules(lost_s=DEADLINE_S * SPEED)
     hooks = Hooks(decided=lambda _, decision: causes.append(decision.cause and decision.cause.name))

@@ -44,7 +44,7 @@ def shell(tmp_path):
 
 
 def test_the_commands_of_the_page_drive_the_mock_robot(shell, tmp_path):
-    """A reader has two terminals and a space bar; the package is one that needs no training."""
+    """A reader types in two terminals and holds the space bar. The test's package needs no training."""
     [robot], [deploy] = blocks(PAGE, "sh robot"), blocks(PAGE, "sh deploy")
     write_package(tmp_path / "runs/move-to-target/0/package")
     serving = shell(robot.strip() + " --listen 127.0.0.1:0", stdout=subprocess.PIPE, text=True)

@@ -79,7 +79,7 @@ def test_the_robot_stands_after_a_bump_and_says_so(robot, mock):
 
 
 def test_the_robot_does_not_leave_its_fence(robot, mock):
-    """The fence ends before the floor does."""
+    """The fence is smaller than the floor, so nothing but the rule stops this robot."""
     real = robot(fence=Fence((-0.6, -0.6), (0.6, 0.6)))
 
     with pytest.raises(RobotStopped, match=r"fence: the robot at .* of the fence; move it back, or widen"):
@@ -90,7 +90,7 @@ def test_the_robot_does_not_leave_its_fence(robot, mock):
 
 
 def test_a_robot_drives_only_while_the_person_permits_it(robot, mock):
-    """Extra periods pass while the key is released, and the policy goes on after that."""
+    """While the key is released, the robot stands and extra periods pass. Then the policy continues."""
     permitted = iter([*[True] * 20, *[False] * 20, *[True] * 1000])
     real = robot(hooks=Hooks(permitted=lambda: next(permitted)))
     extra = []
@@ -103,7 +103,7 @@ def test_a_robot_drives_only_while_the_person_permits_it(robot, mock):
 
 
 def test_a_robot_at_its_charger_is_refused(robot, mock):
-    """It would tear the cable."""
+    """A robot that drives would tear the cable of its charger."""
     mock.send("/mock/charger", {"connected": True})
 
     with pytest.raises(RobotUnfit, match="is connected to its charger; unplug"):
@@ -149,14 +149,14 @@ def test_a_short_bump_ends_the_episode_too(robot, mock):
 
 
 def test_the_numbers_of_a_policy_may_be_those_of_numpy(robot, mock):
-    """An environment of a user passes the numbers of an action as they are."""
+    """A user's environment may pass numbers of NumPy from an action without a conversion."""
     drive(robot(), np.array([0.2, 0.0, 0.0], np.float32), 3)
 
     assert mock.get("/mock/truth")["vx"] == pytest.approx(0.2)
 
 
 def test_an_error_in_the_thread_of_the_commands_reaches_the_program(robot, mock):
-    """Otherwise the policy would drive a robot that stands, until its time is up."""
+    """Without the error, the policy would command a standing robot until the end of the episode's time."""
 
     def decided(situation, decision):
         del decision
@@ -171,7 +171,7 @@ def test_an_error_in_the_thread_of_the_commands_reaches_the_program(robot, mock)
 
 
 def test_after_a_pause_the_policy_looks_before_the_robot_moves(robot):
-    """The command of before the pause was made for another view."""
+    """The policy chose the last command before the pause, so the command may be wrong now."""
     permitted, sent = [True], []
 
     def decided(situation, decision):
@@ -190,7 +190,7 @@ def test_after_a_pause_the_policy_looks_before_the_robot_moves(robot):
 
 
 def test_the_last_command_of_a_dry_run_is_not_sent(mock):
-    """It was made for a robot that must not move, and the person has only just agreed."""
+    """The policy chose this command before the person agreed to a motion of the robot."""
     sent = []
     hooks = Hooks(decided=lambda _, decision: sent.append(decision.twist))
     clock = RobotClock(SPEED)
@@ -256,5 +256,8 @@ def test_an_error_of_the_policy_commands_the_robot_to_stand(mock):
 
 @pytest.mark.parametrize("what", ["kill", "cut", "hang"])
 def test_the_robot_stands_soon_after(what):
-    """A killed program and a cut cable leave only the robot's dead man; a hung policy leaves our watchdog."""
+    """If a policy hangs, our watchdog stops the robot.
+
+    After a kill of the program or a cut of the cable, the robot's dead man's switch does.
+    """
     assert after(what) < LIMITS_S[what]

@@ -149,7 +149,7 @@ def test_the_robot_drives_forward_and_stands_after_the_end(robot, mock):
 
 
 def test_a_wall_presses_the_bumper_over_ros(link, mock):
-    """The driver publishes the bumper only when it changes, so the state is kept with each other message."""
+    """The driver publishes the bumper only at a change, so other messages confirm the bumper's last state."""
     mock.send("/mock/place", [1.6, 0, 0])
     connected, store = link()
     assert eventually(lambda: store.newest.oldest_s > 0.0, pace_s=PACE_S)
@@ -165,7 +165,7 @@ def test_a_wall_presses_the_bumper_over_ros(link, mock):
 
 
 def test_the_driver_clips_what_is_faster_than_its_limit(link, slow):
-    """The policy's program learns nothing of it, so it must ask for the limit before it drives."""
+    """The driver does not report the clipping, so a program must read the limit before the drive."""
     connected, _ = link("/lab/slow")
     speeds = []
 
@@ -188,7 +188,7 @@ def test_a_driver_with_a_lower_limit_is_refused(master, slow):
 
 
 def test_a_driver_with_its_limit_at_the_speed_of_the_rules_is_used(robot, slow):
-    """The default of the rules is the driver's default."""
+    """The default speed limit of the safety rules equals the driver's default limit."""
     real_robot = robot("/lab/slow", speed_m_s=0.2)
 
     def speed():
@@ -228,7 +228,7 @@ def test_without_a_driver_the_robot_is_refused(master):
 
 
 def test_a_command_that_nobody_receives_is_an_error(master):
-    """The loop of commands then knows that zero was not confirmed."""
+    """With the error, the loop that sends commands can report that no driver confirmed the command."""
     link = Ros1Link(address(master))
 
     with pytest.raises(LinkError, match="/cmd_vel: the driver is not connected"):
@@ -282,7 +282,7 @@ def test_a_recorder_of_commands_is_not_the_driver(master, link, other_node):
 @pytest.mark.skipif(cut_network.lack() is not None, reason="this machine has no network namespaces")
 @pytest.mark.parametrize("time", range(3))
 def test_the_robot_stands_soon_after_its_network_was_cut(time):
-    """The driver has no watchdog, and sees no end of the connection, so only the base's dead man is left."""
+    """The driver has no watchdog and does not notice the cut. Only the base's dead man's switch is left."""
     del time
 
     assert cut_network.after_cut_s() < cut_network.LIMIT_S

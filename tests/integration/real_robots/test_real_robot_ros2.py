@@ -124,7 +124,7 @@ def package(tmp_path_factory):
 
 @pytest.mark.parametrize("options", [(), ("--best-effort",)], ids=["reliable", "best-effort"])
 def test_the_robot_drives_over_topics(mock, options):
-    """Publishers of sensors are reliable in one driver and best effort in the next."""
+    """One driver publishes its sensors with reliable QoS, and another driver with best effort."""
     with driver(mock, "/one", *options):
         found = found_by(driving("ros2:/one"))
         truth = mock.get("/mock/truth")
@@ -211,7 +211,7 @@ def redness(image):
 
 
 def test_the_policy_node_is_quiet_without_a_goal_and_opens_no_network(package):
-    """Other nodes may drive the robot then, and packets of tests must not leave this machine."""
+    """Without a goal, other nodes may drive the robot. Packets of tests must not leave this machine."""
     process, client = started("--drift=0")
     try:
         with driver(client, "/", speed=1.0) as robot, node(package, "policy-node") as (program, log):

@@ -65,7 +65,7 @@ def program(monkeypatch):
 
 
 def test_a_driver_of_rospy_receives_our_commands(master, program):
-    """The driver of a robot is not ours."""
+    """The driver of a real robot is another project's program, and uses rospy."""
     driver = program(DRIVER, "theirs")
     assert driver.stdout.readline() == "ready\n"
     link = Ros1Link(master.replace("http:", "ros1:").rstrip("/") + "/theirs")

@@ -225,7 +225,7 @@ def test_a_robot_of_a_run_is_shown_and_shown_again_after_a_restart(master, tmp_p
 
 
 def test_only_the_scene_is_requested_and_only_topics_that_are_read_are_shown(master, tmp_path):
-    """An additional subscriber could make the simulator render pictures, and each request takes its time."""
+    """An additional subscriber could make the simulator render pictures, and each request costs time."""
     simulator = CountingSimulator("rover", master)
     reader = RosSubscriber("/rover/camera/image", "sensor_msgs/Image")
     reader.connect()

@@ -84,7 +84,7 @@ def header_of(raw):
 
 
 def test_a_message_reaches_each_subscriber_at_once(publisher, subscriber):
-    """A command that waits for the next one would arrive too late for the robot's dead man."""
+    """A command that waits for the next one would arrive too late for the robot's dead man's switch."""
     assert publisher.publish(**FORWARD) == 1
     assert subscriber.next().linear.x == 0.25
 
@@ -103,7 +103,7 @@ def test_a_subscriber_that_leaves_is_not_counted(publisher, subscriber):
 
 
 def test_a_subscriber_that_does_not_read_is_dropped_and_delays_nobody(node, publisher, subscriber):
-    """Its messages would be late commands, and waiting for it would stop the robot of another."""
+    """The subscriber would get old commands, and a wait for it would stop the robots of other subscribers."""
     slow = connection(node)
     header_of(slow)
     eventually(lambda: publisher.publish(**FORWARD) == 2, pace_s=0.002)

@@ -129,7 +129,7 @@ def test_a_row_equals_the_environment_over_ros(task, cartpole, master) -> None:
 
 
 def test_a_resume_continues_every_row_bit_for_bit(cartpole) -> None:
-    """An interrupted run must be the run that was not interrupted, although copies were reset since."""
+    """An interrupted run must equal an uninterrupted one, even if copies were reset after the checkpoint."""
     for changes in ({}, cartpole):
         with batch_env(**changes) as (env, _):
             actions = actions_of(env, 30)
@@ -151,7 +151,7 @@ def test_a_resume_continues_every_row_bit_for_bit(cartpole) -> None:
 
 
 def test_a_killed_simulator_ends_the_episodes_of_all_rows_and_comes_back() -> None:
-    """One process has all rows, so its end is one fault, and the rows reach no loss."""
+    """One process simulates all rows, so its end is a single fault. No loss may use the rows of that step."""
     with batch_env() as (env, launcher):
         env.reset()
         [action] = actions_of(env, 1)
@@ -166,7 +166,7 @@ def test_a_killed_simulator_ends_the_episodes_of_all_rows_and_comes_back() -> No
 
 
 def test_a_row_that_fails_is_truncated_alone(cartpole, monkeypatch, tmp_path) -> None:
-    """The other rows go on, the row reaches no loss, and its next episode is a usual one."""
+    """The other rows continue. No loss uses the failed row, and a normal episode follows in it."""
     unlimited = cartpole["world"].read_text().replace(' ctrlrange="-1 1" ctrllimited="true"', "")
     cartpole["world"].write_text(unlimited)
     (tmp_path / "wild_robots.py").write_text(WILD_ROBOT)

@@ -130,7 +130,7 @@ def test_a_killed_reaper_takes_its_own_simulator_along_and_no_other(
 
 @pytest.mark.parametrize("what", ["waits", "stubborn", "family"])
 def test_a_signal_ends_both(two, request, left, eventually_true, what) -> None:
-    """The end of the pod must end both simulators within the same time as one."""
+    """At the end of the pod, two simulators must end within the time that a single one has."""
     it = two(request.getfixturevalue(what))
     it.start(FIRST)
     it.start(SECOND)

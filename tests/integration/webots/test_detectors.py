@@ -68,7 +68,7 @@ def detecting(request, master, tmp_path_factory):
 
 
 def test_a_radar_reads_each_target_by_the_radar_equation(detecting):
-    """Power in dBm, azimuth to the right, and no speed, because nothing moves."""
+    """The power is in dBm, and an azimuth to the right is positive. The speed is 0, because nothing moves."""
     _, it = detecting
     it.advance()
     wavelength, gain = 299_792_458.0 / 20e9, 10.0**1.5
@@ -176,7 +176,7 @@ def test_a_keyboard_has_the_keys_that_are_pressed_in_each_step(detecting):
 
 
 def test_a_key_that_is_not_pressed_cannot_be_released(detecting):
-    """The program learns that its picture of the keyboard is wrong."""
+    """The program must learn that the key is not in the state that the program assumes."""
     _, it = detecting
 
     with pytest.raises(WrongData, match="keyboard: 65 is not pressed"):
@@ -202,7 +202,7 @@ def test_a_joystick_has_buttons_axes_and_hat_switches(detecting):
 
 @pytest.mark.parametrize("button", [-2, 128])
 def test_a_button_that_no_joystick_has_is_refused(detecting, button):
-    """Its number has no room in the message, which would end the simulator."""
+    """The message has no space for such a number, so the number would crash the simulator."""
     _, it = detecting
 
     with pytest.raises(WrongData, match=f"joystick refuses to press {button}"):
@@ -211,7 +211,7 @@ def test_a_button_that_no_joystick_has_is_refused(detecting, button):
 
 
 def test_a_position_that_no_joystick_has_is_refused(detecting):
-    """A byte has no room for it."""
+    """A position must fit into one byte of the message."""
     _, it = detecting
 
     with pytest.raises(WrongData, match=r"joystick refuses set_axes with \[128\]"):
@@ -241,7 +241,7 @@ class Feeling(OwnRobot):
 
 
 def test_forces_and_objects_are_read_in_mujoco(master, tmp_path):
-    """A sensor of force carries its own weight; the camera at the origin looks along x."""
+    """No object touches the plates, so `force-3d` measures a plate's own weight. The camera looks along x."""
     del master
     plates = PLATE % ("pressure", "force", "1") + PLATE % ("force", "force-3d", "-1")
     text = Setting("mujoco").text(robot(plates + CAMERA, "boundingObject Box { size 3 0.5 0.2 }") + SEEN)
@@ -284,7 +284,7 @@ def test_the_stub_refuses_a_camera_that_recognizes(master, tmp_path):
 
 
 def test_a_recognition_of_a_simulator_that_does_not_run_is_a_dead_simulator(master):
-    """The explanation of a fault asks the simulator again, and must end if the simulator is dead."""
+    """To explain a fault, the facade sends one more request, which must not wait for a dead simulator."""
     del master
     objects = RecognizedObjects("absent", "camera")
 
@@ -295,7 +295,7 @@ def test_a_recognition_of_a_simulator_that_does_not_run_is_a_dead_simulator(mast
 
 
 def test_a_touch_sensor_of_another_type_is_a_wrong_world(master, tmp_path):
-    """Its messages have another type, so the sensor would seem to be a dead simulator."""
+    """The sensor's messages have another type, so without this error the simulator would seem to be dead."""
     del master
 
     class Pressed(OwnRobot):

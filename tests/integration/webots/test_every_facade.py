@@ -154,7 +154,7 @@ def test_a_motor_has_the_limits_of_the_world(everything):
 
 
 def test_the_facts_of_the_robot_are_those_of_its_world(everything):
-    """A program can look whether it may use the supervisor, and where the world file is."""
+    """A program can check whether it may use the supervisor, and can find the world file."""
     it = everything.controller
 
     assert (it.model, it.control_mode) == ("", RobotMode.SIMULATION)
@@ -184,7 +184,7 @@ def test_texts_of_the_window_arrive_in_their_order(everything):
 
 
 def test_a_node_is_found_by_definition_number_device_and_parent(everything):
-    """All of these are the same node, so a program may use the way that it has."""
+    """Each way leads to the same node, so a program may use the one for which it has the data."""
     box = everything.observer.find("BOX")
     gps = everything.observer.find_device("gps")
 
@@ -230,7 +230,7 @@ def test_a_pose_in_the_axes_of_another_node_is_their_difference(everything):
 
 
 def test_a_scan_an_image_and_a_layer_are_the_same_measurement(everything):
-    """A box is in front of the lidar."""
+    """A program may read the lidar in any of these three forms."""
     of = everything.robot.of
     everything.robot.advance()
 
@@ -326,7 +326,7 @@ def test_a_battery_loses_the_power_of_its_robot(everything):
 
 
 def test_a_connector_and_a_gripper_that_are_alone_detect_nothing(everything):
-    """Their sensors have a `value` for this too."""
+    """Without a partner, a presence sensor must read 0 or False, and not None."""
     of = everything.robot.of
 
     assert (of["ConnectorPresence"].value, of["VacuumPresence"].value) == (0, False)
@@ -377,7 +377,7 @@ def test_a_facade_of_another_device_is_a_wrong_world(everything, wrong, fact):
 
 
 def test_the_end_of_a_segmentation_leaves_the_camera_on(everything):
-    """Another sensor may read the camera."""
+    """A program may still read the images of the camera itself."""
     if not everything.robot.renders:
         return
     of = everything.robot.of

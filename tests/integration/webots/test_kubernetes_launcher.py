@@ -129,7 +129,7 @@ def test_a_simulator_starts_in_a_pod_and_closing_leaves_nothing(place, tmp_path)
 
 
 def test_a_notebook_that_ends_without_closing_takes_its_simulator_with_it(place):
-    """A user rarely closes a facade, and the pod should not wait for the silence."""
+    """A user rarely closes a facade, and the pod should not wait until its `silence_s` has passed."""
     running = place.notebook()
     assert running.stdout.readline() == "robotino 0.192\n"
 
@@ -194,7 +194,7 @@ def test_a_quota_that_forbids_the_pod_is_the_error(place):
 
 
 def test_a_program_outside_of_the_cluster_is_refused(place):
-    """Its simulator could not be reached, and nothing would remove the simulator with the program."""
+    """Such a program could not reach its simulator, which nothing would remove after the program's end."""
     place.api.delete(PODS, place.name, NOTEBOOK)
     eventually(lambda: not place.all(PODS))
 

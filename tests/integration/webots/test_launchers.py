@@ -129,7 +129,7 @@ def test_a_killed_program_leaves_no_simulator(place, name, world, engine):
 
 
 def test_the_container_has_what_the_settings_say(make, engine, world):
-    """Docker's own words for each setting; the world's folder is read-only, and no right is left."""
+    """Docker has other names for the settings. The container has no capability and a read-only world."""
     make(launcher=Docker(shm_size="1g", gpus=2)).start()
     request = next(engine.created[name].request for name in engine.running())
 
@@ -218,7 +218,7 @@ def test_a_rootless_engine_has_another_network(engine, monkeypatch):
 
 
 def test_without_an_engine_the_line_names_its_address():
-    """No engine runs, or DOCKER_HOST is wrong. The SDK leaves a socket open, so this is another process."""
+    """No engine runs, or DOCKER_HOST is wrong. The SDK leaves a socket open, so the test starts a process."""
     told = subprocess.run(
         [
             sys.executable,

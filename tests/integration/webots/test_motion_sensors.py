@@ -165,7 +165,7 @@ class Located(OwnRobot):
 
 @pytest.mark.parametrize("driver", PHYSICS)
 def test_a_gps_on_the_globe_is_read_in_degrees(master, tmp_path, driver):
-    """In such a world, Webots publishes another type of message. At the origin, the reference is read."""
+    """In such a world, Webots publishes another type of message. The GPS here is at `gpsReference`."""
     del master
     text = Setting(driver).text(robot('GPS { name "gps" } Lidar { name "lidar" numberOfLayers 2 }'), GLOBE)
     with running(text, tmp_path, driver, Located) as (_, located):

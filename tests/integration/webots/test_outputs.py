@@ -41,7 +41,7 @@ def devices(request, master, tmp_path_factory):
 
 
 def test_a_led_has_the_value_that_was_set(devices):
-    """A program may read the LED of another part of the program."""
+    """One part of a program may read the LED that another part has set."""
     devices[LED].set(3)
 
     assert devices[LED].value == 3
@@ -150,7 +150,7 @@ def test_a_display_shows_what_is_drawn(devices, tmp_path, draw, inside, outside)
 
 
 def test_a_display_shows_images_and_files(devices, tmp_path):
-    """An image replaces the old pixels, or alpha mixes both; the simulator's machine has the file."""
+    """An image replaces the old pixels, or alpha mixes both. A file must be on the simulator's machine."""
     display = devices[Display]
     fill(display, 0)
     image = np.zeros((2, 3, 3), np.uint8)

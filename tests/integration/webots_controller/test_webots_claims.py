@@ -41,7 +41,7 @@ def write_files(folder):
 
 @pytest.mark.parametrize("release", ["R2023b", "R2025a"])
 def test_every_claim_about_webots_holds(webots, played, tmp_path, release):
-    """The page of the interface is the promise, for the controller of Webots and for ours."""
+    """The page of the interface makes these claims for Webots' own controller and for ours."""
     asked = claims("webots")
     webots(asked.world, ROBOT, release=release, FAKE_WEBOTS_PHYSICS="mujoco")
     write_files(tmp_path / "worlds")
@@ -63,7 +63,7 @@ def test_a_training_can_drive_a_robot_in_webots(webots):
 
 
 def test_each_service_responds_as_in_the_stub(webots, played, client, tmp_path):
-    """The tests' Webots simulates with the stub: a wrong function or order of arguments differs."""
+    """The tests' Webots simulates with the stub. A difference is a wrong function or order of arguments."""
     asked = claims("stub")
     webots(asked.world, ROBOT, FAKE_WEBOTS_PRESSED="1")
     ours, _ = played(asked, ending=False)

@@ -68,7 +68,7 @@ def test_a_step_that_is_no_multiple_of_the_basic_step_is_refused(webots, prefix,
 
 
 def test_services_respond_in_a_pause_and_a_step_waits_for_its_end(webots, prefix, ask, step):
-    """A trainer pauses a simulator that it does not need; before that, it reads the world."""
+    """A trainer that has paused a simulator may still read the world, but time must stand still."""
     webots(world(prefix, True, True), f"{prefix}_0", f"{prefix}_1", mode="pause")
 
     assert ask(0, "supervisor/simulation_get_mode", "get_int") == {"value": 0}
@@ -108,7 +108,7 @@ def test_the_world_goes_on_without_a_controller_that_was_killed(webots, prefix, 
 
 
 def test_quitting_ends_with_the_status_and_leaves_no_name(webots, prefix, ask):
-    """A sidecar reads the exit code; a name that stays would lead the next simulator's clients astray."""
+    """A sidecar reads the exit code; a name that stays would mislead clients of the next simulator."""
     process = webots(world(prefix, True), f"{prefix}_0")
 
     assert ask(0, "supervisor/simulation_quit", "set_int", value=3) == {"success": True}
@@ -156,7 +156,7 @@ def test_an_injected_crash_ends_only_the_controller(webots, prefix, step):
 
 
 def test_an_injected_value_reaches_the_client(webots, prefix, ask):
-    """Faults of messages need no process to end."""
+    """A fault that only changes a message must not end the controller."""
     faulty = "wrong_value:service=robot/get_time,value=7"
     webots(world(prefix, True), f"{prefix}_0", PALAESTRA_STUB_FAULTS=faulty)
 

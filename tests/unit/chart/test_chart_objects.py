@@ -319,7 +319,7 @@ def test_the_operator_is_reached_from_the_monitoring_namespace_only(one):
 
 
 def test_the_chart_is_of_the_same_release(made):  # noqa: ARG001 - skips without Helm
-    """The release number is written in four files, which must agree."""
+    """The chart and the packages are released together, so their version numbers must agree."""
     chart = yaml.safe_load((CHART / "Chart.yaml").read_text())
 
     assert {chart["version"], chart["appVersion"]} == {version("palaestra")}

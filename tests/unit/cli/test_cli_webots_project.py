@@ -30,7 +30,7 @@ def test_the_project_starts_the_controller_with_this_python(tmp_path, capsys):
 
 @pytest.mark.parametrize(("name", "text"), [("ros", ""), ("ros.py", "print('mine')"), ("helper.py", "")])
 def test_a_controller_of_the_user_is_kept(tmp_path, capsys, name, text):
-    """A binary beside our file would be started instead of it; a changed file would be lost."""
+    """Webots would start a user's binary and not our script, and a user's script would be overwritten."""
     file = tmp_path / "controllers" / "ros" / name
     file.parent.mkdir(parents=True)
     file.write_text(text)

@@ -132,7 +132,7 @@ def test_a_reason_that_a_kubelet_does_not_show_for_a_moment_is_the_reason_all_th
 
 
 def test_a_trouble_that_has_passed_is_not_the_reason(accepted):
-    """The image was pulled long before the timeout, so it is not the cause of the timeout."""
+    """The image was pulled long before the timeout, so the earlier pull error is not the cause."""
     scene = accepted(startTimeoutSeconds=1000)
     pod = scene.new_pod()
     scene.container(pod, "trainer", waiting="ImagePullBackOff: not found")

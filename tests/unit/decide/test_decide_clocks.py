@@ -193,7 +193,7 @@ def kills(scene):
 
 
 def test_kills_are_distinguished_by_pod_and_run_and_not_by_the_clocks_of_nodes(training):
-    """The second node's clock is behind, so by its time its kill is older than the first one."""
+    """The second node's clock is behind, so the time of the second kill is earlier than that of the first."""
     scene, pod = training()
     kill(scene, pod, 0)
     scene.settle(5)

@@ -115,7 +115,7 @@ def test_the_place_where_another_release_s_definition_differs_is_returned():
 
 
 def test_the_operators_rights_are_those_of_an_installation():
-    """The doctor would report a permission that no role grants as missing for ever.
+    """If no role granted a permission, the doctor would always report that permission as missing.
 
     If the doctor did not check a permission, nobody would notice that the permission is missing.
     """

@@ -47,7 +47,7 @@ def test_the_newest_command_is_valid():
 
 @given(velocities, velocities, steps)
 def test_no_step_exceeds_the_limits(current, target, step_s):
-    """Wheels of the real robot would slip, and its motors cannot do it."""
+    """At a higher acceleration, the wheels of a real robot would slip, and its motors are too weak for it."""
     reached = approach(current, target, step_s)
 
     for now, then, limit in zip(current, reached, LIMITS, strict=True):
@@ -71,5 +71,5 @@ def test_a_curve_keeps_its_direction():
 
 
 def test_an_absurd_command_does_not_break_the_base():
-    """JSON can hold numbers whose ratio to a step is infinite; the robot must still obey the next command."""
+    """JSON allows a number whose ratio to a step is infinite; the robot must still obey the next command."""
     assert approach(AHEAD, (1.7e308, 0.0, 0.0), 0.001) == AHEAD

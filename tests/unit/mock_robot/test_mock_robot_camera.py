@@ -18,7 +18,7 @@ def red_columns(*pose):
 
 
 def test_the_pole_is_where_the_pose_says():
-    """It is in the middle straight ahead, to the right after a turn to the left, and wider nearby."""
+    """A pole ahead is in the middle. It moves to the right if the robot turns left, and is wider nearby."""
     ahead, turned, near = red_columns(-2, 0, 0), red_columns(-2, 0, 0.2), red_columns(-1, 0, 0)
 
     assert ahead.mean() == pytest.approx(159.5, abs=1.0)

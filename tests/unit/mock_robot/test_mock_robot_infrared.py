@@ -21,7 +21,7 @@ def without_noise(mean, _deviation):
 
 @given(st.floats(0.03, 0.39))
 def test_it_inverts_the_table(true_m):
-    """The world has the table of the sensor, so no second formula is needed."""
+    """The world file has the sensor's lookup table, so no second formula is needed."""
     value = LookupTable(SHARP).response(true_m, without_noise)
 
     assert distance_m(SHARP, value) == pytest.approx(true_m, abs=1e-9)
@@ -36,18 +36,18 @@ def test_a_sensor_that_sees_nothing_reports_0_41():
 
 
 def test_a_surface_that_is_too_close_has_the_least_distance():
-    """The noise leads to voltages above the table."""
+    """With noise, the voltage may be above every voltage in the lookup table."""
     assert distance_m(SHARP, 3.1) == 0.03
 
 
 def test_a_table_may_rise():
-    """Not all sensors of a world are those of Sharp."""
+    """The voltage of Sharp's sensors falls with the distance, but a world may have other sensors."""
     assert distance_m(RISING, 50.0) == pytest.approx(0.1)
     assert distance_m(RISING, 100.0) == OUT_OF_RANGE_M
 
 
 def test_of_two_distances_the_farther_one_is_reported():
-    """The voltage of a real sensor falls again below 4 cm, and its robot cannot see that."""
+    """Below 4 cm, the voltage of a real sensor falls again, so the robot takes the wall for a farther one."""
     assert distance_m(PEAK, 1.7) == pytest.approx(0.17)
 
 

@@ -91,7 +91,7 @@ def test_a_robot_at_rest_does_not_drift():
 
 
 def test_the_sequence_number_counts_the_updates():
-    """Clients detect by this number that a reading is new; the other values are the last motion."""
+    """Clients detect by this number that a reading is new; the values before it are the last velocity."""
     odometry = DriftingOdometry(0.0, Random(0))
     odometry.advance((0.1, 0.2, 0.3), STEP_S)
     odometry.advance((0.1, 0.2, 0.4), STEP_S)

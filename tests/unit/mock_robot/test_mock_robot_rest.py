@@ -73,7 +73,7 @@ def test_a_bad_charger_is_refused(robot, body):
 
 
 def test_a_place_in_an_obstacle_is_refused(robot):
-    """The answer must say so, because the robot did not move."""
+    """The response must report the refusal, because the robot did not move."""
     with pytest.raises(BadRequestError, match=r"^place: x 2, y 0: an obstacle is there"):
         routes(robot, CLOCK)["POST", "/mock/place"](b"[2, 0, 0]")
 

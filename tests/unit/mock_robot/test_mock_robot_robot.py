@@ -76,7 +76,7 @@ def test_a_person_carries_it_without_its_odometry(robot):
 
 
 def test_it_is_not_put_into_an_obstacle(robot):
-    """The physics would push the robot out of the obstacle, to another place than the wanted one."""
+    """The physics would push the robot out of the obstacle, so it would not be where the person put it."""
     with pytest.raises(MockRobotError, match=r"^x 2, y 0: an obstacle is there; choose a free place$"):
         robot.place(2.0, 0.0, 0.0)
 
@@ -149,7 +149,7 @@ def test_a_world_without_a_robotino_is_refused(tmp_path):
 
 
 def test_a_robot_with_other_wheels_is_refused(tmp_path):
-    """The kinematics belong to these wheels."""
+    """The kinematics of the mock are those of a Robotino's three wheels."""
     world = tmp_path / "other.wbt"
     world.write_bytes(builtin_path("arena").read_bytes().replace(b'"wheel1_joint"', b'"left"'))
 

@@ -280,7 +280,7 @@ def test_the_program_refuses_with_the_exit_code_of_a_wrong_world(options, messag
     ],
 )
 def test_a_request_that_does_not_fit_the_world_is_refused(changes, fact) -> None:
-    """The trainer reports it as a world that does not fit its robot, before the first step."""
+    """Before the first step, the trainer then reports that the world does not fit the job's robot."""
     content = {**ROBOTINO.to_json(), **{name: value if isinstance(value, str | int) else list(value)
                                         for name, value in changes.items()}}  # fmt: skip
     batch = arena(2)
@@ -300,7 +300,7 @@ def test_a_request_that_does_not_fit_the_world_is_refused(changes, fact) -> None
     ],
 )
 def test_a_request_that_does_not_fit_the_model_is_refused(changes, fact, tmp_path) -> None:
-    """As for a world with wheels."""
+    """A model gets the same refusals as a world with wheels, in the test above."""
     batch = carts(tmp_path, 2)
 
     with pytest.raises(BatchRefusedError, match=fact):

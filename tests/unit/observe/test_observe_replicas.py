@@ -139,7 +139,7 @@ def test_what_is_there_is_known_by_kind_and_name(valid_job):
 def test_a_config_map_or_policy_of_somebody_else_is_not_there(valid_job):
     """Any user can set the operator's label, so only the owner reference counts.
 
-    A claim has no owner, because it must outlive its job.
+    By default a claim has no owner, because it must outlive its job.
     """
     named = {"metadata": {"name": "x"}}
 

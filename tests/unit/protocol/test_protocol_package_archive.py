@@ -67,7 +67,7 @@ def test_equal_files_make_equal_bytes():
     ],
 )
 def test_an_archive_that_is_no_package_is_refused(tmp_path, members, fact):
-    """An archive of another person may be made to write elsewhere, or to fill the memory."""
+    """A malicious archive could write files outside the target folder, or fill the memory."""
     place = zipped(tmp_path / "package.zip", members, compression=zipfile.ZIP_DEFLATED)
 
     with pytest.raises(PackageError, match=fact):

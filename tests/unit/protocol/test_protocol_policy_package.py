@@ -72,7 +72,7 @@ def test_a_missing_file_is_named(folder):
     ],
 )
 def test_a_wrong_manifest_is_refused(tmp_path, text, fact):
-    """A reader of another format would take a field for another one."""
+    """A reader of another format would mistake one field for another."""
     (tmp_path / MANIFEST).write_bytes(text)
 
     with pytest.raises(PackageError, match=f"{fact}.*; export the package again"):

@@ -8,7 +8,7 @@ LOST = StopCause("connection lost", "", stops=True)
 
 
 def test_each_hold_is_counted_with_its_time_and_the_long_and_latched_ones_are_stops():
-    """A hold of one late reading is reported; a longer one is a stop as a person sees it."""
+    """A hold for a single late reading is only reported. A person would see a longer hold as a stop."""
     times = iter((0.0, 1.0, 1.1, 2.0, 2.25, 2.5, 9.0, 9.5))
     holds = Holds(lambda: next(times), period_s=0.192)
 

@@ -175,7 +175,7 @@ def test_an_impatient_client_loses_messages_with_the_fault(ros, start):
 
 
 def test_a_client_that_waits_for_the_message_can_lose_the_next_one(ros, start):
-    """The loop sends the messages before it stores the count, so a message does not prove it is ready."""
+    """The loop sends messages before it stores the count. A message does not prove that the loop is ready."""
     start(publish_delay_s=0.002, lost_wakeup=True)
     robot = ros.node("robotino")
     inbox = robot.inbox("ir1/value")

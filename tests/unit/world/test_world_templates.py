@@ -125,7 +125,7 @@ def test_an_error_in_the_body_is_at_its_line_of_the_template() -> None:
     ],
 )
 def test_code_that_is_not_expanded_is_named(code: str, named: str) -> None:
-    """A template that is expanded in part would be another object than in Webots; no template runs long."""
+    """A partly expanded template would differ from its object in Webots. No code may run for long."""
     with pytest.raises(WorldError) as error:
         lamp(LAMP.replace("const tall", f"{code} const tall"))
 

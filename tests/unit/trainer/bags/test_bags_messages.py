@@ -20,7 +20,7 @@ def test_nine_ranges_are_a_scan_from_the_front_counterclockwise():
 
 
 def test_a_distance_out_of_range_is_infinite():
-    """The sensor returns its bound for it, which a reader would take for an obstacle (REP 117)."""
+    """The sensor then returns the bound of its range, which a reader would take for an obstacle (REP 117)."""
     scan = messages.ranges(0.0, [0.4, 0.5, 0.03, 0.2, math.nan], (0.03, 0.4))
 
     assert scan["ranges"][:4] == [math.inf, math.inf, -math.inf, 0.2]
@@ -57,7 +57,7 @@ def test_a_time_that_ros_2_cannot_count_is_refused(stamp_s):
 
 
 def test_a_time_just_before_the_last_second_is_still_one():
-    """Rounding to nanoseconds must not add a second to a field of 31 bits, nor lose digits of today."""
+    """Rounding must not overflow the 31 bits of the seconds, and a time of today must keep all its digits."""
     assert messages.nanoseconds(1_790_000_000.25) == 1_790_000_000_250_000_000
     assert messages.nanoseconds(math.nextafter(2.0**31, 0.0)) < 2**31 * 10**9
 

@@ -28,7 +28,7 @@ def whole(tmp_path_factory):
 
 @given(data=st.data())
 def test_a_truncated_bag_is_refused_and_its_part_is_read(whole, data, tmp_path_factory):
-    """A copy may end early; only the suffix `.part` says that a file may."""
+    """An interrupted copy lacks its end. Only a file with the suffix `.part` is allowed to lack it."""
     content = whole[: data.draw(st.integers(0, len(whole) - 1))]
     path = tmp_path_factory.mktemp("bag") / "log.mcap"
     part = path.with_name("log.mcap.part")

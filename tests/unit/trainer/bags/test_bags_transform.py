@@ -42,7 +42,7 @@ def test_the_transform_of_the_gateway_has_the_bytes_of_ros_2(tmp_path):
 
 
 def test_the_transform_moves_a_point_of_the_robot_to_the_frame_of_odometry():
-    """A viewer draws what the robot sees 1 m ahead where the robot's pose says; a quarter turn makes it y."""
+    """A viewer draws the robot's readings by this transform. After a quarter turn, 1 m ahead is along y."""
     [stamped] = bag_messages.transform(STAMP_S, (1.5, -2.0, math.pi / 2.0))["transforms"]
     moved, turn = stamped["transform"]["translation"], stamped["transform"]["rotation"]
     heading = 2.0 * math.atan2(turn["z"], turn["w"])

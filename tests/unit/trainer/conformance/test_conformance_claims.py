@@ -72,7 +72,7 @@ def test_a_silent_topic_is_named_and_comes_first_in_the_report():
 
 
 def test_only_our_simulators_have_our_services():
-    """A client of Webots would otherwise be told that Webots is wrong."""
+    """The program must not report Webots as wrong because Webots lacks services of our own."""
     of_webots = {path for _, path, _, _ in claims("webots").calls}
 
     assert subjects() == ("stub", "mujoco", "webots", "training")

@@ -126,7 +126,7 @@ def problems(cart):
 
 
 def test_a_cart_that_does_everything_right_keeps_every_claim():
-    """Otherwise the tests below could find the mistake of this cart instead of theirs."""
+    """If this cart had a mistake, the tests below could find it instead of the mistake that they plant."""
     verdicts = rehearsed(CartInPlace(), ASKED, "cart")
 
     assert [verdict.path for verdict in verdicts] == list(CLAIMS)

@@ -120,7 +120,7 @@ def test_an_error_of_a_pending_step_is_raised_in_a_later_step(make_env, make_mem
 
 @pytest.mark.parametrize("name", ["DQN", "QRDQN"])
 def test_every_stored_row_is_a_step_of_the_simulator(make_env, make_member, make_slow, name):
-    """The learner sees the steps of all simulators, and as many updates for a row as without slow ones."""
+    """The learner gets all simulators' steps, and makes as many updates per row as without a slow one."""
     env = make_env(make_member("fast"), make_slow(turns=3))
     hyperparameters = {"learning_starts": 10, "train_freq": 4, "buffer_size": 500, "gradient_steps": 1}
     model = make_model(Algorithm(name=name, hyperparameters=hyperparameters), env, 1, "cpu")

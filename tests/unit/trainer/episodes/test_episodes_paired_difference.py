@@ -46,7 +46,7 @@ def test_results_are_counted_by_what_both_policies_did():
 def test_a_bet_against_the_true_difference_wins_nothing_on_average(pairs, discordant, for_a):
     """The capital is a martingale, so by Ville's inequality it reaches 20 in at most 5 % of all comparisons.
 
-    The test draws any probabilities for the next episode, and bets against the difference that they have.
+    The test draws random probabilities for the next episode, and bets against the difference that they imply.
     """
     chances = {
         "only_a": discordant * for_a,
@@ -95,7 +95,7 @@ def test_episodes_with_equal_results_are_no_evidence_of_a_difference(pairs):
 
 @pytest.mark.parametrize("chances", [(0.9, 0.08, 0.0, 0.02), (0.5, 0.2, 0.1, 0.2), (0.05, 0.5, 0.4, 0.05)])
 def test_whoever_looks_after_each_batch_sees_the_true_difference_inside(chances):
-    """A person may look after each batch.
+    """A person may look at the interval after each batch.
 
     In at most 5 % of the comparisons, the true difference is outside the interval at any of these looks.
     """

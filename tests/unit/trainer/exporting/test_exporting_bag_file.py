@@ -81,7 +81,7 @@ def test_the_poses_are_the_recorded_ones_and_the_velocity_is_unknown(run):
 
 
 def test_a_bag_is_replaced_by_the_newer_episodes(run):
-    """The best policy of a resumed run is another one."""
+    """A resumed run may find a better policy, whose episodes are then those of the run."""
     export([str(run), "--to", "mcap"])
     (run / "replays.json").write_text(json.dumps({"episodes": [RESULTS | {"film": FILM}]}))
 

@@ -104,7 +104,7 @@ def test_a_wait_ends_when_the_simulation_has_reached_the_time():
 
 
 def test_at_the_end_a_paused_simulation_holds_nothing_up():
-    """The robot must be commanded to stand also then."""
+    """The last command makes the robot stand, and must be sent even if the simulation is paused."""
     clock = SimulationClock(time=SimulationTime(lambda: 1.0))
     clock.time.leave()
 
@@ -142,5 +142,5 @@ def test_the_wait_for_time_ends_when_the_check_raises():
     ],
 )
 def test_arguments_of_ros_are_separated_from_those_of_the_program(given, own, ros):
-    """Launch files of ROS 2 add them at the end, and people also at the begin."""
+    """Launch files of ROS 2 add their arguments at the end, and people also type them at the beginning."""
     assert separated(given) == (own, ros)

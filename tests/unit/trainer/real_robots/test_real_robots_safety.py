@@ -54,7 +54,7 @@ CAUSES = [
 
 
 def test_the_command_of_the_policy_is_sent_within_the_limits():
-    """Nothing speaks against this command, but it is faster than 0.2 m/s."""
+    """No rule forbids this motion, but the command is faster than the limit of 0.2 m/s."""
     assert decide(DRIVING, RULES) == ((0.2, 0.0, 0.0), None)
 
 
@@ -65,7 +65,7 @@ def test_a_robot_without_a_command_stands():
 
 @pytest.mark.parametrize(("differs", "name", "stops"), CAUSES)
 def test_each_cause_holds_the_robot(differs, name, stops):
-    """A cause that ends by itself holds the robot back; after the others, a person decides."""
+    """If a cause can end by itself, the drive continues after it; after any other cause, a person decides."""
     twist, cause = decide(replace(DRIVING, **differs), RULES)
 
     assert twist == STANDING
@@ -100,7 +100,7 @@ def test_the_fence_is_closer_for_old_readings_and_fast_commands():
     ("twist", "moves"), [((0.06, 0.0, 0.0), True), ((0.03, 0.03, 0.0), False), ((0.0, 0.0, -0.2), True)]
 )
 def test_a_command_below_the_least_speed_of_a_robotino_is_no_motion(twist, moves):
-    """Near its target a policy commands less than the motors can do, and the robot rightly stands."""
+    """Near its target, a policy may command too low a speed for the motors; the robot then rightly stands."""
     assert is_motion(twist) is moves
 
 

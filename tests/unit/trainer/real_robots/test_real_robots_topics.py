@@ -65,6 +65,6 @@ def test_a_name_that_the_connection_does_not_have_is_refused(address, name, mess
 
 
 def test_a_node_of_ros_2_gets_topics_as_remaps():
-    """Arguments of a person that follow are separate."""
+    """The list ends with `--`, so that ROS does not parse arguments that a person adds."""
     assert remaps({"odom": "/o", "bumper": "b"}) == ["--ros-args", "-r", "odom:=/o", "-r", "bumper:=b", "--"]
     assert remaps({}) == []

@@ -52,7 +52,7 @@ def test_a_variable_of_git_does_not_name_another_repository(repository, monkeypa
 
 @pytest.mark.parametrize("change", ["tracked", "untracked module", "new result"])
 def test_code_that_is_not_in_the_commit_makes_it_dirty(repository, change):
-    """The commit alone would not train the policy again; new files of results change nothing."""
+    """The code of the commit would not reproduce the policy. New files of results are not code."""
     module = "lab_task"
     if change == "tracked":
         (repository / "code/lab_task.py").write_text("A = 2\n")

@@ -26,7 +26,7 @@ def test_registry_and_tag_are_those_of_the_notebook(beside, image, monkeypatch):
 
 
 def test_a_simulator_without_an_image_names_the_remedy():
-    """Webots has a licence and a size of its own, so a release has no image of it."""
+    """Webots is large and has its own license, so a release has no image of it."""
     with pytest.raises(ConfigurationError, match=r"driver webots; give Kubernetes\(image=\.\.\.\) an image"):
         release_image("webots", "kubernetes")
 

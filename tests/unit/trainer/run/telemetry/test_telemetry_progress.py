@@ -198,7 +198,7 @@ def test_time_goes_on_where_the_attempt_before_ended(progress, clock):
 
 
 def test_time_of_a_checkpoint_that_lacks_a_cause_stays_where_it_was(progress, clock):
-    """An older release counted the time of a new cause under another one, which is unknown."""
+    """An older release counted this time under another cause, and its checkpoint does not show which."""
     saved = Counters.from_json({"goodput": {"stepping": 3.0, "recovering": 2.0}})
     progress.resumed(40, saved)
     with progress.spending(Cause.RECYCLING):
