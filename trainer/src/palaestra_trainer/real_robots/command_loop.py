@@ -1,7 +1,7 @@
 """The loop that sends the command of a policy to a robot, 20 times a second, as far as the rules allow.
 
 The loop runs in its own thread, so that it notices a policy that hangs. If the whole process hangs or dies,
-no command is sent, and the robot's own dead man stops it.
+no command is sent, and the robot's own timeout stops it.
 """
 
 from __future__ import annotations

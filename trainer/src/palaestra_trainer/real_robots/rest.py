@@ -2,7 +2,7 @@
 
 Commands and each kind of reading have a persistent connection and a thread of their own. On one connection a
 request would wait for the response to the request before, and a delay of 50 ms would hold back the commands
-until the robot's dead man of 200 ms stops it.
+until the robot's timeout of 200 ms stops it.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ log = structlog.get_logger(__name__)
 
 SocketOption = tuple[int, int, int] | tuple[int, int, bytes]
 
-# Timeout of a request. After a failed request there is time for one more, before the robot's dead man stops
+# Timeout of a request. After a failed request there is time for one more, before the robot's timeout stops
 # the robot.
 TIMEOUT_S: Final = 0.1
 _FIRST_TIMEOUT_S: Final = 2.0  # before the robot moves, a slow network may take longer

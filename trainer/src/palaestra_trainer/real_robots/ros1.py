@@ -4,7 +4,7 @@ The connection needs no installed ROS. Four facts about the driver matter:
 
 - The driver is the node that publishes `odom` and subscribes to `cmd_vel`. Other subscribers, such as a
   recorder, confirm no command; and the driver obeys every publisher of `cmd_vel`, so there must be no other.
-- It forwards each command once, up to 33 ms late, and has no watchdog. So the base's own dead man stops the
+- It forwards each command once, up to 33 ms late, and has no watchdog. So the base's own timeout stops the
   robot.
 - It clips each axis of a command to its limits, and raises a small speed to its minimum, without a notice.
 - It publishes the bumper's state only when the state changes, as a latched message. So the bumper counts as
