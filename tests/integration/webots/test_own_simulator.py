@@ -80,7 +80,7 @@ def test_an_environment_of_another_robot_finds_it_in_the_facade_of_the_program()
 
 @pytest.mark.usefixtures("nothing_configured")
 def test_the_robot_in_a_facade_is_that_of_the_job(tmp_path, monkeypatch):
-    """The program of a job may create the facade, but the job names the robot in its world."""
+    """The class of the robot comes from the job, also if the program of the job creates the facade."""
     job = {
         "job": "j",
         "environment": {"id": "Navigate-v0"},

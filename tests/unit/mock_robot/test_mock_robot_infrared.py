@@ -21,7 +21,7 @@ def without_noise(mean, _deviation):
 
 @given(st.floats(0.03, 0.39))
 def test_it_inverts_the_table(true_m):
-    """The world file has the sensor's lookup table, so no second formula is needed."""
+    """The distance follows from the lookup table in the world file, so the mock robot needs no formula."""
     value = LookupTable(SHARP).response(true_m, without_noise)
 
     assert distance_m(SHARP, value) == pytest.approx(true_m, abs=1e-9)

@@ -84,7 +84,7 @@ def _kill(pid: int, handle: int | None) -> None:
 
 
 def sweep(prefix: str) -> None:
-    """Kill marked processes until some rounds find no process, or the deadline has passed."""
+    """Kill marked processes until `QUIET_ROUNDS` rounds in a row find no process, or until the deadline."""
     deadline = time.monotonic() + DEADLINE_S
     quiet = 0
     while quiet < QUIET_ROUNDS and time.monotonic() < deadline:

@@ -199,7 +199,7 @@ class _Reader:
         if "on" in given:
             event = self._event(given.pop("on"))
             if set(said) & set(FaultEvent):
-                raise self._error(f"on and {said[0]} both determine the event that is counted", "remove on")
+                raise self._error(f"'on' and '{said[0]}' both choose the event to count", "remove 'on'")
         if not said:
             return Trigger(event=event)
         key, text = said[0], given.pop(said[0])

@@ -13,7 +13,8 @@ from palaestra_sim.sidecar.world_files import located
 
 EXIT_WRONG = 2
 OWN_CONTROLLER, STOCK_CONTROLLER = "palaestra", "webots"
-CONTROLLER = "WEBOTS_ROS_CONTROLLER"  # a job sets this variable, because it has no field for the option
+# A job sets this variable, because it has no field for `--webots-controller`.
+CONTROLLER = "WEBOTS_ROS_CONTROLLER"
 
 EPILOG = """
 This program does not start the simulator by itself. A client starts it with POST /start on the control port;

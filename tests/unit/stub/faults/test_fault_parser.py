@@ -105,7 +105,7 @@ def test_a_value_may_be_no_number():
         ("crash:probability=2", "probability is '2'; give a number from 0 to 1"),
         ("crash:probability=nan", "probability is 'nan'; give a number from 0 to 1"),
         ("crash:step=1,every=2", "every and step both determine when the fault occurs; remove one"),
-        ("crash:step=1,on=step", "on and step both determine the event that is counted; remove on"),
+        ("crash:step=1,on=step", "'on' and 'step' both choose the event to count; remove 'on'"),
         ("crash:on=call", "it cannot occur at a call; use step or reset"),
         ("crash:start=1", "it cannot occur at a start; use step or reset"),
         ("lost:reset=1", "it cannot occur at a reset; use step"),

@@ -24,7 +24,8 @@ _PLACE: Final = (0.5, 0.25)
 _HEADING_RAD: Final = 1.0
 _PAUSE, _FAST = 0, 2
 
-_WITHIN_M: Final = 0.02  # bodies with masses do not stop exactly at their start
+# Tolerance of poses and distances: if bodies have masses, the cart does not stand exactly where it was set.
+_WITHIN_M: Final = 0.02
 _WITHIN_RAD: Final = 0.05
 _WITHIN_S: Final = 1e-6
 _MESSAGE_S: Final = 0.5  # the trainer has the same time limit for a sensor's message

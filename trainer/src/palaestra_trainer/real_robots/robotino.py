@@ -222,7 +222,7 @@ class RealRobotino(RobotinoAbc, Cameras):
 
         Raises:
             NoSuchSensor: a depth camera is chosen.
-            CameraUnfit: no image of this size arrives.
+            CameraUnfit: no image of the size `image_size` has arrived in time.
         """
         if depth:
             raise NoSuchSensor(f"{self._link.address}: a Robotino has no depth camera")

@@ -25,7 +25,7 @@ _LOOK_S: Final = 5.0
 
 
 class WatchedTopics:
-    """The sensors' topics below the node of one robot that another node reads.
+    """The images, ranges and laser scans of one robot to which another node subscribes.
 
     The list is read again every 5 s, because a training enables sensors after the simulator's start.
 

@@ -33,7 +33,8 @@ DEVICE_KINDS: Final = ("actuator", "camera", "sensor")
 _TIMESTEP_S: Final = 0.002  # MuJoCo's default
 _LONGEST_MS: Final = 100  # largest default basic step; robots need shorter steps
 _MOST_STEPS: Final = 10_000  # steps of MuJoCo in a basic step; more would take seconds
-_SHORTEST_PART: Final = 99  # the shortest timestep that a message recommends is 1 / (99 + 1) ms
+# A message recommends two timesteps: 1/n ms and 1/(n + 1) ms. This is the greatest n.
+_SHORTEST_PART: Final = 99
 _NEAR: Final = 1e-4  # relative tolerance: 0.0041666 s counts as 1/240 s
 _BYTE_ORDER_MARK: Final = b"\xef\xbb\xbf"
 
