@@ -13,7 +13,7 @@ import pytest
 from gymnasium import spaces
 from stable_baselines3 import PPO
 
-from palaestra_trainer.fault_tolerant import make
+from palaestra_trainer.run.fault_tolerant import make
 
 SCRIPT = Path(__file__).parents[3] / "examples" / "own_training_script.py"
 

@@ -14,10 +14,10 @@ from palaestra_trainer.deferred_imports.sb3 import defer_unused_imports
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from palaestra_trainer.fault_tolerant.env import FaultTolerantEnv
-    from palaestra_trainer.fault_tolerant.env_group import EnvGroup
-    from palaestra_trainer.fault_tolerant.sb3_vec_env import FaultTolerantVecEnv
-    from palaestra_trainer.fault_tolerant.vector_env import FaultTolerantVectorEnv
+    from palaestra_trainer.run.fault_tolerant.env import FaultTolerantEnv
+    from palaestra_trainer.run.fault_tolerant.env_group import EnvGroup
+    from palaestra_trainer.run.fault_tolerant.sb3_vec_env import FaultTolerantVecEnv
+    from palaestra_trainer.run.fault_tolerant.vector_env import FaultTolerantVectorEnv
     from palaestra_trainer.run.policies import TrainedPolicy
 
 defer_unused_imports()
@@ -51,7 +51,7 @@ def make_env(environment: str | None = None, *, role: str = "Collect", **options
         ConfigurationError: the environment is missing or wrong, or all simulators with the role are in use.
         FaultBudgetSpent: the simulator does not start.
     """
-    from palaestra_trainer.fault_tolerant.env import FaultTolerantEnv
+    from palaestra_trainer.run.fault_tolerant.env import FaultTolerantEnv
 
     return FaultTolerantEnv(_players(environment, 1, role, options))
 
@@ -74,7 +74,7 @@ def make_vec_env(
     Raises:
         The same errors as `make_env`.
     """
-    from palaestra_trainer.fault_tolerant.vector_env import FaultTolerantVectorEnv
+    from palaestra_trainer.run.fault_tolerant.vector_env import FaultTolerantVectorEnv
 
     return FaultTolerantVectorEnv(_players(environment, num_envs, role, options))
 
@@ -93,7 +93,7 @@ def make_sb3_vec_env(
     Raises:
         The same errors as `make_env`.
     """
-    from palaestra_trainer.fault_tolerant.sb3_vec_env import FaultTolerantVecEnv
+    from palaestra_trainer.run.fault_tolerant.sb3_vec_env import FaultTolerantVecEnv
 
     return FaultTolerantVecEnv(_players(environment, num_envs, role, options))
 
@@ -120,6 +120,6 @@ def report(*, step: int, success_rate: float | None = None) -> None:
 
 
 def _players(environment: str | None, number: int | None, role: str, options: dict[str, Any]) -> EnvGroup:
-    from palaestra_trainer.fault_tolerant.make import make_players
+    from palaestra_trainer.run.fault_tolerant.make import make_players
 
     return make_players(environment, number, role, options)

@@ -13,10 +13,10 @@ import pytest
 from gymnasium import spaces
 
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.fault_tolerant.env_group import EnvGroup
-from palaestra_trainer.fault_tolerant.sb3_vec_env import FaultTolerantVecEnv
 from palaestra_trainer.job.run_directory import RunDirectory
 from palaestra_trainer.run import attempt as run_attempt
+from palaestra_trainer.run.fault_tolerant.env_group import EnvGroup
+from palaestra_trainer.run.fault_tolerant.sb3_vec_env import FaultTolerantVecEnv
 from palaestra_trainer.run.telemetry.progress import Progress
 from palaestra_trainer.simulators.restarter import Restarter
 from palaestra_trainer.testing import FakeTask

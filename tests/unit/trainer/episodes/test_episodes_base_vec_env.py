@@ -11,9 +11,9 @@ from gymnasium.wrappers import TimeLimit
 from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv
 
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
-from palaestra_trainer.fault_tolerant.env_group import EnvGroup
-from palaestra_trainer.fault_tolerant.sb3_vec_env import FaultTolerantVecEnv
-from palaestra_trainer.fault_tolerant.vector_env import FaultTolerantVectorEnv
+from palaestra_trainer.run.fault_tolerant.env_group import EnvGroup
+from palaestra_trainer.run.fault_tolerant.sb3_vec_env import FaultTolerantVecEnv
+from palaestra_trainer.run.fault_tolerant.vector_env import FaultTolerantVectorEnv
 from palaestra_trainer.simulators.restarter import Restarter
 
 MEMBERS = 3

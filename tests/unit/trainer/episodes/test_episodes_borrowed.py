@@ -17,10 +17,10 @@ from gymnasium import spaces
 from palaestra_trainer.environments.copies import copied
 from palaestra_trainer.episodes.evaluation import evaluate
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
-from palaestra_trainer.fault_tolerant.env import FaultTolerantEnv
-from palaestra_trainer.fault_tolerant.env_group import EnvGroup
-from palaestra_trainer.fault_tolerant.sb3_vec_env import FaultTolerantVecEnv
-from palaestra_trainer.fault_tolerant.vector_env import FaultTolerantVectorEnv
+from palaestra_trainer.run.fault_tolerant.env import FaultTolerantEnv
+from palaestra_trainer.run.fault_tolerant.env_group import EnvGroup
+from palaestra_trainer.run.fault_tolerant.sb3_vec_env import FaultTolerantVecEnv
+from palaestra_trainer.run.fault_tolerant.vector_env import FaultTolerantVectorEnv
 from palaestra_trainer.simulators.restarter import Restarter
 
 LENGTH = 3

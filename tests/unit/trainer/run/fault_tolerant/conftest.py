@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from palaestra_trainer.fault_tolerant.env_group import EnvGroup
+from palaestra_trainer.run.fault_tolerant.env_group import EnvGroup
 from palaestra_trainer.simulators.budget import RestartLimit
 from palaestra_trainer.simulators.restarter import Restarter, settle
 

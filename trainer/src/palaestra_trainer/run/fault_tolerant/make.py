@@ -11,8 +11,6 @@ from typing import Any
 import palaestra_trainer.environments  # noqa: F401 - the import registers the shipped environments
 from palaestra_protocol.pod.enums import Role
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.fault_tolerant.env_group import EnvGroup
-from palaestra_trainer.fault_tolerant.episode_runner import StepResult
 from palaestra_trainer.job.configuration import (
     CONFIG_VARIABLE,
     Configuration,
@@ -21,6 +19,8 @@ from palaestra_trainer.job.configuration import (
     load,
 )
 from palaestra_trainer.run.custom_program import ProgramReport, reported
+from palaestra_trainer.run.fault_tolerant.env_group import EnvGroup
+from palaestra_trainer.run.fault_tolerant.episode_runner import StepResult
 from palaestra_trainer.run.telemetry.progress_sources import follow
 from palaestra_trainer.simulators.allocation import allocate
 from palaestra_trainer.simulators.configured import require_driver

@@ -13,8 +13,8 @@ from stable_baselines3.common.env_checker import check_env as check_env_for_sb3
 
 from palaestra_trainer.environments.make import make_environment
 from palaestra_trainer.errors import Diverged, FaultBudgetSpent, SimulatorHung, WrongData
-from palaestra_trainer.fault_tolerant.env import FaultTolerantEnv
 from palaestra_trainer.job.configuration import Environment
+from palaestra_trainer.run.fault_tolerant.env import FaultTolerantEnv
 from palaestra_trainer.testing import fake_arena
 
 RIGHT, LEFT = 1, 0

@@ -10,7 +10,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space, concatenate, create_empty_array, iterate
 
-from palaestra_trainer.fault_tolerant.env_group import EnvGroup
+from palaestra_trainer.run.fault_tolerant.env_group import EnvGroup
 
 Seeds = SupportsIndex | Sequence[int | None] | None
 Stepped = tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]

@@ -9,8 +9,8 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepR
 
 from palaestra_trainer.environments.infos import TRUNCATED
 from palaestra_trainer.environments.space_flaws import refuse_flaws
-from palaestra_trainer.fault_tolerant.env_group import EnvGroup
-from palaestra_trainer.fault_tolerant.episode_runner import StepResult
+from palaestra_trainer.run.fault_tolerant.env_group import EnvGroup
+from palaestra_trainer.run.fault_tolerant.episode_runner import StepResult
 from palaestra_trainer.simulators.base_vec_env import MembersVecEnv
 
 

@@ -10,7 +10,7 @@ from functools import partial
 from typing import Any
 
 from palaestra_trainer.errors import SimulatorHung
-from palaestra_trainer.fault_tolerant.episode_runner import EpisodeRunner, StepResult
+from palaestra_trainer.run.fault_tolerant.episode_runner import EpisodeRunner, StepResult
 from palaestra_trainer.simulators.restarter import Restarter, await_one
 from palaestra_trainer.waiting.greenlets import take_turns
 

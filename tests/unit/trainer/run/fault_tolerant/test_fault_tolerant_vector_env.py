@@ -13,8 +13,8 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecMonitor
 
 from palaestra_trainer.errors import FaultBudgetSpent
-from palaestra_trainer.fault_tolerant.sb3_vec_env import FaultTolerantVecEnv
-from palaestra_trainer.fault_tolerant.vector_env import FaultTolerantVectorEnv
+from palaestra_trainer.run.fault_tolerant.sb3_vec_env import FaultTolerantVecEnv
+from palaestra_trainer.run.fault_tolerant.vector_env import FaultTolerantVectorEnv
 from palaestra_trainer.testing import MaskedTask
 from palaestra_trainer.testing.fake_task import ACTIONS, OBSERVATIONS
 

@@ -7,7 +7,7 @@ from typing import Any
 import gymnasium
 from gymnasium.envs.registration import EnvSpec
 
-from palaestra_trainer.fault_tolerant.env_group import EnvGroup
+from palaestra_trainer.run.fault_tolerant.env_group import EnvGroup
 from palaestra_trainer.simulators.interface import Step
 
 
