@@ -16,10 +16,10 @@ from pathlib import Path
 
 import structlog
 
-from palaestra_trainer.deployment import checked_package
 from palaestra_trainer.errors import RobotStopped
 from palaestra_trainer.real_robots.command_loop import Hooks
 from palaestra_trainer.real_robots.connect import link_to
+from palaestra_trainer.real_robots.deployment import checked_package
 from palaestra_trainer.real_robots.rest import RestLink
 from palaestra_trainer.real_robots.robot_clock import RobotClock
 from palaestra_trainer.real_robots.robotino import RealRobotino

@@ -29,8 +29,8 @@ from palaestra_trainer.run.signals import Interruption
 from palaestra_trainer.run.telemetry.logs import configure_logs
 
 if TYPE_CHECKING:
-    from palaestra_trainer.deployment.deploy import Deployment
-    from palaestra_trainer.deployment.terminal import Terminal
+    from palaestra_trainer.real_robots.deployment.deploy import Deployment
+    from palaestra_trainer.real_robots.deployment.terminal import Terminal
 
 DEPLOY = """\
 Drive a real Robotino with a policy package.
@@ -72,13 +72,13 @@ def deploy(arguments: Sequence[str] | None = None) -> int:
 
 
 def _drive(options: argparse.Namespace, interruption: Interruption) -> int:
-    from palaestra_trainer.deployment import checked_package
-    from palaestra_trainer.deployment.deploy import Deployment
-    from palaestra_trainer.deployment.hold_key import HoldKey
-    from palaestra_trainer.deployment.record import DeploymentRecord
-    from palaestra_trainer.deployment.terminal import Terminal
     from palaestra_trainer.real_robots.command_loop import Hooks
     from palaestra_trainer.real_robots.connect import link_to
+    from palaestra_trainer.real_robots.deployment import checked_package
+    from palaestra_trainer.real_robots.deployment.deploy import Deployment
+    from palaestra_trainer.real_robots.deployment.hold_key import HoldKey
+    from palaestra_trainer.real_robots.deployment.record import DeploymentRecord
+    from palaestra_trainer.real_robots.deployment.terminal import Terminal
     from palaestra_trainer.real_robots.robotino import RealRobotino
 
     package = checked_package.read(options.package)

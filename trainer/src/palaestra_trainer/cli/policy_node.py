@@ -29,8 +29,8 @@ from palaestra_trainer.run.telemetry.logs import configure_logs
 from palaestra_trainer.waiting.check import Check
 
 if TYPE_CHECKING:
-    from palaestra_trainer.deployment.goals import Goals
     from palaestra_trainer.real_robots.camera import ImageSize
+    from palaestra_trainer.real_robots.deployment.goals import Goals
     from palaestra_trainer.real_robots.robotino import RealRobotino
     from palaestra_trainer.real_robots.ros2 import Ros2Link
 
@@ -90,11 +90,11 @@ def separated(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
 
 
 def _serve(options: argparse.Namespace, ros_arguments: Sequence[str], interruption: Interruption) -> None:
-    from palaestra_trainer.deployment import checked_package
-    from palaestra_trainer.deployment.deploy import Deployment
-    from palaestra_trainer.deployment.goals import GoalDriver, Goals, NewGoal, QuietLink
-    from palaestra_trainer.deployment.record import DeploymentRecord
     from palaestra_trainer.real_robots.command_loop import Hooks
+    from palaestra_trainer.real_robots.deployment import checked_package
+    from palaestra_trainer.real_robots.deployment.deploy import Deployment
+    from palaestra_trainer.real_robots.deployment.goals import GoalDriver, Goals, NewGoal, QuietLink
+    from palaestra_trainer.real_robots.deployment.record import DeploymentRecord
     from palaestra_trainer.real_robots.robotino import RealRobotino
     from palaestra_trainer.real_robots.ros2 import Ros2Link
 

@@ -14,4 +14,5 @@
 - `ros_images`: pictures in messages of both ROS
 - `robotino`: the robot; `scene`: its floor, on which a person places it
 - `robot_clock`: the time of a robot, which may run faster than real time in a mock robot
+- `deployment`: a policy package that drives the robot; no other module knows a task or a policy
 """

@@ -7,9 +7,9 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Final
 
-from palaestra_trainer.deployment.deploy import Deployment
 from palaestra_trainer.errors import ConfigurationError, RobotStopped, TrainerError
 from palaestra_trainer.real_robots.camera import ImageSize
+from palaestra_trainer.real_robots.deployment.deploy import Deployment
 from palaestra_trainer.real_robots.frames import OdometryFrame
 from palaestra_trainer.real_robots.link import RobotLink
 from palaestra_trainer.real_robots.readings import ReadingStore

@@ -2,7 +2,7 @@
 
 import pytest
 
-from palaestra_trainer.deployment.goals import Goals, NewGoal, QuietLink
+from palaestra_trainer.real_robots.deployment.goals import Goals, NewGoal, QuietLink
 from palaestra_trainer.waiting.check import go_on
 
 

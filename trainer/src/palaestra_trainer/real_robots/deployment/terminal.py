@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Final
 
-from palaestra_trainer.deployment.hold_key import HoldKey
+from palaestra_trainer.real_robots.deployment.hold_key import HoldKey
 from palaestra_trainer.waiting.check import Check
 
 _LOOK_S: Final = 0.1

@@ -7,11 +7,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
-from palaestra_trainer.deployment.checked_package import CheckedPackage
-from palaestra_trainer.deployment.record import DeploymentRecord
 from palaestra_trainer.environments.make import make_environment
 from palaestra_trainer.environments.masks import mask_of
 from palaestra_trainer.errors import RobotStopped
+from palaestra_trainer.real_robots.deployment.checked_package import CheckedPackage
+from palaestra_trainer.real_robots.deployment.record import DeploymentRecord
 from palaestra_trainer.real_robots.robotino import RealRobotino
 from palaestra_trainer.real_robots.scene import RealScene
 from palaestra_trainer.robots.geometry import Point, Pose, Twist

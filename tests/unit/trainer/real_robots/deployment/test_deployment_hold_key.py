@@ -2,8 +2,8 @@
 
 import pytest
 
-from palaestra_trainer.deployment.hold_key import HoldKey, KeyPresses
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.real_robots.deployment.hold_key import HoldKey, KeyPresses
 
 
 def presses(*times):

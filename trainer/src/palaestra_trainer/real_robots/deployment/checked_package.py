@@ -11,10 +11,10 @@ import gymnasium
 import yaml
 
 from palaestra_protocol.policy_package import MANIFEST, NETWORK, TRAINING, PackageError, read_files
-from palaestra_trainer.deployment.onnx_policy import OnnxPolicy
 from palaestra_trainer.environments.data_sheet import environment_sheet, parts_of
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.job.configuration import Environment, parse
+from palaestra_trainer.real_robots.deployment.onnx_policy import OnnxPolicy
 
 ROBOT: Final = "Robotino"
 _PERIODS_S: Final = (0.02, 2.0)
