@@ -7,7 +7,7 @@
 - `docs/reference/metrics.md`: every metric that the programs declare
 - `docs/reference/simulators.md`: the devices of the stub
 - `docs/reference/ros-interface.md`: the services and topics of a robot
-- `trainer/src/palaestra_trainer/conformance/interface.json`: the claims of that page as data
+- `trainer/src/palaestra_trainer/ros/conformance/interface.json`: the claims of that page as data
 - `docs/explain/judging.md`: the checks on a replica, in their order
 - `llms.txt`: the pages that docs/README.md links to
 - `charts/palaestra/README.md`: from the chart's values.yaml

@@ -14,7 +14,7 @@ from tools.interface.everything import FAILING, NOT_IN_WEBOTS, device_name, grou
 from tools.interface.facades import facade
 
 PAGE = "docs/reference/ros-interface.md"
-INTERFACE = "trainer/src/palaestra_trainer/conformance/interface.json"
+INTERFACE = "trainer/src/palaestra_trainer/ros/conformance/interface.json"
 BEGIN = "<!-- generated: services and topics -->"
 _TEST: Final = "test_ros_interface.py"
 _OURS: Final = frozenset(("palaestra",))

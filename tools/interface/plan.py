@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from palaestra_trainer.conformance.player import FILES
+from palaestra_trainer.ros.conformance.player import FILES
 from tools.interface import training
 from tools.interface.everything import (
     FAILING,

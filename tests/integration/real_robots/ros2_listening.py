@@ -7,7 +7,7 @@ import json
 import sys
 import threading
 
-from palaestra_trainer.ros2.node import Ros2Node, require
+from palaestra_trainer.ros.ros2_node import Ros2Node, require
 
 DEPTH = 10
 

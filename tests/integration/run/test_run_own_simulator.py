@@ -15,7 +15,7 @@ from xmlrpc.client import ServerProxy
 import pytest
 import yaml
 
-from palaestra_trainer.conformance.claims import claims
+from palaestra_trainer.ros.conformance.claims import claims
 from tests.local_run import PALAESTRA
 from tests.pages import blocks, fenced
 from tests.terminal import Terminal
@@ -113,7 +113,7 @@ def test_the_page_names_the_options_of_the_job_and_prints_a_problem_as_the_progr
     """Both are examples that a reader copies or searches for."""
     [group] = [group for text in blocks(PAGE, "yaml") for group in yaml.safe_load(text)["simulators"]]
     own = JOB["spec"]["simulators"][0]
-    source = ROOT / "trainer/src/palaestra_trainer/conformance/rehearsal.py"
+    source = ROOT / "trainer/src/palaestra_trainer/ros/conformance/rehearsal.py"
     [problem] = [text for _, text in fenced(PAGE) if text.startswith("a step sends")]
 
     assert group == {name: own[name] for name in group}

@@ -1,6 +1,6 @@
 """All calls of the conformance program, made by a client of any library."""
 
-from palaestra_trainer.conformance.player import Player
+from palaestra_trainer.ros.conformance.player import Player
 from tools.interface.everything import ROBOT
 
 

@@ -9,8 +9,8 @@ import sys
 import roslib.message
 import rospy
 
-from palaestra_trainer.conformance.claims import claims
-from palaestra_trainer.conformance.player import DEADLINE_S
+from palaestra_trainer.ros.conformance.claims import claims
+from palaestra_trainer.ros.conformance.player import DEADLINE_S
 from tests.integration.webots.genpy_messages import plain, request_of
 from tests.integration.webots.playing import play
 

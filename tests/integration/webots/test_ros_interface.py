@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from palaestra_sim.scene.png import encode
-from palaestra_trainer.conformance.claims import claims
+from palaestra_trainer.ros.conformance.claims import claims
 from tests.integration.webots.playing import play
 from tests.integration.webots.roscpp_build import build
 from tests.integration.webots.roscpp_client import RoscppClient

@@ -8,8 +8,8 @@ from contextlib import ExitStack
 import pytest
 
 from palaestra_sim.webots_project import extra_projects, write_project
-from palaestra_trainer.conformance.wire_client import WireClient
 from palaestra_trainer.ros import is_served
+from palaestra_trainer.ros.conformance.wire_client import WireClient
 from tests.fake_webots.home import RELEASES, make_home
 from tests.waiting import eventually
 

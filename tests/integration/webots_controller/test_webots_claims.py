@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 
 from palaestra_trainer.cli.conformance import main
-from palaestra_trainer.conformance.claims import FAILED, claims, verdicts
-from palaestra_trainer.conformance.player import Player
-from palaestra_trainer.conformance.rehearsal import CLAIMS, rehearsed
-from palaestra_trainer.conformance.wire_client import WireClient
 from palaestra_trainer.ros import is_served
+from palaestra_trainer.ros.conformance.claims import FAILED, claims, verdicts
+from palaestra_trainer.ros.conformance.player import Player
+from palaestra_trainer.ros.conformance.rehearsal import CLAIMS, rehearsed
+from palaestra_trainer.ros.conformance.wire_client import WireClient
 from tests.waiting import eventually
 from tools.interface.everything import ROBOT
 

@@ -12,7 +12,7 @@ from mcap.reader import make_reader
 from palaestra_trainer.bags import messages as bag_messages
 from palaestra_trainer.bags.definitions import TRANSFORMS
 from palaestra_trainer.bags.writer import BagWriter
-from palaestra_trainer.ros2_gateway import messages
+from palaestra_trainer.simulators.ros2_gateway import messages
 
 STAMP_S = 86400.032
 HALF = math.sqrt(0.5)

@@ -11,13 +11,20 @@ from importlib.metadata import version
 from pathlib import Path
 
 from palaestra_protocol.pod.enums import ExitCode
-from palaestra_trainer.conformance import report
-from palaestra_trainer.conformance.claims import TRAINING, Claims, ClaimVerdict, claims, subjects, verdicts
-from palaestra_trainer.conformance.player import Player
-from palaestra_trainer.conformance.rehearsal import rehearsed
-from palaestra_trainer.conformance.wire_client import WireClient
 from palaestra_trainer.errors import ConfigurationError, TrainerError
 from palaestra_trainer.ros import ensure_node, is_served
+from palaestra_trainer.ros.conformance import report
+from palaestra_trainer.ros.conformance.claims import (
+    TRAINING,
+    Claims,
+    ClaimVerdict,
+    claims,
+    subjects,
+    verdicts,
+)
+from palaestra_trainer.ros.conformance.player import Player
+from palaestra_trainer.ros.conformance.rehearsal import rehearsed
+from palaestra_trainer.ros.conformance.wire_client import WireClient
 
 CONFORMANCE = """\
 Call every service of a running simulator, subscribe to every topic, and compare responses and messages with

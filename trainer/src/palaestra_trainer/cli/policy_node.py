@@ -23,7 +23,7 @@ from palaestra_trainer.real_robots.ros2_clock import SimulationClock, Simulation
 from palaestra_trainer.real_robots.safety import Fence, SafetyRules
 from palaestra_trainer.real_robots.topics import ROS2, refuse_unknown, remaps, topics_of
 from palaestra_trainer.robots.geometry import TURN_RAD_S, Pose
-from palaestra_trainer.ros2.node import Ros2Node, require
+from palaestra_trainer.ros.ros2_node import Ros2Node, require
 from palaestra_trainer.run.signals import Interrupted, Interruption
 from palaestra_trainer.run.telemetry.logs import configure_logs
 from palaestra_trainer.waiting.check import Check

@@ -19,12 +19,16 @@ from palaestra_protocol.pod.status import ExitCode
 from palaestra_trainer.cli.policy_node import separated
 from palaestra_trainer.cli.program import leaving, parser, refuse_without_run
 from palaestra_trainer.errors import ConfigurationError, MasterLost, TrainerError, UnreadableAnswer
-from palaestra_trainer.ros2.node import Ros2Node
-from palaestra_trainer.ros2_gateway.gateway import Gateway
-from palaestra_trainer.ros2_gateway.publishing import RobotPublishers
-from palaestra_trainer.ros2_gateway.simulators import MasterRobotFinder, RobotFinder, RunRobotFinder
+from palaestra_trainer.ros.ros2_node import Ros2Node
 from palaestra_trainer.run.signals import Interrupted, Interruption
 from palaestra_trainer.run.telemetry.logs import configure_logs
+from palaestra_trainer.simulators.ros2_gateway.gateway import Gateway
+from palaestra_trainer.simulators.ros2_gateway.publishing import RobotPublishers
+from palaestra_trainer.simulators.ros2_gateway.simulators import (
+    MasterRobotFinder,
+    RobotFinder,
+    RunRobotFinder,
+)
 
 ABOUT = """\
 Publish a robot of a running simulator in ROS 2. rclpy must be installed. The simulator must be the stub or

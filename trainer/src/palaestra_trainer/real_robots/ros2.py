@@ -43,7 +43,7 @@ from palaestra_trainer.real_robots.ros_images import image_of
 from palaestra_trainer.real_robots.sensor_layout import UNITS, SensorLayout
 from palaestra_trainer.real_robots.topics import ROS2, Topics, refuse_unknown, remaps
 from palaestra_trainer.robots.geometry import Twist
-from palaestra_trainer.ros2.node import Ros2Node, require
+from palaestra_trainer.ros.ros2_node import Ros2Node, require
 from palaestra_trainer.waiting.check import Check, go_on
 
 log = structlog.get_logger(__name__)

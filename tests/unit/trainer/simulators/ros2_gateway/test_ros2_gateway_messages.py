@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import pytest
 
 from palaestra_protocol.scene import SceneState, VisibleNode, VisibleScene
-from palaestra_trainer.ros2_gateway import messages
-from palaestra_trainer.ros2_gateway.publishing import filled
+from palaestra_trainer.simulators.ros2_gateway import messages
+from palaestra_trainer.simulators.ros2_gateway.publishing import filled
 
 POSE = (1.0, 2.0, 3.0, 0.5, 0.1, 0.2, 0.3)
 

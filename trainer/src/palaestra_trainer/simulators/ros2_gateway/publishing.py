@@ -6,7 +6,7 @@ from typing import Any, Final
 
 from palaestra_trainer.bags.messages import Content
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.ros2.node import Ros2Node, require
+from palaestra_trainer.ros.ros2_node import Ros2Node, require
 
 _SENSORS: Final = frozenset(("Image", "LaserScan"))
 

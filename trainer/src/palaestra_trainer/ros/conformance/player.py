@@ -10,7 +10,7 @@ import time
 from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
-from palaestra_trainer.conformance.claims import FAILED, Answer, Call, Claims
+from palaestra_trainer.ros.conformance.claims import FAILED, Answer, Call, Claims
 
 DEADLINE_S = 20.0
 FILES = "$FILES"

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from palaestra_trainer.conformance.claims import Claims, claims, subjects, verdicts
-from palaestra_trainer.conformance.report import differences, markdown, summary
+from palaestra_trainer.ros.conformance.claims import Claims, claims, subjects, verdicts
+from palaestra_trainer.ros.conformance.report import differences, markdown, summary
 
-PAGE = Path(__file__).parents[4] / "docs/howto/conformance.md"
+PAGE = Path(__file__).parents[5] / "docs/howto/conformance.md"
 PATHS = ("led/get_led", "led/set_led", "skin/get_bone_name", "supervisor/field/insert_bool")
 ASKED = Claims(
     robot="robot",

@@ -11,9 +11,9 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final, Protocol
 
-from palaestra_trainer.conformance.claims import FAILED, Answer, Claims, ClaimVerdict
-from palaestra_trainer.conformance.player import RosClient
 from palaestra_trainer.errors import SimulatorFault
+from palaestra_trainer.ros.conformance.claims import FAILED, Answer, Claims, ClaimVerdict
+from palaestra_trainer.ros.conformance.player import RosClient
 
 DEVICES: Final = ("distance sensor", "left motor", "right motor")
 _DEFINITION: Final = "CART"

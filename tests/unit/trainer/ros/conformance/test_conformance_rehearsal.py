@@ -4,9 +4,9 @@ import math
 
 import pytest
 
-from palaestra_trainer.conformance.claims import claims
-from palaestra_trainer.conformance.rehearsal import CLAIMS, rehearsed
 from palaestra_trainer.errors import WrongData
+from palaestra_trainer.ros.conformance.claims import claims
+from palaestra_trainer.ros.conformance.rehearsal import CLAIMS, rehearsed
 
 ASKED = claims("training")
 DEVICES = ["left motor", "right motor", "distance sensor"]
@@ -15,8 +15,8 @@ DEVICES = ["left motor", "right motor", "distance sensor"]
 @pytest.fixture(autouse=True)
 def short_waits(monkeypatch):
     """This cart responds at once, so no check has to wait."""
-    monkeypatch.setattr("palaestra_trainer.conformance.rehearsal._MESSAGE_S", 0.01)
-    monkeypatch.setattr("palaestra_trainer.conformance.rehearsal._QUIET_S", 0.001)
+    monkeypatch.setattr("palaestra_trainer.ros.conformance.rehearsal._MESSAGE_S", 0.01)
+    monkeypatch.setattr("palaestra_trainer.ros.conformance.rehearsal._QUIET_S", 0.001)
 
 
 class CartInPlace:

@@ -5,9 +5,14 @@ import pytest
 from palaestra_protocol.control import RobotName
 from palaestra_protocol.scene import VisibleNode, VisibleScene
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.ros2_gateway.gateway import Gateway
-from palaestra_trainer.ros2_gateway.publishing import RobotPublishers
-from palaestra_trainer.ros2_gateway.simulators import RunRobotFinder, ShownRobot, chosen_robot, shown_node
+from palaestra_trainer.simulators.ros2_gateway.gateway import Gateway
+from palaestra_trainer.simulators.ros2_gateway.publishing import RobotPublishers
+from palaestra_trainer.simulators.ros2_gateway.simulators import (
+    RunRobotFinder,
+    ShownRobot,
+    chosen_robot,
+    shown_node,
+)
 from palaestra_trainer.waiting.check import go_on
 
 TRAINING = """\

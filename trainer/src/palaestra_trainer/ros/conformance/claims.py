@@ -143,4 +143,4 @@ def _equal(found: Any, wanted: Any) -> bool:
 
 @cache
 def _read() -> Any:
-    return json.loads(resources.files("palaestra_trainer.conformance").joinpath(_FILE).read_text())
+    return json.loads(resources.files("palaestra_trainer.ros.conformance").joinpath(_FILE).read_text())

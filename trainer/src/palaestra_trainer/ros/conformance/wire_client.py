@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-from palaestra_trainer.conformance.claims import FAILED, Answer
-from palaestra_trainer.conformance.player import plain
 from palaestra_trainer.errors import SimulatorFault
 from palaestra_trainer.ros import RosService, RosSubscriber
+from palaestra_trainer.ros.conformance.claims import FAILED, Answer
+from palaestra_trainer.ros.conformance.player import plain
 
 _DEADLINE_S: Final = 30.0  # the first camera makes a simulator load OpenGL
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from palaestra_trainer.conformance.claims import ClaimVerdict
+from palaestra_trainer.ros.conformance.claims import ClaimVerdict
 
 
 def summary(verdicts: Sequence[ClaimVerdict]) -> str:

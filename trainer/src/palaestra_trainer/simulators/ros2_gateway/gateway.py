@@ -12,10 +12,15 @@ from palaestra_trainer.bags.messages import Content
 from palaestra_trainer.errors import ConfigurationError, MasterLost, SimulatorFault, UnreadableAnswer
 from palaestra_trainer.robots.robotino import Robotino
 from palaestra_trainer.ros.master import Master
-from palaestra_trainer.ros2_gateway import messages
-from palaestra_trainer.ros2_gateway.glances import IMAGE, SCAN, WatchedTopics
-from palaestra_trainer.ros2_gateway.publishing import RobotPublishers
-from palaestra_trainer.ros2_gateway.simulators import RobotFinder, ShownRobot, caller_id, shown_node
+from palaestra_trainer.simulators.ros2_gateway import messages
+from palaestra_trainer.simulators.ros2_gateway.glances import IMAGE, SCAN, WatchedTopics
+from palaestra_trainer.simulators.ros2_gateway.publishing import RobotPublishers
+from palaestra_trainer.simulators.ros2_gateway.simulators import (
+    RobotFinder,
+    ShownRobot,
+    caller_id,
+    shown_node,
+)
 from palaestra_trainer.waiting.check import Check
 
 POSE_S: Final = 0.1
