@@ -8,8 +8,8 @@ settle_imports()
 
 from typing import TYPE_CHECKING, Any
 
-from palaestra_trainer.deferred_imports.compiler import defer_compiler
-from palaestra_trainer.deferred_imports.sb3 import defer_unused_imports
+from palaestra_trainer.run.deferred_imports.compiler import defer_compiler
+from palaestra_trainer.run.deferred_imports.sb3 import defer_unused_imports
 
 if TYPE_CHECKING:
     from pathlib import Path

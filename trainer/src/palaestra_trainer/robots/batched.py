@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palaestra_protocol.batch import BatchDescription, BatchRequest, BatchShape
-from palaestra_trainer.batch import BatchLink, BatchReading, BatchReset
 from palaestra_trainer.errors import ConfigurationError, NoReading
 from palaestra_trainer.robots.base import SENSOR_RANGE_M
+from palaestra_trainer.robots.batch_link import BatchLink, BatchReading, BatchReset
 from palaestra_trainer.robots.batched_base import (
     BatchedJointsAbc,
     BatchedRobotAbc,

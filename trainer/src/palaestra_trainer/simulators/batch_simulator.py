@@ -10,11 +10,11 @@ from typing import Any, Final, Never
 import gymnasium
 from gymnasium import spaces
 
-from palaestra_trainer.batch import BatchLink
 from palaestra_trainer.environments.batched import BatchedEnv
 from palaestra_trainer.environments.make import make_batched
 from palaestra_trainer.errors import SimulatorDead, SimulatorFault, SimulatorHung, SimulatorRefused
 from palaestra_trainer.job.configuration import DEFAULT_ROBOT, Configuration, SimulatorConfiguration
+from palaestra_trainer.robots.batch_link import BatchLink
 from palaestra_trainer.robots.batched import BatchedScene, batched_form
 from palaestra_trainer.robots.registry import robot_class
 from palaestra_trainer.webots.launching.sidecar import Sidecar

@@ -1,7 +1,7 @@
 """A client of the socket on which a simulator serves copies of its world: one request, one response.
 
-Every wait has a deadline. A response that does not come in time, or is not of the protocol, is a fault of the
-simulator, and the connection is closed.
+`palaestra_protocol.batch` defines the messages. Every wait has a deadline. A response that does not come in
+time, or is not of the protocol, is a fault of the simulator, and the connection is closed.
 """
 
 from __future__ import annotations
