@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from docker.types import DeviceRequest, Mount
 
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.webots.launching.docker_engine import connected, ended, engine_errors
-from palaestra_trainer.webots.launching.docker_launcher import Docker
 from palaestra_trainer.webots.launching.docker_network import ContainerNetwork, network_of
 from palaestra_trainer.webots.launching.docker_output import ContainerOutput
 from palaestra_trainer.webots.launching.owned_sidecar import OwnedSidecar
@@ -19,6 +19,25 @@ from palaestra_trainer.webots.launching.simulator_request import SimulatorReques
 
 _START_S = 60.0
 _LABELS = {"palaestra.launcher": "docker"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ContainerPlan:
+    """All that a container depends on, except its simulator.
+
+    Attributes:
+        image: the image of the simulator.
+        network: see `Docker`.
+        shm_size: see `Docker`.
+        gpus: see `Docker`.
+        folder: the folder that the container can read; None: the world is in the image.
+    """
+
+    image: str
+    network: str
+    shm_size: str
+    gpus: int | Literal["all"]
+    folder: Path | None
 
 
 class DockerLauncher(OwnedSidecar):
@@ -39,18 +58,21 @@ class DockerLauncher(OwnedSidecar):
         self._container.client.close()
 
 
-def start_container(settings: Docker, request: SimulatorRequest) -> DockerLauncher:
-    """Start a sidecar in a new container; see `Docker.launch`."""
-    image = settings.image_of(request)
+def start_container(plan: ContainerPlan, request: SimulatorRequest) -> DockerLauncher:
+    """Start a sidecar in a new container; see `Docker.launch`.
+
+    Args:
+        plan: the settings of the container.
+        request: the simulator, with the path that its world has in the container.
+    """
+    image = plan.image
     engine = connected()
     with ExitStack() as undo:
         undo.callback(engine.close)
         with engine_errors(image):
-            network = network_of(engine, settings.network)
+            network = network_of(engine, plan.network)
             container = engine.containers.create(
-                image,
-                [*network.listeners, *sidecar_options(settings.in_container(request))],
-                **_options(settings, network, settings.folder_of(request.world)),
+                image, [*network.listeners, *sidecar_options(request)], **_options(plan, network)
             )
             undo.callback(ended, container)
             output = ContainerOutput(container)
@@ -63,9 +85,10 @@ def start_container(settings: Docker, request: SimulatorRequest) -> DockerLaunch
     return launcher
 
 
-def _options(settings: Docker, network: ContainerNetwork, folder: Path | None) -> dict[str, Any]:
+def _options(plan: ContainerPlan, network: ContainerNetwork) -> dict[str, Any]:
     """Return the options of `containers.create`."""
-    count = -1 if settings.gpus == "all" else settings.gpus
+    count = -1 if plan.gpus == "all" else plan.gpus
+    folder = plan.folder
     return {
         "auto_remove": True,
         "cap_drop": ["ALL"],
@@ -74,9 +97,9 @@ def _options(settings: Docker, network: ContainerNetwork, folder: Path | None) -
         "environment": dict(network.environment),
         "labels": _LABELS,
         "mounts": [Mount(str(folder), str(folder), "bind", read_only=True)] if folder else [],
-        "network_mode": settings.network,
+        "network_mode": plan.network,
         "security_opt": ["no-new-privileges"],
-        "shm_size": settings.shm_size,
+        "shm_size": plan.shm_size,
         "stdin_open": True,
     }
 

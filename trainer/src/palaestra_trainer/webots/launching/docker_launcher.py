@@ -49,9 +49,16 @@ class Docker(Place):
             SimulatorDead: the container printed nothing within 60 s.
         """
         require_package("docker")
-        from palaestra_trainer.webots.launching.docker_container import start_container
+        from palaestra_trainer.webots.launching.docker_container import ContainerPlan, start_container
 
-        return start_container(self, request)
+        plan = ContainerPlan(
+            image=self.image_of(request),
+            network=self.network,
+            shm_size=self.shm_size,
+            gpus=self.gpus,
+            folder=self.folder_of(request.world),
+        )
+        return start_container(plan, self.in_container(request))
 
     def image_of(self, request: SimulatorRequest) -> str:
         """Return the image for a simulator.

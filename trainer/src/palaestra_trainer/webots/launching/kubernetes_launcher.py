@@ -71,6 +71,13 @@ class Kubernetes(Place):
                 the driver. The message has the remedy or the events of the pod.
         """
         require_package("kubernetes")
-        from palaestra_trainer.webots.launching.kubernetes_pod import start_pod
+        from palaestra_trainer.webots.launching.kubernetes_pod import PodSettings, start_pod
 
-        return start_pod(self, request)
+        settings = PodSettings(
+            image=self.image,
+            resources=self.resources,
+            start_s=self.start_s,
+            silence_s=self.silence_s,
+            lifetime_s=self.lifetime_s,
+        )
+        return start_pod(settings, request)

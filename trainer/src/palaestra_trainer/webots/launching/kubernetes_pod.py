@@ -7,9 +7,11 @@ import os
 import secrets
 import threading
 import time
+from collections.abc import Mapping
 from contextlib import ExitStack, suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 from urllib.parse import urlsplit
 
 from palaestra_protocol.http import Address
@@ -19,7 +21,6 @@ from palaestra_trainer.webots.launching import kubernetes_api as api
 from palaestra_trainer.webots.launching import kubernetes_objects as objects
 from palaestra_trainer.webots.launching import kubernetes_state as state
 from palaestra_trainer.webots.launching.addresses import is_loopback
-from palaestra_trainer.webots.launching.kubernetes_launcher import Kubernetes
 from palaestra_trainer.webots.launching.owned_sidecar import OwnedSidecar
 from palaestra_trainer.webots.launching.pods_by_master import PodsByMaster
 from palaestra_trainer.webots.launching.release_images import release_image
@@ -37,7 +38,18 @@ _session = secrets.token_hex(4)
 _pods = PodsByMaster()
 
 
-def start_pod(settings: Kubernetes, request: SimulatorRequest) -> KubernetesLauncher:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PodSettings:
+    """The settings of a pod, with the names and meanings of `Kubernetes`."""
+
+    image: str | None
+    resources: Mapping[str, Any]
+    start_s: float
+    silence_s: int
+    lifetime_s: int
+
+
+def start_pod(settings: PodSettings, request: SimulatorRequest) -> KubernetesLauncher:
     """Start a sidecar in a new pod; see `Kubernetes.launch`."""
     cluster = api.NamespaceClient()
     with ExitStack() as undo:
@@ -131,7 +143,7 @@ def _notebook(cluster: api.NamespaceClient) -> objects.Notebook:
     return notebook
 
 
-def _planned(settings: Kubernetes, request: SimulatorRequest, notebook: objects.Notebook) -> objects.PodPlan:
+def _planned(settings: PodSettings, request: SimulatorRequest, notebook: objects.Notebook) -> objects.PodPlan:
     own_master = not _master_responds()
     world = _world_file(request.world)
     named = replace(request, world=f"{objects.WORLDS}/{world[0]}") if world else request
