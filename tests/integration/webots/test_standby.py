@@ -13,7 +13,7 @@ import pytest
 import palaestra_trainer.environments  # noqa: F401 - registers the environment
 from palaestra_protocol.control import SidecarState
 from palaestra_trainer.errors import SimulatorDead, SimulatorFault, SimulatorHung
-from palaestra_trainer.job.configuration import Recycle
+from palaestra_trainer.job.simulator_configuration import Recycle
 from palaestra_trainer.simulators.budget import RestartLimit
 from palaestra_trainer.simulators.restarter import Restarter, settle
 from palaestra_trainer.simulators.simulator import Simulator

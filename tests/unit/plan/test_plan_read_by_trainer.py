@@ -8,7 +8,8 @@ from structlog.testing import capture_logs
 
 from palaestra.api import load
 from palaestra.plan import ClusterLayout, Images, identified, plan
-from palaestra_trainer.job.configuration import Normalize, Recycle, parse
+from palaestra_trainer.job.configuration import Normalize, parse
+from palaestra_trainer.job.simulator_configuration import Recycle
 
 EXAMPLES = sorted((Path(__file__).parents[3] / "manifests" / "examples").glob("*.yaml"))
 

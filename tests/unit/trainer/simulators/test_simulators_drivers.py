@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.job.configuration import SimulatorConfiguration
+from palaestra_trainer.job.simulator_configuration import SimulatorConfiguration
 from palaestra_trainer.simulators.drivers import in_driver
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from palaestra_trainer.job.configuration import Recycle
+from palaestra_trainer.job.simulator_configuration import Recycle
 from palaestra_trainer.simulators.recycle_policy import ASK_MEMORY_EVERY_S, RecyclePolicy
 
 MIB = 2**20

@@ -22,14 +22,15 @@ from typing import Annotated, Any, Literal, Self
 
 import structlog
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, Field, ValidationError, model_validator
 from pydantic.alias_generators import to_camel
 from pydantic_core import ErrorDetails
 
-from palaestra_protocol.batch import MOST_ROWS
 from palaestra_protocol.pod.enums import Role
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.job.run_directory import RunDirectory
+from palaestra_trainer.job.section import ConfigurationSection, Positive
+from palaestra_trainer.job.simulator_configuration import SimulatorConfiguration
 from palaestra_trainer.job.simulator_rules import simulator_mistake
 
 log = structlog.get_logger(__name__)
@@ -39,7 +40,6 @@ _UNKNOWN = "extra_forbidden"  # pydantic's type of the error for an unknown fiel
 CONFIG_VARIABLE = "PALAESTRA_CONFIG"
 CONFIRM_EPISODES = 100  # a measured success rate of 95 % is then right to about 4 points
 
-Positive = Annotated[int, Field(ge=1)]
 Reward = Literal["Dense", "Sparse"]
 Device = Literal["cpu", "cuda"]
 Cnn = Literal["small"]
@@ -47,18 +47,7 @@ DEFAULT_REWARD: Reward = "Dense"
 DEFAULT_ROBOT = "Robotino"
 
 
-class _Section(BaseModel):
-    """An immutable section of the file, with camelCase names in YAML; `parse` handles unknown fields."""
-
-    model_config = ConfigDict(
-        alias_generator=to_camel,
-        populate_by_name=True,
-        extra="forbid",
-        frozen=True,
-    )
-
-
-class Wrapper(_Section):
+class Wrapper(ConfigurationSection):
     """A wrapper around the environment, see `environments.wrappers`.
 
     Attributes:
@@ -70,7 +59,7 @@ class Wrapper(_Section):
     options: dict[str, Any] = Field(default_factory=dict)
 
 
-class Environment(_Section):
+class Environment(ConfigurationSection):
     """The gymnasium environment to train in.
 
     Attributes:
@@ -89,7 +78,7 @@ class Environment(_Section):
     frame_stack: Annotated[int, Field(ge=2)] | None = None
 
 
-class Normalize(_Section):
+class Normalize(ConfigurationSection):
     """How observations and rewards are normalized before learning, see `algorithms.normalization`.
 
     Attributes:
@@ -105,7 +94,7 @@ class Normalize(_Section):
     clip_rewards: Annotated[float, Field(gt=0)] = 10.0
 
 
-class Callback(_Section):
+class Callback(ConfigurationSection):
     """A callback of the job's author, see `run.callbacks`.
 
     Attributes:
@@ -117,7 +106,7 @@ class Callback(_Section):
     options: dict[str, Any] = Field(default_factory=dict)
 
 
-class Algorithm(_Section):
+class Algorithm(ConfigurationSection):
     """The learning algorithm of the run.
 
     Attributes:
@@ -138,7 +127,7 @@ class Algorithm(_Section):
     callbacks: tuple[Callback, ...] | None = None
 
 
-class Evaluation(_Section):
+class Evaluation(ConfigurationSection):
     """When the policy is evaluated, on how many episodes, and the success rate that ends training.
 
     Attributes:
@@ -160,71 +149,14 @@ class Evaluation(_Section):
         return CONFIRM_EPISODES if self.confirm_episodes is None else self.confirm_episodes
 
 
-class Checkpoint(_Section):
+class Checkpoint(ConfigurationSection):
     """How often a checkpoint is saved, and how many of the newest checkpoints are kept."""
 
     every_steps: Positive = 5000
     keep: Positive = 3
 
 
-class Recycle(_Section):
-    """Limits for a healthy simulator, which is restarted after its episode when it reaches a limit.
-
-    Attributes:
-        after_resets: greatest number of resets since the simulator was started, or took over as a standby.
-        after_minutes: greatest number of minutes since the simulator was started or took over; its time as a
-            standby does not count.
-        above_memory_bytes: greatest memory of all processes of the simulator together.
-    """
-
-    after_resets: Positive | None = None
-    after_minutes: Annotated[float, Field(gt=0)] | None = None
-    above_memory_bytes: Positive | None = None
-
-
-class Restart(_Section):
-    """The restart budget of one simulator: at most `limit` restarts within any `within_seconds`."""
-
-    limit: Annotated[int, Field(ge=0)] = 10
-    within_seconds: Annotated[float, Field(gt=0)] = 600
-
-
-class SimulatorConfiguration(_Section):
-    """One simulator of this replica.
-
-    Attributes:
-        name: `<group>-<index>`, unique in the file.
-        role: `Collect` for collecting experience, `Evaluate` for evaluating the policy.
-        min_simulators: number of simulators of its group that must work for the run to continue; None: all.
-        control: address of the control port of the simulator's sidecar.
-        driver: the simulator program, `stub`, `mujoco`, `webots` or `command`.
-        options: command-line options of the simulator program.
-        world: path of the generated world that the simulator loads.
-        reset: `Reload`: the simulator loads its world again before each episode but the first; None: it only
-            resets its world.
-        standby: whether the sidecar also runs a standby for this simulator.
-        batch: number of copies of the world that the simulator steps together; None: one, over ROS.
-        start_deadline_seconds: seconds within which the simulator must respond after its start.
-    """
-
-    name: str
-    group: str
-    index: Annotated[int, Field(ge=0)]
-    role: Role
-    min_simulators: Positive | None = None
-    control: str = ""
-    driver: str = "stub"
-    options: tuple[str, ...] = ()
-    world: str = ""
-    recycle: Recycle | None = None
-    reset: Literal["Reload"] | None = None
-    standby: bool = False
-    batch: Annotated[int, Field(ge=1, le=MOST_ROWS)] | None = None
-    restart: Restart = Field(default_factory=Restart)
-    start_deadline_seconds: Annotated[float, Field(gt=0)] = 60
-
-
-class Configuration(_Section):
+class Configuration(ConfigurationSection):
     """The complete configuration of one replica, which the operator derives from the TrainingJob.
 
     Attributes:
@@ -270,7 +202,8 @@ class Configuration(_Section):
 
     @model_validator(mode="after")
     def _simulators_fit_together(self) -> Self:
-        if mistake := simulator_mistake(self):
+        own_program, asynchronous = self.command is not None, self.collection == "Asynchronous"
+        if mistake := simulator_mistake(self.simulators, own_program=own_program, asynchronous=asynchronous):
             raise ValueError(mistake)
         return self
 

@@ -17,8 +17,9 @@ from palaestra_trainer.episodes.evaluation import ActingPolicy, evaluate_on_all
 from palaestra_trainer.episodes.seeds import episode_seeds
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.job.configuration import Configuration, SimulatorConfiguration
+from palaestra_trainer.job.configuration import Configuration
 from palaestra_trainer.job.run_directory import RunDirectory
+from palaestra_trainer.job.simulator_configuration import SimulatorConfiguration
 from palaestra_trainer.run import checkpoint
 from palaestra_trainer.run.attempt import STOPPED_S, MakeMembers, use_threads
 from palaestra_trainer.run.versions import SIMULATING, versions

@@ -10,7 +10,8 @@ from typing import NamedTuple
 
 from palaestra_protocol.pod.enums import Role
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.job.configuration import Configuration, SimulatorConfiguration
+from palaestra_trainer.job.configuration import Configuration
+from palaestra_trainer.job.simulator_configuration import SimulatorConfiguration
 from palaestra_trainer.webots.launching.locks import FileLock
 
 

@@ -13,7 +13,8 @@ from gymnasium import spaces
 from palaestra_trainer.environments.batched import BatchedEnv
 from palaestra_trainer.environments.make import make_batched
 from palaestra_trainer.errors import SimulatorDead, SimulatorFault, SimulatorHung, SimulatorRefused
-from palaestra_trainer.job.configuration import DEFAULT_ROBOT, Configuration, SimulatorConfiguration
+from palaestra_trainer.job.configuration import DEFAULT_ROBOT, Configuration
+from palaestra_trainer.job.simulator_configuration import SimulatorConfiguration
 from palaestra_trainer.robots.batch_link import BatchLink
 from palaestra_trainer.robots.batched import BatchedScene, batched_form
 from palaestra_trainer.robots.registry import robot_class

@@ -18,13 +18,8 @@ import gymnasium
 import palaestra_trainer.environments  # noqa: F401 - the import registers the shipped environments
 from palaestra_trainer.environments.make import make_environment
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.job.configuration import (
-    CONFIG_VARIABLE,
-    DEFAULT_ROBOT,
-    Configuration,
-    SimulatorConfiguration,
-    load,
-)
+from palaestra_trainer.job.configuration import CONFIG_VARIABLE, DEFAULT_ROBOT, Configuration, load
+from palaestra_trainer.job.simulator_configuration import SimulatorConfiguration
 from palaestra_trainer.robots.registry import robot_class
 from palaestra_trainer.robots.simulated import SimulatedRobot, SimulatedScene
 from palaestra_trainer.simulators.batch_simulator import BatchSimulator

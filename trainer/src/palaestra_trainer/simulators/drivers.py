@@ -7,7 +7,7 @@ import shutil
 from pathlib import Path
 
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.job.configuration import SimulatorConfiguration
+from palaestra_trainer.job.simulator_configuration import SimulatorConfiguration
 
 DRIVERS = ("stub", "mujoco", "webots")
 _SAME_OPTIONS = {"stub", "mujoco"}

@@ -12,7 +12,8 @@ import structlog
 
 from palaestra_protocol.pod.enums import Role
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.job.configuration import Configuration, SimulatorConfiguration
+from palaestra_trainer.job.configuration import Configuration
+from palaestra_trainer.job.simulator_configuration import SimulatorConfiguration
 from palaestra_trainer.simulators.budget import Group, RestartLimit
 from palaestra_trainer.simulators.interface import Member, Watcher
 from palaestra_trainer.simulators.restarter import LOOK_EVERY_S, Restarter

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from palaestra_trainer.job.configuration import Recycle
+from palaestra_trainer.job.simulator_configuration import Recycle
 
 # Seconds between two requests for the memory: for each request, the sidecar sums the memory of all processes
 # of the simulator.

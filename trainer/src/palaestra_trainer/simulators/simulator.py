@@ -13,7 +13,7 @@ import gymnasium
 from palaestra_protocol.control import RobotName
 from palaestra_protocol.scene import SceneState, VisibleScene
 from palaestra_trainer.errors import ConfigurationError, SimulatorFault
-from palaestra_trainer.job.configuration import Recycle
+from palaestra_trainer.job.simulator_configuration import Recycle
 from palaestra_trainer.robots.base import RobotAbc, Scene
 from palaestra_trainer.robots.robotino import Robotino
 from palaestra_trainer.robots.sight import Sight

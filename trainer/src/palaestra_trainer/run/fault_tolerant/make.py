@@ -11,13 +11,8 @@ from typing import Any
 import palaestra_trainer.environments  # noqa: F401 - the import registers the shipped environments
 from palaestra_protocol.pod.enums import Role
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.job.configuration import (
-    CONFIG_VARIABLE,
-    Configuration,
-    Environment,
-    SimulatorConfiguration,
-    load,
-)
+from palaestra_trainer.job.configuration import CONFIG_VARIABLE, Configuration, Environment, load
+from palaestra_trainer.job.simulator_configuration import SimulatorConfiguration
 from palaestra_trainer.run.custom_program import ProgramReport, reported
 from palaestra_trainer.run.fault_tolerant.env_group import EnvGroup
 from palaestra_trainer.run.fault_tolerant.episode_runner import StepResult

@@ -11,7 +11,8 @@ from typing import Final, Protocol
 from palaestra_protocol.control import RobotName, SidecarState, SimulatorState
 from palaestra_protocol.scene import SceneState, VisibleScene
 from palaestra_trainer.errors import ConfigurationError, SimulatorDead, SimulatorFault
-from palaestra_trainer.job.configuration import SimulatorConfiguration, load_run
+from palaestra_trainer.job.configuration import load_run
+from palaestra_trainer.job.simulator_configuration import SimulatorConfiguration
 from palaestra_trainer.ros.master import Master
 from palaestra_trainer.webots.launching.sidecar import Sidecar
 from palaestra_trainer.webots.observer import Observer
