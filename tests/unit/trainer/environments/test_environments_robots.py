@@ -12,8 +12,8 @@ from palaestra_trainer.job.configuration import Environment
 from palaestra_trainer.robots import Joints, RobotAbc, SceneWrapper
 from palaestra_trainer.robots.differential import DifferentialDrive, TurtleBot3Burger
 from palaestra_trainer.robots.joints import JointRobot
-from palaestra_trainer.robots.registry import SHIPPED, robot_class
 from palaestra_trainer.robots.robotino import Robotino
+from palaestra_trainer.simulators.robot_registry import SHIPPED, robot_class
 from palaestra_trainer.testing import fake_arena, fake_court
 
 

@@ -12,8 +12,8 @@ from palaestra_trainer.environments.make import creator_of, keywords
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.job.configuration import Algorithm, Callback, Environment
 from palaestra_trainer.job.user_code.kwargs import named, takes_any
-from palaestra_trainer.robots.registry import robot_class
 from palaestra_trainer.run.callbacks import make_callbacks
+from palaestra_trainer.simulators.robot_registry import robot_class
 
 NUMBERS = itertools.count()
 FIELDS = {

@@ -170,7 +170,8 @@ class Configuration(ConfigurationSection):
             the newest checkpoint in that directory.
         initial_policy: a model.zip with whose policy a new run begins; None: random weights.
         stall_deadline_seconds: the run fails after this number of seconds without an environment step.
-        robot: class of the robot, `module:Class` or a name of `robots.registry`; None: `DEFAULT_ROBOT`.
+        robot: class of the robot, `module:Class` or a name of `simulators.robot_registry`; None:
+            `DEFAULT_ROBOT`.
         command: the user's own program that replaces the built-in training loop; the trainer does not read
             it.
         status_address: `host:port` of /metrics, /status and /healthz.

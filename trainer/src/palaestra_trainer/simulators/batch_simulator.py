@@ -17,7 +17,7 @@ from palaestra_trainer.job.configuration import DEFAULT_ROBOT, Configuration
 from palaestra_trainer.job.simulator_configuration import SimulatorConfiguration
 from palaestra_trainer.robots.batch_link import BatchLink
 from palaestra_trainer.robots.batched import BatchedScene, batched_form
-from palaestra_trainer.robots.registry import robot_class
+from palaestra_trainer.simulators.robot_registry import robot_class
 from palaestra_trainer.webots.launching.sidecar import Sidecar
 
 _POLL_S: Final = 0.05

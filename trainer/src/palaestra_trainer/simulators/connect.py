@@ -20,11 +20,11 @@ from palaestra_trainer.environments.make import make_environment
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.job.configuration import CONFIG_VARIABLE, DEFAULT_ROBOT, Configuration, load
 from palaestra_trainer.job.simulator_configuration import SimulatorConfiguration
-from palaestra_trainer.robots.registry import robot_class
 from palaestra_trainer.robots.simulated import SimulatedRobot, SimulatedScene
 from palaestra_trainer.simulators.batch_simulator import BatchSimulator
 from palaestra_trainer.simulators.fleet import limit_of
 from palaestra_trainer.simulators.interface import Member
+from palaestra_trainer.simulators.robot_registry import robot_class
 from palaestra_trainer.simulators.simulator import Simulator
 from palaestra_trainer.simulators.standby import Standby
 from palaestra_trainer.webots import Attached, Mode, Webots, ensure_node
