@@ -18,7 +18,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 
 from palaestra_trainer.job.run_directory import RunDirectory
 from palaestra_trainer.run import attempt
-from palaestra_trainer.waiting.exit import leave_after
+from palaestra_trainer.run.exit import leave_after
 
 AT_STEP = 5
 

@@ -92,7 +92,6 @@ def _options() -> argparse.ArgumentParser:
 
 def _compare(chosen: argparse.Namespace, interruption: Interruption) -> int:
     with without_collections():
-        from palaestra_trainer.episodes.paired_difference import Verdict
         from palaestra_trainer.run import compare as comparing
         from palaestra_trainer.simulators.connect import connect_here
 
@@ -111,7 +110,7 @@ def _compare(chosen: argparse.Namespace, interruption: Interruption) -> int:
         partial(_report, chosen, rules),
         interruption.check,
     )
-    return UNDECIDED if found.verdict is Verdict.UNDECIDED else ExitCode.DONE
+    return ExitCode.DONE if found.decided else UNDECIDED
 
 
 def _report(chosen: argparse.Namespace, rules: Rules, comparison: Comparison) -> None:

@@ -15,9 +15,11 @@ from pathlib import Path
 from typing import Any
 
 from palaestra_protocol.pod.status import ExitCode
-from palaestra_trainer import load_policy, make_env
 from palaestra_trainer.cli.program import write_line
 from palaestra_trainer.errors import TrainerError
+from palaestra_trainer.run.fault_tolerant.env import FaultTolerantEnv
+from palaestra_trainer.run.fault_tolerant.make import make_players
+from palaestra_trainer.run.policies import load_policy
 
 USAGE = "usage: python -P -m palaestra_trainer.cli.play RUN"
 
@@ -31,7 +33,8 @@ def main(arguments: Sequence[str]) -> int:
     signal.signal(signal.SIGTERM, lambda *_: interrupted.set())
     try:
         policy = load_policy(Path(arguments[0]))
-        with make_env(policy.environment_id, **policy.environment_options) as env:
+        players = make_players(policy.environment_id, 1, "Collect", policy.environment_options)
+        with FaultTolerantEnv(players) as env:
             _play(policy, env, interrupted)
     except TrainerError as error:
         sys.stderr.write(f"{error}\n")

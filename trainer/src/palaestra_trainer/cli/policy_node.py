@@ -26,7 +26,6 @@ from palaestra_trainer.robots.geometry import TURN_RAD_S, Pose
 from palaestra_trainer.ros.ros2_node import Ros2Node, require
 from palaestra_trainer.run.signals import Interrupted, Interruption
 from palaestra_trainer.run.telemetry.logs import configure_logs
-from palaestra_trainer.waiting.check import Check
 
 if TYPE_CHECKING:
     from palaestra_trainer.real_robots.camera import ImageSize
@@ -126,7 +125,7 @@ def _serve(options: argparse.Namespace, ros_arguments: Sequence[str], interrupti
         if simulation is not None:
             stack.callback(simulation.leave)
         say, warn = node.ros.get_logger().info, node.ros.get_logger().warning
-        _connect(robot, simulation, interruption.check, warn)
+        _connect(robot, simulation, interruption, warn)
         _wait_for_images(robot, package.image_size, warn)
         deployment = Deployment(package, robot, record, node.ros.get_logger().debug)
         _subscribe(node, link, goals, rules.fence)
@@ -136,13 +135,16 @@ def _serve(options: argparse.Namespace, ros_arguments: Sequence[str], interrupti
 
 
 def _connect(
-    robot: RealRobotino, simulation: SimulationTime | None, check: Check, warn: Callable[[str], object]
+    robot: RealRobotino,
+    simulation: SimulationTime | None,
+    interruption: Interruption,
+    warn: Callable[[str], object],
 ) -> None:
     """Wait until the robot may be driven, because nodes of a launch file start in any order."""
     while True:
         try:
             if simulation is not None:
-                simulation.refuse_unset(check)
+                simulation.refuse_unset(interruption.check)
             robot.connect()
         except RobotUnfit as error:
             warn(f"{error}; waiting for the robot")

@@ -10,10 +10,10 @@ import structlog
 
 from palaestra_protocol.pod.status import ExitCode, Termination
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.run.exit import leave_after
 from palaestra_trainer.run.signals import Interrupted
 from palaestra_trainer.run.telemetry.logs import last_lines
 from palaestra_trainer.run.termination import UNEXPECTED, end_of, write_last_word
-from palaestra_trainer.waiting.exit import leave_after
 
 log = structlog.get_logger(__name__)
 

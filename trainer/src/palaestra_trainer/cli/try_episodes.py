@@ -27,12 +27,10 @@ from palaestra_trainer.run.signals import Interruption
 from palaestra_trainer.run.telemetry.logs import configure_logs
 
 if TYPE_CHECKING:
-    from palaestra_trainer.cli.trying.agents import Agent
-    from palaestra_trainer.episodes.evaluation import Episode
+    from palaestra_trainer.run.trying.agents import Agent
     from palaestra_trainer.simulators.restarter import Restarter
 
 AGENTS = ("zero", "random", "keyboard")
-SEEDS = "try"
 FAILED = 1
 _WIDEST = 100
 
@@ -86,8 +84,7 @@ def _attempt(chosen: argparse.Namespace, interruption: Interruption) -> int:
             "run it in a terminal, or use --agent random"
         )
     with without_collections():
-        from palaestra_trainer.cli.trying import episodes, report
-        from palaestra_trainer.episodes.seeds import episode_seeds
+        from palaestra_trainer.run.trying import episodes, report
         from palaestra_trainer.simulators.connect import connect_here
         from palaestra_trainer.simulators.fleet import Fleet
         from palaestra_trainer.simulators.interface import NullWatcher
@@ -96,17 +93,20 @@ def _attempt(chosen: argparse.Namespace, interruption: Interruption) -> int:
     fleet = Fleet(configuration, connect_here(configuration, run=chosen.run), NullWatcher())
     say = _drop if chosen.json else write_line
 
-    def show(number: int, episode: Episode) -> None:
-        say(report.line_of(number, episode))
-
     try:
         [restarter] = fleet.collecting
         with _agent(chosen, restarter, configuration.seed, interruption) as (agent, legend):
             for line in (*_head(configuration, restarter), *legend):
                 say(line)
             fleet.start(interruption.check)
-            seeds = episode_seeds(configuration.seed, SEEDS, chosen.episodes)
-            tried = episodes.play(restarter, agent, seeds, interruption.check, show)
+            seeds = episodes.seeds(configuration.seed, chosen.episodes)
+            tried = episodes.play(
+                restarter,
+                agent,
+                seeds,
+                interruption.check,
+                lambda number, episode: say(report.line_of(number, episode)),
+            )
     finally:
         fleet.stop()
     if chosen.json:
@@ -121,7 +121,7 @@ def _agent(
     chosen: argparse.Namespace, restarter: Restarter, seed: int, interruption: Interruption
 ) -> Iterator[tuple[Agent, list[str]]]:
     """Yield the agent, and lines that explain the keys to a person who drives the robot."""
-    from palaestra_trainer.cli.trying import agents, keyboard, keymap
+    from palaestra_trainer.run.trying import agents, keyboard, keymap
 
     env = restarter.member.env
     if chosen.agent == "keyboard":

@@ -37,6 +37,7 @@ from palaestra_trainer.run.checkpoint import SavedCheckpoint
 from palaestra_trainer.run.context import RunContext
 from palaestra_trainer.run.directory_check import inspect
 from palaestra_trainer.run.end_record import write_end
+from palaestra_trainer.run.exit import leave_after
 from palaestra_trainer.run.her_reward_env import make_judge
 from palaestra_trainer.run.journal import Journal
 from palaestra_trainer.run.logger import CurvesLogger, hide_points
@@ -56,7 +57,6 @@ from palaestra_trainer.run.versions import versions
 from palaestra_trainer.run.watchdog import Watchdog, stalled
 from palaestra_trainer.simulators.fleet import Fleet, rest
 from palaestra_trainer.simulators.interface import Member
-from palaestra_trainer.waiting.exit import leave_after
 
 log = structlog.get_logger(__name__)
 

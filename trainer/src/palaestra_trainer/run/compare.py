@@ -24,10 +24,10 @@ from palaestra_trainer.job.configuration import DEFAULT_ROBOT, Configuration, lo
 from palaestra_trainer.job.run_directory import RunDirectory
 from palaestra_trainer.run.attempt import STOPPED_S, MakeMembers
 from palaestra_trainer.run.evaluate import Playing, evaluating, playing
+from palaestra_trainer.run.exit import leave_after
 from palaestra_trainer.simulators.drivers import in_driver
 from palaestra_trainer.waiting.at_once import at_once
 from palaestra_trainer.waiting.check import Check, go_on
-from palaestra_trainer.waiting.exit import leave_after
 
 MakeHere = Callable[[Path], MakeMembers]  # returns a function that creates the simulators of a run directory
 
@@ -66,6 +66,11 @@ class Comparison:
     verdict: Verdict
     faults: int
     ended: bool
+
+    @property
+    def decided(self) -> bool:
+        """Whether it is clear which policy is better, or that they are alike."""
+        return self.verdict is not Verdict.UNDECIDED
 
 
 def contestants(a: Path, b: Path, driver: str | None = None) -> tuple[Configuration, Configuration]:

@@ -22,13 +22,13 @@ from palaestra_trainer.job.run_directory import RunDirectory
 from palaestra_trainer.job.simulator_configuration import SimulatorConfiguration
 from palaestra_trainer.run import checkpoint
 from palaestra_trainer.run.attempt import STOPPED_S, MakeMembers, use_threads
+from palaestra_trainer.run.exit import leave_after
 from palaestra_trainer.run.versions import SIMULATING, versions
 from palaestra_trainer.simulators.drivers import in_driver
 from palaestra_trainer.simulators.fleet import Fleet
 from palaestra_trainer.simulators.interface import NullWatcher
 from palaestra_trainer.simulators.restarter import Restarter
 from palaestra_trainer.waiting.check import Check, go_on
-from palaestra_trainer.waiting.exit import leave_after
 
 log = structlog.get_logger(__name__)
 

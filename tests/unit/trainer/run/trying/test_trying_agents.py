@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from gymnasium import spaces
 
-from palaestra_trainer.cli.trying.agents import EndEpisode, EndTry, Random, Zero, names_of_actions, zero_of
-from palaestra_trainer.cli.trying.keyboard import KeyboardDriver
-from palaestra_trainer.cli.trying.keymap import DOWN, LEFT, RIGHT, SPACE, UP, decode, keys_of, legend
 from palaestra_trainer.environments.masks import all_allowed, allows
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.robots.geometry import Movement
 from palaestra_trainer.run.signals import Interrupted
+from palaestra_trainer.run.trying.agents import EndEpisode, EndTry, Random, Zero, names_of_actions, zero_of
+from palaestra_trainer.run.trying.keyboard import KeyboardDriver
+from palaestra_trainer.run.trying.keymap import DOWN, LEFT, RIGHT, SPACE, UP, decode, keys_of, legend
 from palaestra_trainer.waiting.check import go_on
 
 MASKED = (spaces.Discrete(4, start=2), spaces.MultiDiscrete([2, 3]), spaces.MultiBinary(3))

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from palaestra_trainer.cli.trying.agents import EndEpisode, EndTry
-from palaestra_trainer.cli.trying.keymap import NEXT, QUIT, Keys, decode
+from palaestra_trainer.run.trying.agents import EndEpisode, EndTry
+from palaestra_trainer.run.trying.keymap import NEXT, QUIT, Keys, decode
 from palaestra_trainer.waiting.check import Check
 
 _LOOK_EVERY_S = 0.1

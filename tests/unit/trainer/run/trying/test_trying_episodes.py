@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from gymnasium import spaces
 
-from palaestra_trainer.cli.trying import episodes
-from palaestra_trainer.cli.trying.agents import EndEpisode, Random, Zero
-from palaestra_trainer.cli.trying.problems import Problems
-from palaestra_trainer.cli.trying.report import as_json, line_of, summary
-from palaestra_trainer.cli.trying.step_times import StepTimes
 from palaestra_trainer.environments.env_checker import held
 from palaestra_trainer.errors import FaultBudgetSpent
 from palaestra_trainer.run.signals import Interrupted
+from palaestra_trainer.run.trying import episodes
+from palaestra_trainer.run.trying.agents import EndEpisode, Random, Zero
+from palaestra_trainer.run.trying.problems import Problems
+from palaestra_trainer.run.trying.report import as_json, line_of, summary
+from palaestra_trainer.run.trying.step_times import StepTimes
 from palaestra_trainer.simulators.budget import RestartLimit
 from palaestra_trainer.simulators.restarter import Restarter
 from palaestra_trainer.waiting.check import go_on

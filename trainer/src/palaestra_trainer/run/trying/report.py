@@ -5,8 +5,8 @@ from __future__ import annotations
 from statistics import fmean
 from typing import Any
 
-from palaestra_trainer.cli.trying.episodes import Tried
 from palaestra_trainer.episodes.evaluation import Episode
+from palaestra_trainer.run.trying.episodes import Tried
 
 
 def line_of(number: int, episode: Episode) -> str:

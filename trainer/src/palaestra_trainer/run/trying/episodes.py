@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import wait
 from dataclasses import dataclass, field
 from functools import partial
@@ -12,18 +12,20 @@ from typing import Any
 
 import numpy as np
 
-from palaestra_trainer.cli.trying.agents import Agent, EndEpisode, EndTry
-from palaestra_trainer.cli.trying.problems import Problems, beyond, check_by_libraries
-from palaestra_trainer.cli.trying.step_times import StepTimes
 from palaestra_trainer.environments.episode_end import REMEDY
 from palaestra_trainer.environments.masks import gives_masks
 from palaestra_trainer.episodes.evaluation import Episode
 from palaestra_trainer.episodes.reset_options import reset_options
+from palaestra_trainer.episodes.seeds import episode_seeds
 from palaestra_trainer.errors import Diverged, FaultBudgetSpent, SimulatorFault, TrainerError, fact_of
 from palaestra_trainer.run.signals import Interrupted
+from palaestra_trainer.run.trying.agents import Agent, EndEpisode, EndTry
+from palaestra_trainer.run.trying.problems import Problems, beyond, check_by_libraries
+from palaestra_trainer.run.trying.step_times import StepTimes
 from palaestra_trainer.simulators.restarter import LOOK_EVERY_S, Restarter
 from palaestra_trainer.waiting.check import Check
 
+SEEDS = "try"  # the stream of the episodes' seeds
 MOST_STEPS = 10_000  # limit of one episode; a person does not wait as long as a trainer
 
 
@@ -50,6 +52,11 @@ class Tried:
 
 class _Stop(Exception):
     """The environment has a problem after which it cannot continue."""
+
+
+def seeds(seed: int, episodes: int) -> Iterator[int]:
+    """Yield seeds for episodes of `palaestra-try`, which has a stream of its own."""
+    return episode_seeds(seed, SEEDS, episodes)
 
 
 def play(
