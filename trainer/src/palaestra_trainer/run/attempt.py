@@ -242,7 +242,8 @@ class Attempt:
         refuse_statistics(task, wanted.environment.id)
         algorithms.refuse_without_masks(self._algorithm, task, wanted.environment.id)
         judge = make_judge(wanted) if her.wanted(self._algorithm) else None
-        env = collecting_env(fleet.collecting, wanted, interruption.check, judge)
+        unawaited = wanted.collection == "Asynchronous"
+        env = collecting_env(fleet.collecting, wanted.seed, interruption.check, judge, asynchronous=unawaited)
         stack.callback(env.close)
         self._progress.moments = env.moments
         replay = replay_size(self._algorithm, env.observation_space, env.action_space, wanted.steps)
