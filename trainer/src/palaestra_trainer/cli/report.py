@@ -85,9 +85,9 @@ def _deployments(records: Sequence[Path]) -> list[RunData]:
     """Return the data of deployments; without records, the libraries of bags are not needed."""
     if not records:
         return []
-    from palaestra_trainer.reporting.read_deployment import read_deployment
+    from palaestra_trainer.real_robots.deployment.read_record import read_record
 
-    return [read_deployment(record) for record in records]
+    return [read_record(record) for record in records]
 
 
 def _usual_file(runs: Sequence[RunDirectory], records: Sequence[Path]) -> Path:

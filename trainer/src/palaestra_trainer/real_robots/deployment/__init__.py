@@ -4,6 +4,7 @@
 - `onnx_policy`: the policy, run by onnxruntime
 - `terminal`: the person's terminal; `hold_key`: motion only while a person holds a key
 - `record`: the record of a deployment as a bag, written by a thread of its own
+- `read_record`: a record as the data of a report
 - `goals`: goals that arrive while the program runs, one episode for each
 - `deploy`: the dry run, the question, and the episodes
 

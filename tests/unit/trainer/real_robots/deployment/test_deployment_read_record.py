@@ -5,7 +5,7 @@ import pytest
 from palaestra_trainer.bags import definitions, messages
 from palaestra_trainer.bags.writer import BagWriter
 from palaestra_trainer.cli.report import main
-from palaestra_trainer.reporting.read_deployment import read_deployment
+from palaestra_trainer.real_robots.deployment.read_record import read_record
 
 BEGIN_S = 1_700_000_000.0
 
@@ -39,7 +39,7 @@ def test_each_episode_is_replayed_with_its_target(bag):
     drive(bag, 3.0, (0.0, 2.0), REACHED | {"episode": "collided", "success": False})
     bag.close()
 
-    data = read_deployment(bag.path)
+    data = read_record(bag.path)
 
     assert data.figures == {"episodes": "2", "successes": "1"}
     assert data.ended == "failed"
@@ -58,7 +58,7 @@ def test_an_episode_that_a_rule_ended_is_shown_with_its_cause(bag):
     drive(bag, 0.0, (1.0, 0.0), {"decision": "stand", "cause": "fence"})
     bag.close()
 
-    data = read_deployment(bag.path)
+    data = read_record(bag.path)
 
     assert data.figures == {"episodes": "1", "successes": "0", "last cause to stand": "fence"}
     assert data.replays[0].facts.startswith("stopped")
@@ -69,7 +69,7 @@ def test_a_dry_run_has_no_episode(bag):
     """Its record has a target and decisions, and nothing was driven after them."""
     bag.close()
 
-    assert read_deployment(bag.path).replays == ()
+    assert read_record(bag.path).replays == ()
 
 
 def test_the_program_writes_the_report_beside_the_record(bag, capsys):

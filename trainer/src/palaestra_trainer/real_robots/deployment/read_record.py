@@ -32,7 +32,7 @@ class _Ended(NamedTuple):
     success: bool | None
 
 
-def read_deployment(path: Path) -> RunData:
+def read_record(path: Path) -> RunData:
     """Return the episodes, the decisions and the metadata of a record as the data of a report.
 
     Raises:
