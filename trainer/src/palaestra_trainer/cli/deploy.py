@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import math
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from palaestra_protocol.imports import import_without
 
@@ -20,11 +19,11 @@ from palaestra_protocol.numbers import seconds
 from palaestra_protocol.pod.status import ExitCode
 from palaestra_trainer.cli.program import leaving, parser, refuse_without_run, write_line
 from palaestra_trainer.errors import ConfigurationError, RobotStopped, TrainerError
+from palaestra_trainer.real_robots.deployment import floor
 from palaestra_trainer.real_robots.robot_clock import RobotClock
-from palaestra_trainer.real_robots.safety import Fence, SafetyRules
+from palaestra_trainer.real_robots.safety import SafetyRules
 from palaestra_trainer.real_robots.sensor_layout import ORDERS, UNITS, SensorLayout
 from palaestra_trainer.real_robots.topics import topics_of
-from palaestra_trainer.robots.geometry import TURN_RAD_S, Point, Pose
 from palaestra_trainer.run.signals import Interruption
 from palaestra_trainer.run.telemetry.logs import configure_logs
 
@@ -54,7 +53,8 @@ exit codes:
   130  ended by Ctrl-C; the robot was commanded to stand
 """
 STOPPED = 3
-_MARGIN_M = 1.0  # without --fence, the fence is this far around start and targets
+
+Typed = TypeVar("Typed")
 
 
 def deploy(arguments: Sequence[str] | None = None) -> int:
@@ -98,7 +98,7 @@ def _drive(options: argparse.Namespace, interruption: Interruption) -> int:
         stack.callback(robot.close)  # before the record is closed, so the record contains the stop
         robot.stand_at(options.start)
         deployment = Deployment(package, robot, record, terminal.show)
-        targets: list[Point | None] = list(options.target) or [None]
+        targets: list[tuple[float, float] | None] = list(options.target) or [None]
         deployment.rehearse(targets[0])
         terminal.end_line()
         if options.dry_run:
@@ -111,7 +111,9 @@ def _drive(options: argparse.Namespace, interruption: Interruption) -> int:
         return _drive_all(deployment, targets, terminal)
 
 
-def _drive_all(deployment: Deployment, targets: Sequence[Point | None], terminal: Terminal) -> int:
+def _drive_all(
+    deployment: Deployment, targets: Sequence[tuple[float, float] | None], terminal: Terminal
+) -> int:
     """Drive the episodes up to the first one without success, after which the robot may touch something."""
     for target in targets:
         end = deployment.drive(target)
@@ -123,43 +125,33 @@ def _drive_all(deployment: Deployment, targets: Sequence[Point | None], terminal
 
 
 def _rules(options: argparse.Namespace) -> SafetyRules:
-    fence = _fence(options)
-    start = (options.start.x_m, options.start.y_m)
-    for name, (x_m, y_m) in (("start", start), *(("target", point) for point in options.target)):
-        if fence.gap_m(Pose(x_m, y_m, 0.0)) <= 0.0:
-            raise ConfigurationError(
-                f"fence: the {name} ({x_m:g}, {y_m:g}) is too close to the fence for the robot; widen --fence"
-            )
+    fence = floor.fence_around(options.start, options.target, options.fence)
     return SafetyRules(speed_m_s=options.speed_limit, turn_rad_s=options.turn_limit, fence=fence)
-
-
-def _fence(options: argparse.Namespace) -> Fence:
-    if isinstance(options.fence, Fence):
-        return options.fence
-    if not options.target:
-        raise ConfigurationError("fence: neither --target nor --fence is given; give the floor for the robot")
-    points: list[Point] = [(options.start.x_m, options.start.y_m), *options.target]
-    xs, ys = zip(*points, strict=True)
-    return Fence((min(xs) - _MARGIN_M, min(ys) - _MARGIN_M), (max(xs) + _MARGIN_M, max(ys) + _MARGIN_M))
 
 
 def arguments_parser() -> argparse.ArgumentParser:
     """Return the parser of the program's arguments."""
     options = parser("palaestra-deploy", DEPLOY, EXIT_CODES)
-    add = options.add_argument
+    add, limits = options.add_argument, SafetyRules()
     add("package", type=Path, metavar="PACKAGE", help="folder or zip of the package")
     add("--robot", required=True, metavar="ADDRESS", help=_ROBOT)
-    add("--target", type=_point, action="append", default=[], metavar="X,Y", help=_TARGET)
-    add("--start", type=_pose, default=Pose(0.0, 0.0, 0.0), metavar="X,Y,HEADING", help=_START)
-    add("--fence", type=_rectangle, metavar="X,Y,X,Y", help=_FENCE)
+    add("--target", type=_typed(floor.point_of), action="append", default=[], metavar="X,Y", help=_TARGET)
+    add("--start", type=_typed(floor.pose_of), default="0,0,0", metavar="X,Y,HEADING", help=_START)
+    add("--fence", type=_typed(floor.fence_of), metavar="X,Y,X,Y", help=_FENCE)
     add(
         "--speed-limit",
         type=seconds,
-        default=SafetyRules().speed_m_s,
+        default=limits.speed_m_s,
         metavar="M/S",
         help="default: %(default)s",
     )
-    add("--turn-limit", type=seconds, default=TURN_RAD_S, metavar="RAD/S", help="default: %(default)s")
+    add(
+        "--turn-limit",
+        type=seconds,
+        default=limits.turn_rad_s,
+        metavar="RAD/S",
+        help="default: %(default)s",
+    )
     add("--dry-run", action="store_true", help="show the commands of some steps, and do not drive")
     add("--yes", action="store_true", help="do not ask before driving")
     add(
@@ -195,31 +187,16 @@ def _joined(arguments: Sequence[str]) -> list[str]:
     return joined
 
 
-def _point(text: str) -> Point:
-    x_m, y_m = _numbers(text, "X,Y")
-    return x_m, y_m
+def _typed(read: Callable[[str], Typed]) -> Callable[[str], Typed]:
+    """Return a type of an option, whose mistakes argparse reports with the option's name."""
 
+    def value(text: str) -> Typed:
+        try:
+            return read(text)
+        except ConfigurationError as error:
+            raise argparse.ArgumentTypeError(str(error)) from error
 
-def _pose(text: str) -> Pose:
-    return Pose(*_numbers(text, "X,Y,HEADING"))
-
-
-def _rectangle(text: str) -> Fence:
-    low_x, low_y, high_x, high_y = _numbers(text, "X,Y,X,Y")
-    try:
-        return Fence((low_x, low_y), (high_x, high_y))
-    except ConfigurationError as error:
-        raise argparse.ArgumentTypeError(str(error)) from error
-
-
-def _numbers(text: str, form: str) -> list[float]:
-    try:
-        numbers = [float(part) for part in text.split(",")]
-    except ValueError:
-        numbers = []
-    if len(numbers) != len(form.split(",")) or not all(map(math.isfinite, numbers)):
-        raise argparse.ArgumentTypeError(f"{text!r} is not {form} in meters and radians")
-    return numbers
+    return value
 
 
 def deploy_and_leave() -> int:

@@ -22,7 +22,6 @@ from palaestra_trainer.real_robots.robot_clock import RobotClock
 from palaestra_trainer.real_robots.ros2_clock import SimulationClock, SimulationTime
 from palaestra_trainer.real_robots.safety import Fence, SafetyRules
 from palaestra_trainer.real_robots.topics import ROS2, refuse_unknown, remaps, topics_of
-from palaestra_trainer.robots.geometry import TURN_RAD_S, Pose
 from palaestra_trainer.ros.ros2_node import Ros2Node, require
 from palaestra_trainer.run.signals import Interrupted, Interruption
 from palaestra_trainer.run.telemetry.logs import configure_logs
@@ -176,7 +175,7 @@ def _simulation(node: Ros2Node) -> SimulationTime | None:
 
 def _rules(node: Ros2Node) -> SafetyRules:
     speed_m_s = _declared(node, "speed_limit", SafetyRules().speed_m_s)
-    turn_rad_s = _declared(node, "turn_limit", TURN_RAD_S)
+    turn_rad_s = _declared(node, "turn_limit", SafetyRules().turn_rad_s)
     for name, value in (("speed_limit", speed_m_s), ("turn_limit", turn_rad_s)):
         if not 0.0 < value < math.inf:
             raise ConfigurationError(f"{name}: {value} is not a positive number")
@@ -213,7 +212,7 @@ def _subscribe(node: Ros2Node, link: Ros2Link, goals: Goals, fence: Fence | None
             )
         elif not (math.isfinite(x_m) and math.isfinite(y_m)):
             warn("goal ignored: its position is not finite")
-        elif fence is not None and fence.gap_m(Pose(x_m, y_m, 0.0)) <= 0.0:
+        elif fence is not None and not fence.admits((x_m, y_m)):
             warn(f"goal ignored: ({x_m:g}, {y_m:g}) is too close to the fence for the robot")
         else:
             goals.put((x_m, y_m))

@@ -48,6 +48,10 @@ class Fence:
                 "give the smallest x and y, then the greatest"
             )
 
+    def admits(self, point: Point) -> bool:
+        """Return whether a robot at this point is within the fence."""
+        return self.gap_m(Pose(*point, 0.0)) > 0.0
+
     def gap_m(self, pose: Pose) -> float:
         """Return the meters between the robot's outline and the fence; negative beyond the fence."""
         x_m, y_m = pose.x_m, pose.y_m
