@@ -3,7 +3,7 @@
 import io
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
 from mcap.writer import Writer
@@ -14,6 +14,7 @@ from palaestra_trainer.bags.writer import BagWriter
 from palaestra_trainer.errors import ConfigurationError
 
 UNKNOWN_KIND = 0x7F  # reserved for later versions of MCAP
+LENGTH_OF_THE_HEADER = 9  # its first byte, after eight bytes of magic and the kind of the record
 
 
 @pytest.fixture(scope="module")
@@ -44,6 +45,7 @@ def test_a_truncated_bag_is_refused_and_its_part_is_read(whole, data, tmp_path_f
 
 @settings(max_examples=300)
 @given(at=st.integers(0), to=st.integers(0, 255))
+@example(at=LENGTH_OF_THE_HEADER + 1, to=10)
 def test_a_damaged_bag_is_refused_or_its_messages_are_right(whole, at, to, tmp_path_factory):
     """Each chunk has a checksum, so a damaged byte cannot become a wrong pose."""
     damaged = bytearray(whole)
@@ -69,6 +71,16 @@ def test_a_chunk_that_looks_like_another_record_is_missed(whole, tmp_path):
     (tmp_path / "log.mcap").write_bytes(damaged)
 
     with pytest.raises(ConfigurationError, match="it has 2 of 3 messages"):
+        read_bag(tmp_path / "log.mcap")
+
+
+def test_a_header_that_seems_to_contain_the_messages_is_found(whole, tmp_path):
+    """The reader skips the rest of a record, so it would return a drive without a message."""
+    damaged = bytearray(whole)
+    damaged[LENGTH_OF_THE_HEADER + 1] = 10
+    (tmp_path / "log.mcap").write_bytes(damaged)
+
+    with pytest.raises(ConfigurationError, match="the end of its data is missing"):
         read_bag(tmp_path / "log.mcap")
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-from mcap.records import Channel, Chunk, McapRecord, Message, Metadata, Schema, Statistics
+from mcap.records import Channel, Chunk, DataEnd, McapRecord, Message, Metadata, Schema, Statistics
 from mcap.stream_reader import StreamReader, breakup_chunk
 from mcap_ros2.decoder import DecoderFactory
 
@@ -84,8 +84,9 @@ def _content(path: Path) -> bytes:
 
 def _records(content: bytes) -> Iterator[McapRecord]:
     """Yield the records of a file and of its chunks, each chunk after the check of its checksum."""
-    uncompressed = 0
+    uncompressed, ended = 0, False
     for record in StreamReader(io.BytesIO(content), emit_chunks=True, validate_crcs=True).records:
+        ended = ended or isinstance(record, DataEnd)
         if not isinstance(record, Chunk):
             yield record
             continue
@@ -93,6 +94,8 @@ def _records(content: bytes) -> Iterator[McapRecord]:
         if uncompressed > MOST_UNCOMPRESSED_BYTES:
             raise ValueError(f"it has more than {MOST_UNCOMPRESSED_BYTES:,} bytes of messages")
         yield from breakup_chunk(record, validate_crc=True)
+    if not ended:  # a damaged length may put all messages into another record
+        raise ValueError("the end of its data is missing")
 
 
 def _fill(bag: Bag, records: Iterator[McapRecord]) -> None:
