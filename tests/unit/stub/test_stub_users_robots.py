@@ -14,6 +14,11 @@ ARM = """Robot { name "arm" children [ HingeJoint {
     DistanceSensor { name "eye" lookupTable [ 0 0 0, 9 9 0 ] }
     SliderJoint { endPoint DEF TIP Solid { translation 1 0 0 } } ] } } ] }"""
 
+THREE_WHEELS = """Robot { children [
+  Robotino3Wheel { } Robotino3Wheel { number 1 } Robotino3Wheel { number 2 }
+  Robotino3Platform { translation 0 0 0.28 extension [ GPS { } ] } ]
+  boundingObject Cylinder { radius 0.2 height 0.2 } physics Physics { } }"""
+
 
 def drive(simulation, seconds, **speeds):
     """Turn the motors of the only robot at these speeds in rad/s, and return the robot's new position."""
@@ -64,9 +69,13 @@ def test_robots_of_webots_drive_by_their_wheels(robot, left, right, radius, trac
     assert turned.heading_rad == pytest.approx(0.8 * 2.0 * radius / track, rel=0.02)
 
 
-def test_a_robotino_of_webots_drives_as_the_one_of_the_arena():
-    """The PROTO's wheels have a radius of 0.063 m and are 120 degrees apart."""
-    body = drive(load_world("Robotino3 { }"), 0.8, wheel0_joint=0.0, wheel1_joint=-1.0, wheel2_joint=1.0)
+@pytest.mark.parametrize("robot", ["Robotino3 { }", THREE_WHEELS])
+def test_a_robotino_of_webots_drives_as_the_one_of_the_arena(robot):
+    """The PROTO's wheels have a radius of 0.063 m and are 120 degrees apart.
+
+    Published variants of the robot consist of three `Robotino3Wheel`.
+    """
+    body = drive(load_world(robot), 0.8, wheel0_joint=0.0, wheel1_joint=-1.0, wheel2_joint=1.0)
 
     assert body.x == pytest.approx(0.8 * 0.063 / math.sqrt(0.75), rel=0.01)
 

@@ -8,7 +8,8 @@ from typing import NamedTuple
 
 import pytest
 
-from palaestra_sim.world import Node, World, builtin, parse
+from palaestra_sim.world import Node, World, builtin, parse, parse_proto
+from palaestra_sim.world.tree import walk
 from tests.unit.world.robot_descriptions import (
     ARMS,
     CARS,
@@ -247,6 +248,25 @@ def test_motors_and_bodies_have_the_documented_limits_and_masses(name: str) -> N
     assert {numbers(motor, "maxVelocity") for motor, _ in driven(name)} == {(DRIVES[name].max_velocity,)}
     assert numbers(physics, "mass") == (DRIVES[name].mass,)
     assert robot.nodes("boundingObject")
+
+
+@pytest.mark.parametrize(("height", "mass"), [(0.530447, 2.434), (1.0, 2.852)])
+def test_the_platform_of_the_robotino_has_the_mass_of_its_height(height: float, mass: float) -> None:
+    """A robot with a high platform tips over sooner.
+
+    The table weighs 1.961 kg, and the tube 0.891 kg for each meter; the center of mass is that of both parts.
+    """
+    path = PROTOS / "Robotino3Platform.proto"
+    written = path.read_text().replace("SFFloat    height      0.530447", f"SFFloat height {height}")
+    body = parse_proto(written.encode(), path.name).body
+    (physics,) = body.nodes("physics")
+    table, tube = (numbers(it, "translation")[2] for it in of_type(walk([body]), "Pose")[1:])
+
+    assert numbers(physics, "mass") == pytest.approx((mass,), abs=1e-3)
+    assert (table, tube) == pytest.approx((height + 0.006553, height / 2))
+    assert numbers(physics, "centerOfMass") == pytest.approx(
+        (0, 0, (1.9611 * table + (mass - 1.9611) * tube) / mass), abs=1e-3
+    )
 
 
 def test_the_robotino_is_the_one_of_the_arena() -> None:
