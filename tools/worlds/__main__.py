@@ -25,6 +25,7 @@ SIMULATORS: Final = ("palaestra-stub", "palaestra-mujoco")
 DEADLINE_S: Final = 180.0
 # Matches a robot's controller, except `<none>` and `void`: robots with these two values have no controller.
 CONTROLLER: Final = re.compile(rb'(\bcontroller\s+)"(?!<none>|void")[^"\n]*"')
+VOID: Final = re.compile(rb'(\bcontroller\s+)"void"')
 MARK: Final = ".counted.wbt"
 HEADER: Final = b"#VRML_SIM "  # files with another header are parts of worlds
 LINE: Final = 80
@@ -93,9 +94,14 @@ def asked(simulator: str, world: Path) -> Answer:
 
 @contextmanager
 def for_ros(world: Path, simulator: str) -> Iterator[Path]:
-    """Write a copy next to a world, in which robots have the controller `ros`; yield the path of the copy."""
+    """Write a copy next to a world, in which robots have the controller `ros`; yield the path of the copy.
+
+    A robot with the controller `void` gets the controller `ros` only if no other robot has a controller: such
+    a world waits for the controller of its user.
+    """
     copy = world.with_name(f"{world.stem}.{simulator}{MARK}")
-    copy.write_bytes(CONTROLLER.sub(rb'\1"ros"', world.read_bytes()))
+    content, driven = CONTROLLER.subn(rb'\1"ros"', world.read_bytes())
+    copy.write_bytes(content if driven else VOID.sub(rb'\1"ros"', content))
     try:
         yield copy
     finally:

@@ -48,3 +48,22 @@ def test_robots_get_the_controller_ros_and_equal_worlds_count_once(folder, capsy
     )
     assert "   1 the stub simulates no Mystery on a robot" in lines[-2]
     assert sorted(path.name for path in (folder / "worlds").iterdir()) == sorted(worlds)
+
+
+def test_a_robot_without_a_controller_gets_one_only_if_it_is_the_only_robot(folder, capsys):
+    """A starter world has one robot with the controller void, and its users set the controller.
+
+    In a world with a driven robot, such a robot belongs to the scenery.
+    """
+    starter = WORLD.replace("CONTROLLER", "void").replace("PARTS", ARM)
+    statue = starter.replace(ARM, "Mystery { }").replace('"r"', '"statue"').partition("Robot")
+    (folder / "worlds" / "starter.wbt").write_text(starter)
+    (folder / "worlds" / "scene.wbt").write_text(starter.replace("void", "mine") + "".join(statue[1:]))
+
+    _, lines = count(folder, capsys)
+
+    (line,) = lines
+    assert line == (
+        "palaestra-stub: 2 of 2 worlds start as they are, 2 with --leave-out all; "
+        "2 of these keep a robot with a motor and a sensor"
+    )
