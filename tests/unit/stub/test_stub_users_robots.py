@@ -56,16 +56,24 @@ def test_a_robot_of_webots_stands_still_unless_a_client_drives_it():
             0.11,
             0.394,
         ),
+        (
+            "Moose",
+            [f"left_motor_{number}" for number in range(1, 5)],
+            [f"right_motor_{number}" for number in range(1, 5)],
+            0.3175,
+            1.2498,
+        ),
     ],
 )
 def test_robots_of_webots_drive_by_their_wheels(robot, left, right, radius, track):
     """The motion follows from the radius of the wheels and from the distance between them."""
-    straight = drive(load_world(f"{robot} {{ }}"), 0.8, **dict.fromkeys([*left, *right], 1.0))
+    world = f'{robot} {{ controller "ros" controllerArgs [ "--name=r" "--synchronize" ] }}'
+    straight = drive(load_world(world), 0.8, **dict.fromkeys([*left, *right], 1.0))
     assert straight.x == pytest.approx(0.8 * radius, rel=0.02)
     assert straight.y == pytest.approx(0.0, abs=1e-6)
 
     speeds = {**dict.fromkeys(left, -1.0), **dict.fromkeys(right, 1.0)}
-    turned = drive(load_world(f"{robot} {{ }}"), 0.8, **speeds)
+    turned = drive(load_world(world), 0.8, **speeds)
     assert turned.heading_rad == pytest.approx(0.8 * 2.0 * radius / track, rel=0.02)
 
 

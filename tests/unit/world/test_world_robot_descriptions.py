@@ -16,6 +16,7 @@ from tests.unit.world.robot_descriptions import (
     PARTS,
     PROTOS,
     ROBOTS,
+    ROVERS,
     described,
     numbers,
     of_type,
@@ -31,6 +32,7 @@ FIELDS = {
     "Robotino3": "model window selfCollision topSlot bodySlot cameraSlot middleSlot bottomSlot "
     "infraredSensorModel",
     "TurtleBot3Burger": "extensionSlot",
+    "Moose": "window color bodySlot",
     "BmwX5": "color engineSound windshieldWipers frontSpotLights rearMirror leftWingMirror rightWingMirror "
     "mirrorFar sensorsSlotFront sensorsSlotRear sensorsSlotTop sensorsSlotCenter interior "
     "dynamicSpeedDisplay indicatorLevers steeringWheel completeInterior shifter "
@@ -45,6 +47,7 @@ NAMES = {
     "Pioneer3dx": "Pioneer 3-DX",
     "Robotino3": "Robotino 3",
     "TurtleBot3Burger": "TurtleBot3Burger",
+    "Moose": "moose",
     "BmwX5": "vehicle",
     "TeslaModel3": "vehicle",
     **{arm: arm for arm in ARMS},
@@ -55,6 +58,7 @@ WITHOUT_EFFECT = {
     "Robotino3": {"infraredSensorModel"},
     "CharacterSkin": {"model"},
     "VelodynePuck": {"version"},
+    "Moose": {"color"},
     "BmwX5": set(FIELDS["BmwX5"].split())
     - {"window", "sensorsSlotFront", "sensorsSlotRear", "sensorsSlotTop", "sensorsSlotCenter"},
     "TeslaModel3": {"plate", "engineSound", "frontSpotLights"},
@@ -89,6 +93,7 @@ DEVICES = {
     | {"accelerometer", "compass", "gyro", "inertial unit", "touch sensor"},
     "TurtleBot3Burger": {f"{it} {part}" for it in TWO for part in ("motor", "sensor")}
     | {"accelerometer", "gyro", "compass"},
+    "Moose": {f"{it} motor {i}" for it in ("left", "right") for i in range(1, 5)},
     "BmwX5": OF_CARS
     | {"left_front_wheel", "right_front_wheel", "wiper_sensor"}
     | {"left_wiper_motor", "right_wiper_motor"},
@@ -146,18 +151,19 @@ def test_each_description_is_of_the_proto_that_its_file_is_named_after() -> None
     """The reader looks for a PROTO in the file of the same name."""
     files = sorted(path.stem for path in PROTOS.glob("*.proto"))
 
-    assert files == sorted(ROBOTS + CARS + ARMS + PARTS)
+    assert files == sorted(ROBOTS + ROVERS + CARS + ARMS + PARTS)
     assert [described(name).name for name in files] == files
 
 
-@pytest.mark.parametrize("name", ROBOTS + CARS + ARMS)
+@pytest.mark.parametrize("name", ROBOTS + ROVERS + CARS + ARMS)
 def test_a_world_can_set_every_documented_field(name: str) -> None:
     """Any other field is an error, because Webots would also reject a misspelled field."""
-    common = set(COMMON.split()) - ({"customData"} if name in CARS + ARMS else set())
+    without = {"customData"} if name in CARS + ARMS + ROVERS else set()
+    common = set(COMMON.split()) - without - ({"supervisor"} if name in ROVERS else set())
     assert set(described(name).defaults) == common | set(FIELDS[name].split())
 
 
-@pytest.mark.parametrize("name", ROBOTS + CARS + ARMS + PARTS)
+@pytest.mark.parametrize("name", ROBOTS + ROVERS + CARS + ARMS + PARTS)
 def test_a_field_without_effect_is_one_that_chooses_a_variant(name: str) -> None:
     """All other fields are used in the body, so they have the same effect as in Webots."""
     description = described(name)
@@ -167,7 +173,7 @@ def test_a_field_without_effect_is_one_that_chooses_a_variant(name: str) -> None
     assert set(description.defaults) - description.used == without
 
 
-@pytest.mark.parametrize("name", ROBOTS + CARS + ARMS)
+@pytest.mark.parametrize("name", ROBOTS + ROVERS + CARS + ARMS)
 def test_a_robot_has_its_documented_name(name: str) -> None:
     """The ROS name of a robot contains this name."""
     (robot,) = described(name).body.nodes
@@ -176,7 +182,7 @@ def test_a_robot_has_its_documented_name(name: str) -> None:
     assert robot.text("name") == NAMES[name]
 
 
-@pytest.mark.parametrize("name", ROBOTS + CARS + ARMS + PARTS)
+@pytest.mark.parametrize("name", ROBOTS + ROVERS + CARS + ARMS + PARTS)
 def test_descriptions_need_no_other_file_and_draw_nothing(name: str) -> None:
     """A simulator without an installation of Webots uses the descriptions.
 
@@ -188,7 +194,7 @@ def test_descriptions_need_no_other_file_and_draw_nothing(name: str) -> None:
     assert types <= PLAIN | ({"RobotisLds01"} if name == "TurtleBot3Burger" else set())
 
 
-@pytest.mark.parametrize("name", ROBOTS + CARS + ARMS)
+@pytest.mark.parametrize("name", ROBOTS + ROVERS + CARS + ARMS)
 def test_a_robot_has_the_documented_devices(name: str) -> None:
     """A program finds devices by name, so each name occurs once."""
     devices = of_type(described(name).body.walk(), *TYPES_OF_DEVICES)
@@ -225,7 +231,7 @@ def test_wheels_stand_on_the_floor(name: str) -> None:
     assert lowest == pytest.approx([-0.00385 if name == "Robotino3" else 0.0] * len(lowest))
 
 
-@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("name", ROBOTS + ROVERS)
 def test_a_wheel_turns_about_its_axle(name: str) -> None:
     """The anchor of a joint may be any point on the axle; the e-puck's anchor is between its wheels."""
     for joint in of_type(described(name).body.walk(), "HingeJoint"):
@@ -284,6 +290,27 @@ def test_the_robotino_is_the_one_of_the_arena() -> None:
     for name, sensor in theirs.items():
         assert numbers(sensor, "lookupTable") == numbers(ours[name], "lookupTable")
         assert numbers(sensor, "translation") == pytest.approx(numbers(ours[name], "translation"), abs=1e-3)
+
+
+def test_the_wheels_of_the_moose_are_where_its_manufacturer_puts_them() -> None:
+    """A client's odometry uses the distances, which are those of Clearpath's `moose_description`.
+
+    The heights are relative to the axles of the wheels in the middle, which touch the floor first.
+    """
+    body = described("Moose").body
+    axles = [(1.0036, 0.02223), (0.33639, 0), (-0.33638, 0), (-1.01123, 0.02223)]
+    wheels = {motor.text("name"): numbers(wheel, "translation") for motor, wheel in driven("Moose")}
+
+    for side, y in (("left", 0.6249), ("right", -0.6249)):
+        for number, (x, z) in enumerate(axles, 1):
+            assert wheels[f"{side} motor {number}"] == pytest.approx((x, y, z - 0.06))
+    for _, wheel in driven("Moose"):
+        (tire,), (physics,) = of_type(within(wheel, body), "Cylinder"), wheel.nodes("physics")
+        assert numbers(tire, "radius") + numbers(tire, "height") == (0.3175, 0.303)
+        assert numbers(physics, "mass") == (16.8,)
+    (robot,) = body.nodes
+    assert numbers(robot.nodes("physics")[0], "mass") == (1590,)
+    assert {numbers(motor, "maxVelocity") for motor, _ in driven("Moose")} == {(26,)}
 
 
 @pytest.mark.parametrize(
