@@ -57,6 +57,13 @@ def test_a_robot_of_webots_stands_still_unless_a_client_drives_it():
             0.394,
         ),
         (
+            "Rosbot",
+            ["front_left_wheel_motor", "rear_left_wheel_motor"],
+            ["front_right_wheel_motor", "rear_right_wheel_motor"],
+            0.0425,
+            0.192,
+        ),
+        (
             "Moose",
             [f"left_motor_{number}" for number in range(1, 5)],
             [f"right_motor_{number}" for number in range(1, 5)],

@@ -11,7 +11,7 @@ from palaestra_sim.world import Node, World, parse, parse_proto
 PROTOS = Path(palaestra_sim.world.__file__).parent / "protos"
 ROBOTS = ("E-puck", "Pioneer3at", "Pioneer3dx", "Robotino3", "TurtleBot3Burger")
 CARS = ("BmwX5", "TeslaModel3")
-ROVERS = ("Moose",)
+ROVERS = ("Moose", "Rosbot")
 ARMS = ("UR3e", "UR5e", "UR10e")
 LIDARS = {
     "HokuyoUrg04lx": (240, 667, 0.06, 4.095),
@@ -33,6 +33,7 @@ INFRARED = {
     "SharpGP2Y0A710K0F": ((1.0, 2.5), (5.5, 1.37)),
 }
 PARTS = (
+    "Astra",
     "CharacterSkin",
     "E-puckGroundSensors",
     "Kinect",

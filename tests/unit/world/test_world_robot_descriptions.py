@@ -33,6 +33,7 @@ FIELDS = {
     "infraredSensorModel",
     "TurtleBot3Burger": "extensionSlot",
     "Moose": "window color bodySlot",
+    "Rosbot": "selfCollision cameraSlot lidarSlot",
     "BmwX5": "color engineSound windshieldWipers frontSpotLights rearMirror leftWingMirror rightWingMirror "
     "mirrorFar sensorsSlotFront sensorsSlotRear sensorsSlotTop sensorsSlotCenter interior "
     "dynamicSpeedDisplay indicatorLevers steeringWheel completeInterior shifter "
@@ -48,6 +49,7 @@ NAMES = {
     "Robotino3": "Robotino 3",
     "TurtleBot3Burger": "TurtleBot3Burger",
     "Moose": "moose",
+    "Rosbot": "Rosbot",
     "BmwX5": "vehicle",
     "TeslaModel3": "vehicle",
     **{arm: arm for arm in ARMS},
@@ -65,6 +67,7 @@ WITHOUT_EFFECT = {
 }
 
 TWO = ("left wheel", "right wheel")
+CORNERS = ("front left", "front right", "rear left", "rear right")
 FOUR = ("back left wheel", "back right wheel", "front left wheel", "front right wheel")
 SONARS = {f"so{i}" for i in range(16)}
 OF_CARS = (
@@ -94,6 +97,9 @@ DEVICES = {
     "TurtleBot3Burger": {f"{it} {part}" for it in TWO for part in ("motor", "sensor")}
     | {"accelerometer", "gyro", "compass"},
     "Moose": {f"{it} motor {i}" for it in ("left", "right") for i in range(1, 5)},
+    "Rosbot": {f"{it} wheel motor{part}" for it in CORNERS for part in ("", " sensor")}
+    | {f"{it} distance sensor" for it in CORNERS}
+    | {f"imu {it}" for it in ("accelerometer", "gyro", "compass", "inertial_unit")},
     "BmwX5": OF_CARS
     | {"left_front_wheel", "right_front_wheel", "wiper_sensor"}
     | {"left_wiper_motor", "right_wiper_motor"},
@@ -110,6 +116,9 @@ PLAIN = TYPES_OF_DEVICES | {
     "Box", "Capsule", "Cylinder", "Group", "HingeJoint", "HingeJointParameters", "Physics", "Pose", "Robot",
     "Solid", "Sphere", "Zoom",
 }  # fmt: skip
+
+# The default sensors in the slots of robots.
+OF_SLOTS = {"TurtleBot3Burger": {"RobotisLds01"}, "Rosbot": {"Astra", "RpLidarA2"}}
 
 
 class Drive(NamedTuple):
@@ -158,8 +167,8 @@ def test_each_description_is_of_the_proto_that_its_file_is_named_after() -> None
 @pytest.mark.parametrize("name", ROBOTS + ROVERS + CARS + ARMS)
 def test_a_world_can_set_every_documented_field(name: str) -> None:
     """Any other field is an error, because Webots would also reject a misspelled field."""
-    without = {"customData"} if name in CARS + ARMS + ROVERS else set()
-    common = set(COMMON.split()) - without - ({"supervisor"} if name in ROVERS else set())
+    without = {"customData"} if name in (*CARS, *ARMS, "Moose") else set()
+    common = set(COMMON.split()) - without - ({"supervisor"} if name == "Moose" else set())
     assert set(described(name).defaults) == common | set(FIELDS[name].split())
 
 
@@ -186,12 +195,12 @@ def test_a_robot_has_its_documented_name(name: str) -> None:
 def test_descriptions_need_no_other_file_and_draw_nothing(name: str) -> None:
     """A simulator without an installation of Webots uses the descriptions.
 
-    They refer to no other file, except to the lidar's description.
+    They refer to no other file, except to the descriptions of their sensors.
     """
     description = described(name)
     types = {node.type_name for node in description.body.walk()}
 
-    assert types <= PLAIN | ({"RobotisLds01"} if name == "TurtleBot3Burger" else set())
+    assert types <= PLAIN | OF_SLOTS.get(name, set())
 
 
 @pytest.mark.parametrize("name", ROBOTS + ROVERS + CARS + ARMS)
@@ -311,6 +320,39 @@ def test_the_wheels_of_the_moose_are_where_its_manufacturer_puts_them() -> None:
     (robot,) = body.nodes
     assert numbers(robot.nodes("physics")[0], "mass") == (1590,)
     assert {numbers(motor, "maxVelocity") for motor, _ in driven("Moose")} == {(26,)}
+
+
+def test_the_rosbot_is_the_one_of_its_manufacturer() -> None:
+    """The distances are those of Husarion's `rosbot_description`, for wheels and infrared sensors."""
+    body = described("Rosbot").body
+    wheels = {motor.text("name"): wheel for motor, wheel in driven("Rosbot")}
+    eyes = {it.text("name"): it for it in of_type(body.walk(), "DistanceSensor")}
+    yaws = dict(zip(CORNERS, (0.13, -0.13, 3.01, 3.27), strict=True))
+
+    for name in CORNERS:
+        x, y = (1 if "front" in name else -1), (1 if "left" in name else -1)
+        wheel, eye = wheels[f"{name} wheel motor"], eyes[f"{name} distance sensor"]
+        (tire,), (physics,) = of_type(within(wheel, body), "Cylinder"), wheel.nodes("physics")
+        assert numbers(wheel, "translation") == (0.053 * x, 0.096 * y, 0.0425)
+        assert numbers(tire, "radius") + numbers(tire, "height") == (0.0425, 0.036)
+        assert numbers(physics, "mass") == (0.1,)
+        assert numbers(eye, "translation") == (0.1 * x, 0.05 * y, 0.0525)
+        assert numbers(eye, "rotation") == (0, 0, 1, yaws[name])
+        assert numbers(eye, "lookupTable") == (0, 0, 0, 2, 2, 0)
+    (robot,) = body.nodes
+    assert numbers(robot.nodes("physics")[0], "mass") == (2,)
+
+
+def test_the_astra_sees_as_its_data_sheet_says() -> None:
+    """Both devices have 640 by 480 pixels and see 60 degrees; the depth ends at 8 m."""
+    body = described("Astra").body
+    (camera,), (depth,) = of_type(body.walk(), "Camera"), of_type(body.walk(), "RangeFinder")
+
+    assert (camera.text("name"), depth.text("name")) == ("Astra rgb", "Astra depth")
+    for device in (camera, depth):
+        assert numbers(device, "width") + numbers(device, "height") == (640, 480)
+        assert numbers(device, "fieldOfView") == pytest.approx((math.radians(60),), abs=0.01)
+    assert numbers(depth, "minRange") + numbers(depth, "maxRange") == (0.6, 8)
 
 
 @pytest.mark.parametrize(
