@@ -64,6 +64,13 @@ def test_a_robot_of_webots_stands_still_unless_a_client_drives_it():
             0.192,
         ),
         (
+            "RosbotXl",
+            ["fl_wheel_joint", "rl_wheel_joint"],
+            ["fr_wheel_joint", "rr_wheel_joint"],
+            0.05,
+            0.27,
+        ),
+        (
             "Moose",
             [f"left_motor_{number}" for number in range(1, 5)],
             [f"right_motor_{number}" for number in range(1, 5)],

@@ -11,7 +11,7 @@ from palaestra_sim.world import Node, World, parse, parse_proto
 PROTOS = Path(palaestra_sim.world.__file__).parent / "protos"
 ROBOTS = ("E-puck", "Pioneer3at", "Pioneer3dx", "Robotino3", "TurtleBot3Burger")
 CARS = ("BmwX5", "TeslaModel3")
-ROVERS = ("Moose", "Rosbot")
+ROVERS = ("Moose", "Rosbot", "RosbotXl")
 ARMS = ("UR3e", "UR5e", "UR10e")
 LIDARS = {
     "HokuyoUrg04lx": (240, 667, 0.06, 4.095),

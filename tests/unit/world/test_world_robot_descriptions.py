@@ -34,6 +34,7 @@ FIELDS = {
     "TurtleBot3Burger": "extensionSlot",
     "Moose": "window color bodySlot",
     "Rosbot": "selfCollision cameraSlot lidarSlot",
+    "RosbotXl": "selfCollision lidarSlot",
     "BmwX5": "color engineSound windshieldWipers frontSpotLights rearMirror leftWingMirror rightWingMirror "
     "mirrorFar sensorsSlotFront sensorsSlotRear sensorsSlotTop sensorsSlotCenter interior "
     "dynamicSpeedDisplay indicatorLevers steeringWheel completeInterior shifter "
@@ -50,6 +51,7 @@ NAMES = {
     "TurtleBot3Burger": "TurtleBot3Burger",
     "Moose": "moose",
     "Rosbot": "Rosbot",
+    "RosbotXl": "rosbot_xl",
     "BmwX5": "vehicle",
     "TeslaModel3": "vehicle",
     **{arm: arm for arm in ARMS},
@@ -67,6 +69,7 @@ WITHOUT_EFFECT = {
 }
 
 TWO = ("left wheel", "right wheel")
+IMU = {f"imu {it}" for it in ("accelerometer", "gyro", "compass", "inertial_unit")}
 CORNERS = ("front left", "front right", "rear left", "rear right")
 FOUR = ("back left wheel", "back right wheel", "front left wheel", "front right wheel")
 SONARS = {f"so{i}" for i in range(16)}
@@ -99,7 +102,10 @@ DEVICES = {
     "Moose": {f"{it} motor {i}" for it in ("left", "right") for i in range(1, 5)},
     "Rosbot": {f"{it} wheel motor{part}" for it in CORNERS for part in ("", " sensor")}
     | {f"{it} distance sensor" for it in CORNERS}
-    | {f"imu {it}" for it in ("accelerometer", "gyro", "compass", "inertial_unit")},
+    | IMU,
+    "RosbotXl": {f"{it}_wheel_joint" for it in ("fl", "fr", "rl", "rr")}
+    | {f"{it} wheel motor sensor" for it in CORNERS}
+    | IMU,
     "BmwX5": OF_CARS
     | {"left_front_wheel", "right_front_wheel", "wiper_sensor"}
     | {"left_wiper_motor", "right_wiper_motor"},
@@ -118,7 +124,7 @@ PLAIN = TYPES_OF_DEVICES | {
 }  # fmt: skip
 
 # The default sensors in the slots of robots.
-OF_SLOTS = {"TurtleBot3Burger": {"RobotisLds01"}, "Rosbot": {"Astra", "RpLidarA2"}}
+OF_SLOTS = {"TurtleBot3Burger": {"RobotisLds01"}, "Rosbot": {"Astra", "RpLidarA2"}, "RosbotXl": {"RpLidarA2"}}
 
 
 class Drive(NamedTuple):
@@ -341,6 +347,18 @@ def test_the_rosbot_is_the_one_of_its_manufacturer() -> None:
         assert numbers(eye, "lookupTable") == (0, 0, 0, 2, 2, 0)
     (robot,) = body.nodes
     assert numbers(robot.nodes("physics")[0], "mass") == (2,)
+
+
+def test_the_rosbot_xl_is_the_one_of_its_manufacturer() -> None:
+    """The distances and masses are those of Husarion's `rosbot_description` with Mecanum wheels."""
+    wheels = {numbers(wheel, "translation"): wheel for _, wheel in driven("RosbotXl")}
+    (robot,) = described("RosbotXl").body.nodes
+
+    assert set(wheels) == {(x, y, 0.048) for x in (0.085, -0.085) for y in (0.135, -0.135)}
+    assert [numbers(it.nodes("physics")[0], "mass") for it in (robot, *wheels.values())] == [
+        (3.5,),
+        *[(0.4,)] * 4,
+    ]
 
 
 def test_the_astra_sees_as_its_data_sheet_says() -> None:
