@@ -2,18 +2,22 @@
 
 The load of machines varies, so a figure is a ratio within one run, or is printed next to the figure to which
 it is compared. Arguments select parts by name, e.g. `python -m tests.bench stepping parallel`. `--scale 0.1`
-runs a tenth of each part, which tests that the part works.
+runs a tenth of each part, which tests that the part works. `--record FILE` also writes the figures into a
+file of JSON.
 """
 
 import argparse
 import json
 import sys
 import time
+from functools import partial
 
 from tests.bench import (
     abroad,
     batch,
+    clients,
     collection,
+    goodput,
     hostile,
     learning,
     newcomer,
@@ -21,8 +25,12 @@ from tests.bench import (
     operator_planning,
     parallel,
     plain,
+    recording,
+    recoveries,
+    rllib,
     runs,
     simulators,
+    startup,
     step_floor,
     stepping,
     watched,
@@ -32,6 +40,7 @@ from tests.bench import (
 PARTS = {
     "stepping": stepping.measure,
     "floor": step_floor.measure,
+    "clients": clients.measure,
     "batch": batch.measure,
     "simulators": simulators.measure,
     "webots": webots.measure,
@@ -46,6 +55,10 @@ PARTS = {
     "hostile": hostile.measure,
     "newcomer": newcomer.measure,
     "plain": plain.measure,
+    "startup": startup.measure,
+    "recoveries": recoveries.measure,
+    "goodput": goodput.measure,
+    "rllib": rllib.measure,
     "learning": learning.measure,
     "navigating": learning.measure_navigate,
     "sparse": learning.measure_sparse,
@@ -59,16 +72,27 @@ def main():
     parser = argparse.ArgumentParser(prog="tests.bench", description=__doc__.splitlines()[0])
     parser.add_argument("parts", nargs="*", metavar="PART", help=f"from {', '.join(PARTS)}; default: all")
     parser.add_argument("--scale", type=float, default=1.0, help="share of the full size (default: 1)")
+    parser.add_argument(
+        "--record", metavar="FILE", help="file of JSON in which the figures replace older ones"
+    )
+    parser.add_argument("--rllib", metavar="PYTHON", help="interpreter with Ray, for the part `rllib`")
     asked = parser.parse_args()
     chosen = asked.parts or list(PARTS)
     if unknown := [name for name in chosen if name not in PARTS]:
         parser.error(f"{unknown[0]} is not a part; choose from {', '.join(PARTS)}")
     for name in chosen:
-        started = time.monotonic()
-        found = PARTS[name](asked.scale)
+        if name == "rllib" and not asked.rllib:
+            sys.stderr.write("rllib: skipped; name an interpreter that imports Ray with --rllib\n")
+            continue
+        measure = partial(rllib.measure, python=asked.rllib) if name == "rllib" else PARTS[name]
+        started, before = time.monotonic(), recording.load()
+        found = measure(asked.scale)
         line = {"part": name, "scale": asked.scale, "seconds": round(time.monotonic() - started, 1), **found}
         sys.stdout.write(json.dumps(line) + "\n")
         sys.stdout.flush()
+        if asked.record:
+            others = rllib.versions(asked.rllib) if name == "rllib" else {}
+            recording.record(asked.record, line, (before, recording.load()), others)
 
 
 if __name__ == "__main__":

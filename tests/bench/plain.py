@@ -1,8 +1,8 @@
 """The cost of simulators, ROS and restarts: `make run` compared with plain Stable-Baselines3.
 
 Plain training runs the same task in one process without a simulator: `fake_arena` simulates the task, and SB3
-evaluates the policy. Steps, hyperparameters, evaluations and confirmation episodes are equal to the
-example's.
+evaluates the policy. `subproc` is a program with Stable-Baselines3's `SubprocVecEnv`, which steps the same
+simulators as the example. Steps, hyperparameters, evaluations and confirmation episodes are equal in all.
 """
 
 import json
@@ -32,16 +32,22 @@ LEAST_STEPS = 300
 
 
 def measure(scale=1.0):
-    """Return the seconds of both trainings, which run one after the other, and the ratio."""
+    """Return the seconds of the trainings, which run one after the other, and their ratios."""
     plain_s = seconds_of([sys.executable, "-m", "tests.bench.plain", str(scale)])
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "job.yaml"
         file.write_text(json.dumps(job(scale)))
         run_s = seconds_of([PALAESTRA, "run", file, "--dir", folder])
+    with tempfile.TemporaryDirectory() as folder:
+        spec = Path(folder) / "spec.json"
+        spec.write_text(json.dumps(job(scale)["spec"]))
+        subproc_s = seconds_of([sys.executable, "-m", "tests.bench.sb3_program", spec, folder])
     return {
         "seconds": round(run_s),
         "plain_seconds": round(plain_s),
         "times_plain": round(run_s / plain_s, 2),
+        "subproc_seconds": round(subproc_s),
+        "times_subproc": round(run_s / subproc_s, 2),
     }
 
 

@@ -1,6 +1,6 @@
 """Environment steps over ROS, by Palaestra's clients and by rospy in turns.
 
-One step consists of three wheel commands, one time_step, nine distances, the bumper and the position.
+One step consists of three wheel commands, one time_step, nine distances, the bumper and the pose.
 """
 
 import itertools
@@ -72,14 +72,25 @@ def step(robot, way):
 
 
 class RospyStepper:
-    """Takes the same step as a rospy program does, with a proxy per service and a subscriber per topic."""
+    """Takes the same step as a rospy program does, with a proxy per service and a subscriber per topic.
 
-    def __init__(self, name):
+    Args:
+        name: the ROS name of the robot, whose sensors are enabled.
+        persistent: whether each proxy keeps its connection; otherwise it opens a new one for each call.
+    """
+
+    def __init__(self, name, *, persistent=False):
         self._calls = [
-            *(proxy(f"/{name}/wheel{number}_joint/set_velocity", "set_float") for number in range(3)),
-            proxy(f"/{name}/robot/time_step", "set_int"),
+            *(
+                proxy(f"/{name}/wheel{number}_joint/set_velocity", "set_float", persistent=persistent)
+                for number in range(3)
+            ),
+            proxy(f"/{name}/robot/time_step", "set_int", persistent=persistent),
         ]
-        self._position = proxy(f"/{name}/supervisor/node/get_position", "node_get_position")
+        self._pose = [
+            proxy(f"/{name}/supervisor/node/{call}", f"node_{call}", persistent=persistent)
+            for call in ("get_position", "get_orientation")
+        ]
         self._node = proxy(f"/{name}/supervisor/get_from_def", "supervisor_get_from_def")(name="ROBOTINO")
         self._arrived = threading.Semaphore(0)
         self._subscribers = [
@@ -94,7 +105,8 @@ class RospyStepper:
         for wheel in self._calls[:3]:
             wheel(value=1.0)
         self._calls[3](value=PERIOD_MS)
-        self._position(node=self._node.value.node)
+        for call in self._pose:
+            call(node=self._node.value.node)
         for _ in TOPICS:
             if not self._arrived.acquire(timeout=5):
                 raise TimeoutError("a sensor published no message within 5 s")
@@ -104,6 +116,8 @@ class RospyStepper:
 
         The next `RospyStepper` uses the same node name.
         """
+        for call in (*self._calls, *self._pose):
+            call.close()
         for subscriber in self._subscribers:
             subscriber.unregister()
         eventually(lambda: not self._connected())
@@ -118,7 +132,7 @@ class RospyStepper:
         self._arrived.release()
 
 
-def proxy(name, type_name):
+def proxy(name, type_name, *, persistent=False):
     """Return rospy's proxy of a webots_ros service; like most programs, it opens a connection per call."""
     type_ = service_type(f"webots_ros/{type_name}")
     service = type(
@@ -131,7 +145,7 @@ def proxy(name, type_name):
             "_response_class": message(f"{type_.name}Response", type_.response),
         },
     )
-    return rospy.ServiceProxy(name, service)
+    return rospy.ServiceProxy(name, service, persistent=persistent)
 
 
 def message(name, codec):

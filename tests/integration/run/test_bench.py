@@ -18,6 +18,7 @@ from tests.soak import chaos
 
 SMALL = (
     "batch",
+    "clients",
     "collection",
     "floor",
     "newcomer",
@@ -28,10 +29,12 @@ SMALL = (
     "watched",
     "webots",
 )
+OF_PEERS = ("goodput", "recoveries", "startup")
 OF_A_CLUSTER = ("hostile",)
 # These parts run the examples in MEASURED of test_run_from_file_to_policy.py.
 OF_WHOLE_RUNS = ("learning", "navigating", "plain", "seeing", "sparse", "transfer")
 ELSEWHERE = ("memory", "operator", "recovery", "shutdown")
+SKIPPED = "rllib"  # RLlib is not installed with this project
 DEADLINE_S = 800  # the work takes a minute or two on an idle machine
 
 
@@ -43,15 +46,18 @@ def numbers(found):
 
 def test_every_part_is_run_by_a_test():
     """A new part without a test could break unnoticed."""
-    assert PARTS.keys() == {*SMALL, *OF_A_CLUSTER, *OF_WHOLE_RUNS, *ELSEWHERE}
+    assert PARTS.keys() == {*SMALL, *OF_A_CLUSTER, *OF_WHOLE_RUNS, *OF_PEERS, *ELSEWHERE, SKIPPED}
 
 
 @pytest.mark.minutes(1)
 @pytest.mark.timeout(900)
-@pytest.mark.parametrize("parts", [SMALL, OF_WHOLE_RUNS], ids=["small", "of whole runs"])
+@pytest.mark.parametrize(
+    "parts", [SMALL, OF_WHOLE_RUNS, OF_PEERS], ids=["small", "of whole runs", "of peers"]
+)
 def test_the_benchmark_measures(parts, tmp_path):
-    """Each part must print one line of JSON that contains only numbers."""
-    command = [sys.executable, "-m", "tests.bench", "--scale", "0", *parts]
+    """Each part must print one line of JSON that contains only numbers, and record it."""
+    record = tmp_path / "figures.json"
+    command = [sys.executable, "-m", "tests.bench", "--scale", "0", "--record", record, *parts]
     with (tmp_path / "errors").open("w+") as errors:
         done = subprocess.run(
             command, cwd=ROOT, stdout=subprocess.PIPE, stderr=errors, timeout=DEADLINE_S, check=False
@@ -65,6 +71,28 @@ def test_the_benchmark_measures(parts, tmp_path):
         found = list(numbers(line))
         assert len(found) > len(("scale", "seconds"))
         assert all(isinstance(number, int | float) for number in found)
+    recorded = json.loads(record.read_text())
+    assert {part: found["figures"].keys() for part, found in recorded.items()} == {
+        part: line.keys() - {"scale"} for part, line in lines.items()
+    }
+
+
+def test_rllib_is_skipped_in_one_line_without_an_interpreter_that_has_it():
+    """Most people measure without RLlib, and must see that its figures are missing, and how to get them."""
+    done = subprocess.run(
+        [sys.executable, "-m", "tests.bench", SKIPPED],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=DEADLINE_S,
+        check=False,
+    )
+
+    assert done.returncode == 0
+    assert done.stdout == ""
+    [line] = done.stderr.splitlines()
+    assert line.startswith("rllib: skipped")
+    assert "--rllib" in line
 
 
 @pytest.mark.minutes(1)
