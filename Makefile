@@ -15,7 +15,7 @@ COMPILE := $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --gen
 # modules again, which takes seconds.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help setup test-packages run notebook test check e2e images cluster cluster-down format bench soak golden lock
+.PHONY: help setup test-packages run notebook test check e2e images cluster cluster-down format bench peers soak golden lock
 
 help: ## list the commands
 	@grep -E '^[a-z0-9-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z0-9-]+):.*## (.*)/\1\t\2/' | expand -t 15
@@ -89,6 +89,12 @@ format: setup ## rewrite the sources in the common format
 
 bench: setup test-packages ## measure speed and memory against the project's limits; prints JSON
 	@$(BIN)/python -m tests.bench
+
+PEERS := clients collection plain startup recoveries goodput
+RLLIB :=
+peers: setup test-packages ## measure the figures of docs/explain/peers.md again; RLLIB=PYTHON: those of RLlib too
+	@$(BIN)/python -m tests.bench --record docs/explain/peers.json $(PEERS) $(if $(RLLIB),--rllib $(RLLIB) rllib)
+	@$(BIN)/python -m tests.golden
 
 soak: setup test-packages ## inject faults for hours, and check that unattended training continues; prints JSON
 	@$(BIN)/python -m tests.soak

@@ -29,13 +29,21 @@ def record(path, line, load, versions=None):
     line = dict(line)
     part, scale = line.pop("part"), line.pop("scale")
     recorded[part] = {
-        "command": f"python -m tests.bench{'' if scale == 1.0 else f' --scale {scale:g}'} {part}",
+        "command": " ".join(("python -m tests.bench", *options(part, scale), part)),
         "machine": machine(),
         "load": [round(each, 1) for each in load],
         "versions": installed() | (versions or {}),
         "figures": line,
     }
-    path.write_text(json.dumps(recorded, indent=2, sort_keys=True) + "\n")
+    path.write_text(json.dumps(dict(sorted(recorded.items())), indent=2) + "\n")
+
+
+def options(part, scale):
+    """Return the options of the command that measures a part."""
+    if part == "rllib":
+        yield "--rllib PYTHON"
+    if scale != 1.0:
+        yield f"--scale {scale:g}"
 
 
 def load():

@@ -9,6 +9,7 @@
 - `docs/reference/ros-interface.md`: the services and topics of a robot
 - `trainer/src/palaestra_trainer/ros/conformance/interface.json`: the claims of that page as data
 - `docs/explain/judging.md`: the checks on a replica, in their order
+- `docs/explain/peers.md`: the comparisons that are recorded in docs/explain/peers.json
 - `llms.txt`: the pages that docs/README.md links to
 - `charts/palaestra/README.md`: from the chart's values.yaml
 - `charts/palaestra/dashboards/*.json`: from tools/dashboards
@@ -33,6 +34,7 @@ from tools.interface import page as interface
 from tools.judging import page as judging
 from tools.llms import page as llms
 from tools.metrics import page as metrics
+from tools.peers import page as peers
 
 ROOT = Path(__file__).parents[2]
 
@@ -46,6 +48,7 @@ def recorded() -> Iterator[tuple[Path, str]]:
     yield ROOT / algorithms.PAGE, algorithms.page((ROOT / algorithms.PAGE).read_text())
     yield ROOT / metrics.PAGE, metrics.page((ROOT / metrics.PAGE).read_text())
     yield ROOT / judging.PAGE, judging.page((ROOT / judging.PAGE).read_text())
+    yield ROOT / peers.PAGE, peers.page((ROOT / peers.PAGE).read_text(), ROOT)
     yield ROOT / interface.PAGE, interface.page((ROOT / interface.PAGE).read_text())
     yield ROOT / interface.INTERFACE, interface.interface_file()
     yield ROOT / devices.PAGE, devices.page((ROOT / devices.PAGE).read_text())

@@ -15,6 +15,8 @@ from tests.bench import hostile
 from tests.bench.__main__ import PARTS
 from tests.local_run import ROOT
 from tests.soak import chaos
+from tools.peers.page import chapters
+from tools.peers.rows import CHAPTERS
 
 SMALL = (
     "batch",
@@ -35,6 +37,7 @@ OF_A_CLUSTER = ("hostile",)
 OF_WHOLE_RUNS = ("learning", "navigating", "plain", "seeing", "sparse", "transfer")
 ELSEWHERE = ("memory", "operator", "recovery", "shutdown")
 SKIPPED = "rllib"  # RLlib is not installed with this project
+OF_PAGE = {chapter.part for chapter in CHAPTERS}  # of docs/explain/peers.md
 DEADLINE_S = 800  # the work takes a minute or two on an idle machine
 
 
@@ -55,7 +58,7 @@ def test_every_part_is_run_by_a_test():
     "parts", [SMALL, OF_WHOLE_RUNS, OF_PEERS], ids=["small", "of whole runs", "of peers"]
 )
 def test_the_benchmark_measures(parts, tmp_path):
-    """Each part must print one line of JSON that contains only numbers, and record it."""
+    """Each part must print one line of JSON that contains only numbers, and record it for a page."""
     record = tmp_path / "figures.json"
     command = [sys.executable, "-m", "tests.bench", "--scale", "0", "--record", record, *parts]
     with (tmp_path / "errors").open("w+") as errors:
@@ -75,6 +78,7 @@ def test_the_benchmark_measures(parts, tmp_path):
     assert {part: found["figures"].keys() for part, found in recorded.items()} == {
         part: line.keys() - {"scale"} for part, line in lines.items()
     }
+    assert chapters(recorded).count("| Palaestra / the other |") == len(OF_PAGE & recorded.keys())
 
 
 def test_rllib_is_skipped_in_one_line_without_an_interpreter_that_has_it():
