@@ -53,10 +53,10 @@ def figures_of_a_crowd(plane, api, folder, count, quiet_s):
     bare_s = seconds_to_pods(api, "bare", crowd.create_bare_jobs, count)
     client_s = seconds_to_pods(api, "client", crowd.create_all_objects, count)
     with operator(plane, folder / "operator.log") as running_operator:
-        spent = cpu_seconds(running_operator)
+        spent = cpu_seconds(running_operator.process.pid)
         operator_s = seconds_to_pods(api, "operator", crowd.create_training_jobs, count)
         crowd.wait_for_silence(plane)
-        spent = cpu_seconds(running_operator) - spent
+        spent = cpu_seconds(running_operator.process.pid) - spent
         before = requests(plane)
         time.sleep(quiet_s)  # idle time, in which no request may arrive
         return {
@@ -107,9 +107,9 @@ def seconds_to_pods(api, namespace, create, count):
     return time.monotonic() - began
 
 
-def cpu_seconds(installed):
-    """Return the processor time that an operator has used so far."""
-    fields = Path(f"/proc/{installed.process.pid}/stat").read_text().rpartition(")")[2].split()
+def cpu_seconds(pid):
+    """Return the processor time that a process has used so far."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / TICKS_A_SECOND
 
 

@@ -11,8 +11,9 @@ import sys
 
 import pytest
 
-from tests.bench import hostile
+from tests.bench import foreign_operators, hostile, operators
 from tests.bench.__main__ import PARTS
+from tests.control_plane.programs import NoPrograms
 from tests.local_run import ROOT
 from tests.soak import chaos
 from tools.peers.page import chapters
@@ -32,7 +33,7 @@ SMALL = (
     "webots",
 )
 OF_PEERS = ("goodput", "recoveries", "startup")
-OF_A_CLUSTER = ("hostile",)
+OF_A_CLUSTER = ("hostile", "operators")
 # These parts run the examples in MEASURED of test_run_from_file_to_policy.py.
 OF_WHOLE_RUNS = ("learning", "navigating", "plain", "seeing", "sparse", "transfer")
 ELSEWHERE = ("memory", "operator", "recovery", "shutdown")
@@ -110,6 +111,22 @@ def test_the_costly_worlds_of_one_tenant_beside_jobs_of_another_are_measured():
 
     assert found["hostile_jobs"] == 1
     assert found["rss_mib_at_most"] >= found["rss_mib_before"] > 0
+    assert all(isinstance(number, int | float) for number in numbers(found))
+
+
+@pytest.mark.minutes(1)
+@pytest.mark.timeout(900)
+def test_one_job_of_each_operator_is_measured():
+    """The part compares with operators of other projects, whose programs only `make bench` builds."""
+    try:
+        foreign_operators.programs(build=False)
+    except NoPrograms as missing:
+        pytest.skip(str(missing))
+
+    found = operators.measure(0.0)
+
+    assert found["jobs"] == 1
+    assert found["train_jobs"]["programs"]["kubeflow-trainer"]["writes_a_job"] > 0
     assert all(isinstance(number, int | float) for number in numbers(found))
 
 
