@@ -8,7 +8,7 @@ from typing import NoReturn
 def failing(number: int) -> Callable[..., NoReturn]:
     """Return a function that always fails with this error number."""
 
-    def fail(*_: object) -> NoReturn:
+    def fail(*_: object, **__: object) -> NoReturn:
         raise OSError(number, os.strerror(number))
 
     return fail

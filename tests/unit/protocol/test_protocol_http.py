@@ -198,6 +198,12 @@ def test_a_request_that_is_not_complete_at_its_deadline_is_closed_unanswered(pie
     assert time.monotonic() >= begin + DEADLINE_S * 0.9
 
 
+def test_a_deadline_that_has_passed_closes_the_connection_before_a_read() -> None:
+    """A busy machine may start the thread of a connection late, and a timeout of 0 s means no waiting."""
+    with Server(LOOPBACK, ROUTES, name="palaestra-test", deadline_s=0.0) as server:
+        assert ask(server, b"GET /healthz HTTP/1.1\r\n\r\n") is None
+
+
 def test_a_head_without_end_is_closed_unanswered(server) -> None:
     """No line is too long and the lines are few, so only the limit of the whole head protects the memory."""
     lines = b"".join(b"X-%d: %s\r\n" % (number, b"x" * 50_000) for number in range(10))

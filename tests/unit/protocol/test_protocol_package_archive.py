@@ -108,3 +108,33 @@ def test_a_missing_file_is_no_package(tmp_path):
         PackageError, match=r"No such file or directory; name a package of `palaestra export`"
     ):
         read_package(tmp_path / "package.zip")
+
+
+def test_an_archive_with_64_bit_numbers_is_refused_before_its_list_is_read(tmp_path):
+    """The size of such a list is in another record, which may name any size."""
+    content = archived(WHOLE)
+    place = tmp_path / "package.zip"
+    place.write_bytes(content[:-22] + b"PK\x06\x07" + bytes(16) + content[-22:])
+
+    with pytest.raises(PackageError, match="is a zip of more than 4 GiB or 65,535 files; export the package"):
+        read_package(place)
+
+
+@pytest.mark.parametrize("compression", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+def test_a_compression_that_not_every_python_has_is_refused(tmp_path, compression):
+    """A robot's Python may lack bz2 and lzma, so a package that one reader accepts suits all readers."""
+    place = zipped(tmp_path / "package.zip", WHOLE.items(), compression=compression)
+
+    with pytest.raises(PackageError, match="compressed in another way than by deflate"):
+        read_package(place)
+
+
+def test_an_archive_whose_list_is_damaged_is_refused(tmp_path):
+    """The end of the file is whole, so only the reader of the list finds the damage."""
+    content = archived(WHOLE)
+    first = content.index(b"PK\x01\x02")
+    place = tmp_path / "package.zip"
+    place.write_bytes(content[:first] + b"PK\x00\x00" + content[first + 4 :])
+
+    with pytest.raises(PackageError, match=r"is not a zip of a package \(Bad magic number"):
+        read_package(place)

@@ -96,3 +96,21 @@ def test_a_folder_without_a_manifest_is_no_package(tmp_path):
         PackageError, match=r"No such file or directory; name a folder or a zip of `palaestra export`"
     ):
         read_package(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("changes", "fact"),
+    [
+        ({"sha256": "0" * 63}, r"files\[0\]\.sha256: is not a SHA-256"),
+        ({"sha256": "G" * 64}, r"files\[0\]\.sha256: is not a SHA-256"),
+        ({"size": 2**31 + 1}, "files: have 2147483649 bytes, more than the 2147483648 of a package"),
+    ],
+)
+def test_a_description_that_no_file_can_have_is_refused_before_a_file_is_read(tmp_path, changes, fact):
+    """The message blames the manifest; without the check it would blame the file, which may be right."""
+    content = json.loads(manifest_text({}, {"a": b""}))
+    content["files"][0] |= changes
+    (tmp_path / MANIFEST).write_text(json.dumps(content))
+
+    with pytest.raises(PackageError, match=f"{fact}; export the package again"):
+        read_package(tmp_path)

@@ -183,6 +183,13 @@ def test_a_value_that_does_not_fit_its_field_is_refused(text, value):
             method({"value": value})
 
 
+@pytest.mark.parametrize("message", [(256, 1), (1, 2, 3), (1,)])
+def test_a_tuple_that_does_not_fit_is_refused_with_all_fields(message):
+    """The numbers of a tuple have no names, so the message names the fields that it should have."""
+    with pytest.raises(ValueError, match="demo/Test: first, second: "):
+        codec("uint8 first\nuint8 second").encode(message)
+
+
 def test_a_field_that_the_type_does_not_have_is_refused():
     """A mistyped field name would otherwise send an empty value."""
     with pytest.raises(ValueError, match="demo/Test: the type has no field vale"):

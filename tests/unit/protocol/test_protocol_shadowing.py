@@ -1,5 +1,9 @@
 """Reports of modules in a user's folder that shadow modules of Python or of Palaestra's dependencies."""
 
+import os
+import sys
+from pathlib import Path
+
 import pytest
 
 from palaestra_protocol.shadowing import shadows
@@ -78,3 +82,11 @@ def test_a_folder_that_is_missing_or_named_twice_changes_nothing(put, tmp_path):
 
     assert shadows(f"{tmp_path}/missing:{tmp_path}") == [reason]
     assert shadows("") == []
+
+
+def test_a_python_whose_library_is_no_folder_of_the_path_shadows_nothing(put, monkeypatch):
+    """A frozen Python imports its library without `sys.path`, so no folder comes before the library."""
+    library = str(Path(os.__file__).parent)
+    monkeypatch.setattr(sys, "path", [folder for folder in sys.path if folder != library])
+
+    assert put("corridor.py") == []

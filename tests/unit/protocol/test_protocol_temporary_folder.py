@@ -1,6 +1,9 @@
 """A temporary folder exists as long as the process that made it, however that process ends."""
 
+import errno
+import io
 import os
+import runpy
 import signal
 import subprocess
 import sys
@@ -8,7 +11,9 @@ from pathlib import Path
 
 import pytest
 
+from palaestra_protocol import temporary_folder as module
 from palaestra_protocol.temporary_folder import temporary_folder
+from tests.failing import failing
 from tests.waiting import eventually
 
 PATIENCE_S = 30.0
@@ -44,6 +49,12 @@ def owner(tmp_path):
     for it in started:
         it.kill()
         it.communicate()
+
+
+def pipes():
+    """Return the open pipes of this process."""
+    links = (each.readlink() for each in Path("/proc/self/fd").iterdir() if each.is_symlink())
+    return {link.name for link in links if link.name.startswith("pipe:")}
 
 
 def is_gone(pid):
@@ -131,4 +142,42 @@ def test_a_forked_child_does_not_delay_the_end_of_the_block(tmp_path):
     os.waitpid(child, 0)
 
     assert gone
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.filterwarnings("ignore:subprocess .* is still running:ResourceWarning")
+def test_a_block_that_changes_the_working_folder_leaves_nothing(tmp_path, monkeypatch):
+    """The block cannot remove a folder by a relative path then, and the keeper has the absolute path."""
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path)
+
+    with temporary_folder("own-", Path()):
+        monkeypatch.chdir(tmp_path / "elsewhere")
+
+    assert eventually(lambda: [each.name for each in tmp_path.iterdir()] == ["elsewhere"], PATIENCE_S)
+
+
+def test_the_keeper_removes_the_folder_whose_path_it_reads(tmp_path, monkeypatch):
+    """The owner can end by SIGKILL at any time after it has sent the path."""
+    folder = tmp_path / "own-folder"
+    (folder / "below").mkdir(parents=True)
+    (folder / "below" / "file").touch()
+    (tmp_path / "other").touch()
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(os.fsencode(folder))))
+
+    runpy.run_path(module.__file__, run_name="__main__")
+
+    assert [each.name for each in tmp_path.iterdir()] == ["other"]
+
+
+def test_a_system_that_starts_no_process_is_an_error_and_leaves_nothing_open(tmp_path, monkeypatch):
+    """A pod with a limit of processes reports the limit, and its signals and pipes are as before."""
+    before, signals = pipes(), signal.pthread_sigmask(signal.SIG_BLOCK, ())
+    monkeypatch.setattr(subprocess, "Popen", failing(errno.EAGAIN))
+
+    with pytest.raises(BlockingIOError), temporary_folder("own-", tmp_path):
+        pass
+
+    assert pipes() <= before
+    assert signal.pthread_sigmask(signal.SIG_BLOCK, ()) == signals
     assert list(tmp_path.iterdir()) == []

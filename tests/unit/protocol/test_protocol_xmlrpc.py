@@ -136,12 +136,31 @@ def test_several_calls_of_one_request_are_made_in_order_and_fail_alone(server):
             proxy.system.multicall("no list")
 
 
-def test_a_request_that_is_not_finished_is_dropped(server):
-    """A client that stops in the middle of a request must not occupy a thread for ever."""
-    with dialed(server(request_s=0.2)) as connection:
+@pytest.mark.parametrize("request_s", [0.2, 0.0])
+def test_a_request_that_is_not_finished_is_dropped(server, request_s):
+    """A client that stops in the middle of a request must not occupy a thread for ever.
+
+    With a limit of 0 s, the deadline has passed before the second read begins.
+    """
+    with dialed(server(request_s=request_s)) as connection:
         connection.sendall(b"POST / HTTP/1.1\r\n")
 
         assert connection.recv(1) == b""
+
+
+def test_a_body_that_the_client_cuts_short_is_not_called():
+    """A node that is killed in the middle of a call must not register half a name."""
+    called = []
+    with (
+        RpcServer(("127.0.0.1", 0), {"note": called.append}.get) as running,
+        dialed(running) as connection,
+    ):
+        body = encode_request("note", ("whole",))
+        connection.sendall(b"POST / HTTP/1.1\r\nContent-Length: %d\r\n\r\n" % (len(body) + 1) + body)
+        connection.shutdown(socket.SHUT_WR)
+
+        assert connection.recv(1) == b""
+    assert called == []
 
 
 def test_a_connection_without_a_request_is_dropped(server):
@@ -220,6 +239,12 @@ def test_a_call_ends_at_its_deadline_however_slowly_the_answer_comes(peer, piece
         call(peer(pieces, pace_s=0.05), 0.3, "m")
 
     assert time.monotonic() - began < PATIENCE_S
+
+
+def test_the_deadline_of_a_call_includes_the_time_to_write_its_parameters(peer):
+    """A caller that stops at a deadline counts from the call, not from the first byte that is sent."""
+    with pytest.raises(TimeoutError):
+        call(peer([]), 0.02, "m", list(range(100_000)))
 
 
 @pytest.mark.parametrize(
