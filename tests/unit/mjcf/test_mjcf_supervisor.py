@@ -5,6 +5,7 @@ import math
 import pytest
 
 from palaestra_sim.ros_interfaces import UnsimulatedError
+from palaestra_sim.scene.geometry import to_quaternion
 from palaestra_sim.scene.tree.fields import FieldType
 from tests.unit.mjcf.conftest import FORCE, POSITION, VELOCITY
 
@@ -134,6 +135,50 @@ def test_a_field_moves_what_is_free_or_stands(load, name):
     simulation.reset()
     simulation.step(10)
     assert node.place.world_position == start
+
+
+@pytest.mark.parametrize("name", ["ball", "target"])
+def test_a_field_turns_what_is_free_or_stands(load, name):
+    """A task that places an object at random also turns it."""
+    simulation = load(FORCE, "", ("<option", '<option gravity="0 0 0"'))
+    node = simulation.tree.of_def(name)
+
+    rotation = simulation.tree.field_of(node, "rotation", simulation)
+    rotation.set(FieldType.ROTATION, 0, (0.0, 0.0, 1.0, 1.2))
+    simulation.step(10)
+
+    assert to_quaternion(node.place.world_pose.rotation) == pytest.approx(
+        (0, 0, math.sin(0.6), math.cos(0.6))
+    )
+    simulation.reset()
+    simulation.step(10)
+    assert to_quaternion(node.place.world_pose.rotation) == pytest.approx((0, 0, 0, 1))
+
+
+@pytest.mark.parametrize("position", [math.nan, math.inf, -math.inf])
+def test_a_joint_stays_at_a_position_that_is_not_finite(load, position):
+    """One NaN in the state would spread to every body of the model."""
+    simulation = load()
+    slider = simulation.tree.of_def("slider")
+    simulation.set_joint_position(slider, 0.5, 1)
+
+    simulation.set_joint_position(slider, position, 1)
+
+    assert positions(simulation)[0] == (0.5, 0.0, 1.0)
+
+
+def test_a_reset_of_the_physics_stops_all_motion_and_moves_nothing(load):
+    """A supervisor uses it at the start of an episode, after it has placed all bodies."""
+    simulation = load()
+    simulation.robots[0].motors["push"].set_effort(5.0)
+    simulation.step(100)
+    before, ball = positions(simulation), simulation.tree.of_def("ball")
+    assert simulation.motion.velocity(ball)[0][2] < -0.5
+
+    simulation.reset_physics()
+
+    assert simulation.motion.velocity(ball) == ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    assert positions(simulation) == before
 
 
 def test_a_field_does_not_move_what_joints_move(load):
