@@ -16,9 +16,11 @@ from palaestra_sim.mujoco.physics import MujocoPhysics
 from palaestra_sim.scene.geometry import axis_angle_to_quaternion, to_quaternion
 from palaestra_sim.scene.loader import Loader
 from palaestra_sim.scene.mode import Mode
+from palaestra_sim.scene.simulation import Simulation
 from palaestra_sim.scene.tree.field_types import FieldType
 from palaestra_sim.scene.tree.fields import quaternion_to_axis_angle
-from palaestra_sim.world import builtin_path
+from palaestra_sim.stub.physics import StubPhysics
+from palaestra_sim.world import builtin, builtin_path
 
 PERIOD_MS = 192
 CARTPOLE = """<mujoco>
@@ -277,6 +279,7 @@ def test_the_program_refuses_with_the_exit_code_of_a_wrong_world(options, messag
         ({"robot": "EPUCK"}, "the world has no robot DEF EPUCK"),
         ({"mark": "WALL_0"}, "cannot move WALL_0, because it has a boundingObject"),
         ({"joints": ("hinge",)}, "does not set joints, such as 'hinge'"),
+        ({"mark": "NOWHERE"}, "the world has no node DEF NOWHERE"),
     ],
 )
 def test_a_request_that_does_not_fit_the_world_is_refused(changes, fact) -> None:
@@ -294,6 +297,10 @@ def test_a_request_that_does_not_fit_the_world_is_refused(changes, fact) -> None
     [
         ({"commanded": "velocity"}, "the motor 'push' is commanded by force, not by velocity"),
         ({"sensors": ["gyro"]}, "does not read 'gyro'"),
+        ({"sensors": ["push"]}, "the model has no sensor 'push'"),
+        ({"motors": ["leg"]}, "the motor 'leg' does not exist"),
+        ({"motors": ["hinge"]}, "the motor 'hinge' does not exist"),
+        ({"period_ms": 30}, "30 ms is not a multiple of the basic step of 20 ms"),
         ({"sensors": ["nose"]}, "the model has no sensor 'nose'"),
         ({"joints": ["knee"]}, "the model has no hinge or slider 'knee'"),
         ({"robot": "CART"}, "does not place CART in a model of MuJoCo"),
@@ -305,3 +312,41 @@ def test_a_request_that_does_not_fit_the_model_is_refused(changes, fact, tmp_pat
 
     with pytest.raises(BatchRefusedError, match=fact):
         batch.open(BatchRequest.from_json({**CART.to_json(), **changes}))
+
+
+DOOR = """Solid { translation 0 0 3 name "frame" children [ HingeJoint {
+  jointParameters HingeJointParameters { axis 0 0 1 }
+  endPoint Solid { name "door" boundingObject Box { size 0.1 0.4 0.4 } physics Physics { density -1 mass 3 } }
+} ] }"""
+
+
+@pytest.mark.parametrize(
+    ("change", "fact"),
+    [
+        (
+            ("", "Solid { translation 0 0 3 boundingObject Box { } physics Physics { } }"),
+            "1 Solids with physics",
+        ),
+        (("", DOOR), "1 doors"),
+        (("", 'Robot { name "other" translation 0 0 3 }'), "simulates one robot, and the world has 2"),
+        (('coordinateSystem "ENU"', 'coordinateSystem "NUE"'), "a world whose y axis points up"),
+        (("supervisor TRUE", "supervisor TRUE battery [ 50 60 10 ]"), "does not simulate a battery"),
+    ],
+)
+def test_a_world_whose_parts_no_copy_would_have_is_refused(change, fact) -> None:
+    """If a copy left the door out, a policy would learn to drive through a wall."""
+    old, new = change
+    text = builtin("arena").decode()
+    text = text.replace(old, new, 1) if old else f"{text}\n{new}\n"
+    simulation = Simulation.load(text.encode(), MujocoPhysics(feeling=True), "world.wbt", Mode.FAST)
+
+    with pytest.raises(BatchRefusedError, match=f"{fact}.*remove batch from the job"):
+        SceneBatch(simulation, "world.wbt", 2, 1)
+
+
+def test_a_world_without_mujoco_is_refused() -> None:
+    """The stub's robots have no MuJoCo body that could be copied."""
+    simulation = Simulation.load(builtin("arena"), StubPhysics(), "world.wbt", Mode.FAST)
+
+    with pytest.raises(BatchRefusedError, match="simulates robots that drive on wheels with fixed axles"):
+        SceneBatch(simulation, "world.wbt", 2, 1)
