@@ -92,6 +92,28 @@ def test_a_world_has_the_nodes_of_its_templates() -> None:
     assert sorted(names) == ["x post", "y post", "y post", "z post"]
 
 
+@pytest.mark.parametrize(
+    ("code", "written"),
+    [
+        ("fields.height.value - 1", "1.5"),
+        ("3 - 1 - 1", "1"),
+        ("fields.fixed.value || unknown", "true"),
+        ("!fields.fixed.value || 'b'", "b"),
+        ("'' && 'b'", ""),
+        ("1 === '1'", "false"),
+        ("1 !== '1'", "true"),
+        ("fields.label.value === 'lamp'", "true"),
+        ("'is ' + !fields.fixed.value", "is false"),
+        ("1000 * 1000", "1000000"),
+    ],
+)
+def test_a_value_is_written_as_javascript_writes_it(code: str, written: str) -> None:
+    """Names and numbers of a template must be those that Webots has."""
+    body = lamp(LAMP.replace('"%<= fields.label.value >% of', f'"%<= {code} >% of')).body
+
+    assert body.text("model") == f"{written} of two"
+
+
 def test_an_error_in_the_body_is_at_its_line_of_the_template() -> None:
     """A person corrects the template, not its expansion."""
     text = LAMP.replace("children IS parts", "children IS part")
@@ -113,6 +135,11 @@ def test_an_error_in_the_body_is_at_its_line_of_the_template() -> None:
         ("let a = fields.absent.value;", "fields.absent.value"),
         ("let a = fields.label.value * 2;", "'lamp' instead of a number"),
         ("let a = 1 / 0;", "a division by zero"),
+        ("let a = fields.height.value.x;", "fields.height.value.x"),
+        ("let a = fields.color.value.w;", "fields.color.value.w"),
+        ("let a = 'at ' + fields.color.value;", "a vector instead of a text"),
+        ("let a = (1;", ";"),
+        ("let a = true ? 1;", ";"),
         ("let a = 1 == '1';", "1.0 == '1'"),
         ("if (true) {", "a { that is never closed"),
         ("}", "}"),
