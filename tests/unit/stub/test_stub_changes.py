@@ -148,6 +148,75 @@ def test_a_place_that_the_field_does_not_have_answers_no_success(robot, children
     assert count(robot, children) == before
 
 
+CRATE = """DEF CRATE Solid { translation 1.3 0.5 0.5 name "crate"
+  children DEF AGAIN Group { }
+  boundingObject DEF OUTLINE Group { children [ Box { } ] }
+} Group { children USE AGAIN } DEF BARE Solid { name "bare" }"""
+ACTING = 'Solid { name "new" boundingObject Box { } }'
+DRAWN = "Shape { geometry Sphere { } }"
+
+
+@pytest.mark.parametrize(
+    ("place", "text", "message"),
+    [
+        ("OUTLINE.children", "Box { }", "Group.children, which is part of a boundingObject"),
+        ("AGAIN.children", DRAWN, r"Group.children, which is used several times \(USE\)"),
+        ("ROBOTINO.children", ACTING, "a Solid that affects the simulation cannot be added to a robot"),
+        (
+            "BARE.physics",
+            "Physics { }",
+            "a Physics that affects the simulation cannot be added to Solid.physics",
+        ),
+        ("BARE.boundingObject", "Box { }", "a Box that .* cannot be added to Solid.boundingObject"),
+    ],
+)
+def test_a_node_without_effect_where_it_is_added_is_refused(robot, add, find, place, text, message):
+    """If the call succeeded, the client would believe in an obstacle that no sensor sees."""
+    add(CRATE)
+    node, _, field = place.partition(".")
+    target = robot.get("supervisor/node/get_field", node=find(node), fieldName=field)
+    before = robot.get("supervisor/node/export_string", node=find(node))
+
+    with pytest.raises(ServiceFailed, match=f"{message}.*change the world file, or use driver webots"):
+        add(text, field=target)
+    assert robot.get("supervisor/node/export_string", node=find(node)) == before
+
+
+def test_a_drawn_node_may_be_added_to_a_robot(robot, add, find):
+    """A task marks the robot that has to move; the mark only changes the pictures of cameras."""
+    field = robot.get("supervisor/node/get_field", node=find("ROBOTINO"), fieldName="children")
+    before = count(robot, field)
+
+    assert add(DRAWN, field=field) == 1
+    assert count(robot, field) == before + 1
+
+
+def test_nodes_that_every_world_needs_and_parts_of_outlines_stay(robot, add, find):
+    """The simulation reads them once, at the start."""
+    add(CRATE)
+    root = robot.get("supervisor/get_root")
+    outline = robot.get("supervisor/node/get_field", node=find("OUTLINE"), fieldName="children")
+
+    with pytest.raises(ServiceFailed, match="the Group of a world cannot be removed; keep it"):
+        robot.get("supervisor/node/remove", node=root)
+    with pytest.raises(ServiceFailed, match="no part of a boundingObject can be removed"):
+        robot.get("supervisor/field/remove_node", field=outline, position=0)
+    assert count(robot, outline) == 1
+
+
+def test_a_wheel_of_a_robot_cannot_be_removed_and_its_mark_can(robot, find):
+    """The first two nodes of the robot are drawn, and the third is the joint of a wheel."""
+    parts = robot.get("supervisor/node/get_field", node=find("ROBOTINO"), fieldName="children")
+    before = count(robot, parts)
+
+    with pytest.raises(
+        ServiceFailed, match="a HingeJoint that affects the simulation cannot be removed from"
+    ):
+        robot.get("supervisor/field/remove_node", field=parts, position=2)
+    assert robot.get("supervisor/field/remove_node", field=parts, position=1) == 1
+    assert count(robot, parts) == before - 1
+
+
 def test_a_running_robot_and_its_parts_cannot_be_removed(robot, find):
     """If the call succeeded, the client would believe that the part is gone."""
     for name in ("ROBOTINO", "BODY"):
@@ -259,6 +328,24 @@ def test_a_robot_that_stands_at_a_wall_has_a_contact_point_there(start, ros):
     assert [it.point.x for it in of_wall] == pytest.approx([1.25] * len(of_wall))
     assert {it.node_id for it in of_wall} == {number}
     assert number not in {it.node_id for it in of_robot}
+
+
+def test_two_robots_that_touch_have_the_same_contact_points(start, world, simple_robot):
+    """Each robot learns of the other one, as of a wall."""
+    other = simple_robot.replace('name "robotino"', 'name "other"').replace("DEF ", "DEF OTHER_")
+    moved = other.replace("Robot {", "Robot { translation 0 0 9", 1)
+    first, second = (simulation := start(world=world(robot=simple_robot + moved)).simulation).robots
+    assert list(simulation.contact_points(first.parts.node, descendants=True)) == []
+    x, y, z = first.place.translation
+    reach = first.body.radius + second.body.radius
+
+    second.place.translation = (x + reach - 0.001, y, z)
+
+    of_first = simulation.contact_points(first.parts.node, descendants=True)
+    of_second = simulation.contact_points(second.parts.node, descendants=True)
+    assert {point for point, _ in of_first} == {point for point, _ in of_second} != set()
+    for point, _ in of_first:
+        assert math.dist(point[:2], (x + first.body.radius, y)) < 0.05
 
 
 def points(node, handle):

@@ -90,7 +90,9 @@ def require_room(node: SceneNode, field: str, added: Sequence[SceneNode]) -> Non
     if node.outline or len(node.twins) > 1:
         part = "part of a boundingObject" if node.outline else "used several times (USE)"
         raise UnsimulatedError(f"nothing can be added to {where}, which is {part}; {_ELSEWHERE}")
-    if not any(_acts(inside) for it in added for inside in (it, *it.descendants())):
+    # The simulation reads the boundingObject of a Solid once, so a new one would not become an obstacle.
+    outline = field == "boundingObject"
+    if not any(outline or _acts(inside) for it in added for inside in (it, *it.descendants())):
         return
     if node.type_name == "Robot" or _on_robot(node):
         raise UnsimulatedError(
