@@ -11,6 +11,7 @@ import pytest
 
 import palaestra.client.tar_stream
 from palaestra.client.tar_extraction import MOST_HEAD_BYTES, WrongArchive, unpack
+from palaestra.client.tar_stream import pack
 
 WANTED = ("model.zip", "summary.json", "tensorboard")
 PROGRAM = Path(palaestra.client.tar_stream.__file__).read_text()
@@ -53,6 +54,20 @@ def test_a_folder_that_is_not_there_is_an_empty_archive(tmp_path):
     unpack(packed(tmp_path / "none", "model.zip"), tmp_path, WANTED, 10**6)
 
     assert list(tmp_path.iterdir()) == []
+
+
+def test_only_named_files_and_folders_are_packed_in_a_fixed_order(tmp_path, capfdbinary):
+    """A run writes to its files meanwhile, and a file that nobody asked for may be large."""
+    (tmp_path / "tensorboard" / "deep").mkdir(parents=True)
+    for name in ("secret", "model.zip", "tensorboard/b", "tensorboard/a", "tensorboard/deep/c"):
+        (tmp_path / name).write_text(name)
+
+    pack(str(tmp_path), ["tensorboard", "model.zip", "missing"])
+
+    with tarfile.open(fileobj=io.BytesIO(capfdbinary.readouterr().out)) as tar:
+        found = {each.name: tar.extractfile(each).read().decode() for each in tar}
+    assert list(found) == ["tensorboard/a", "tensorboard/b", "tensorboard/deep/c", "model.zip"]
+    assert list(found.values()) == list(found)
 
 
 def member(name, size=1, kind=tarfile.REGTYPE, **words):

@@ -80,3 +80,22 @@ def test_the_history_forgets_what_no_line_has_room_for():
 
     assert len(history.of(0)) == MOST
     assert history.of(0)[0].step == 5
+
+
+def test_a_replica_without_figures_is_one_line(draw):
+    """Figures, a progress bar or an attempt 0 would look like those of a run that has begun."""
+    empty = dict.fromkeys(("reason", "message", "pod", "step", "target", "successRate", "meanReturn"))
+    empty |= {"stepsPerSecond": None, "simulators": [], "lastCheckpoint": None, "attempt": 0}
+
+    text = draw(running_job(**empty))
+
+    replica = text.partition("replica 0")[2]
+    assert replica.split() == ["Running"]
+
+
+def test_a_run_of_unknown_length_has_steps_and_no_bar(draw):
+    """A program of the user's own may count steps without a target."""
+    text = draw(running_job(step=300, target=None))
+
+    assert "300, 50 a second" in text
+    assert "━" not in text

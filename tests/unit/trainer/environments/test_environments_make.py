@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import gymnasium
 import pytest
 
 from palaestra_trainer.environments.make import keywords, make_environment
@@ -132,3 +133,13 @@ def test_gymnasium_s_own_options_are_its_own(made):
     env.reset(seed=1)
 
     assert [env.step(0)[3] for _ in range(2)] == [False, True]
+
+
+def test_a_registration_that_only_has_a_batched_form_is_refused():
+    """The evaluation needs the single environment, which `vector_entry_point` alone does not create."""
+    gymnasium.register(id="Hall-v0", vector_entry_point=Hall)
+    try:
+        with pytest.raises(ConfigurationError, match="Hall-v0 is registered without an entry_point; add one"):
+            make_environment(Environment(id="Hall-v0"), *fake_arena())
+    finally:
+        gymnasium.registry.pop("Hall-v0")

@@ -123,6 +123,35 @@ def test_simulators_that_do_not_fit_together_are_refused(simulators, fact):
         parse(MINIMAL | {"simulators": simulators})
 
 
+COPIES = MINIMAL["simulators"][0] | {"driver": "mujoco", "batch": 4}
+OTHER = {"name": "e-0", "group": "e", "index": 0, "role": "Evaluate"}
+
+
+@pytest.mark.parametrize(
+    ("simulators", "changes", "fact"),
+    [
+        ([COPIES, OTHER | {"driver": "mujoco", "batch": 2}], {}, "batch is for one simulator with role Coll"),
+        ([COPIES | {"role": "Evaluate"}], {}, "batch is for one simulator with role Collect"),
+        ([COPIES, OTHER | {"role": "Collect"}], {}, "batch needs one collecting simulator; use a larger"),
+        ([COPIES | {"driver": "stub"}], {}, "batch needs driver mujoco, without standby, reset and recycle"),
+        ([COPIES | {"standby": True}], {}, "batch needs driver mujoco, without standby, reset and recycle"),
+        ([COPIES], {"command": ["python", "mine.py"]}, "batch is for the built-in training loop"),
+        ([COPIES], {"collection": "Asynchronous"}, "Asynchronous is for several simulators"),
+    ],
+)
+def test_copies_of_a_world_that_do_not_fit_the_job_are_refused(simulators, changes, fact):
+    """The operator refuses the same jobs, but a person may also write the file for a run on a laptop."""
+    with pytest.raises(ConfigurationError, match=fact):
+        parse(MINIMAL | changes | {"simulators": simulators})
+
+
+def test_copies_of_a_world_are_accepted_with_a_simulator_that_evaluates():
+    """The evaluation plays over ROS, as the policy of the job will later."""
+    configuration = parse(MINIMAL | {"simulators": [COPIES, OTHER]})
+
+    assert [simulator.batch for simulator in configuration.simulators] == [4, None]
+
+
 def test_the_error_for_a_missing_file_has_the_variable_that_names_it(tmp_path, monkeypatch):
     """A person who started the program by hand has only this message."""
     monkeypatch.setenv("PALAESTRA_CONFIG", str(tmp_path / "none.yaml"))

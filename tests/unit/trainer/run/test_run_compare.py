@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import itertools
+import json
 
 import pytest
 
+from palaestra_trainer.cli.compare import compare as compare_program
 from palaestra_trainer.episodes.paired_difference import Pairs, Verdict
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.job.configuration import dump
@@ -211,3 +213,37 @@ def test_a_batch_is_a_line_and_the_end_an_object():
     assert told["success_rate"] == [0.9, 0.75]
     assert told["difference_interval"] == [-0.2042, 0.5027]
     assert (told["verdict"], told["faults"], told["only_a"], told["only_b"]) == ("undecided", 2, 4, 1)
+
+
+@pytest.fixture
+def program(make_member, monkeypatch):
+    """Return `palaestra-compare`, which plays in simulators of this process."""
+
+    def connect_here(configuration, run):
+        del run
+        return [make_member(entry.name) for entry in configuration.simulators]
+
+    monkeypatch.setattr("palaestra_trainer.simulators.connect.connect_here", connect_here)
+    return lambda *arguments: compare_program([*map(str, arguments)])
+
+
+def test_a_person_gets_a_line_for_each_batch_and_a_sentence(reaching, staying, program, capsys):
+    """The first lines name both runs, because the others only call them A and B."""
+    code = program(reaching, staying, "--margin", "0.1")
+
+    first, second, *others, line, sentence = capsys.readouterr().out.splitlines()
+    assert code == 0
+    assert (first, second) == (f"A: {reaching}", f"B: {staying}")
+    assert not [each for each in others if "A is better" in each]
+    assert line.startswith("    20 episodes · A 100% · B 0% · A - B 100 points")
+    assert sentence.startswith("A is better: its success rate is ")
+
+
+def test_a_program_gets_one_object_and_no_other_line(reaching, program, capsys):
+    """A program could not parse an object between lines of text, and needs the exit code."""
+    code = program(reaching, reaching, "--json", "--episodes", "30")
+
+    told = json.loads(capsys.readouterr().out)
+    assert code == 3
+    assert (told["a"], told["b"]) == (str(reaching), str(reaching))
+    assert (told["verdict"], told["episodes"]) == ("undecided", 30)

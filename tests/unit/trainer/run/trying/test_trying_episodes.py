@@ -116,6 +116,21 @@ def test_each_problem_is_a_sentence_with_a_remedy(tried, changes, words):
     assert any(words in line for line in lines), lines
 
 
+@pytest.mark.parametrize(
+    ("space", "observation"),
+    [
+        (spaces.Dict({"place": Task.observation_space}), lambda it: {"place": Task.seen(it)}),
+        (spaces.Tuple((spaces.Discrete(2), Task.observation_space)), lambda it: (1, Task.seen(it))),
+    ],
+    ids=["dict", "tuple"],
+)
+def test_an_observation_of_parts_moves_if_a_part_moves(tried, space, observation):
+    """An environment with a constant part, such as a goal, must not be reported as still."""
+    lines = summary(tried(observation_space=space, seen=observation))
+
+    assert not any("observation" in line and "same" in line for line in lines), lines
+
+
 def test_an_episode_that_does_not_end_is_a_problem(tried, monkeypatch):
     """An evaluation would wait for the end of such an episode."""
     monkeypatch.setattr(episodes, "MOST_STEPS", 50)
