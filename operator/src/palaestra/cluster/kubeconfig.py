@@ -21,7 +21,7 @@ from kubernetes.client.configuration import Configuration
 from kubernetes.client.exceptions import OpenApiException
 from kubernetes.config import ConfigException
 from kubernetes.config.kube_config import ConfigNode, KubeConfigLoader, KubeConfigMerger
-from urllib3.exceptions import InsecureRequestWarning, LocationParseError
+from urllib3.exceptions import HTTPError, InsecureRequestWarning, LocationParseError
 from urllib3.util import parse_url
 
 from palaestra.cluster.client_config import Access
@@ -64,14 +64,17 @@ def access(files: str, context: str | None) -> Access:
 
     Raises:
         NotConfigured: the kubeconfig cannot be read, or one of its fields is invalid.
+        Unreachable: the identity provider of an `auth-provider` does not respond.
     """
     try:
         merger, config = _merged(files)
         name = context or str(config[CURRENT])
         chosen = config["contexts"].get_with_name(name)["context"]
-        cluster = _entry(config["clusters"].get_with_name(chosen["cluster"])["cluster"])
+        cluster = _entry(config["clusters"].get_with_name(chosen["cluster"])["cluster"], "cluster")
         user = _user(config, chosen)
         return _access(files, merger, name, cluster, user)
+    except Unreachable:  # an OSError, but the kubeconfig is right
+        raise
     except WRONG as error:
         raise NotConfigured(_fact(files, error)) from error
 
@@ -111,9 +114,9 @@ def _merged(files: str) -> tuple[KubeConfigMerger, Any]:
     return merger, config
 
 
-def _entry(node: ConfigNode) -> _Entry:
-    if not isinstance(node.value, Mapping):
-        raise ConfigException(f"{node.name} is not a mapping")
+def _entry(node: Any, field: str) -> _Entry:
+    if not isinstance(node, ConfigNode) or not isinstance(node.value, Mapping):  # plain text is not a node
+        raise ConfigException(f"the {field} of the context is not a mapping of fields")
     return _Entry(node.value, Path(node.path or "").absolute().parent)
 
 
@@ -123,7 +126,7 @@ def _user(config: ConfigNode, chosen: ConfigNode) -> _Entry:
     found = config["users"].get_with_name(name, safe=True) if name and config.safe_get("users") else None
     if found is None or not found.safe_get("user"):
         return _Entry({}, Path())
-    return _entry(found["user"])
+    return _entry(found["user"], "user")
 
 
 def _access(files: str, merger: KubeConfigMerger, context: str, cluster: _Entry, user: _Entry) -> Access:
@@ -207,16 +210,23 @@ def _of_provider(merger: KubeConfigMerger, context: str, provider: Mapping[str, 
     loader = KubeConfigLoader(
         merger.config, active_context=context, config_base_path=base, config_persister=merger.save_changes
     )
-    loader.load_and_set(configuration)
+    try:
+        loader.load_and_set(configuration)  # requests a new token if the kubeconfig's token has expired
+    except HTTPError as error:
+        raise _no_token(error) from error
 
     def header() -> str | None:
         try:
             settings = configuration.auth_settings()  # requests a new token if the old one has expired
-        except (*WRONG, OpenApiException) as error:
-            raise Unreachable(0, "NoCredentials", f"{PROVIDER} returned no token ({error})") from error
+        except (*WRONG, OpenApiException, HTTPError) as error:
+            raise _no_token(error) from error
         return str(settings["BearerToken"]["value"]) if "BearerToken" in settings else None
 
     return header
+
+
+def _no_token(error: Exception) -> Unreachable:
+    return Unreachable(0, "NoCredentials", f"{PROVIDER} returned no token ({error})")
 
 
 def _told_to_plugins(cluster: _Entry) -> dict[str, Any]:
