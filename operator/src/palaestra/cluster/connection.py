@@ -25,6 +25,7 @@ def connect(kubeconfig: str | None = None, context: str | None = None, limits: T
 
     Raises:
         NotConfigured: no API server is configured, or its credentials cannot be read.
+        Unreachable: the identity provider of a kubeconfig does not respond.
     """
     files = kubeconfig or os.environ.get("KUBECONFIG") or _home()
     return Api(Transport(_access(files, context), limits or Timeouts()))

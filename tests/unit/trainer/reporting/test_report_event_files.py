@@ -58,3 +58,16 @@ def test_any_bytes_are_read_without_an_error(content):
     """The other parts of a report must be written even if an event file is damaged."""
     add_scalars(content, {})
     add_scalars(len(content).to_bytes(8, "little") + bytes(4) + content + bytes(4), {})
+
+
+def test_an_integer_without_end_ends_the_record(tmp_path):
+    """A damaged file may have any number of bytes with the bit that announces another one."""
+    write(tmp_path, ("train/loss", 0.5, 100))
+    [path] = tmp_path.iterdir()
+    endless = b"\xff" * 30
+    record = len(endless).to_bytes(8, "little") + bytes(4) + endless + bytes(4)
+    found = {}
+
+    add_scalars(path.read_bytes() + record, found)
+
+    assert found == {"train/loss": {100: 0.5}}

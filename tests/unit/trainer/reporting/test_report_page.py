@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from palaestra_protocol.scene import ShapeKind, Triangles, VisibleNode, VisibleScene, VisualShape
 from palaestra_trainer.reporting import page as pages
-from palaestra_trainer.reporting.charts import ticks
+from palaestra_trainer.reporting.charts import Series, chart, ticks
 from palaestra_trainer.reporting.elements import element, own_code
 from palaestra_trainer.reporting.page import MOST_BYTES, page
 from palaestra_trainer.reporting.run_data import Evaluated, Replay, ReportedFault, RunData, SpaceReplay
@@ -301,3 +301,17 @@ def test_ticks_are_few_and_inside_their_axis(first, second):
 
     assert 0 < len(found) <= 7 or not found
     assert all(low <= value <= high for value in found)
+
+
+@pytest.mark.parametrize("ends", [(0.0, 5e-324), (1.0, 1.0), (-1e308, 1e308), (0.0, float("inf"))])
+def test_an_axis_that_no_number_divides_has_one_label_at_most(ends):
+    """The distance of two labels is then zero or infinite, and no loop over them would end."""
+    assert len(ticks(*ends)) <= 1
+
+
+def test_a_curve_of_one_point_at_step_zero_is_drawn():
+    """An evaluation before the first step is the only point of a run that has just begun."""
+    drawn = str(chart("success", [Series(label="a", points=((0.0, 0.5),), dots=True)], share=True))
+
+    assert "<svg" in drawn
+    assert "nan" not in drawn
