@@ -12,7 +12,7 @@ from gymnasium import spaces
 from stable_baselines3.common.vec_env import VecNormalize
 
 from palaestra_trainer.algorithms import make_model, policy_of
-from palaestra_trainer.algorithms.normalization import ValidNormalize
+from palaestra_trainer.algorithms.normalization import Moments, ValidNormalize
 from palaestra_trainer.episodes.evaluation import evaluate
 from palaestra_trainer.episodes.seeds import EVALUATE
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
@@ -277,3 +277,12 @@ def test_a_run_that_normalizes_is_measured_as_it_was_evaluated(play, job, direct
         best["success_rate"],
         best["mean_return"],
     ]
+
+
+@pytest.mark.parametrize("mean", [[0.0], [[0.0, 0.0]]])
+def test_statistics_of_another_shape_are_refused(mean):
+    """NumPy would broadcast the statistics of one number to all numbers of an observation."""
+    content = {"mean": mean, "variance": [1.0, 1.0], "count": 5.0}
+
+    with pytest.raises(ValueError, match=r"statistics of shape .*, not \(2,\)"):
+        Moments.from_json(content, (2,))

@@ -74,3 +74,11 @@ def test_a_summary_that_says_nothing_finishes_nothing(directory, make_configurat
     directory.summary.write_text(text)
 
     assert finished(directory, make_configuration()) is None
+
+
+@pytest.mark.parametrize("line", ["5", "[1]", "null"])
+def test_a_line_that_is_no_object_is_left_out(tmp_path, line):
+    """A file that a disk damaged may have a line that is JSON by chance."""
+    (tmp_path / "lines").write_text(f'{{"a": 1}}\n{line}\n{{"a": 2}}\n')
+
+    assert list(read_lines(tmp_path / "lines")) == [{"a": 1}, {"a": 2}]

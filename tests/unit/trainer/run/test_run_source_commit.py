@@ -86,3 +86,12 @@ def test_the_record_of_an_attempt_has_the_commit_of_its_code(tmp_path):
     run.begin_attempt("", "resumed at step 8", source=source)
 
     assert [line.get("source") for line in read_lines(run.attempts)] == [None, source]
+
+
+@pytest.mark.parametrize("module", ["not_a_module_of_any_folder", "sys"])
+def test_a_module_without_a_file_is_recorded_by_the_working_directory(repository, module):
+    """The run may start from the repository of a module that is imported in another way."""
+    found = source_commit(f"{module}:Env-v0", repository)
+
+    assert found["of"] == "working directory"
+    assert found["commit"] == git(repository, "rev-parse", "HEAD")
