@@ -9,13 +9,12 @@ import tempfile
 import time
 from pathlib import Path
 
-from tests.bench.peer_runs import Program, job, started_at_s, wait_for_steps
+from tests.bench.peer_runs import LOOK_EVERY_S, Program, job, started_at_s, wait_for_steps
 from tests.bench.sizes import scaled
 from tests.local_run import running
 from tests.soak.jobs import ANY_NUMBER
 
 TIMES = 20
-LOOK_EVERY_S = 0.02
 
 
 def measure(scale=1.0):

@@ -11,6 +11,10 @@ Get = Callable[[Figures], float]
 STEP_PROFILE = "[where a step's time goes](speed.md#the-floor)"
 RESTARTS = "[the measured figures](reliability.md#figures)"
 RUN_PROFILE = "[a whole run](speed.md#a-whole-run)"
+AFTER_A_FAULT = (
+    "After a fault, the trainer waits until the sidecar has started a new simulator, and connects to it: "
+    f"{RESTARTS}."
+)
 LOOP = "the same run without restarts, in a loop"
 SUBPROC = "Stable-Baselines3 with `SubprocVecEnv`"
 
@@ -234,10 +238,7 @@ CHAPTERS = (
             "The loops start a program at once; a Job of Kubernetes waits 10 s before the first restart of a "
             "pod, and up to 5 minutes before a later one."
         ),
-        reason=(
-            "After a fault, the trainer waits until the sidecar has started a new simulator, and connects to "
-            f"it: {RESTARTS}."
-        ),
+        reason=AFTER_A_FAULT,
     ),
     Chapter(
         part="goodput",
@@ -253,9 +254,6 @@ CHAPTERS = (
             "With the same checkpoint interval of 500 steps; at ten faults in a scaled hour, a program that "
             "starts for some seconds hardly trains, which a real hour would not show."
         ),
-        reason=(
-            "After a fault, the trainer waits until the sidecar has started a new simulator, and connects to "
-            f"it: {RESTARTS}."
-        ),
+        reason=AFTER_A_FAULT,
     ),
 )

@@ -57,7 +57,7 @@ def test_a_folder_that_is_not_there_is_an_empty_archive(tmp_path):
 
 
 def test_only_named_files_and_folders_are_packed_in_a_fixed_order(tmp_path, capfdbinary):
-    """A run writes to its files meanwhile, and a file that nobody asked for may be large."""
+    """The run writes files while they are packed, and a file that was not requested may be large."""
     (tmp_path / "tensorboard" / "deep").mkdir(parents=True)
     for name in ("secret", "model.zip", "tensorboard/b", "tensorboard/a", "tensorboard/deep/c"):
         (tmp_path / name).write_text(name)

@@ -70,7 +70,7 @@ def results(check, *arguments, **options):
 
 
 def test_a_missing_operator_is_one_result_and_not_four():
-    """A person must first install it; images and metrics of no operator are no further problems."""
+    """A person must install the operator first. Its images and metrics cannot be checked before that."""
     [found] = results(runs)
 
     assert found.verdict is CheckStatus.WRONG

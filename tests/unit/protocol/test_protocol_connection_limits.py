@@ -41,7 +41,7 @@ def test_a_request_that_ends_after_its_connection_was_closed_takes_no_slot(conne
 
 
 def test_a_connection_without_a_thread_gives_its_slot_back(monkeypatch, connected):
-    """A pod at its limit of processes must accept connections again after the limit is no longer reached."""
+    """A pod reaches its limit of processes, and later accepts connections again."""
 
     def fail(_):
         raise RuntimeError("can't start new thread")

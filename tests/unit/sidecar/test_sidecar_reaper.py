@@ -143,7 +143,7 @@ def test_orphans_end_with_the_first_process(reaped):
 
 
 def test_a_reaper_whose_sidecar_has_ended_still_ends_the_simulator(reaped):
-    """A report that nobody reads must not end the reaper before its work is done."""
+    """The reaper reports to its sidecar. If this report fails, the reaper must still do its work."""
     it = reaped(WAITS)
     pid = int(it.reports.readline().split()[1])
     it.output.readline()

@@ -1,7 +1,7 @@
 """Choose the VecEnv of a run.
 
-A step of the first kind waits for all simulators, a step of `AsynchronousVecEnv` does not, and the third kind
-steps the copies inside one simulator.
+A step of `SimulatorsVecEnv` waits for all simulators, and a step of `AsynchronousVecEnv` does not.
+`BatchVecEnv` steps the copies inside one simulator.
 """
 
 from __future__ import annotations

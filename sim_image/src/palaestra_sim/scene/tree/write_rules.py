@@ -132,7 +132,7 @@ def _require_no_client(nodes: Iterable[SceneNode], done: str) -> None:
 
 
 def _acts(node: SceneNode) -> bool:
-    return node.type_name not in _DRAWN | _HOLDING
+    return node.type_name not in _DRAWN and node.type_name not in _HOLDING
 
 
 def resizes(node: SceneNode, field: str) -> bool:
