@@ -19,10 +19,12 @@ for path in paths:
 print(json.dumps(codes))
 """
 
-# Two simulators: one has the ROS master of both, the other a world file. Then the program kills itself.
+# A simulator for which no node has room, then two others: one has the ROS master of both, the other a world
+# file. Then the program kills itself.
 SIMULATORS = """
 import json, os, pathlib, signal
 from palaestra_sim.world import builtin
+from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.robots.robotino import Robotino
 from palaestra_trainer.webots import Kubernetes, Webots
 
@@ -35,6 +37,10 @@ def driven(webots):
         robot.close()
         return round(webots.observer.time() - before, 6)
 
+try:
+    Webots("robotino", "arena", launcher=Kubernetes(resources={"requests": {"cpu": "4000"}}, start_s=10))
+except ConfigurationError as error:
+    refusal = str(error)
 place = Kubernetes(silence_s=10)
 first = Webots("robotino", "arena", launcher=place)
 world = pathlib.Path("/tmp/own.wbt")
@@ -44,7 +50,7 @@ periods = [driven(first), driven(second)]
 first.close()
 periods.append(driven(second))
 names = [first.robot_name, second.robot_name]
-print(json.dumps({"names": names, "periods": periods}), flush=True)
+print(json.dumps({"names": names, "periods": periods, "refusal": refusal}), flush=True)
 os.kill(os.getpid(), signal.SIGKILL)
 """
 _OF_NOTEBOOKS = "app.kubernetes.io/component=notebook-simulator"
@@ -114,6 +120,7 @@ def assert_a_notebook_starts_simulators_in_pods(cluster: Cluster) -> None:
 
     assert seen["names"] == ["robotino", "robotino_2"]
     assert seen["periods"] == [0.192] * 3
+    assert "FailedScheduling" in seen["refusal"]
 
     def ended_jobs() -> bool:
         jobs = cluster.select("jobs", SYSTEM, _OF_NOTEBOOKS)
