@@ -19,6 +19,7 @@
 - `shadowing`: finds a user's modules that shadow modules of Python or of a dependency
 - `signals`: selects the signals that a program handles
 - `temporary_folder`: makes a folder that exists as long as its process
+- `whole_file`: writes files atomically
 - `http`: the HTTP server of operator, trainer and sidecar, with limits for time and size
 - `xmlrpc`: XML-RPC as ROS uses it, with limits for time and size
 - `tcp_server`: the base class of the HTTP and XML-RPC servers: one port, a thread for each connection
@@ -26,6 +27,6 @@
 
 This package imports no other package of Palaestra. These modules use sockets, threads, processes or the
 interpreter's state: `connection_limits`, `http`, `imports`, `linux`, `shadowing`, `signals`, `tcp_server`,
-`temporary_folder`, `ros.sockets`, and the server and client of `xmlrpc`. All other modules are pure: they
-compute values from values.
+`temporary_folder`, `whole_file`, `ros.sockets`, and the server and client of `xmlrpc`. All other modules are
+pure: they compute values from values.
 """

@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
-from palaestra_sim.whole_file import write_whole
+from palaestra_protocol.whole_file import write_whole
 
 EXTRA_PROJECTS: Final = "WEBOTS_EXTRA_PROJECT_PATH"
 """The environment variable of Webots with a list of project folders, in the format of PATH."""

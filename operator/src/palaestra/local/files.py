@@ -1,12 +1,11 @@
-"""Write files atomically: after a crash a file has its old or its new content, never a part of it."""
+"""Write the files of a local run, and name the folder in each message about a failure."""
 
-import os
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from palaestra.local.errors import StorageFailed
+from palaestra_protocol.whole_file import replace_file
 
 
 def write(path: Path, content: bytes) -> None:
@@ -17,17 +16,7 @@ def write(path: Path, content: bytes) -> None:
     """
     with storage(path):
         path.parent.mkdir(parents=True, exist_ok=True)
-        descriptor, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-        try:
-            with os.fdopen(descriptor, "wb") as file:
-                file.write(content)
-                file.flush()
-                os.fsync(file.fileno())
-            Path(temporary).chmod(0o644)
-            Path(temporary).replace(path)
-        except OSError:
-            Path(temporary).unlink(missing_ok=True)
-            raise
+        replace_file(path, lambda unfinished: unfinished.write_bytes(content))
 
 
 def make_folder(path: Path) -> None:

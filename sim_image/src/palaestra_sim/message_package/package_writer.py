@@ -6,9 +6,9 @@ import compileall
 import tempfile
 from pathlib import Path
 
+from palaestra_protocol.whole_file import write_whole
 from palaestra_sim.errors import ForeignPackageError
 from palaestra_sim.message_package.files import MANIFEST, NAME, package_files
-from palaestra_sim.whole_file import write_whole
 
 
 def write(folder: Path) -> Path:

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Final
 
+from palaestra_protocol.whole_file import write_whole
 from palaestra_sim.errors import WorldError
-from palaestra_sim.whole_file import write_whole
 
 _MOST_PLACES: Final = 8  # maximum number of line numbers in one report line
 

@@ -9,9 +9,9 @@ from functools import partial
 from pathlib import Path
 
 from palaestra_protocol.control import RobotName
+from palaestra_protocol.whole_file import write_whole
 from palaestra_sim.errors import RootError, SidecarError, WorldError
 from palaestra_sim.sidecar import project
-from palaestra_sim.whole_file import write_whole
 from palaestra_sim.world import MJCF, RunIdentity, builtin_path, generate, placed, rename, robots, suffix
 from palaestra_sim.world import root_of as root_around
 from palaestra_sim.world.bounded_read import read_bounded

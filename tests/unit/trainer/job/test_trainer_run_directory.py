@@ -1,13 +1,12 @@
-"""The files of a run directory: after a crash, each is the old or the new file as a whole."""
+"""The files of a run directory: after a crash, each of them can be read."""
 
 from __future__ import annotations
 
-import errno
 import json
 
 import pytest
 
-from palaestra_trainer.job.run_directory import RunDirectory, append_line, read_lines, replace_file
+from palaestra_trainer.job.run_directory import RunDirectory, append_line, read_lines
 from palaestra_trainer.run.summary import finished, summarise, write_summary
 from palaestra_trainer.run.telemetry.progress import Progress
 
@@ -41,21 +40,6 @@ def test_a_line_that_a_crash_tore_is_left_out(tmp_path):
 def test_a_file_that_is_not_there_has_no_lines(tmp_path):
     """At the start of a run, nothing has been evaluated."""
     assert list(read_lines(tmp_path / "none")) == []
-
-
-def test_a_file_is_replaced_as_a_whole_or_not_at_all(tmp_path):
-    """A full disk must not destroy the best model."""
-    path = tmp_path / "model.zip"
-    replace_file(path, lambda name: name.write_text("old"))
-
-    def fail(name):
-        name.write_text("ne")
-        raise OSError(errno.ENOSPC, "No space left on device")
-
-    with pytest.raises(OSError, match="No space"):
-        replace_file(path, fail)
-    assert path.read_text() == "old"
-    assert [it.name for it in tmp_path.iterdir()] == ["model.zip"]
 
 
 def test_a_summary_makes_a_run_finished(directory, make_configuration):

@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import json
 
+from palaestra_protocol.whole_file import replace_file
 from palaestra_trainer.algorithms.make_model import resolve
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.job.configuration import Algorithm, Configuration
-from palaestra_trainer.job.run_directory import RunDirectory, replace_file
+from palaestra_trainer.job.run_directory import RunDirectory
 
 
 def begin_with(

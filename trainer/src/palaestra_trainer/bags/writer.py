@@ -21,10 +21,10 @@ from typing import Any, Final, Self
 from mcap.records import Schema
 from mcap_ros2.writer import Writer
 
+from palaestra_protocol.whole_file import sync
 from palaestra_trainer.bags.definitions import definition
 from palaestra_trainer.bags.messages import nanoseconds
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.job.run_directory import sync
 
 PART: Final = ".part"
 METADATA: Final = "palaestra"  # name of the metadata record

@@ -11,10 +11,11 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from palaestra_protocol.whole_file import replace_file
 from palaestra_trainer.bags import definitions, messages
 from palaestra_trainer.bags.writer import PART, BagWriter
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.job.run_directory import RunDirectory, replace_file
+from palaestra_trainer.job.run_directory import RunDirectory
 from palaestra_trainer.reporting.plain_values import number, records, text
 from palaestra_trainer.reporting.read_replays import replays_of
 from palaestra_trainer.reporting.run_data import Replay

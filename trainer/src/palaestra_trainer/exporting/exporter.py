@@ -11,12 +11,13 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, Protocol
 
+from palaestra_protocol.whole_file import replace_file
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.exporting.metadata import data_sheet
 from palaestra_trainer.exporting.policy_module import PolicyModule
 from palaestra_trainer.exporting.verify import OBSERVATIONS, Run, compare
 from palaestra_trainer.job.configuration import load
-from palaestra_trainer.job.run_directory import RunDirectory, replace_file
+from palaestra_trainer.job.run_directory import RunDirectory
 from palaestra_trainer.run.policies import load_policy
 
 PACKAGE = "package"  # a folder or a zip, in which the policy is an ONNX file

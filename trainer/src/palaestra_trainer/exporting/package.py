@@ -17,11 +17,12 @@ from palaestra_protocol.policy_package import (
     is_package,
     manifest_text,
 )
+from palaestra_protocol.whole_file import replace_file
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.exporting.measurements import own_result, results_of
 from palaestra_trainer.exporting.onnx_file import sheet_of
 from palaestra_trainer.job.configuration import DEFAULT_ROBOT, Configuration
-from palaestra_trainer.job.run_directory import RunDirectory, read_lines, replace_file
+from palaestra_trainer.job.run_directory import RunDirectory, read_lines
 from palaestra_trainer.simulators.robot_registry import robot_class
 
 JOB = "job.yaml"  # the TrainingJob; only a run of `palaestra run` has this file

@@ -1,23 +1,23 @@
-"""The files in the folder of one run on its volume, and functions that write these files.
+"""The files in the folder of one run on its volume, and functions for its files of JSON lines.
 
-This folder is enough to inspect the run and to resume it. A whole file is replaced atomically: the new
-content is written under a temporary name, then follow fsync, rename and fsync of the folder. Lines are
-appended with fsync. So after a crash each file has either its old or its new content.
+This folder is enough to inspect the run and to resume it. Whole files are replaced by
+`palaestra_protocol.whole_file`, and lines are appended with fsync. So after a crash each file has either its
+old or its new content.
 """
 
 from __future__ import annotations
 
-import errno
 import json
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from palaestra_protocol.whole_file import replace_file
+
 RUN_VARIABLE = "PALAESTRA_RUN"
-_NO_SUCH_CALL = frozenset({errno.EINVAL, errno.ENOTSUP, errno.ENOSYS, errno.EBADF})
 
 
 class RunDirectory:
@@ -157,42 +157,3 @@ def drop_lines(path: Path, unwanted: Callable[[dict[str, Any]], bool]) -> None:
     if len(kept) < len(lines):
         text = "".join(json.dumps(line) + "\n" for line in kept)
         replace_file(path, lambda name: name.write_text(text, encoding="utf-8"))
-
-
-def replace_file(path: Path, write: Callable[[Path], object]) -> None:
-    """Replace the file at `path` by the file that `write` writes to a temporary name.
-
-    Raises:
-        OSError: the file could not be written; the old file is unchanged.
-    """
-    with temporary(path) as name:
-        write(name)
-        sync(name)
-        name.rename(path)
-    sync(path.parent)
-
-
-@contextmanager
-def temporary(path: Path) -> Iterator[Path]:
-    """Yield a temporary path in the folder of `path` with the same suffix; remove that file at the end."""
-    name = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
-    try:
-        yield name
-    finally:
-        name.unlink(missing_ok=True)
-
-
-def sync(path: Path) -> None:
-    """Wait until a file's or a folder's contents are on the disk.
-
-    Some file systems over object stores and networks do not support fsync of a folder. On such a file system,
-    this function does nothing for a folder.
-    """
-    descriptor = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    except OSError as error:
-        if error.errno not in _NO_SUCH_CALL or not path.is_dir():
-            raise
-    finally:
-        os.close(descriptor)

@@ -9,7 +9,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
 
-from palaestra_trainer.job.run_directory import RunDirectory, replace_file
+from palaestra_protocol.whole_file import replace_file
+from palaestra_trainer.job.run_directory import RunDirectory
 from palaestra_trainer.reporting.film import animated, pictures
 from palaestra_trainer.reporting.read_replays import replays_of
 from palaestra_trainer.reporting.run_data import Replay

@@ -10,7 +10,8 @@ from typing import Any
 
 import structlog
 
-from palaestra_trainer.job.run_directory import RunDirectory, replace_file
+from palaestra_protocol.whole_file import replace_file
+from palaestra_trainer.job.run_directory import RunDirectory
 from palaestra_trainer.reporting.page import page
 from palaestra_trainer.reporting.read_run import read_run
 from palaestra_trainer.reporting.run_data import RunData

@@ -19,6 +19,7 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from torch.optim.optimizer import register_optimizer_step_pre_hook
 
 from palaestra_protocol.pod.status import Cause, ExitCode
+from palaestra_protocol.whole_file import replace_file
 from palaestra_trainer import algorithms
 from palaestra_trainer.algorithms import her
 from palaestra_trainer.algorithms.divergence import Learner
@@ -28,7 +29,7 @@ from palaestra_trainer.episodes.collecting import CollectingVecEnv
 from palaestra_trainer.episodes.collecting_env import collecting_env
 from palaestra_trainer.errors import ConfigurationError, Diverged, TrainerError, fact_of
 from palaestra_trainer.job.configuration import Configuration, dump
-from palaestra_trainer.job.run_directory import RunDirectory, replace_file
+from palaestra_trainer.job.run_directory import RunDirectory
 from palaestra_trainer.run import checkpoint
 from palaestra_trainer.run.best_model import Enough, forget_after
 from palaestra_trainer.run.callbacks import JobCallbacks, make_callbacks

@@ -21,19 +21,14 @@ import structlog
 from stable_baselines3.common.base_class import BaseAlgorithm
 
 from palaestra_protocol.pod.status import Cause
+from palaestra_protocol.whole_file import replace_file
 from palaestra_trainer import algorithms
 from palaestra_trainer.episodes.evaluation import Episode, EvaluationResult, evaluate_on_all
 from palaestra_trainer.episodes.scene_film import SceneFilm
 from palaestra_trainer.episodes.second_play import record_again
 from palaestra_trainer.episodes.seeds import CONFIRM, EVALUATE, episode_seeds
 from palaestra_trainer.errors import ConfigurationError, TrainerError
-from palaestra_trainer.job.run_directory import (
-    RunDirectory,
-    append_line,
-    drop_lines,
-    read_lines,
-    replace_file,
-)
+from palaestra_trainer.job.run_directory import RunDirectory, append_line, drop_lines, read_lines
 from palaestra_trainer.run import checkpoint
 from palaestra_trainer.run.context import RunContext
 from palaestra_trainer.run.logger import CurvesLogger

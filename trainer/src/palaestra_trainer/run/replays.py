@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from palaestra_protocol.scene import VisibleScene
+from palaestra_protocol.whole_file import replace_file
 from palaestra_trainer.episodes.evaluation import Episode, EvaluationResult
 from palaestra_trainer.episodes.scene_film import (
     MOST_SCENE_CHARACTERS,
@@ -19,7 +20,7 @@ from palaestra_trainer.episodes.scene_film import (
     SceneFilm,
     characters,
 )
-from palaestra_trainer.job.run_directory import RunDirectory, replace_file
+from palaestra_trainer.job.run_directory import RunDirectory
 from palaestra_trainer.reporting.read_replays import replays_of
 
 RecordAgain = Callable[[tuple[int, Episode]], SceneFilm]

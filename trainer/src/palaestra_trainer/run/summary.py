@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from palaestra_protocol.pod.status import SuccessInterval, Termination
+from palaestra_protocol.whole_file import replace_file
 from palaestra_trainer.job.configuration import Configuration
-from palaestra_trainer.job.run_directory import RunDirectory, read_lines, replace_file
+from palaestra_trainer.job.run_directory import RunDirectory, read_lines
 from palaestra_trainer.run.best_model import best_of, confirmation_of
 from palaestra_trainer.run.telemetry.goodput import trained_share
 from palaestra_trainer.run.telemetry.progress import Progress

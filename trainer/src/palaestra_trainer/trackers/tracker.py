@@ -17,7 +17,8 @@ import yaml
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import KVWriter
 
-from palaestra_trainer.job.run_directory import RunDirectory, replace_file
+from palaestra_protocol.whole_file import replace_file
+from palaestra_trainer.job.run_directory import RunDirectory
 
 TENSORBOARD = "tensorboard"  # the name by which a logged value can exclude TensorBoard
 

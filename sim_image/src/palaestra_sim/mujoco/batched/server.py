@@ -30,9 +30,9 @@ from palaestra_protocol.batch import (
     reset_parts,
 )
 from palaestra_protocol.fields import ProtocolError
+from palaestra_protocol.whole_file import write_whole
 from palaestra_sim.errors import SimError
 from palaestra_sim.mujoco.batched.world import BatchReadings, BatchWorld, Reset
-from palaestra_sim.whole_file import write_whole
 
 FRAME_S: Final = 10.0  # the longest time for the rest of a frame that has begun, and for a response
 _LOOPBACK: Final = "127.0.0.1"

@@ -14,8 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
+from palaestra_protocol.whole_file import sync
 from palaestra_trainer.algorithms.buffers import ValidReplayBuffer
-from palaestra_trainer.job.run_directory import sync
 from palaestra_trainer.run.checkpoint.manifest import EXPERIENCE, SavedCheckpoint, digest_of
 
 

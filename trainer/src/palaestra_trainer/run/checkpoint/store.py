@@ -12,8 +12,8 @@ from pathlib import Path
 import structlog
 from stable_baselines3.common.base_class import BaseAlgorithm
 
+from palaestra_protocol.whole_file import sync
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.job.run_directory import sync
 from palaestra_trainer.run.checkpoint import manifest, own_buffer, replay_store
 from palaestra_trainer.run.checkpoint.manifest import Manifest, SavedCheckpoint, digest_of
 from palaestra_trainer.run.checkpoint.state import TrainingState, replay_buffer
