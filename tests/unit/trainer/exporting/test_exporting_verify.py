@@ -38,7 +38,12 @@ def policy_of(cls, seen=NUMBERS, acted=FEW, scales=None, **options):
     model = cls(alias, DummyVecEnv([lambda: MaskedTask(seen, acted)]), **deepcopy(SMALL) | options)
     nowhere = Environment(id="nowhere")
     return TrainedPolicy(
-        model=model, environment_id="", environment_options={}, environment=nowhere, scales=scales or {}
+        model=model,
+        environment_id="",
+        environment_options={},
+        robot="Robotino",
+        environment=nowhere,
+        scales=scales or {},
     )
 
 

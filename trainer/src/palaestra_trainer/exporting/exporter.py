@@ -96,7 +96,7 @@ def export(run: Path, to: str, file: Path | None = None, results: Path | None = 
     if to == PACKAGE:
         path = file or run / PACKAGE
         package: Any = import_module(f"{__package__}.package")  # it imports the library for ONNX
-        package.write_package(path, content, configuration, directory, results)
+        package.write_package(path, content, loaded, configuration, directory, results)
     else:
         path = file or run / f"policy.{to}"
         replace_file(path, lambda name: name.write_bytes(content))

@@ -21,9 +21,9 @@ from palaestra_protocol.whole_file import replace_file
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.exporting.measurements import own_result, results_of
 from palaestra_trainer.exporting.onnx_file import sheet_of
-from palaestra_trainer.job.configuration import DEFAULT_ROBOT, Configuration
+from palaestra_trainer.job.configuration import Configuration
 from palaestra_trainer.job.run_directory import RunDirectory, read_lines
-from palaestra_trainer.simulators.robot_registry import robot_class
+from palaestra_trainer.run.policies import TrainedPolicy
 
 JOB = "job.yaml"  # the TrainingJob; only a run of `palaestra run` has this file
 _OURS = frozenset({NETWORK, MODEL, JOB, TRAINING, MANIFEST})
@@ -32,13 +32,19 @@ _ZIP = ".zip"
 
 
 def write_package(
-    place: Path, network: bytes, configuration: Configuration, run: RunDirectory, results: Path | None = None
+    place: Path,
+    network: bytes,
+    policy: TrainedPolicy,
+    configuration: Configuration,
+    run: RunDirectory,
+    results: Path | None = None,
 ) -> None:
     """Write a package, or replace an older package.
 
     Args:
         place: the folder of the package; or its zip, if the name ends in `.zip`.
         network: the exported policy, as the content of an ONNX file with its data sheet.
+        policy: the exported policy.
         configuration: the configuration of the run.
         run: the run directory.
         results: a file with further results of the policy, as `palaestra-eval --json` prints them.
@@ -51,7 +57,7 @@ def write_package(
     files = {NETWORK: network, MODEL: run.model.read_bytes(), TRAINING: run.configuration.read_bytes()}
     if (job := run.path / JOB).is_file():
         files[JOB] = job.read_bytes()
-    description = _description(sheet_of(network), configuration, run)
+    description = _description(sheet_of(network), policy, configuration, run)
     if results is not None:
         description["evaluated"] += results_of(results, run.model)
     files[MANIFEST] = manifest_text(description, files)
@@ -85,10 +91,11 @@ def _write(content: bytes, path: Path) -> None:
     path.write_bytes(content)
 
 
-def _description(sheet: Mapping[str, Any], configuration: Configuration, run: RunDirectory) -> dict[str, Any]:
+def _description(
+    sheet: Mapping[str, Any], policy: TrainedPolicy, configuration: Configuration, run: RunDirectory
+) -> dict[str, Any]:
     """Return the fields of the manifest, except those about its files."""
-    name = configuration.robot or DEFAULT_ROBOT
-    robot = robot_class(name)
+    robot = policy.robot_class
     attempts = list(read_lines(run.attempts))
     return {
         "palaestra": version("palaestra-trainer"),
@@ -96,7 +103,7 @@ def _description(sheet: Mapping[str, Any], configuration: Configuration, run: Ru
         "versions": attempts[-1].get("versions", {}) if attempts else {},
         "job": configuration.job,
         "replica": configuration.replica,
-        "robot": {"class": name, "definition": robot.definition, "period_s": robot.period_ms / _MS},
+        "robot": {"class": policy.robot, "definition": robot.definition, "period_s": robot.period_ms / _MS},
         "policy": dict(sheet),
         "evaluated": own_result(configuration, run),
         "reproduce": f"palaestra run {JOB}" if (run.path / JOB).is_file() else None,

@@ -17,11 +17,13 @@ from palaestra_trainer.algorithms import entry_of, predict_allowed, takes_masks
 from palaestra_trainer.environments.make import keywords, make_environment
 from palaestra_trainer.environments.masks import masks_in
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.job.configuration import Configuration, Environment, load
+from palaestra_trainer.job.configuration import DEFAULT_ROBOT, Configuration, Environment, load
 from palaestra_trainer.job.run_directory import RunDirectory
 from palaestra_trainer.robots.base import RobotAbc, Scene
+from palaestra_trainer.robots.simulated import SimulatedRobot
 from palaestra_trainer.run.byte_code import refuse_another_python
 from palaestra_trainer.run.checkpoint.tensors import NORMALIZE
+from palaestra_trainer.simulators.robot_registry import robot_class
 
 
 class Scale(NamedTuple):
@@ -41,6 +43,7 @@ class TrainedPolicy:
         model: the Stable-Baselines3 model, which needs normalized observations if the run normalized them.
         environment_id: name of the environment in which the policy learned.
         environment_options: keyword arguments of that environment, without robot and scene.
+        robot: the class of the robot that learned, as `trainer.robot` of the job names it.
         environment: the job's settings of that environment, including its wrappers.
         scales: mean, variance, clip and epsilon by the key of the observation, or by "" if the observation is
             not a Dict; values under other keys are not normalized.
@@ -49,8 +52,18 @@ class TrainedPolicy:
     model: BaseAlgorithm
     environment_id: str
     environment_options: dict[str, Any]
+    robot: str
     environment: Environment
     scales: Mapping[str, Scale]
+
+    @property
+    def robot_class(self) -> type[SimulatedRobot]:
+        """The class of the robot that learned.
+
+        Raises:
+            ConfigurationError: the class cannot be imported.
+        """
+        return robot_class(self.robot)
 
     @property
     def takes_masks(self) -> bool:
@@ -136,6 +149,7 @@ def load_policy(run_or_zip: str | Path) -> TrainedPolicy:
         model=_load(model, configuration),
         environment_id=environment.id,
         environment_options=keywords(environment),
+        robot=configuration.robot or DEFAULT_ROBOT,
         environment=environment,
         scales=_scales(model),
     )
