@@ -204,27 +204,31 @@ def test_a_new_connection_takes_the_place_of_an_idle_one(server):
 def peer():
     """`peer(pieces)` returns the address of a program that answers with these pieces and then waits."""
     ended = threading.Event()
-    sockets = []
+    begun = []
 
     def begin(pieces, pace_s=0.0):
         listening = socket.create_server(("127.0.0.1", 0))
-        sockets.append(listening)
 
         def answer():
-            connection, _ = listening.accept()
-            sockets.append(connection)
             with contextlib.suppress(OSError):
-                for piece in pieces:
-                    connection.sendall(piece)
-                    ended.wait(pace_s)
+                connection, _ = listening.accept()
+                with connection:
+                    for piece in pieces:
+                        connection.sendall(piece)
+                        ended.wait(pace_s)
+                    ended.wait(PATIENCE_S)
 
-        threading.Thread(target=answer, daemon=True).start()
+        thread = threading.Thread(target=answer, daemon=True)
+        thread.start()
+        begun.append((listening, thread))
         return f"http://127.0.0.1:{listening.getsockname()[1]}/"
 
     yield begin
     ended.set()
-    for each in sockets:
-        each.close()
+    for listening, thread in begun:
+        listening.shutdown(socket.SHUT_RDWR)  # a thread that still waits for a connection ends
+        thread.join(PATIENCE_S)
+        listening.close()
 
 
 HEAD = b"HTTP/1.1 200 OK\r\nContent-Type: text/xml\r\n"
