@@ -42,12 +42,13 @@ def test_a_node_with_another_address_replaces_the_old_one_of_its_name(registered
 
 
 def test_a_service_has_the_address_of_the_node_that_registered_last():
-    """A restarted simulator registers the same service names."""
+    """A restarted simulator registers the same service names. The old node had no other registration."""
     nodes = Registrations()
     nodes.register_service("/s", "/a", "http://a", "rosrpc://a")
     nodes.register_service("/s", "/b", "http://b", "rosrpc://b")
 
     assert nodes.address_of("/s") == "rosrpc://b"
+    assert not nodes.knows("/a")
     assert not nodes.unregister_service("/s", "/a", "rosrpc://a")
     assert nodes.unregister_service("/s", "/b", "rosrpc://b")
     assert nodes.address_of("/s") is None

@@ -60,6 +60,9 @@ class Registrations:
     def register_service(self, service: str, node: str, uri: str, address: str) -> str | None:
         """Register the only node that serves `service`; return the same value as `register`."""
         replaced = self._entered(Kind.SERVICE, service, node, uri)
+        owner, _ = self._service_uris.get(service, (node, ""))
+        if owner != node:
+            self._left(Kind.SERVICE, service, owner)
         self._members[Kind.SERVICE][service] = {node: uri}
         self._service_uris[service] = (node, address)
         return replaced
