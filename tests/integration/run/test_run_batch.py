@@ -128,6 +128,18 @@ def test_a_row_equals_the_environment_over_ros(task, cartpole, master) -> None:
             assert told(infos[0]) == told(info[0])
 
 
+def test_a_reset_and_a_step_simulate_one_period_of_each_row() -> None:
+    """The metric of simulated time counts the copies, and divided by the wall time it is their speed."""
+    with batch_env() as (env, _):
+        member = env._restarter.member
+        before = member.simulated_s
+        env.reset()
+        [action] = actions_of(env, 1)
+        env.step(action)
+
+        assert member.simulated_s - before == pytest.approx(2 * ROWS * 0.192)
+
+
 def test_a_resume_continues_every_row_bit_for_bit(cartpole) -> None:
     """An interrupted run must equal an uninterrupted one, even if copies were reset after the checkpoint."""
     for changes in ({}, cartpole):

@@ -117,7 +117,7 @@ class BatchedRobot(BatchedRobotAbc):
         reading = self._link.reset(reset)
         self._commands[reset.rows] = reset.commands
         self._put(reset.rows, reading)
-        self.simulated_s += 2.0 * self.period_s * len(reset.rows)
+        self.simulated_s += self.period_s * len(reset.rows)
 
     def poses(self) -> Floats:
         """Return x and y in meters and the heading in radians of each row's robot: (rows, 3)."""
