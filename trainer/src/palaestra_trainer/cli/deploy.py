@@ -157,7 +157,7 @@ def arguments_parser() -> argparse.ArgumentParser:
     add(
         "--no-hold",
         action="store_true",
-        help="drive without a held key; only if the robot cannot hit a person",
+        help=_NO_HOLD,
     )
     add("--sensor-order", choices=ORDERS, default=ORDERS[0], help="order of the robot's distance sensors")
     add("--sensor-unit", choices=UNITS, default=UNITS[0], help="unit of the robot's distance sensors")
