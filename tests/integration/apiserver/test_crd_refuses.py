@@ -188,7 +188,7 @@ def test_a_driver_that_is_a_command_needs_one(create):
     )
 
     assert code == 1
-    assert_says(said, "spec.simulators[0].command.*is for driver command, which requires it; set both")
+    assert_says(said, "spec.simulators[0].command.*is for driver command only, .*; set both")
 
 
 def groups_with_worlds(*lengths):

@@ -106,7 +106,7 @@ def test_a_namespace_in_the_job_is_that_of_the_command(file, client):
         load(file(job={**JOB, "metadata": {"name": "j", "namespace": "x"}}, matrix={"seed": [1]}))
     )
 
-    with pytest.raises(PalaestraError, match=r"metadata\.namespace: is x, and the sweep is for .*; choose"):
+    with pytest.raises(PalaestraError, match=r"metadata\.namespace: is x, but the sweep creates .*; choose"):
         ClusterBackend(client, "s", None, print).check(trial.job)
 
 

@@ -157,7 +157,7 @@ def test_the_policy_node_drives_to_goals_in_the_time_of_clock(mock, package, tmp
         node(package, "in-a-simulation", *fenced, "--", "--record", bag) as (program, log),
     ):
         send(robot, "map", (x_m, y_m))
-        wait_for(log, "goal ignored: its frame is map, that of odometry is odom")
+        wait_for(log, "goal ignored: its frame is map, but the frame of odometry is odom")
         send(robot, "odom", (x_m + 2.0, y_m))
         wait_for(log, "is too close to the fence")
         assert mock.get("/mock/truth")["x"] == 0.0

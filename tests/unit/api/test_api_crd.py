@@ -235,7 +235,7 @@ def test_a_field_of_a_part_is_kept_by_a_rule_of_its_own() -> None:
 
 
 def test_groups_cannot_be_added_or_removed() -> None:
-    """Rules on items see only items that existed before, so the list needs a rule of its own."""
+    """A rule on an item applies only to an item that existed before, so the list needs a rule of its own."""
     assert rules_of("spec.simulators")[-1]["rule"] == (
         "size(self) == size(oldSelf) && self.all(item, oldSelf.exists(old, old.name == item.name))"
     )

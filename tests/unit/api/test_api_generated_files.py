@@ -36,7 +36,7 @@ EXAMPLES = [
     "name", ["manifests/crd.yaml", "charts/palaestra/crd.yaml", "docs/reference/trainingjob.md"]
 )
 def test_the_committed_file_is_current(name, repository) -> None:
-    """If the models have changed, `make golden` generates these files again."""
+    """After a change of the models, these files are outdated until `make golden` generates them again."""
     assert (repository / name).read_text(encoding="utf-8") == generated_files(repository)[name]
 
 
@@ -61,7 +61,7 @@ def test_every_example_is_tested_here(repository) -> None:
 
 
 def test_the_smallest_example_is_twelve_lines_at_most(repository) -> None:
-    """The README shows this job, which must be short. So the other fields need good defaults."""
+    """The README shows this job, so it must be short, and most fields need good defaults."""
     text = (repository / "manifests/examples/minimal.yaml").read_text(encoding="utf-8")
 
     assert len(text.splitlines()) <= 12
@@ -85,7 +85,7 @@ def test_the_examples_show_what_their_names_say(repository) -> None:
 
 
 def test_the_example_for_mujoco_is_the_same_job_with_another_driver(repository) -> None:
-    """`make run SIM=mujoco` changes only the driver, so that policies can be compared with the stub's."""
+    """Policies of `make run SIM=mujoco` and of the stub can be compared only if their jobs are equal."""
     folder = repository / "manifests/examples"
     stub, mujoco = (
         load((folder / f"{name}.yaml").read_text(encoding="utf-8"), name).spec

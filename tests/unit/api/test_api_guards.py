@@ -64,7 +64,7 @@ def job(spec):
 
 @pytest.mark.parametrize("name", BROKEN)
 def test_an_address_with_a_password_is_reported_without_it(name):
-    """The message goes into a status, which more people can read than the spec."""
+    """The message becomes part of the status, and more people may read the status than the spec."""
     spec, line = BROKEN[name]
 
     assert broken_guards(job(spec)) == (line,)

@@ -39,7 +39,7 @@ def test_a_path_is_read_as_it_is_shown(path) -> None:
 
 @pytest.mark.parametrize("text", ["", ".a", "a..b", "a.", "a[", "a[-1]", 'a["b]', 'a["\\x"]', "a-b"])
 def test_a_text_that_is_no_path_is_empty(text) -> None:
-    """`path_of` returns an empty path for a mistyped text, which therefore names no field."""
+    """For a mistyped text, `path_of` returns an empty path, and no field has an empty path."""
     assert path_of(text) == ()
 
 
@@ -64,9 +64,9 @@ def test_what_is_not_there_cannot_be_taken() -> None:
 
 
 def test_a_stand_in_is_put_once() -> None:
-    """`take` puts the stand-in only once.
+    """`take` replaces a wrong value by a valid stand-in, so that the other fields can be checked.
 
-    If the error stays, it is in the stand-in itself, and `take` returns False.
+    A second error at this path is an error of the stand-in itself, so `take` returns False.
     """
     pruned = Pruned({"metadata": 3})
 

@@ -195,7 +195,7 @@ def test_a_mutilated_job_is_accepted_or_refused_in_words(job, draw) -> None:
 
 @given(JOBS, st.data())
 def test_whatever_is_taken_from_a_job_file_the_reader_copes(job, draw) -> None:
-    """An editor that crashes may leave half a file."""
+    """An editor that crashes may leave half a file, which must give an error message and not a traceback."""
     text = yaml.safe_dump(job)
     start = draw.draw(st.integers(0, len(text)))
     end = draw.draw(st.integers(start, len(text)))
@@ -265,7 +265,7 @@ AFFINITIES = st.fixed_dictionaries(
 
 @given(AFFINITIES)
 def test_any_affinity_of_a_pod_is_accepted(affinity):
-    """The API server accepts any affinity of a pod in a job.
+    """The API server accepts in a job every affinity that it accepts in a pod.
 
     The models must accept it too, or the operator would refuse the job after `kubectl apply`.
     """

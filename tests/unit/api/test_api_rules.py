@@ -85,17 +85,23 @@ BROKEN = {
     "copies in several simulators": (
         {**COPIES, "simulators.0.standby": True},
         (
-            "spec.simulators[0].batch: excludes count, standby, reset and recycle; remove them, "
-            "or remove batch"
+            "spec.simulators[0].batch: cannot be combined with count, standby, reset and recycle; "
+            "remove them, or remove batch"
         ),
     ),
     "a driver without its command": (
         {"simulators.0.driver": "command", "simulators.0.image": "mine:1"},
-        "spec.simulators[0].command: is for driver command, which requires it; set both or neither",
+        (
+            "spec.simulators[0].command: is for driver command only, and is required with that driver; "
+            "set both or neither"
+        ),
     ),
     "a command without its driver": (
         {"simulators.0.command": ["simulate"]},
-        "spec.simulators[0].command: is for driver command, which requires it; set both or neither",
+        (
+            "spec.simulators[0].command: is for driver command only, and is required with that driver; "
+            "set both or neither"
+        ),
     ),
     "a program in no image": (
         {"simulators.0.driver": "command", "simulators.0.command": ["simulate"]},

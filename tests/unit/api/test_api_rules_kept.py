@@ -1,4 +1,4 @@
-"""A rule accepts every job that keeps it, also one that differs little from a job that breaks it."""
+"""A rule accepts every job that keeps it, even if a small change of the job would break the rule."""
 
 import pytest
 

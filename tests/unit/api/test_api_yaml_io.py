@@ -103,7 +103,7 @@ def test_a_document_without_end_is_refused(text, fact) -> None:
 
 
 def test_aliases_count_as_often_as_they_are_used() -> None:
-    """Nine lines of aliases can expand to a billion values."""
+    """Nine lines of aliases can expand to a billion values, so the limit must count each use of an alias."""
     lines = ["a0: &a0 [x, x, x, x, x, x, x, x, x, x]"]
     lines += [f"a{n}: &a{n} [{', '.join([f'*a{n - 1}'] * 10)}]" for n in range(1, 9)]
 

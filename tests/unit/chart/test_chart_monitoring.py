@@ -82,7 +82,7 @@ def test_runbooks_are_links_if_a_value_has_the_address():
 def test_every_dashboard_is_mounted_as_it_is(made):
     """Grafana's sidecar finds a dashboard only by the label `grafana_dashboard`.
 
-    The content must be that of the file, which other tests check.
+    Other tests check the file, so the mounted content must be equal to it.
     """
     found = {
         name: (json.loads(text), each["metadata"]["labels"].get("grafana_dashboard"))

@@ -222,7 +222,7 @@ def test_the_image_of_webots_has_no_default(made, image, chosen):  # noqa: ARG00
 def test_every_image_comes_from_the_registry_by_its_digest(made, one):
     """An offline cluster can pull only from this registry.
 
-    So the images of tests and options must come from it too.
+    So the chart must take every image from it, also those of `helm test` and of the optional servers.
     """
     images = {container["image"] for pod in pods(made("offline")).values() for container in pod["containers"]}
     chosen = options(one("offline", "Deployment"))

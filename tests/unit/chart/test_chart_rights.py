@@ -67,7 +67,7 @@ def test_roles_of_one_name_are_distinguished_by_their_namespaces():
 
 
 def test_what_another_account_holds_is_not_granted():
-    """Both the namespace and the name identify a service account."""
+    """A service account of the same name in another namespace is another account."""
     bound = role("reads")
 
     assert granted([bound, binding(bound, "trial")], "robots", "operator") == set()

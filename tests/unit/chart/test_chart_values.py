@@ -131,7 +131,7 @@ def test_every_value_has_a_sentence(value):
 
 @pytest.mark.parametrize("mode", MODES)
 def test_helm_finds_nothing_wrong(mode):
-    """`helm lint --strict` treats warnings as errors."""
+    """Helm's own linter finds mistakes that an installation accepts; `--strict` makes warnings errors."""
     values = yaml.safe_dump(MODES[mode])
 
     assert "0 chart(s) failed" in helm("lint", str(CHART), "--strict", "--values=-", sent=values)

@@ -167,7 +167,7 @@ def test_world_without_a_job_is_refused(tmp_path, fails):
 
 
 def test_world_can_be_checked_by_each_simulator(tmp_path, capsys):
-    """The author of a world learns which simulators accept it, and none of them is started."""
+    """The author of a world sees which simulators accept it, and need not start a simulator."""
     path = tmp_path / "my.wbt"
     path.write_bytes(builtin("arena"))
     assert main(["world", str(path), "--check"]) == 0
@@ -216,7 +216,7 @@ def test_world_s_help_names_all_that_changes(capsys):
 
 
 def test_crd_prints_a_custom_resource_definition(capsys):
-    """The printed definition belongs to the installed release."""
+    """A user can apply the definition of the installed release without a copy of the repository."""
     assert main(["crd"]) == 0
 
     crd = yaml.safe_load(capsys.readouterr().out)
@@ -384,7 +384,7 @@ def test_help_and_version_say_what_they_are(arguments, capsys):
 
 
 def test_export_is_the_trainers_program_with_its_exit_code(tmp_path, capfd):
-    """The command runs the trainer's program, which has PyTorch, and passes on its exit code and message."""
+    """Only the trainer's program has PyTorch, so the command runs it and returns its exit code."""
     assert main(["export", str(tmp_path / "none"), "--to", "onnx"]) == 2
 
     out, err = capfd.readouterr()
@@ -403,7 +403,7 @@ def test_export_without_the_trainer_is_refused(tmp_path, monkeypatch, capsys):
 
 @pytest.mark.parametrize("name", ["package", "package.zip"])
 def test_a_run_does_not_begin_with_a_damaged_package(job, tmp_path, capsys, name):
-    """A policy with one wrong weight would train on without a word."""
+    """If one weight of the policy were wrong, the run would continue the training without an error."""
     package = tmp_path / name
     files = {"model.zip": b"another model", MANIFEST: manifest_text({}, {"model.zip": b"the model"})}
     if package.suffix:

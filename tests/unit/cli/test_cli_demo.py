@@ -20,7 +20,7 @@ def test_the_demo_trains_the_example_of_make_run():
 
 
 def test_the_policy_plays_in_the_world_in_which_it_learned():
-    """In the world of its training the policy reaches the target, which the viewer should see."""
+    """A viewer should see the policy reach the target, and the policy has learned this in only one world."""
     learns = demo_job()
 
     plays = playing_job(learns, Path("/runs/demo/0"))

@@ -9,11 +9,11 @@ from palaestra.cli import main
 
 
 def test_the_project_starts_the_controller_with_this_python(tmp_path, capsys):
-    """Webots reads the interpreter from the first line; another one would not have the package."""
+    """Webots reads the interpreter from the first line, and another interpreter may lack the package."""
     folder = tmp_path / "new" / "project"
 
     assert main(["webots-project", str(folder)]) == 0
-    assert main(["webots-project", str(folder)]) == 0  # a second time it renews its own file
+    assert main(["webots-project", str(folder)]) == 0  # overwrites its own file
 
     controller = folder / "controllers" / "ros" / "ros.py"
     first = controller.read_text().partition("\n")[0]
@@ -30,7 +30,7 @@ def test_the_project_starts_the_controller_with_this_python(tmp_path, capsys):
 
 @pytest.mark.parametrize(("name", "text"), [("ros", ""), ("ros.py", "print('mine')"), ("helper.py", "")])
 def test_a_controller_of_the_user_is_kept(tmp_path, capsys, name, text):
-    """Webots would start a user's binary and not our script, and a user's script would be overwritten."""
+    """Webots prefers a user's binary to our script, and the command must not overwrite a user's script."""
     file = tmp_path / "controllers" / "ros" / name
     file.parent.mkdir(parents=True)
     file.write_text(text)
@@ -42,6 +42,6 @@ def test_a_controller_of_the_user_is_kept(tmp_path, capsys, name, text):
 
 
 def test_a_folder_that_cannot_be_written_is_named(capsys):
-    """The reason is one sentence, and nothing was written."""
+    """A person must see one sentence with the remedy, not a traceback."""
     assert main(["webots-project", "/proc/project"]) == 2
     assert capsys.readouterr().err.endswith("give a folder in which you can write\n")

@@ -38,5 +38,5 @@ def test_what_was_made_for_a_job_concerns_it(kind, name, uid):
     ],
 )
 def test_what_only_looks_like_it_does_not(kind, name, uid):
-    """A TrainingJob `job-0` may exist next to `job`, whose child also has the name `job-0`."""
+    """A TrainingJob `job-0` may exist next to a TrainingJob `job`, whose child has the name `job-0` too."""
     assert not concerns(event(kind, name, uid), running_job())

@@ -53,7 +53,7 @@ def test_the_claims_of_a_trial_go_with_it_unless_its_author_keeps_them(written, 
     [("Pending", "True", "Running"), ("Pending", "False", "Accepted"), ("Failed", "True", "Failed")],
 )
 def test_a_trial_that_did_not_succeed_reports_the_whole_message(phase, accepted, subject, monkeypatch):
-    """Only one condition has the whole message, and the others only refer to it."""
+    """The report must take the message from the one condition that has it: the others only refer to it."""
     conditions = [
         {
             "type": kind,

@@ -48,7 +48,7 @@ def test_the_namespace_is_that_of_the_chosen_context(written):
 
 
 def test_a_context_that_is_missing_is_named_with_the_command_that_lists_contexts(written):
-    """A person has probably mistyped the name."""
+    """A person who mistyped the name finds the right name with this command."""
     with pytest.raises(
         NotConfigured, match=r"--context: .* has no context 'usaul'; `kubectl config get-cont"
     ):
@@ -77,7 +77,7 @@ def test_a_cluster_without_fields_is_refused_by_its_name(tmp_path, written):
 
 
 def test_the_token_of_an_oidc_provider_is_used_while_it_is_valid(written):
-    """Clusters of some universities still write this provider, which needs no request for a valid token."""
+    """Some universities still give out kubeconfigs with this provider. A valid token needs no request."""
     valid = token(time.time() + 3600)
     user = {"auth-provider": {"name": "oidc", "config": {"id-token": valid, "idp-issuer-url": SERVER}}}
 
@@ -85,7 +85,7 @@ def test_the_token_of_an_oidc_provider_is_used_while_it_is_valid(written):
 
 
 def test_an_identity_provider_that_does_not_respond_is_an_error_that_a_retry_may_solve(written, monkeypatch):
-    """A person needs the name of the field, and not a traceback of the official client."""
+    """The provider may respond later. Until then, a person needs the name of the field, not a traceback."""
     monkeypatch.setenv("NO_PROXY", "127.0.0.1")
     config = {"id-token": token(1), "refresh-token": "r", "idp-issuer-url": "http://127.0.0.1:1"}
     user = {"auth-provider": {"name": "oidc", "config": config}}

@@ -81,4 +81,4 @@ def test_only_so_many_counts_are_remembered(server, monkeypatch):
         recorder.record(JOB, "Normal", "Planned", message, once=True)
 
     assert counts(server) == [1, 1]
-    assert server.requests == ["create"] * 3  # the first event was forgotten, so the server answers again
+    assert server.requests == ["create"] * 3  # the recorder has forgotten "first", so it asks the server

@@ -108,7 +108,7 @@ def test_an_authority_that_was_replaced_is_trusted_within_a_minute(files, tmp_pa
 
 
 def test_outside_of_a_pod_there_is_no_account(files, monkeypatch):
-    """A laptop may have such files, but it is not in a pod and has no service account."""
+    """A laptop may have such files, but without the variables of a pod it has no service account."""
     monkeypatch.delenv("KUBERNETES_SERVICE_HOST")
 
     with pytest.raises(NotConfigured, match="KUBERNETES_SERVICE_HOST"):
@@ -121,7 +121,7 @@ def test_outside_of_a_pod_there_is_no_account(files, monkeypatch):
     ids=["none", "for all", "not for the cluster's network"],
 )
 def test_a_proxy_of_the_environment_is_used_but_where_it_says_not(files, monkeypatch, proxy, direct, proxied):
-    """`kubectl` obeys the same variables, also if NO_PROXY lists networks."""
+    """The operator must use the same proxy as `kubectl`, which accepts networks in NO_PROXY too."""
     if proxy:
         monkeypatch.setenv("HTTPS_PROXY", proxy)
     monkeypatch.setenv("NO_PROXY", direct)

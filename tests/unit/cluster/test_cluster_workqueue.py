@@ -95,7 +95,7 @@ def test_names_are_handed_out_in_the_order_in_which_they_came():
 
 
 def test_a_crowd_in_one_lane_delays_no_other_lane():
-    """In each round every tenant gets one turn, also a tenant with a thousand jobs."""
+    """In each round every tenant gets one turn, even a tenant with a thousand jobs."""
     queue = WorkQueue(lane=lambda key: key[0])
     for key in ("a1", "a2", "a3", "b1", "b2", "c1"):
         queue.add(key)

@@ -14,7 +14,7 @@ from tests.waiting import eventually
 
 CLUSTER = Path(__file__).parents[2] / "cluster"
 END_S = 30
-CLEANING_S = 0.3  # duration of the cleanup of interrupted tests; the cluster must exist until its end
+CLEANING_S = 0.3  # interrupted tests clean up for this time, in which the cluster must still exist
 INTERRUPTED = 130
 TOLD = 'echo "$(basename "$0")" >>"$CALLS"\n'
 PROGRAMS = {
@@ -86,7 +86,7 @@ class E2e:
 
     @property
     def calls(self):
-        """The recorded calls, in order."""
+        """Return the recorded calls, in order."""
         return self._calls.read_text().split() if self._calls.exists() else []
 
     def stands(self, *, by_e2e):

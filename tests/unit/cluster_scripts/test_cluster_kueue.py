@@ -43,7 +43,7 @@ def made(folder):
 
 
 def test_the_chart_names_the_image_that_is_made_with_it(tmp_path):
-    """Kueue's own chart names a staging image that is always pulled, which a node here could not do."""
+    """A node of the test cluster cannot pull the staging image that Kueue's own chart always pulls."""
     objects = yaml.safe_load_all(helm("template", "kueue", str(made(tmp_path))))
     deployments = [each["spec"]["template"]["spec"] for each in objects if each["kind"] == "Deployment"]
 

@@ -187,7 +187,7 @@ def test_what_a_job_asks_for_itself_is_free(make_scene, name):
     ],
 )
 def test_a_job_that_requests_a_gpu_tolerates_the_taint_of_nodes_with_gpus(make_scene, resources, free):
-    """The admission plugin ExtendedResourceToleration of Kubernetes adds the same toleration."""
+    """Kubernetes' plugin ExtendedResourceToleration adds the same toleration, so no permission is needed."""
     scene = make_scene(scheduling={"tolerations": [GPU]}, trainer={"resources": resources})
 
     scene.settle()
@@ -197,7 +197,7 @@ def test_a_job_that_requests_a_gpu_tolerates_the_taint_of_nodes_with_gpus(make_s
 
 @pytest.mark.parametrize("key", ["node.kubernetes.io/unschedulable", "memory"])
 def test_a_resource_of_every_node_opens_no_taint(make_scene, key):
-    """A scheduler ignores unknown resources of kubernetes.io, so a request for one proves nothing."""
+    """Every node satisfies such a request, so the request does not show that the pod needs a special node."""
     asks = {"resources": {"requests": {key: "1"}}}
     scene = make_scene(scheduling={"tolerations": [{"key": key, "operator": "Exists"}]}, trainer=asks)
 

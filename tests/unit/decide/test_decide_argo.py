@@ -67,7 +67,7 @@ def test_a_job_that_its_spec_suspends_is_suspended(make_scene, health):
 
 
 def test_a_job_that_failed_is_degraded_also_without_the_condition(training, last_word, health):
-    """An older CustomResourceDefinition does not accept the condition Stalled."""
+    """An older CustomResourceDefinition rejects the condition Stalled, so the phase alone must be enough."""
     scene, pod = training()
     scene.end(pod, 81, last_word(reason="Diverged: NaN"))
     scene.end_job("Failed", 0, "PodFailurePolicy")

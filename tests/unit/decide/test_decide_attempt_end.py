@@ -201,7 +201,7 @@ def test_a_pod_that_was_deleted_and_did_not_save_in_time_is_a_failure(training):
     scene.settle()
 
     assert last(scene) == (1, 137, "TrainerFailed")
-    assert "its pod was deleted, and it did not save in time" in scene.replica().last_attempt.message
+    assert "the pod was deleted, and the trainer did not save in time" in scene.replica().last_attempt.message
     assert (scene.replica().restarts.trainer, scene.replica().restarts.disruption) == (1, 0)
 
 

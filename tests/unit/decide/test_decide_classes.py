@@ -19,7 +19,7 @@ def replacements(decision):
 
 
 def forget(scene):
-    """Create the next pod, whose node never starts the trainer, and decide until the operator notices it."""
+    """Create the next pod on a node that never starts the trainer, and decide after the grace time."""
     pod = scene.running_pod()
     scene.container(pod, "trainer", waiting="PodInitializing")
     scene.settle()
@@ -206,7 +206,7 @@ def test_a_pod_that_is_marked_and_lives_is_evicted_again(accepted):
 
 
 def test_a_disruption_budget_that_allows_no_eviction_is_reported(accepted):
-    """The operator retries the eviction and does not delete the pod, which would ignore the budget."""
+    """The operator retries the eviction. If it deleted the pod instead, it would ignore the budget."""
     scene = accepted()
     scene.budget = True
     forget(scene)
@@ -243,7 +243,7 @@ def test_pods_are_replaced_as_often_as_the_limit_allows(accepted, limit):
 def test_dropped_restart_policies_are_found_out_at_once(accepted):
     """A pod without these restart policies never starts its trainer.
 
-    A person may fix the webhook that dropped them before the last retry.
+    With an early message, a person can fix the webhook while the replica still has retries.
     """
     scene = accepted()
     pod = scene.new_pod()

@@ -116,7 +116,7 @@ def test_a_new_process_believes_a_trainer_that_tells_how_long_it_stands(training
 
 
 def test_active_time_is_kept_by_the_status_and_goes_on_in_a_new_process(training):
-    """A restart loses only the time since the last write of the status, which makes the deadline later."""
+    """A restart loses the active time since the last write of the status, so the deadline comes later."""
     scene, pod = training(activeDeadlineSeconds=100)
     scene.poll(pod, step=1)
     scene.settle(60)
@@ -179,7 +179,7 @@ def test_a_completion_time_is_the_operators_own(training, last_word, server_s):
 
 
 def kill(scene, pod, run):
-    """Let the kernel kill the simulator in a run of its container, which the kubelet then restarts."""
+    """Let the kernel kill the simulator in a run of its container; the kubelet restarts the container."""
     scene.container(pod, "sim-collect-0", running=True, restarts=run + 1)
     ended = {"exitCode": 137, "reason": "OOMKilled", "finishedAt": scene.node_stamp()}
     for each in pod["status"]["initContainerStatuses"]:

@@ -53,7 +53,7 @@ def test_an_edit_of_the_network_policy_is_said_and_left_alone(training):
 
 
 def test_an_edit_is_to_be_written_once(training):
-    """Each change of any object causes a reconcile, which would repeat the event."""
+    """Each change of any object causes a reconcile, and each reconcile would repeat the event."""
     scene, _ = training()
     scene.job()["spec"]["parallelism"] = 0
 

@@ -23,7 +23,7 @@ def config_map(data=None, labels=None):
 
 
 def held(scene):
-    """Return the reason and the message of the condition Accepted, which must be False."""
+    """Require that the condition Accepted is False, and return its reason and its message."""
     accepted = scene.status.conditions[0]
     assert (accepted.type.value, accepted.status.value) == ("Accepted", "False")
     return accepted.reason, accepted.message

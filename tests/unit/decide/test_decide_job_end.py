@@ -80,7 +80,7 @@ def test_a_trainer_that_was_killed_for_its_memory_is_reported_with_its_limit(tra
 
 
 def test_a_simulator_that_hung_each_time_is_distinguished_from_a_stalled_run(training, last_word):
-    """Both have exit code 82, and only the trainer's termination message has the cause."""
+    """Both kinds of end have exit code 82, and only the trainer's termination message has the cause."""
     scene, pod = training()
     scene.end(pod, 82, last_word(reason="SimulatorHung: collect-0: no answer within 600 s"))
     scene.end_job("Failed", 0, "BackoffLimitExceeded")

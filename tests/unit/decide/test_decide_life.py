@@ -16,7 +16,7 @@ def kinds(decision):
 
 
 def test_nothing_is_created_before_the_status_holds_the_images(make_scene):
-    """After any write an operator of another release may take over, which must plan the same objects."""
+    """After any write, an operator of another release may take over and must plan the same objects."""
     scene = make_scene()
 
     first = scene.step()
@@ -46,7 +46,7 @@ def test_a_newer_release_plans_mujoco_with_the_image_of_the_old_one(make_scene):
 
 
 def test_a_newer_release_plans_with_the_images_of_the_old_one(make_scene):
-    """The operator stored these images when it accepted the job, which keeps them for its whole life."""
+    """A job keeps the images that the status got when the operator accepted the job."""
     scene = make_scene(replicas=2)
     scene.step()
     scene.layout = type(scene.layout)(images=type(scene.layout.images).of_release("2"))

@@ -229,7 +229,7 @@ def test_a_replica_that_has_not_trained_gets_a_new_claim(training):
 def test_a_claim_of_a_replica_that_has_ended_is_not_looked_for(training, last_word):
     """People delete the claims of finished jobs.
 
-    The operator would request such a claim every ten seconds.
+    Without this rule, the operator would request such a claim every ten seconds.
     """
     scene, pod = training()
     scene.end(pod, 0, last_word(step=500, reason="Completed"))

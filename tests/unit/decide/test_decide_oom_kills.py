@@ -12,7 +12,7 @@ GROUPS = [GROUP, {"name": "evaluate", "role": "Evaluate"}]
 
 @pytest.fixture
 def scene_and_pod(training):
-    """Return a job that trains, whose collecting simulator has a memory limit, and its pod."""
+    """Return a job that trains, and its pod; the collecting simulator has a memory limit."""
     return training(simulators=GROUPS)
 
 
@@ -36,7 +36,7 @@ def kills(scene):
 
 
 def test_a_memory_kill_of_a_simulator_that_is_back_at_once_is_reported(scene_and_pod):
-    """The kubelet restarts a killed container the first time without a delay, so the kill is easy to miss."""
+    """After a first kill, the kubelet restarts the container without a delay, so the kill is easy to miss."""
     scene, pod = scene_and_pod
     kill(scene, pod)
 

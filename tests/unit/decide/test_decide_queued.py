@@ -75,7 +75,7 @@ def test_an_operator_that_was_restarted_keeps_the_words_until_it_has_asked(words
 
 
 def test_words_that_no_longer_hold_are_dropped(queued):
-    """The operator has read the Workload again, which has no message now."""
+    """The operator has read the Workload again, and the Workload has no message now."""
     say(queued, SHORT)
 
     say(queued, "")

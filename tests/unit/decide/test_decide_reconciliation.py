@@ -11,7 +11,7 @@ NO_WORLD = [
 
 
 def gaps(status):
-    """Return the reason and the message of `Reconciling` and `Stalled`, if present, which must be true."""
+    """Return reason and message of `Reconciling` and `Stalled`; each of them must be true or absent."""
     found = {each.type.value: each for each in status.conditions[5:]}
     assert all(each.status is ConditionStatus.TRUE for each in found.values())
     return {kind: (each.reason, each.message) for kind, each in found.items()}

@@ -64,7 +64,7 @@ def test_figures_have_the_four_decimals_that_people_read(training):
 
 
 def test_the_interval_of_the_success_rate_is_kept_as_the_rate_is(training):
-    """The next attempt reports no interval before its first evaluation."""
+    """Until its first evaluation, an attempt reports no interval, so the status keeps the last one."""
     scene, pod = training()
     scene.poll(pod, step=30, success_rate=0.9, success_interval=SuccessInterval(low=0.7, high=1, episodes=20))
     scene.settle()

@@ -110,7 +110,7 @@ def test_amounts_that_change_with_each_job_of_the_queue_are_written_as_progress(
 
 
 def test_a_number_in_another_message_is_news():
-    """For example, the message has the number of crashes of a sidecar, which a user must see at once."""
+    """For example, the message counts the crashes of a sidecar, and a user must see each crash at once."""
     old = changed({"reason": "SidecarCrashLoop", "message": "crashed 3 times"})
 
     assert write_in_s(old, changed({"reason": "SidecarCrashLoop", "message": "crashed 4 times"}), 5) == 0

@@ -62,7 +62,7 @@ def counted(replica):
 
 
 def job(size=0, **annotations):
-    """Return a TrainingJob from a cache that does not keep its spec, which had `size` bytes."""
+    """Return a TrainingJob whose spec had `size` bytes, from a cache that does not keep the spec."""
     metadata = {"name": "job", "namespace": "default", "annotations": annotations}
     raw = {"kind": "TrainingJob", "metadata": metadata, "spec": {"world": "w" * size}}
     kept = trimmed(raw)

@@ -38,7 +38,7 @@ def test_a_job_that_somebody_else_suspends_is_left_suspended(training):
     assert scene.settle().actions == ()
     assert (scene.status.phase, scene.replica().reason) == (Phase.SUSPENDED, "Suspended")
     assert scene.replica().message == (
-        "suspended by kueue, not by spec.suspend; it continues when Job job-0 is resumed"
+        "suspended by kueue, not by spec.suspend; the replica continues when Job job-0 is resumed"
     )
 
 

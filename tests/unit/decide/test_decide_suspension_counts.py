@@ -17,7 +17,7 @@ def tell_suspension(scene, status):
 
 
 def test_a_resumption_may_be_dated_after_the_pod_that_it_made(training):
-    """The Job controller creates the pod first and then takes the time, which may be a second later."""
+    """The Job controller creates the pod first. It writes the time of the resumption maybe a second later."""
     scene, _ = training()
     scene.objects["pods"].clear()
     scene.pass_(15)

@@ -187,7 +187,7 @@ def test_between_two_pods_the_message_says_how_the_last_one_failed(training, las
 
 
 def test_without_a_last_word_the_message_quotes_the_end_of_the_log(training):
-    """Kubernetes copies the end of the log into the termination message."""
+    """A trainer that crashed wrote no message, so Kubernetes' copy of the end of its log has the cause."""
     scene, pod = training()
     scene.end(pod, 1, "Traceback (most recent call last):\n  ...\nMemoryError\n")
 
@@ -197,7 +197,7 @@ def test_without_a_last_word_the_message_quotes_the_end_of_the_log(training):
 
 
 def test_a_trainer_that_is_tried_again_after_it_ran_out_of_memory_says_so(training):
-    """The next pod may need less memory for its replay buffer, or fail again."""
+    """The next pod may fail in the same way, so the user must see the cause after the first failure."""
     scene, pod = training()
     scene.end(pod, 137, reason="OOMKilled")
 
@@ -320,7 +320,7 @@ def test_an_init_container_that_fails_is_named_with_its_last_line(accepted, comm
 
 @pytest.mark.parametrize(("limit", "code"), [(0, 70), (3, 2), (3, 80), (3, 81)])
 def test_a_pod_that_was_the_last_is_not_called_tried_again(training, last_word, reasons, limit, code):
-    """No pod follows this one, whatever the Job reports later."""
+    """The limit or the exit code forbids another pod, so the status must not promise a retry."""
     scene, pod = training(backoffLimit=limit)
     scene.end(pod, code, last_word())
 

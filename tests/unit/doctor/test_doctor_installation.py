@@ -96,7 +96,7 @@ def test_an_operator_without_leader_election_needs_no_lease():
 
 
 def test_metrics_without_a_running_operator_have_the_remedy_of_the_operator():
-    """The pod may still be pending, and its log is empty then."""
+    """Without a running pod there are no metrics, so the person must first repair the operator."""
     [found] = results(metrics, deployment(), [POD | {"status": {"phase": "Pending"}}])
 
     assert found.verdict is CheckStatus.WRONG
@@ -114,7 +114,7 @@ def test_metrics_that_the_api_server_cannot_reach_are_unknown():
 
 
 def test_a_user_who_may_not_reach_pods_gets_no_result_about_metrics():
-    """The missing permission is the user's, which the caller reports; the operator may be right."""
+    """The user lacks this permission, and the caller of the check reports it. The operator may be right."""
     with pytest.raises(Forbidden):
         results(metrics, deployment(), [POD], Forbidden(403, "Forbidden", "pods/proxy"))
 

@@ -22,7 +22,7 @@ ROOT = Path(__file__).parents[3]
     [("v1.9.3", "wrong"), ("v1.32.9", "wrong"), ("v1.33.2+k3s1", "ok"), ("v2.0.0", "ok"), ("", "wrong")],
 )
 def test_a_version_is_judged_by_whether_it_has_sidecars_for_good(version, verdict):
-    """Sidecar containers are stable since Kubernetes 1.33, which the chart also requires."""
+    """Sidecar containers are stable since Kubernetes 1.33, so the chart also requires this version."""
     assert judged_version("nodes", version).verdict == verdict
 
 

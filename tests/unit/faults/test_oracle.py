@@ -21,7 +21,7 @@ def test_two_pods_of_a_replica_at_one_moment_are_found():
 
 
 def test_a_pod_that_follows_one_that_ended_or_was_deleted_is_none_too_many():
-    """If the oracle counted both pods at the same time, it would report every restart as an error."""
+    """Every restart has two pods, one after the other, so the oracle must not report it as an error."""
     ended = [("ADDED", pod("a")), ("MODIFIED", pod("a", "Failed")), ("ADDED", pod("b"))]
     deleted = [("ADDED", pod("a")), ("DELETED", pod("a")), ("ADDED", pod("b"))]
 

@@ -90,7 +90,7 @@ def test_a_bill_of_an_image_lists_its_packages_of_debian_and_of_python(image):
 
 
 def test_a_package_that_a_later_layer_removes_is_not_listed(image):
-    """The trainer's Dockerfile removes packages that only the build needs."""
+    """The trainer's Dockerfile removes packages that only the build needs, and no bill may list them."""
     installed = layer(metadata("hatchling"), metadata("numpy"))
     removal = layer((f"{SITE}/.wh.hatchling-1.2.dist-info", ""))
 

@@ -69,7 +69,7 @@ def workshop(root, engine, tmp_path):
 
 
 def test_an_unchanged_image_is_not_built_again(workshop, engine):
-    """Each run of the cluster tests requests the images."""
+    """Each run of the cluster tests requests the images, and a build takes minutes."""
     first, second = workshop.build(OPERATOR), workshop.build(OPERATOR)
 
     assert len(engine.orders) == 1
@@ -139,7 +139,7 @@ def test_a_tag_is_part_of_the_content(workshop):
 
 
 def test_the_context_is_gone_after_the_build(workshop, engine):
-    """With PyTorch among its wheels, the build context has several gigabytes."""
+    """With PyTorch among its wheels, a build context has several gigabytes, which would fill the disk."""
     workshop.build(OPERATOR)
 
     assert not engine.orders[0].context.exists()

@@ -9,7 +9,7 @@ from tools.images import programs
 from tools.images.engines import Docker, Order
 from tools.images.errors import ImagesError
 
-# This program succeeds for the commands in DOCKER_KNOWS, logs every call, and saves "saved".
+# A fake `docker` that logs every call. It succeeds for the commands in DOCKER_KNOWS; others exit with code 1.
 DOCKER = """#!/bin/bash
 echo "$@" >>"$DOCKER_CALLS"
 for word in $DOCKER_KNOWS; do [[ $word == "$1" || $word == "$1-$2" ]] && known=yes; done

@@ -1,4 +1,4 @@
-"""The image of Webots is built from the archive that its user has; here, from one of the same layout."""
+"""The image of Webots is built from an archive that a user provides; the tests use one of the same layout."""
 
 import hashlib
 import os
@@ -114,7 +114,7 @@ def test_a_release_is_unpacked_into_its_folder(archive, tmp_path):
 
 @pytest.mark.parametrize("version", [f"{RELEASE} revision 1\n", f"{RELEASE}\nmore"])
 def test_a_revision_of_the_release_is_accepted(archive, tmp_path, version):
-    """The name of a revision's archive may lack the revision."""
+    """An archive may have the name of the release although it contains a revision of this release."""
     assert install(archive(version=version), tmp_path / "home").returncode == 0
 
 
@@ -153,7 +153,7 @@ def test_an_archive_without_a_part_of_webots_is_refused(archive, tmp_path, missi
 
 
 def test_a_missing_shared_library_is_named(archive, tmp_path):
-    """Otherwise Webots would fail only in a cluster, at the start of the first simulator."""
+    """If the build accepted the image, Webots would fail only in a cluster, at the first start."""
     source = tmp_path / "lacking.c"
     source.write_text("int lacking(void) { return 0; }\n")
     lacking, binary = tmp_path / "liblacking.so", tmp_path / "binary.c"
@@ -173,7 +173,7 @@ def test_a_missing_shared_library_is_named(archive, tmp_path):
 
 @pytest.mark.parametrize("folder", ["", "assets/"])
 def test_assets_are_unpacked_without_their_folder(archive, tmp_path, folder):
-    """Webots looks for the files directly in its cache."""
+    """Webots looks for the files in its cache, and not in a subfolder `assets` of the archive."""
     packed = tmp_path / "assets.zip"
     with zipfile.ZipFile(packed, "w") as assets:
         assets.writestr(f"{folder}{ASSET}", "asset")
@@ -207,7 +207,7 @@ def test_an_x_server_that_does_not_start_is_an_error(container, tmp_path):
 
 
 def test_webots_finds_the_assets_of_the_image(container, tmp_path):
-    """The cache is in the home folder, which a pod mounts over the image's folder."""
+    """In a pod the home folder is an empty volume, so the program links the assets into Webots' cache."""
     (tmp_path / "assets").mkdir()
     (tmp_path / "assets" / ASSET).write_text("asset")
 
@@ -233,7 +233,7 @@ def test_preferences_of_the_user_stay(container, tmp_path):
 
 
 def test_the_recipe_has_release_and_digests_of_the_archives(tmp_path):
-    """The Dockerfile checks both, and a builder that caches steps sees another archive."""
+    """The Dockerfile checks both. A builder with a cache notices a new archive by the changed digest."""
     archive, assets = tmp_path / "webots-R2023b-x86-64_ubuntu-22.04.tar.bz2", tmp_path / "assets.zip"
     archive.write_bytes(b"archive")
     assets.write_bytes(b"assets")
@@ -274,7 +274,7 @@ def test_a_wrong_archive_is_refused_before_the_build(tmp_path, name, sha256, mac
     ],
 )
 def test_webots_without_an_archive_is_refused(capsys, arguments, message):
-    """Otherwise the command would build only other images."""
+    """Without an error, the command would end successfully and the image of Webots would be missing."""
     with pytest.raises(SystemExit):
         main(arguments)
 
@@ -282,5 +282,5 @@ def test_webots_without_an_archive_is_refused(capsys, arguments, message):
 
 
 def test_the_image_has_the_name_that_a_job_may_give():
-    """The documentation names the image, and the operator's record of a job has the same name."""
+    """A job of Webots names an image, so the built image must have the name that this project documents."""
     assert webots.RECIPE.reference("1.2.3") == f"docker.io/library/{Images.of_release('1.2.3').webots}"

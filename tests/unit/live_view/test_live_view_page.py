@@ -134,7 +134,7 @@ def place(page, name):
 
 
 def test_a_page_that_nobody_looks_at_asks_for_nothing(page, simulator):
-    """A user may leave the view open over night, which must not slow down the training."""
+    """A user may leave the view open over night, and an unwatched view must not slow down the training."""
     threading.Event().wait(0.5)
 
     assert page.address.startswith("http://127.0.0.1:")

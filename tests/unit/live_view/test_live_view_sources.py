@@ -211,7 +211,7 @@ def test_a_standby_is_seen_after_it_has_taken_over():
 
 
 class FakeClient:
-    """A cluster's client with one job of two groups, whose pod responds through the API server."""
+    """A cluster's client with one job of two groups; the job's pod responds through the API server."""
 
     namespace = "lab"
 

@@ -38,7 +38,7 @@ def test_without_a_policy_every_failure_is_counted():
 
 
 def test_rules_are_read_in_order_and_the_first_match_decides():
-    """Kubernetes documents this order for `podFailurePolicy`."""
+    """A local run must decide as Kubernetes does, which documents this order for `podFailurePolicy`."""
     rules = [
         {"action": "Ignore", "onExitCodes": {"operator": "NotIn", "values": [7]}},
         {"action": "FailJob", "onExitCodes": {"operator": "In", "values": [7, 8]}},

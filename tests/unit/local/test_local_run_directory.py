@@ -50,7 +50,7 @@ def test_a_run_goes_on_with_the_job_that_it_was_started_with(directory):
 
 
 def test_more_steps_prolong_a_run_and_change_nothing_else(tmp_path):
-    """Up to the last checkpoint, a longer training is the same, so one spec still explains the result."""
+    """A user may find after a run that the policy still improves, and can then continue the training."""
     run_directory.prepare(tmp_path, record(trainer={"steps": 100}))
     longer = record(trainer={"steps": 150})
 
@@ -342,7 +342,7 @@ def test_the_summary_tells_what_was_measured_and_how_to_look_at_it(directory):
 
 
 def test_a_shell_reads_the_commands_of_a_summary_as_they_are_meant(tmp_path):
-    """Users copy these commands, also if the name of the folder has spaces."""
+    """Users copy these commands, and the name of their folder may have spaces."""
     directory = tmp_path / "Ada's runs" / "$HOME `x`" / "0"
     (directory / "tensorboard").mkdir(parents=True)
     for name in ("model.zip", "attempts.jsonl"):

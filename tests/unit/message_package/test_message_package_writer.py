@@ -50,7 +50,7 @@ def test_the_folder_holds_every_file_of_the_package_and_nothing_besides(package)
 
 
 def test_the_bytecode_names_the_files_where_they_are(package):
-    """In a read-only container Python cannot compile the files again, and tracebacks need their paths."""
+    """A read-only container keeps this bytecode, and a traceback shows the paths that it contains."""
     code = "import sys; sys.path.append(sys.argv[1]); import webots_ros.srv._set_int as module\n"
     code += "print(module.__cached__, module.set_intRequest.serialize.__code__.co_filename)"
 

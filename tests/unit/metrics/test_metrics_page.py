@@ -46,7 +46,7 @@ UNITLESS = {
     "palaestra_trainer_simulators",
 }
 OTHER_UNITS = re.compile(r"_(ms|milliseconds|minutes|hours|kb|mb|gb|kilobytes|megabytes|percent)(_|$)")
-# Prometheus or its operator adds these labels to a target, and would rename a program's own.
+# Prometheus or its operator adds these labels to a target. It renames a program's label of the same name.
 OF_TARGETS = {
     "job", "instance", "namespace", "pod", "container", "endpoint", "service", "training_job", "replica",
 }  # fmt: skip
@@ -111,7 +111,7 @@ def test_labels_are_bounded_and_not_those_of_a_target(family):
 
 @each_family
 def test_a_histogram_has_ascending_buckets_and_nothing_else_has_any(family):
-    """Each bucket is a series of each trainer, so their number is limited."""
+    """Each trainer has one series for each bucket, so the number of buckets is limited."""
     buckets = family.buckets
 
     assert bool(buckets) is (family.kind is MetricType.HISTOGRAM)

@@ -52,9 +52,9 @@ def series(text):
 
 @pytest.mark.parametrize(("served", "declared"), [(operator, of_operator), (trainer, of_trainer)])
 def test_each_histogram_has_the_samples_that_a_strict_reader_needs(served, declared):
-    """A strict reader needs ascending buckets up to infinity and an equal count.
+    """A strict reader needs ascending buckets up to infinity, and a `_count` that equals the last bucket.
 
-    It also needs a sum, except for a histogram whose sum may decrease.
+    It also needs a `_sum`, except for a histogram whose sum may decrease.
     """
     text = served()
     found = series(text)

@@ -71,7 +71,7 @@ def cartpole(tmp_path):
 
 @pytest.fixture
 def load(cartpole):
-    """`load(...)` returns the simulation of such a world, which leaves out the types in `leave_out`."""
+    """`load(...)` returns the simulation of such a world; it leaves out the node types in `leave_out`."""
 
     def load(*texts, leave_out=()):
         return load_mjcf(cartpole(*texts), Mode.FAST, LeaveOut(types=frozenset(leave_out)))

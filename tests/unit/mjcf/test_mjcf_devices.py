@@ -174,7 +174,7 @@ def test_sensors_have_the_values_of_the_moment(load):
 
 
 def test_a_rangefinder_measures_meters_and_its_whole_reach_if_it_meets_nothing(load):
-    """MuJoCo returns -1 if the ray hits no object, which a policy would take for a very near object."""
+    """If the ray hits no object, MuJoCo returns -1. A policy would take -1 for a very near object."""
     simulation = load(FORCE, '<rangefinder name="up" site="skin" cutoff="7"/>')
 
     simulation.step(10)
@@ -184,7 +184,10 @@ def test_a_rangefinder_measures_meters_and_its_whole_reach_if_it_meets_nothing(l
 
 
 def test_the_other_sensors_have_the_units_of_webots(load):
-    """An accelerometer at rest measures gravity upward, and a quaternion ends with w."""
+    """As in Webots, an accelerometer at rest measures gravity upward, and a quaternion ends with w.
+
+    The chip with the sensors is upside down, so the value along its z axis is negative.
+    """
     simulation = load()
 
     simulation.step(10)

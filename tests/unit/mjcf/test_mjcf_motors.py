@@ -40,7 +40,7 @@ def test_a_position_servo_without_a_target_moves_at_its_velocity(load, velocity,
 
 
 def test_a_position_servo_without_a_target_stops_at_the_limit_of_its_commands(load):
-    """The model limits the control, so a target beyond it would only delay the way back."""
+    """The joint cannot follow a target beyond the limit of the control, so it would come back too late."""
     simulation = load(POSITION)
     motor = motor_of(simulation)
     motor.set_position(-math.inf)
@@ -66,7 +66,7 @@ def test_a_servo_without_a_target_and_a_velocity_stays(load, actuator):
 
 
 def test_a_velocity_servo_accelerates_within_its_limit(load):
-    """A robot that must not slip starts at 0.2 m/s2, and has a tenth of a meter after a second."""
+    """A robot must not slip when it starts. At 0.2 m/s2 it moves a tenth of a meter in the first second."""
     simulation = load(VELOCITY)
     motor = motor_of(simulation)
     motor.set_position(math.inf)
@@ -93,7 +93,7 @@ def test_gains_are_refused_where_the_model_has_them(load, actuator):
 
 @pytest.mark.parametrize(("actuator", "held"), [(POSITION, 0.7), (VELOCITY, 0.7)])
 def test_a_commanded_servo_holds_the_joint_position_that_a_client_sets(load, actuator, held):
-    """Otherwise the servo would pull the joint back to its old target within the next step."""
+    """Without a new target, the servo would pull the joint back to the old target within the next step."""
     simulation = load(actuator)
     motor = motor_of(simulation)
     motor.set_velocity(1.0)
@@ -107,7 +107,7 @@ def test_a_commanded_servo_holds_the_joint_position_that_a_client_sets(load, act
 
 
 def test_the_position_of_a_tendon_is_its_length_by_the_gear(load):
-    """A tendon of the coefficient 2 is twice as long as the way of its joint."""
+    """With the coefficient 2, the length of the tendon is twice the position of its joint."""
     simulation = load(ROPE, "", TENDON)
     motor = motor_of(simulation)
 

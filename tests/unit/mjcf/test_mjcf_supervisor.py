@@ -53,7 +53,7 @@ def test_a_reset_returns_to_the_start_bit_for_bit(load):
 
 
 def test_looking_changes_nothing(load):
-    """Poses are computed when a client requests them, which must not change the next step."""
+    """Poses are computed when a client requests them, and the computation must not change the next step."""
     watched, other = load(), load()
     for simulation in (watched, other):
         simulation.robots[0].motors["push"].set_effort(3.0)
@@ -279,7 +279,7 @@ def test_the_same_follows_from_a_loaded_state_each_time(load):
 
 
 def test_nothing_is_added_to_or_removed_from_a_model(load):
-    """MuJoCo compiles a model once, at the start."""
+    """MuJoCo compiles a model once, at the start, so bodies cannot be added or removed later."""
     simulation = load()
     root = simulation.tree.field_of(simulation.tree.root, "children", simulation)
 

@@ -56,8 +56,8 @@ def test_no_step_exceeds_the_limits(current, target, step_s):
 
 @given(velocities, velocities, steps)
 def test_the_robot_reaches_the_target(current, target, step_s):
-    """The limits delay a command, but must not change its effect; a stop is such a command too."""
-    for _ in range(100):  # 6 m/s take 1.0 s at 6 m/s2, which are 125 steps of 8 ms at most
+    """The limits delay a command, but must not change the velocity that the robot reaches in the end."""
+    for _ in range(100):  # a change of 6 m/s at 6 m/s2 takes 1 s: at most 63 of these steps
         current = approach(current, target, 2.0 * step_s)
 
     assert current == target
@@ -71,5 +71,5 @@ def test_a_curve_keeps_its_direction():
 
 
 def test_an_absurd_command_does_not_break_the_base():
-    """JSON allows a number whose ratio to a step is infinite; the robot must still obey the next command."""
+    """JSON allows a velocity that overflows to infinity here; the robot must still obey the next command."""
     assert approach(AHEAD, (1.7e308, 0.0, 0.0), 0.001) == AHEAD

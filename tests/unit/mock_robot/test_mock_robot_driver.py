@@ -1,4 +1,4 @@
-"""The habits of the driver for ROS 1: its limits, and that it forwards a command once."""
+"""The behavior of the driver for ROS 1: it limits each command, and forwards it once."""
 
 import math
 
@@ -19,7 +19,7 @@ from palaestra_sim.mock_robot.driver import CommandSlot, Limits, points
     ids=["clipped", "unchanged", "raised", "each axis by itself", "zero"],
 )
 def test_the_driver_limits_each_axis_by_itself(command, forwarded):
-    """The driver does so without a notice, so a policy that was trained with 0.5 m/s drives differently."""
+    """The driver logs no limited command, so a policy that was trained with 0.5 m/s drives differently."""
     assert Limits().within(command) == forwarded
 
 

@@ -28,7 +28,7 @@ def test_it_inverts_the_table(true_m):
 
 
 def test_a_sensor_that_sees_nothing_reports_0_41():
-    """A real Robotino reports this number, also with noise; a policy may have learned 0.40."""
+    """A real Robotino reports exactly 0.41 m then, so the noise of the sensor must not change this value."""
     gauss = Random(0).gauss
     values = [LookupTable(SHARP).response(2.0, gauss) for _ in range(1000)]
 

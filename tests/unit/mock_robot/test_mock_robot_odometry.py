@@ -59,7 +59,7 @@ def test_without_drift_it_integrates_the_motion(vx, vy, omega):
 
 @pytest.mark.parametrize("seed", range(8))
 def test_drift_changes_the_length_of_a_way(seed):
-    """Wheels wear, and floors differ."""
+    """The odometry of a real robot has this error too, because wheels wear and floors differ."""
     odometry = DriftingOdometry(0.02, Random(seed))
     before, after = driven(odometry, (0.5, 0.0, 0.0), 0.32)
 
@@ -91,7 +91,7 @@ def test_a_robot_at_rest_does_not_drift():
 
 
 def test_the_sequence_number_counts_the_updates():
-    """Clients detect by this number that a reading is new; the values before it are the last velocity."""
+    """Clients detect a new reading by its last value, the sequence number. The velocity comes before it."""
     odometry = DriftingOdometry(0.0, Random(0))
     odometry.advance((0.1, 0.2, 0.3), STEP_S)
     odometry.advance((0.1, 0.2, 0.4), STEP_S)

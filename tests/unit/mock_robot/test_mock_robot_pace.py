@@ -51,7 +51,7 @@ def test_after_a_long_delay_the_clock_loses_time(real):
 
 
 def test_no_command_comes_from_the_future(real):
-    """Otherwise, a command that arrives during a delay would be valid for longer than 200 ms."""
+    """If the clock went back after a delay, a command of that time would be valid for more than 200 ms."""
     clock = Clock(1.0, most_behind_s=0.1, monotonic=real)
     real.s += 3.0
     stamped_s = clock.now_s()

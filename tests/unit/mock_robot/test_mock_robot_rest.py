@@ -55,7 +55,7 @@ def test_both_methods_command_the_robot(robot, method):
 
 
 def test_the_charger_can_be_connected(robot):
-    """A program that refuses to drive on a cable needs a test."""
+    """A test can then check that a program does not drive while the robot is connected to its charger."""
     table = routes(robot, CLOCK)
     power = table["GET", "/data/powermanagement"]
     assert power(b"")["ext_power"] is False
@@ -67,7 +67,7 @@ def test_the_charger_can_be_connected(robot):
 
 @pytest.mark.parametrize("body", [b"true", b'{"connected": 1}', b"{}"])
 def test_a_bad_charger_is_refused(robot, body):
-    """The message must show the right body."""
+    """The message must show a valid body, so that a person can correct the request."""
     with pytest.raises(BadRequestError, match=r'send \{"connected": true\} or false$'):
         routes(robot, CLOCK)["POST", "/mock/charger"](body)
 
@@ -91,7 +91,7 @@ def test_delays_are_robot_time():
 
 
 def test_a_share_of_the_responses_is_late():
-    """A client needs a timeout, and must survive it."""
+    """A test can then check that a client has a timeout and continues after it."""
     network = PoorNetwork(CLOCK, 0.0, 0.1, Random(0))
     waits = [network.wait_s("/data/bumper") for _ in range(1000)]
 

@@ -53,7 +53,7 @@ def test_truth_counts_commands(robot):
 
 
 def test_without_drift_truth_and_odometry_agree(robot):
-    """Then a program may compare them, after it has aligned the frames once."""
+    """A test can then compare the two poses, after it has aligned their frames at the start."""
     start = robot.odometry()
     drive(robot, (0.3, 0.1, 0.4), 1.0)
 
@@ -65,7 +65,7 @@ def test_without_drift_truth_and_odometry_agree(robot):
 
 
 def test_a_person_carries_it_without_its_odometry(robot):
-    """A kidnapped robot must look like a real one: only the room has changed."""
+    """A real robot does not notice that a person carries it, so only the true pose may change."""
     before = robot.odometry()
     robot.place(0.0, 1.0, 7.0)
 

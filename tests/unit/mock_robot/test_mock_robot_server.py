@@ -101,14 +101,14 @@ def test_a_refusal_has_the_fact_and_the_remedy(server, head, body, status, fact)
 
 
 def test_a_body_that_is_cut_short_is_not_obeyed(server) -> None:
-    """The rest of a velocity could have been a stop."""
+    """The missing part of the body could change the command, for example to a stop."""
     head = "PUT /velocity HTTP/1.1\r\nContent-Length: 10"
 
     assert asked(server(), head, b"[9, 9", ends=True) is None
 
 
 def test_a_response_comes_late_by_the_given_time(server) -> None:
-    """A real robot needs tens of milliseconds, to which a policy must be used."""
+    """A real robot responds after tens of milliseconds, so the mock must be able to delay its responses."""
     begun = time.monotonic()
 
     status, _, _ = asked(server(wait_s=0.2), "GET /distances HTTP/1.1")

@@ -175,7 +175,7 @@ def test_the_number_of_threads_does_not_change_a_bit(threads) -> None:
 
 
 def test_an_episode_does_not_depend_on_the_copy_or_on_earlier_episodes() -> None:
-    """A resume plays an episode again from its reset, while other copies are somewhere else."""
+    """A resumed run plays an episode again from its reset, while the other copies may be in any state."""
     commands = commands_of(3, 3)
     batch = arena(3)
     batch.open(ROBOTINO)
@@ -208,7 +208,7 @@ def test_a_copy_that_fails_leaves_the_others_as_they_are(tmp_path) -> None:
 
 
 def test_a_reset_makes_a_failed_copy_whole_again(tmp_path) -> None:
-    """The next episode of the copy is the one that it would have been without the failure."""
+    """The failure must have no effect on the next episode of the copy."""
     batch = carts(tmp_path, 2, limited=False)
     batch.open(CART)
     expected = batch.reset(upright((0, 1)))
@@ -244,7 +244,7 @@ def test_each_cart_has_the_bits_of_the_single_model(tmp_path) -> None:
 
 
 def test_the_parts_that_a_batch_does_not_simulate_are_listed_in_one_message() -> None:
-    """A camera that sends nothing, or noise that differs, would train another policy in silence."""
+    """Without the message, a missing camera image or different noise would change the policy unnoticed."""
     load = Loader(physics=lambda: MujocoPhysics(feeling=True))
 
     with pytest.raises(

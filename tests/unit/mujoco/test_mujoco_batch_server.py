@@ -125,7 +125,7 @@ def read(response, rows=ROWS):
 
 
 def test_the_responses_have_the_bits_of_the_world(trainer, tmp_path) -> None:
-    """A number that the wire changes would break a resume, which compares bits."""
+    """A resume compares bits, so the wire must not change a number."""
     client, world = trainer(), carts(tmp_path, ROWS, limited=False)
     world.open(CART)
 

@@ -64,7 +64,7 @@ def test_the_parts_of_a_group_have_their_own_centers() -> None:
     ],
 )
 def test_a_heading_is_that_of_the_outline(outline, heading_rad) -> None:
-    """A cylinder about its own axis looks the same from each side."""
+    """A cylinder looks the same from each side, so a rotation about its own axis gives no heading."""
     [found] = shapes(solid(outline, "rotation 0 0 1 0.5"))
 
     assert found.heading_rad == pytest.approx(heading_rad)

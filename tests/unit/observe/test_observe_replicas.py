@@ -156,7 +156,7 @@ def test_of_other_kinds_only_who_wrote_them_is_forgotten():
 
 
 def test_what_is_kept_in_memory_shows_the_same(look, raw_job, raw_pod):
-    """The cache drops only fields that the operator never reads, which are most of an object."""
+    """The cache drops only fields that the operator never reads. They make up most of an object."""
     raw_job |= {"status": {"failed": 1}}
     raw_job["metadata"] |= {
         "annotations": {

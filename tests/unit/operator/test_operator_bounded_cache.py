@@ -79,7 +79,7 @@ def test_what_is_forgotten_makes_room(full):
 
 
 class Cluster:
-    """An API server and the caches with one Job, which another program has resumed and which lacks a pod."""
+    """An API server and the caches with one Job. Another program has resumed the Job; its pod is missing."""
 
     def __init__(self):
         self.asked = 0

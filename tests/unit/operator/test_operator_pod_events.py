@@ -88,7 +88,7 @@ def test_after_that_its_events_are_read_now_and_then(server):
 
 
 def test_the_pauses_grow_to_five_minutes(server):
-    """A quota may be used up for a whole night, which needs no frequent requests."""
+    """A quota may be used up for a whole night, and frequent requests would not change that."""
     pod_events = PodEvents(server, lambda: server.now)
     pod_events.of(KEY, UID, [job()], [])
     server.now += PATIENCE_S

@@ -1,4 +1,4 @@
-"""The operator does not execute a decision from an outdated cache, which a read and preconditions reveal."""
+"""By a read and by preconditions, the operator detects that it has decided with an outdated cache."""
 
 import pytest
 

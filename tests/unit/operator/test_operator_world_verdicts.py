@@ -97,7 +97,7 @@ def test_a_small_world_is_checked_at_once(begin: Begin, slow: Slow) -> None:
 
 
 def test_many_small_worlds_of_a_job_are_not(begin: Begin, slow: Slow) -> None:
-    """The size limit applies to all worlds of a job, which may have 32."""
+    """The size limit applies to the sum of a job's worlds, and a job may have 32."""
     worlds = [world(ROBOT + b"# %d" % number, MOST_BYTES_HERE // 2) for number in range(3)]
 
     assert begin(slow).verdicts(EVIL, worlds) == {}
@@ -190,7 +190,7 @@ def test_a_check_without_a_verdict_is_tried_again(
 def test_so_many_verdicts_are_remembered_and_no_more(
     begin: Begin, slow: Slow, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A user may change a ConfigMap any number of times, which must not fill the memory."""
+    """A user may change a ConfigMap any number of times, and the verdicts must not fill the memory."""
     monkeypatch.setattr("palaestra.operator.world_verdicts.REMEMBERED", 1)
     checking = begin(slow)
     for given in (large(0), large(1)):

@@ -105,7 +105,7 @@ def test_damping_and_friction_slow_a_pendulum():
 
 
 def test_a_spring_holds_a_rod_where_the_torques_are_equal():
-    """The torques of spring and weight are then equal.
+    """The rod comes to rest at the angle at which the two torques are equal.
 
     The spring's torque is 100 times the angle. The weight's torque is m g l / 2 times the cosine of the
     angle.

@@ -38,7 +38,7 @@ def distances(simulation):
 
 
 def test_a_robot_drives_as_it_is_commanded(load, drive):
-    """Half a meter a second gives half a meter in a second, less the distance lost while it accelerates."""
+    """In a second at 0.5 m/s, the robot drives half a meter, less the distance lost in the acceleration."""
     body = drive(load(), 0.25, 0.0, 0.0, steps=5)
 
     assert (body.x, body.y) == pytest.approx((0.25 * 0.96, 0.0), abs=0.02)

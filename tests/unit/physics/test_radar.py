@@ -115,7 +115,7 @@ def test_a_target_is_hidden_only_if_the_radar_knows_occlusion(radar, obstacle):
 
 
 def test_a_speed_is_the_change_of_distance_between_two_samples(radar):
-    """So a Solid that only a supervisor moves has a speed too.
+    """A Solid that only a supervisor moves therefore has a speed too.
 
     The speed is positive if the target moves away.
     """

@@ -55,7 +55,7 @@ def test_a_force_goes_through_the_lookup_table():
 
 
 def test_a_pull_is_no_pressure():
-    """A plate that hangs below the robot is pulled: with one axis it reads 0, with three axes the pull."""
+    """The plate hangs below the robot. A sensor with one axis then reads 0; with three, it reads the pull."""
     above, below = b"0 0 0.15 rotation 0 1 0 -1.5707963", b"0 0 0.35 rotation 0 1 0 1.5707963"
     weight, elsewhere = b"Solid { translation 0 0 0.35", b"Solid { translation 3 0 0.05"
     low = scale("force").replace(above, below).replace(weight, elsewhere)
@@ -66,7 +66,7 @@ def test_a_pull_is_no_pressure():
 
 
 def test_three_axes_are_published_as_a_wrench():
-    """A wrench has a force and a torque, so the torque is 0. As in Webots, `get_type` returns 2."""
+    """The sensor measures no torque, so the wrench has the torque 0. As in Webots, `get_type` returns 2."""
     kind, plate = weigh(scale("force-3d"))
     (topic,) = kind.topics(plate)
     codec = message_type(topic.type_name).codec

@@ -1,4 +1,4 @@
-"""Fields that no sensor's reading shows alone: each changes what a device does, as Webots' manual says."""
+"""Fields whose effect no single reading shows; the expected behavior is that of Webots' manual."""
 
 import numpy as np
 import pytest

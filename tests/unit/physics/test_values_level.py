@@ -114,7 +114,7 @@ def expected(pose, height, azimuth, other):
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
 @pytest.mark.parametrize("lifted", [0.0, 0.35], ids=["on the floor", "lifted"])
 def test_each_level_ray_meets_what_stands_at_its_height(setting, lifted):
-    """A sensor above a low step does not see the step, also after a supervisor has lifted the robot."""
+    """A sensor above a low step does not see the step, even after a supervisor has lifted the robot."""
     simulation = simulation_of(setting)
     wrong = []
     for x, y, heading in PLACES:

@@ -33,7 +33,7 @@ def directional(sensor, _setting):
 
 
 def point(sensor, _setting):
-    """Return the irradiance of a PointLight with the default attenuation, which is none."""
+    """Return the irradiance of a PointLight, whose default attenuation ignores the distance."""
     return np.ones(3) * (0.5 + 2.0 * facing(sensor, PLACE - sensor.position))
 
 
@@ -173,7 +173,7 @@ def test_a_shape_in_front_of_a_light_hides_its_direct_light(setting, hiding, sha
 
 @pytest.mark.parametrize("setting", [it for it in SETTINGS if it.system == "ENU"], ids=str)
 def test_a_part_of_the_same_robot_hides_no_light(setting):
-    """As in Webots without `selfCollision`: else every sensor inside a hull would see only ambient light."""
+    """As in Webots without `selfCollision`, a sensor inside a hull sees more than the ambient light."""
     value, (ambient, direct) = shaded(setting, (2.0, 0.5, 0.3), own_part)
 
     assert value == pytest.approx(ambient + direct, rel=1e-6)

@@ -24,7 +24,7 @@ STARTS = [
 
 
 def wheel(name, hub, azimuth_rad):
-    """Return a wheel with a motor and a position sensor, whose axle points to an azimuth."""
+    """Return a wheel with a motor and a position sensor; its axle points to an azimuth."""
     c, s = math.cos(azimuth_rad), math.sin(azimuth_rad)
     x, y = hub
     return f"""HingeJoint {{
@@ -165,7 +165,7 @@ def test_sensors_of_motion_read_what_the_circle_gives(base, setting):
 
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
 def test_a_battery_loses_the_power_of_the_robot_times_the_time(setting):
-    """The loss is in joules. Motors take nothing, and an empty battery stays empty."""
+    """The loss is in joules. This robot has no motors, and an empty battery stays empty."""
     body = "battery [ 50 60 10 ] cpuConsumption 7"
     simulation = setting.load(robot("", body))
     for steps in (10, 100, 1000):

@@ -144,9 +144,9 @@ def is_seen(lidar, layer, sensor, ways):
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
 @pytest.mark.parametrize("name", FIXED)
 def test_each_ray_of_a_lidar_leaves_at_its_azimuth_and_elevation(setting, name):
-    """The layers go from the top down, and both ends are layers.
+    """The first layer is at the top of the vertical field of view, and the last layer at its bottom.
 
-    The rays go from the left, each in the middle of its share of the view. A tilt turns all rays upwards
+    The rays of a layer go from left to right, each in the middle of its pixel. A tilt turns all rays upwards
     about the y axis.
     """
     simulation = scanned(setting)
@@ -173,7 +173,7 @@ def test_a_rotating_lidar_sees_all_around_within_a_turn(setting):
 
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
 def test_a_step_measures_the_part_that_the_head_of_a_lidar_passes(setting):
-    """Rays that the head has not yet passed read 0, also after a reset of the world."""
+    """Rays that the head has not passed since the start, or since a reset of the world, read 0."""
     simulation = scanned(setting)
     lidar = device(simulation, "turning")
     simulation.reset()

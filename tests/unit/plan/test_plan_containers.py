@@ -261,7 +261,7 @@ def test_the_copied_sidecar_is_where_the_users_image_starts_it(in_cluster):
 
 
 def test_ros_writes_its_logs_into_a_folder_that_is_there(in_cluster, on_laptop):
-    """ROS would create a missing folder with the owner of its parent, which is root for a pod's volume."""
+    """ROS would create a missing folder with the owner of its parent, and root owns the volume of a pod."""
     for planned in (containers(in_cluster()), containers(on_laptop())):
         for container in planned.values():
             mounted = [mount["mountPath"] for mount in container["volumeMounts"]]

@@ -245,7 +245,7 @@ def test_a_pod_has_a_user_namespace_if_the_installation_asks_for_it(valid_job, i
 
 
 def test_scheduling_reaches_the_pod(in_cluster):
-    """The plan copies the scheduling values of a platform engineer unchanged."""
+    """A platform engineer decides by these values on which nodes a pod runs."""
     planned = in_cluster(
         scheduling={
             "nodeSelector": {"gpu": "yes"},

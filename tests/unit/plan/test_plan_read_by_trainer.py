@@ -144,9 +144,9 @@ def test_how_simulators_are_kept_going_is_read_as_it_was_written(valid_job):
     ids=["stub", "mujoco", "webots", "command", "stored job"],
 )
 def test_simulators_that_do_not_age_are_recycled_only_if_the_job_says_so(valid_job, group, read):
-    """Restarts took a fifth of a training's time.
+    """Needless restarts took a fifth of a training's time.
 
-    Only the simulator of the paper failed at the 25th reset.
+    Only the simulator of the original paper, Webots, failed at its 25th reset.
     """
     job = valid_job(simulators=[COLLECT | group, EVALUATE])
 
@@ -198,7 +198,10 @@ def test_the_file_of_a_job_without_a_gpu_says_nothing_of_devices(valid_job):
     ],
 )
 def test_the_kind_of_reset_is_read_as_it_was_written(valid_job, written, recycle, reset):
-    """A reset is not recycling, a reload is an order to the simulator, and a restart is recycling."""
+    """The plan writes a restart as recycling after each reset, and a reload as the kind of reset.
+
+    A plain reset is the default, so the plan writes nothing for it.
+    """
     collecting = read_back(valid_job(simulators=[COLLECT | written, EVALUATE])).simulators[0]
 
     assert (collecting.recycle, collecting.reset) == (recycle, reset)

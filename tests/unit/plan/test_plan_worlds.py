@@ -161,7 +161,7 @@ def test_the_error_for_a_broken_world_has_field_line_and_column(in_cluster):
 
 
 def test_a_world_that_no_sidecar_could_name_is_refused_before_anything_is_created(in_cluster):
-    """A person sees a rejection at once, but a simulator that cannot start perhaps hours later."""
+    """A person sees a rejection at once, but may notice a failed start of a simulator only hours later."""
     twice = '#VRML_SIM R2023b utf8\nRobot { controller "ros" }\nRobot { controller "ros" }\n'
 
     with pytest.raises(WorldError, match=r'^spec\.simulators\[1\]\.world\.inline:3:1: .* called "robot"'):
@@ -169,7 +169,7 @@ def test_a_world_that_no_sidecar_could_name_is_refused_before_anything_is_create
 
 
 def test_worlds_that_fit_nowhere_are_refused(valid_job):
-    """A ConfigMap has a size limit, so the message tells the author to put larger worlds into the images."""
+    """A ConfigMap has a size limit. As the remedy, the message names images, which can hold larger worlds."""
     source = {"configMap": {"name": "worlds", "key": "a.wbt"}}
     huge = ARENA.encode() + b"# " + b"x" * MOST_BYTES
     job = valid_job(simulators=[group(world=source), EVALUATE])

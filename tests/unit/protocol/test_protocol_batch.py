@@ -1,4 +1,4 @@
-"""The frames between a trainer and a simulator with copies: sizes are checked before they are believed."""
+"""The frames between a trainer and a simulator with copies; a reader checks each size before it uses it."""
 
 import struct
 
@@ -36,7 +36,7 @@ def content(whole):
 
 
 def test_a_request_and_its_description_are_read_as_they_were_written() -> None:
-    """Both ends have one declaration of each message."""
+    """Trainer and simulator use the same declaration of each message, so a change reaches both."""
     description = BatchDescription(rows=2, basic_step_ms=32, units=("V", "V"))
 
     asked, offered = (
@@ -49,7 +49,7 @@ def test_a_request_and_its_description_are_read_as_they_were_written() -> None:
 
 
 def test_a_reset_and_a_response_are_read_as_they_were_written() -> None:
-    """The module only cuts the bytes; both ends make arrays of them."""
+    """The module only splits a frame into byte strings; trainer and simulator make arrays of them."""
     parts = ResetParts(
         rows=memoryview(struct.pack("<2I", 0, 3)), seeds=memoryview(struct.pack("<2q", 7, 8)),
         places=EMPTY, joints=memoryview(struct.pack("<2d", 0.5, 1.5)), commands=EMPTY,

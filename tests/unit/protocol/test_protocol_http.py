@@ -294,7 +294,7 @@ def test_an_error_of_a_route_is_logged_and_the_server_goes_on(server, caplog) ->
 
 
 def test_a_closed_server_frees_its_address() -> None:
-    """Otherwise the next server with this address would fail, even if the closed server was never started."""
+    """A new server must be able to use the address, even if the closed server was never started."""
     server = Server(LOOPBACK, ROUTES, name="palaestra-test")
     address = server.address
     with pytest.raises(OSError, match="Address already in use"):

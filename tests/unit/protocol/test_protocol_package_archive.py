@@ -35,7 +35,7 @@ def link(name):
 
 
 def test_the_contents_are_those_that_were_written(tmp_path):
-    """A person may also have made the zip with another program, which compresses."""
+    """A person may also have made the zip with a program that compresses files."""
     ours, theirs = tmp_path / "ours.zip", tmp_path / "theirs.zip"
     ours.write_bytes(archived(WHOLE))
     zipped(theirs, WHOLE.items(), compression=zipfile.ZIP_DEFLATED)
@@ -111,7 +111,7 @@ def test_a_missing_file_is_no_package(tmp_path):
 
 
 def test_an_archive_with_64_bit_numbers_is_refused_before_its_list_is_read(tmp_path):
-    """The size of such a list is in another record, which may name any size."""
+    """The size of such a list is in another record, and a malicious record may name any size."""
     content = archived(WHOLE)
     place = tmp_path / "package.zip"
     place.write_bytes(content[:-22] + b"PK\x06\x07" + bytes(16) + content[-22:])

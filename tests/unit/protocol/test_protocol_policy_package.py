@@ -53,7 +53,7 @@ def test_a_file_of_another_length_is_refused(folder, content):
 
 
 def test_a_missing_file_is_named(folder):
-    """The message must say what to copy."""
+    """The message must name the file, so that a person can copy it."""
     (folder / "model.zip").unlink()
 
     with pytest.raises(PackageError, match=r"model\.zip: No such file or directory; copy the whole package"):

@@ -1,4 +1,4 @@
-"""The reason of a shutdown tells whether the master means this node."""
+"""A node decides by the reason of a shutdown whether the master means this node."""
 
 import pytest
 
@@ -17,5 +17,5 @@ def test_a_node_ends_for_a_reason_that_names_it_or_no_node(reason):
 
 @pytest.mark.parametrize("named", ["/robotino_2", "/sim/robotino", "/robotin"])
 def test_a_node_does_not_end_for_a_reason_that_names_another_node(named):
-    """The node would end because the port of a killed node was given to it."""
+    """The master sends a shutdown to the port of the old node. The system may have reused this port."""
     assert means_another_node(f"[{named}] {REPLACED}", "/robotino")

@@ -113,7 +113,7 @@ def test_a_signal_for_all_processes_of_a_service_does_not_end_the_keeper(owner, 
 
 
 def test_without_a_keeper_the_block_still_removes_the_folder(owner, tmp_path):
-    """A person may kill a process that she does not know."""
+    """A person may kill the keeper because she does not know what this process is for."""
     it, keeper = owner()
     os.kill(keeper, signal.SIGKILL)
 
@@ -147,7 +147,7 @@ def test_a_forked_child_does_not_delay_the_end_of_the_block(tmp_path):
 
 @pytest.mark.filterwarnings("ignore:subprocess .* is still running:ResourceWarning")
 def test_a_block_that_changes_the_working_folder_leaves_nothing(tmp_path, monkeypatch):
-    """The block cannot remove a folder by a relative path then, and the keeper has the absolute path."""
+    """After the change, the block's relative path is wrong, but the keeper has the absolute path."""
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path)
 
@@ -171,7 +171,7 @@ def test_the_keeper_removes_the_folder_whose_path_it_reads(tmp_path, monkeypatch
 
 
 def test_a_system_that_starts_no_process_is_an_error_and_leaves_nothing_open(tmp_path, monkeypatch):
-    """A pod with a limit of processes reports the limit, and its signals and pipes are as before."""
+    """A pod may have reached its limit of processes. The caller continues with its old signals and pipes."""
     before, signals = pipes(), signal.pthread_sigmask(signal.SIG_BLOCK, ())
     monkeypatch.setattr(subprocess, "Popen", failing(errno.EAGAIN))
 

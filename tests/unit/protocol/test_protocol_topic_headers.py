@@ -1,4 +1,4 @@
-"""The headers of topics: who accepts which peer."""
+"""The headers of topics: the peers that a publisher or a subscriber accepts."""
 
 import pytest
 
@@ -14,7 +14,7 @@ TWIST, BOOL = message_type("geometry_msgs/Twist"), message_type("std_msgs/Bool")
 
 
 def test_a_publisher_and_a_subscriber_of_one_type_accept_each_other():
-    """Both headers name the type, its md5 sum and its definition, which tools read."""
+    """Both headers have the type, its md5 sum and its definition. Tools read the definition."""
     wanted = subscriber_header("/listener", "/cmd_vel", TWIST)
     given = publisher_header("/speaker", "/cmd_vel", TWIST, wanted, latched=True)
     check_publisher(given, TWIST)
@@ -31,7 +31,7 @@ def test_a_publisher_accepts_a_tool_that_reads_every_type():
 
 
 def test_a_publisher_refuses_another_type():
-    """The bytes would be read as wrong numbers."""
+    """The subscriber would decode the bytes of this publisher as wrong numbers."""
     with pytest.raises(HeaderRefused, match=rf"wants md5sum {BOOL.md5}, but geometry_msgs/Twist has 9f195f"):
         publisher_header("/speaker", "/cmd_vel", TWIST, subscriber_header("/listener", "/cmd_vel", BOOL))
 

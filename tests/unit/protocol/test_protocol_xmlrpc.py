@@ -42,7 +42,7 @@ def test_what_is_encoded_is_decoded(values):
 
 @given(st.binary(max_size=60))
 def test_any_bytes_are_a_document_or_refused(data):
-    """A caller then catches one error instead of all errors of Python's parser."""
+    """A caller has to catch only one error, not all errors of Python's parser."""
     for document in (data, b"<methodCall><methodName>m</methodName><params>" + data):
         with contextlib.suppress(UnreadableDocument):
             decode_request(document)

@@ -128,7 +128,7 @@ def test_a_new_look_is_a_new_revision(simulation):
 
 @pytest.mark.parametrize("world", ["pen", "court"])
 def test_a_robot_without_visible_shapes_has_those_with_which_it_collides(world):
-    """The built-in E-puck and TurtleBot3 have only collision shapes. A viewer would not see these robots."""
+    """The built-in E-puck and TurtleBot3 have only collision shapes and would otherwise be invisible."""
     path = builtin_path(world)
     assert path is not None
 

@@ -105,7 +105,7 @@ def watched(monkeypatch):
 @pytest.mark.usefixtures("watched")
 @pytest.mark.parametrize("physics", [StubPhysics, MujocoPhysics])
 def test_no_field_of_a_device_is_ignored_in_silence(physics):
-    """A user would otherwise train without the noise, delay or aperture that the world file sets."""
+    """If a field were ignored, a user would train without the noise or delay that the world file sets."""
     ignored = []
     for type_name, name in FIELDS:
         kind = field_kinds(type_name)[name]

@@ -13,7 +13,7 @@ from tests.values.worlds import PHYSICS, Setting
 
 @pytest.mark.parametrize("front", [False, True])
 def test_the_nearest_of_many_triangles_is_that_of_all(front):
-    """A ray tests only triangles in boxes that it meets; this must not change the result."""
+    """A ray tests only the triangles in boxes that it meets, and must still find the nearest one."""
     draw = random.Random(5)
     points = [tuple(draw.uniform(-1.0, 1.0) for _ in range(3)) for _ in range(60)]
     triangles = [tuple(draw.sample(range(60), 3)) for _ in range(200)]

@@ -14,7 +14,7 @@ BLUE, RED = bytes((255, 0, 0, 255)), bytes((0, 0, 255, 255))
 
 
 def decode(data):
-    """Return the size and rows of a PNG file without filters, which is the form that this project writes."""
+    """Return the size and the rows of a PNG file that this project has written, so without filters."""
     assert data[:8] == b"\x89PNG\r\n\x1a\n"
     chunks, at = {}, 8
     while at < len(data):

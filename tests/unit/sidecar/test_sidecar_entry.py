@@ -14,7 +14,7 @@ print(json.dumps(sorted(name for name in sys.modules if name.startswith("palaest
 def test_signals_are_held_back_before_anything_else_is_imported():
     """Process 1 of a container loses a SIGTERM that arrives before signals are blocked.
 
-    Each import before that makes the time longer in which a SIGTERM is lost.
+    Each import before that moment makes this loss more likely.
 
     Only two modules come first. `shadowing` fixes the import path, because a user's `signal.py` may shadow
     Python's. `linux` checks the system, because other systems lack these signals.

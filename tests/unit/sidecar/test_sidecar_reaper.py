@@ -85,7 +85,7 @@ def test_the_start_and_the_wait_status_are_reported(reaped):
 
 
 def test_a_program_that_cannot_be_run_is_an_error_with_its_number(reaped):
-    """The sidecar names the reason, such as a missing file, which an exit code of 127 does not."""
+    """From the number the sidecar gets the reason, such as a missing file; exit code 127 does not show it."""
     it = reaped("", program="/nonexistent/simulator")
 
     assert sorted(it.ended()) == [f"error {errno.ENOENT}", f"exit {127 << 8}"]
@@ -102,7 +102,7 @@ def test_a_simulator_may_end_itself_at_a_request(reaped):
 
 
 def test_a_simulator_that_ignores_the_request_runs_until_it_is_killed(reaped):
-    """The sidecar decides when it waited long enough."""
+    """The sidecar decides how long the simulator may take, so the reaper does not kill it by itself."""
     it = reaped(WAITS)
     it.output.readline()
     it.send(reaper.TERMINATE)
@@ -134,7 +134,7 @@ def test_no_process_is_left_when_the_exit_is_reported(reaped):
 
 
 def test_orphans_end_with_the_first_process(reaped):
-    """The simulator is its first process; what remains of it after that serves no client."""
+    """The first process is the simulator. After its end, its remaining processes serve no client."""
     it = reaped("setsid sleep 600 & echo $!; exit 3")
     orphan = int(it.output.readline())
 

@@ -1,4 +1,4 @@
-"""A measurement of false stops hides neither a short hold nor a stop that the robot cannot end itself."""
+"""The measurement of false stops reports short holds, and the stops that only a person can end."""
 
 from palaestra_trainer.real_robots.safety import STANDING, SafetyDecision, StopCause
 from tests.soak.holds import Holds

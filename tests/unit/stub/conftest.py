@@ -335,7 +335,7 @@ ROBOT = f"""DEF ROBOTINO Robot {{
 
 @pytest.fixture
 def simple_robot():
-    """Return the text of a robot of radius 0.2 m with one ray without noise, whose value is 1 - distance."""
+    """Return the text of a robot of radius 0.2 m with one ray, which measures 1 - distance without noise."""
     return ROBOT
 
 

@@ -131,7 +131,7 @@ def test_a_fast_turn_does_not_swing_through_a_pole(pair):
 
 
 def test_an_outline_beside_the_origin_goes_along(pair):
-    """The robot's outline is one disc away from its origin, and this disc must turn with the robot."""
+    """The robot's outline is a disc that is not at its origin, so the disc must turn with the robot."""
     body, _ = pair([RoundPart(0.2, 0.1, 0.05)])
 
     body.place(1.0, 2.0, math.pi / 2)

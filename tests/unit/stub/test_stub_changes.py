@@ -192,7 +192,7 @@ def test_a_drawn_node_may_be_added_to_a_robot(robot, add, find):
 
 
 def test_nodes_that_every_world_needs_and_parts_of_outlines_stay(robot, add, find):
-    """The simulation reads them once, at the start."""
+    """The simulation reads these nodes once, at the start, so a removal would have no effect."""
     add(CRATE)
     root = robot.get("supervisor/get_root")
     outline = robot.get("supervisor/node/get_field", node=find("OUTLINE"), fieldName="children")
@@ -331,7 +331,7 @@ def test_a_robot_that_stands_at_a_wall_has_a_contact_point_there(start, ros):
 
 
 def test_two_robots_that_touch_have_the_same_contact_points(start, world, simple_robot):
-    """Each robot learns of the other one, as of a wall."""
+    """A client reads a contact with another robot in the same way as a contact with a wall."""
     other = simple_robot.replace('name "robotino"', 'name "other"').replace("DEF ", "DEF OTHER_")
     moved = other.replace("Robot {", "Robot { translation 0 0 9", 1)
     first, second = (simulation := start(world=world(robot=simple_robot + moved)).simulation).robots

@@ -43,7 +43,7 @@ def lit(picture):
     ids=["line", "rectangle", "filled rectangle", "oval", "filled oval", "polygon", "filled polygon"],
 )
 def test_a_shape_is_drawn_as_far_as_it_is_on_the_picture(points, rows):
-    """A program may draw beyond the edge of the image, which must neither fail nor change other pixels."""
+    """A program may draw beyond the edge of the image. The call must neither fail nor change other pixels."""
     picture = ImageBuffer(width=5, height=5)
     picture.draw(points, RED)
 

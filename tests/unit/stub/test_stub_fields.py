@@ -142,7 +142,7 @@ def test_an_obstacle_that_is_moved_is_seen_where_it_is(robot, field):
 
 
 def test_a_write_beyond_the_values_that_there_are_is_lost(robot, field):
-    """The response is the success of Webots' controller, so a client must check the count itself."""
+    """Webots' controller also reports success for such a write, so a client must check the count itself."""
     handle = field("ROBOTINO", "controllerArgs")
 
     assert robot.get("supervisor/field/set_string", field=handle, index=9, value="x") == 1

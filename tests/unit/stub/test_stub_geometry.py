@@ -37,7 +37,7 @@ def test_a_rotation_keeps_lengths(matrix, vector):
 
 @given(matrix=matrices, vector=vectors)
 def test_the_transposed_turns_back(matrix, vector):
-    """The transpose is the inverse, which makes the inverse cheap."""
+    """The transpose of a rotation is its inverse, so the code need not compute an inverse."""
     assert turn(transposed(matrix), turn(matrix, vector)) == close(vector)
 
 
@@ -55,7 +55,7 @@ def test_a_frame_in_a_frame_carries_points_through_both(outer, inner, point):
 
 @given(rotation=rotations)
 def test_the_axis_stays_where_it_is(rotation):
-    """Otherwise `from_axis_angle` would turn about another axis than that of the world file."""
+    """If the axis moved, `from_axis_angle` would turn about another axis than that of the world file."""
     axis = rotation[:3]
 
     assert turn(from_axis_angle(rotation), axis) == close(axis)
@@ -79,13 +79,13 @@ def test_both_ways_to_a_quaternion_agree(rotation):
 
 
 def test_an_axis_without_direction_turns_nothing():
-    """An axis in a world file may be 0 0 0, which must not give NaN."""
+    """An axis in a world file may be 0 0 0, and the rotation must not become NaN."""
     assert from_axis_angle((0.0, 0.0, 0.0, 1.0)) == from_axis_angle((0.0, 0.0, 1.0, 0.0))
 
 
 @given(angle=st.floats(-3.1, 3.1))
 def test_the_heading_is_the_angle_about_z(angle):
-    """Every body that is turned only about z is upright."""
+    """The planar physics turns a robot only about z, so the robot stays upright."""
     pose = Pose(rotation=from_axis_angle((0.0, 0.0, 1.0, angle)))
 
     assert pose.heading_rad == close(angle)

@@ -47,7 +47,7 @@ def test_a_joystick_is_not_connected_until_somebody_moves_it(robot):
 
 
 def test_a_moved_joystick_publishes_axes_points_of_view_and_pressed_buttons(robot):
-    """As with the real controller, a step has one message for the buttons: the first that is pressed."""
+    """As with the real controller, a step has one message about buttons, with the first pressed button."""
     assert robot.get("palaestra/joystick/set_axes", values=[100.0, -128.0]) is True
     assert robot.get("palaestra/joystick/set_povs", values=[1.0]) is True
     assert robot.get("palaestra/joystick/press", value=3) is True

@@ -141,7 +141,7 @@ def test_a_file_that_no_simulator_writes_fails_with_a_remedy(robot, service, fac
 
 
 def test_the_harmless_rest_answers_as_webots_does(robot):
-    """These services are for a person at the window of Webots, which a training does not have."""
+    """These services act on the window of Webots, which does not exist here, so they only respond."""
     assert robot.get("robot/wait_for_user_input_event", eventType=1, timeout=0) == 0
     assert robot.get("robot/wwi_receive_text") == ""
     assert robot.get("robot/wwi_send_text", value="hello") is True

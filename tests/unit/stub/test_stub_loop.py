@@ -95,7 +95,7 @@ def test_after_short_waits_it_looks_before_it_sleeps(loop, chatter, looks):
 
 
 def test_a_longer_wait_now_and_then_is_enough_not_to_look(loop, pair, looks):
-    """Polling in vain takes processor time from other simulators."""
+    """If no request comes soon, polling only takes processor time from other simulators."""
 
     def ask():
         asked.append(pair.send(b"question"))

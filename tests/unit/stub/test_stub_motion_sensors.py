@@ -86,7 +86,7 @@ def test_each_axis_of_a_noisy_table_draws_its_own_noise(load_with):
 
 
 def test_a_sensor_without_a_table_answers_an_empty_one(node_with):
-    """The field is empty by default."""
+    """A client must not take a missing table, which is the default, for an error."""
     assert node_with("Compass { }").get("compass/get_lookup_table") == ()
 
 
@@ -168,7 +168,7 @@ def test_a_gyro_reads_the_motor_that_carries_it_too(load_with):
 def test_a_gyro_marks_what_it_does_not_measure(node_with):
     """In ROS, -1 in a covariance means "not measured".
 
-    The covariance of the reading itself is unknown, which is 0.
+    The covariance of the reading itself is unknown, and ROS writes 0 for an unknown covariance.
     """
     node = node_with("Gyro { }")
     node.call("gyro/enable", value=STEP_MS)

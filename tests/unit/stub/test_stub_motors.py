@@ -82,7 +82,7 @@ def test_a_motor_tells_what_the_world_file_says(robot):
 
 @pytest.mark.parametrize(("asked", "kept"), [(0.0, 0.0), (40.0, 10.0), (-1.0, 10.0), (math.nan, 10.0)])
 def test_available_torque_is_kept_within_the_limit(robot, asked, kept):
-    """The call succeeds for every value, also for one that Webots ignores."""
+    """The call succeeds for every value, even for a value that Webots ignores."""
     assert robot.get("wheel0_joint/set_available_torque", value=asked) is True
     assert robot.get("wheel0_joint/get_available_torque") == kept
 

@@ -279,7 +279,7 @@ def test_a_node_can_be_exported_as_written(robot, find):
 
 
 def test_hints_are_taken(robot, find):
-    """These services change only the speed of responses, or the rendering."""
+    """A client may call these services, which change only the speed of responses, or the rendering."""
     target = find("TARGET")
 
     assert robot.get("supervisor/node/enable_pose_tracking", node=target, sampling_period=32) == 1

@@ -41,11 +41,11 @@ def cast(obstacle, x, y, heading, reach=10.0):
 @given(
     place=st.tuples(places, places), away=st.tuples(nearby, nearby), heading=angles, radius=st.floats(0.05, 1)
 )
-# The square of this distance is so small that its digits are lost.
+# The square of this distance is so small that rounding destroys its digits.
 @example(place=(0.0, 0.0), away=(0.0, 2.8e-161), heading=0.0, radius=1.0)
 @pytest.mark.parametrize("block", [False, True], ids=["disc", "block"])
 def test_a_robot_that_was_pushed_out_touches_and_is_not_inside(block, place, away, heading, radius):
-    """A contact gives the shortest way out of the obstacle, so a robot moved along it still touches."""
+    """A contact has the shortest way out of the obstacle. A robot that moves this way ends at the surface."""
     obstacle = Block(*place, heading, (1.0, 2.0)) if block else Disc(*place, 1.0)
     x, y = place[0] + away[0], place[1] + away[1]
     contact = obstacle.contact(x, y, radius)

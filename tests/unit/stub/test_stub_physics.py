@@ -92,7 +92,7 @@ def test_driving_and_turning_is_a_circle(build):
     After a full turn the circle is closed, up to the error of the midpoint rule.
     """
     body, go = build()
-    steps = 400  # so slow that the robot reaches the speed in the first step
+    steps = 400  # the robot is so slow that it reaches its speed in the first step
     omega = 2 * math.pi / (steps * STEP_S)
 
     go(0.3, 0.0, omega, steps // 2)

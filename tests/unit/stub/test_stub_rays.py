@@ -25,7 +25,7 @@ def one(_mean, deviation):
 
 
 def test_rows_answer_their_own_value():
-    """A row is a measured pair of distance and voltage, which must hold exactly."""
+    """A row is a measured pair of distance and voltage, so its distance must give exactly its voltage."""
     table = LookupTable(ROWS)
 
     assert [table.response(row[0], silent) for row in ROWS] == pytest.approx([3.0, 2.0, 1.0])

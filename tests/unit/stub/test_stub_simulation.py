@@ -203,7 +203,7 @@ def test_a_seed_is_a_number_or_in_an_object(custom_data, seed):
 
 @given(text=st.text())
 def test_no_custom_data_is_an_error(text):
-    """The data may belong to another program, so no text is an error."""
+    """The data may belong to another program, so any text is accepted."""
     assert isinstance(seed_of(text, otherwise=1), int)
 
 

@@ -221,7 +221,7 @@ def test_closing_ends_every_controller(ros, start):
 
 
 def test_messages_that_were_due_at_a_reload_never_come(ros, start):
-    """The controller whose messages they are does not exist any more."""
+    """The reload has ended the controller that would send these messages."""
     start(publish_delay_s=0.01)
     old = ros.node("robotino")
     inbox = old.inbox("ir1/value")

@@ -235,7 +235,7 @@ def test_a_gripper_that_would_hold_something_is_not_switched_on(pair):
 
 
 def test_connectors_that_fit_are_not_locked(pair):
-    """In Webots the lock would join the two robots, which the stub cannot simulate."""
+    """In Webots the lock would join the two robots, and the stub cannot simulate joined robots."""
     other = 'Connector { name "plug" model "a" rotation 0 0 1 3.14159 }'
     here, _ = pair('Connector { name "socket" model "a" }', other, 0.005)
 

@@ -119,7 +119,7 @@ def test_a_lidar_of_webots_can_be_mounted_on_any_robot():
 
 
 def test_a_joint_begins_at_its_position_and_ends_at_its_stop():
-    """In a world file, the end of a joint has its pose for the joint's `position`, which is 0.5 here."""
+    """The pose of a joint's end in a world file belongs to the joint's `position`, which is 0.5 here."""
     simulation = load_world(ARM)
     (robot,) = simulation.robots
     tip = simulation.tree.of_def("TIP")

@@ -230,7 +230,7 @@ def test_wheels_that_cannot_steer_drive_nothing(wheels):
 
 
 def test_axles_that_are_parallel_but_for_rounding_are_parallel():
-    """With two degrees of toe, two wheels are still a pair; otherwise the robot would drive sideways."""
+    """If two axles with two degrees of toe were not a pair, the solution would drive the robot sideways."""
     toed = [replace(wheel, axle=unit(math.pi / 2 + i * 0.02)) for i, wheel in enumerate(PIONEER_3AT)]
 
     assert abs(find_drive(toed).twist((1.0, 1.0, 1.0, 1.0))[0]) == pytest.approx(0.11, rel=0.01)

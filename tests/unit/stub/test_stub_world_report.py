@@ -90,7 +90,7 @@ def test_a_node_that_uses_itself_ends_in_one_sentence(check):
 
 
 def test_nodes_that_double_end_in_one_sentence(check, monkeypatch):
-    """Sixty such lines would make 2 to the 60th nodes."""
+    """Each line doubles the number of nodes, so sixty lines would make 2 to the 60th nodes."""
     monkeypatch.setattr("palaestra_sim.scene.nodes.instantiate.MAX_NODES", 500)
     lines = [
         f"DEF A{level} Group {{ children [ USE A{level - 1} USE A{level - 1} ] }}" for level in range(1, 60)

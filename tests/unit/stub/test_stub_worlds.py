@@ -209,13 +209,13 @@ def test_a_door_on_a_hinge_without_physics_stands_where_it_is():
 
 
 def test_a_door_that_swings_is_refused():
-    """A robot in Webots would push the door open."""
+    """A robot in Webots would push the door open, and the stub cannot move the door."""
     with pytest.raises(WorldError, match="a Solid with physics moves when it is pushed"):
         load_world(DOOR % "physics Physics { }")
 
 
 def test_a_conveyor_belt_is_refused():
-    """A conveyor belt in Webots moves the objects on it."""
+    """A conveyor belt in Webots moves the objects on it, and the stub cannot move them."""
     with pytest.raises(WorldError, match="a Track with devices moves the objects on it"):
         load_world("Track { device [ LinearMotor { } ] boundingObject Box { } }")
 

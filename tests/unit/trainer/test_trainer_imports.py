@@ -77,7 +77,7 @@ def test_an_optimizer_brings_no_compiler_before_a_program_compiles():
 
 
 def test_what_a_user_keeps_from_being_compiled_is_kept_from_it():
-    """If the mark were only on the placeholder, it would be lost when another function is compiled."""
+    """PyTorch marks a function that must not be compiled, and looks for the mark when it compiles another."""
     program = OPTIMIZE + "kept = torch._dynamo.disable(lambda x: x)\n"
 
     assert _run(program + "print(json.dumps([before, hasattr(kept, '_torchdynamo_disable')]))") == [
@@ -96,7 +96,7 @@ def test_a_part_of_the_compiler_can_be_imported_first():
 def test_a_library_that_a_user_imports_first_is_the_real_one_everywhere():
     """If a placeholder were imported later, the library would exist twice under one name."""
     first = "import matplotlib.figure, pandas\n"
-    # From Stable-Baselines3 2.9 on, the logger imports neither of them at module level.
+    # From Stable-Baselines3 2.9 on, its logger imports neither Matplotlib nor pandas at module level.
     real = "{'matplotlib': matplotlib, 'pandas': pandas}"
     same = f"[getattr(logger, name, library) is library for name, library in {real}.items()]"
     program = first + IMPORT + f"from stable_baselines3.common import logger\nprint(json.dumps({same}))"

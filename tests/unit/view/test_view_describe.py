@@ -109,7 +109,7 @@ def test_events_have_an_age_and_a_count():
 
 
 def test_an_event_about_a_container_names_it():
-    """Otherwise a pod with five containers would have five equal lines `Container created`."""
+    """Without the name, a pod with five containers would have five equal lines `Container created`."""
     event = Event(
         time=NOW,
         warning=False,

@@ -26,7 +26,7 @@ def test_a_handle_that_no_service_returned_is_refused(handle) -> None:
 
 
 def test_the_handle_of_a_field_is_not_that_of_a_node() -> None:
-    """Both are pointers, so the library could not tell them apart."""
+    """Both handles are pointers, so the library could not distinguish them."""
     handles = WebotsHandles()
 
     assert (handles.of_node(5), handles.of_field(6)) == (5, 6)

@@ -1,4 +1,4 @@
-"""The types with which the controller calls libController, beside the C functions of the tests' library."""
+"""The types with which the controller calls libController equal those of the C functions in the tests."""
 
 from palaestra_sim.webots.library import PROTOTYPE_OF
 from tests.fake_webots.wire import RESULTS, functions

@@ -86,7 +86,7 @@ def of_type(nodes: Iterable[Node], *types: str) -> list[Node]:
 
 
 def numbers(node: Node, field: str) -> tuple[float, ...]:
-    """Return the numbers of a field, which the node must have."""
+    """Return the numbers of a field; it is an error if the node does not have the field."""
     found = node.numbers(field)
     assert found is not None, f"{node.type_name} without {field}"
     return found

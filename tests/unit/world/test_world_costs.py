@@ -13,7 +13,7 @@ import pytest
 from palaestra_sim.world import RunIdentity, WorldError, check, generate
 
 SMALL, GROWTH = 32 << 10, 4
-MOST = 2.5  # How many times longer than proportional the large world may take, since the machine may be busy
+MOST = 2.5  # On a busy machine, the large world may take this many times longer than proportional.
 TRIES = 4
 HEADER = b"#VRML_SIM R2023b utf8\n"
 ROBOT = b'Robot{controller "ros"}'

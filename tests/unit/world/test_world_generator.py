@@ -199,7 +199,7 @@ def test_a_robot_within_a_robot_gets_its_own_name(world: Make, identity: RunIden
 
 
 def test_a_proto_whose_controller_is_ros_is_a_robot(world: Make, identity: RunIdentity) -> None:
-    """The generator does not read the PROTO's file, which has the default name.
+    """The robot's default name is in the PROTO's file, but the generator does not read this file.
 
     So it uses the type as the name.
     """
@@ -210,7 +210,7 @@ def test_a_proto_whose_controller_is_ros_is_a_robot(world: Make, identity: RunId
 
 
 def test_a_robot_without_a_name_is_called_robot(world: Make, identity: RunIdentity) -> None:
-    """Webots has the same default."""
+    """Webots gives such a robot the name `robot`, so the generated name must contain it too."""
     made = generate(world('Robot { controller "ros" }'), identity, clock=False)
 
     assert robots(made)[0].ros_name == ros_name(identity, "robot")

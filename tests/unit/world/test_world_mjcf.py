@@ -176,7 +176,7 @@ GROWING = [
 
 @for_each("element, fact", GROWING)
 def test_a_line_that_would_take_all_memory_is_refused(element, fact):
-    """MuJoCo allocates memory for any size in the file, which could take gigabytes or minutes."""
+    """MuJoCo allocates memory for any size in the file, and could need gigabytes or minutes for one line."""
     with pytest.raises(WorldError) as refused:
         check(with_custom(b"", element.encode()))
 

@@ -39,7 +39,7 @@ def test_a_world_has_a_header_and_nodes_in_source_order(scene: World) -> None:
 
 
 def test_protos_from_elsewhere_are_listed_by_address(scene: World) -> None:
-    """PROTO declarations are not nodes of the world."""
+    """A declaration of a PROTO is not a node of the world, so both have lists of their own."""
     assert [token.text for token in scene.externs] == [
         b'"https://example.org/Lamp.proto"',
         b'"webots://Chair.proto"',

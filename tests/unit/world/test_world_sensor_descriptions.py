@@ -79,7 +79,7 @@ def test_a_lidar_of_many_layers_looks_up_and_down_as_documented(name: str) -> No
 
 @pytest.mark.parametrize("name", INFRARED)
 def test_an_infra_red_sensor_returns_the_volts_of_its_data_sheet(name: str) -> None:
-    """The voltage falls with the distance, also beyond the documented range."""
+    """The voltage falls with the distance, even beyond the documented range."""
     (sensor,) = described(name).body.nodes
     table = numbers(sensor, "lookupTable")
     distances, volts = table[::3], table[1::3]

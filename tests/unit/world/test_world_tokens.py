@@ -35,12 +35,12 @@ def test_a_comment_ends_with_its_line_even_glued_to_a_word() -> None:
 
 
 def test_a_number_sign_in_a_string_is_data() -> None:
-    """Addresses and colors contain `#`."""
+    """Addresses and colors contain `#`, which must not begin a comment inside a string."""
     assert words('url "https://host/a#b"') == ["url", '"https://host/a#b"']
 
 
 def test_line_ends_of_windows_are_blanks() -> None:
-    """A world may have been edited on Windows."""
+    """A world may have been edited on Windows, where lines end with two characters."""
     assert words("Robot {\r\n}\r\n") == ["Robot", "{", "}"]
 
 

@@ -182,7 +182,7 @@ NOTED = [
     ("frame_stack: four", "frame_stack: left out; 'four' is not a number"),
     (
         "env_wrapper: a.Own",
-        "env_wrapper: a run counts returns outside of the wrappers, and Zoo inside of them",
+        "env_wrapper: a run sums the rewards after the wrappers, Zoo the rewards before them",
     ),
     ("env_wrapper: rl_zoo3.wrappers.FrameSkip", "rl_zoo3.wrappers.FrameSkip needs the package rl_zoo3"),
     ("env_wrapper: [{a.Own: 1, b: 2}]", "is left out, because it does not name a class"),
@@ -283,7 +283,7 @@ def test_frames_of_normalized_observations_have_a_note(converted):
     _, notes = converted("frame_stack: 4", "normalize: true")
     _, of_rewards = converted("frame_stack: 4", "normalize: {norm_obs: false}")
 
-    assert notes == ["frame_stack: a run normalizes the stacked observation; Zoo stacks normalized ones"]
+    assert notes == ["frame_stack: a run stacks observations, then normalizes; Zoo normalizes, then stacks"]
     assert of_rewards == []
 
 

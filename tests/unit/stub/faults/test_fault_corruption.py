@@ -90,7 +90,7 @@ def test_a_message_too_short_for_a_reading_stays_short():
 
 
 def test_a_bumper_has_nothing_to_become_nan():
-    """The reading of a bumper is True or False, which cannot become NaN."""
+    """The reading of a bumper is True or False, so it cannot become NaN."""
     sound = message("webots_ros/BoolStamped", data=True)
 
     assert damaged_message("webots_ros/BoolStamped", sound, WRONG_VALUE) == sound

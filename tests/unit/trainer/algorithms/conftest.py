@@ -34,7 +34,7 @@ class Search(sb3_contrib.ARS):
 
 
 class Masked(sb3.PPO):
-    """PPO with the rollout buffer of MaskablePPO, which nothing gives masks to."""
+    """PPO with the rollout buffer of MaskablePPO, although PPO stores no masks in it."""
 
     def _setup_model(self):
         super()._setup_model()
@@ -80,53 +80,53 @@ def failing(left):
 
 
 class Doubled(FlattenExtractor):
-    """Twice the observation."""
+    """Features that are twice the observation."""
 
     def forward(self, observations):
         return 2.0 * super().forward(observations)
 
 
 class Scribbling(FlattenExtractor):
-    """It scales the observation in its place."""
+    """An extractor that overwrites the observation."""
 
     def forward(self, observations):
         return super().forward(observations.mul_(0.5))
 
 
 class ScribblingPolicy(ActorCriticPolicy):
-    """It scales the observation in its place."""
+    """A policy that overwrites the observation."""
 
     def forward(self, obs, deterministic=False):
         return super().forward(obs.mul_(0.5), deterministic)
 
 
 class Picky(FlattenExtractor):
-    """It wants a Dict."""
+    """An extractor that accepts only observations of a Dict."""
 
     def __init__(self, observation_space):
         observation_space["sensors"]
 
 
 class Hasty(FlattenExtractor):
-    """It asks for what is not there yet."""
+    """An extractor that reads an attribute which does not exist."""
 
     def __init__(self, observation_space):
         self.missing
 
 
 class Lost(FlattenExtractor):
-    """It asks for a key that its table lacks."""
+    """An extractor that reads a missing key."""
 
     def __init__(self, observation_space):
         {}["units"]
 
 
 class OwnPolicy(ActorCriticPolicy):
-    """The usual policy."""
+    """The usual policy under another name."""
 
 
 class Calm(torch.nn.Module):
-    """An activation."""
+    """An activation function."""
 
     def forward(self, x):
         return torch.tanh(x / 2)

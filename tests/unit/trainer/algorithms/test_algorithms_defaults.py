@@ -57,7 +57,7 @@ def test_an_own_environment_has_the_defaults_of_stable_baselines3(name):
 @pytest.mark.parametrize("name", sorted(ALGORITHMS))
 @pytest.mark.parametrize("environment", [ARENA, f"palaestra_trainer.environments:{ARENA}"])
 def test_the_arena_keeps_its_own_defaults(name, environment):
-    """The arena has the same defaults under each of its names."""
+    """A job may write the id of the arena with or without the package, and must get the same defaults."""
     resolved = resolve(Algorithm(name=name), environment).hyperparameters
 
     assert resolved.items() >= ALGORITHMS[name].arena.items()

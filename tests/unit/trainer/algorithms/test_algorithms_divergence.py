@@ -19,7 +19,7 @@ ALL = ("DQN", "PPO", "A2C", "REINFORCE")
 
 @pytest.fixture
 def model(job, make_member):
-    """Return a function that makes a model of an algorithm in a corridor, whose logger writes nothing."""
+    """Return a function that makes a model of an algorithm in a corridor; its logger writes nothing."""
 
     def make(name):
         env = SimulatorsVecEnv([Restarter(make_member())], run_seed=1)
@@ -71,7 +71,7 @@ def test_a_refusal_names_step_loss_and_tensors(model):
 
 
 def test_a_figure_that_is_no_loss_may_be_unknown(model):
-    """The explained variance is NaN if all returns are equal, which is not a divergence."""
+    """If all returns are equal, the explained variance is NaN, but the training has not diverged."""
     made = model("PPO")
     made.logger.record("train/explained_variance", math.nan)
     made.logger.record("rollout/loss", math.nan)

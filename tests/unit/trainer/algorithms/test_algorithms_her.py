@@ -222,7 +222,7 @@ def test_episodes_with_lost_rows_are_dropped():
 
 
 def test_changed_rows_are_marked_for_the_next_checkpoint():
-    """The end of an episode changes all its rows, also rows in chunks that are already saved."""
+    """The end of an episode changes all its rows, even rows in chunks that are already saved."""
     buffer = buffer_of()
     buffer.chunk_rows = 2
     for place in range(5):

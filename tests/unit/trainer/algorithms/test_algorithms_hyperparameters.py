@@ -18,7 +18,7 @@ def test_defaults_are_hyperparameters_of_the_class(name):
 
 
 def test_all_mistyped_hyperparameters_are_reported_at_once_with_the_nearest_name():
-    """A person corrects all names in one go, before a simulator is started in vain."""
+    """A person can correct all names at once, and no simulator starts for a run that must fail."""
     wrong = {"learning_rat": 1, "gama": 0.9, "zzz": 0}
 
     with pytest.raises(ConfigurationError) as caught:
@@ -70,7 +70,7 @@ WRONG = [
 
 @pytest.mark.parametrize(("name", "hyperparameters", "line"), WRONG, ids=lambda it: str(it)[:40])
 def test_a_value_of_a_wrong_type_is_refused_by_the_signature(name, hyperparameters, line):
-    """Without the check, each of four attempts would start the simulators in vain."""
+    """Without the check, each of four attempts would start the simulators and then fail."""
     with pytest.raises(ConfigurationError) as refusal:
         check(Algorithm(name=name, hyperparameters=hyperparameters))
 

@@ -239,7 +239,7 @@ def run(directory, make_member, make_configuration):
 
 
 def test_an_environment_without_masks_is_refused_before_a_simulator_starts(run, last_word):
-    """Without masks every action would be allowed, which is plain PPO."""
+    """Without masks every action would be allowed, so the job would train with plain PPO unnoticed."""
     code, members, _ = run(lambda: task_of(FakeTask))
 
     assert code == 2
@@ -267,7 +267,7 @@ def test_training_evaluations_and_confirmations_take_only_allowed_actions(run, d
 
 
 def test_an_evaluation_outside_a_run_asks_for_masks_too(learn, make_member):
-    """The policy itself knows that it needs masks."""
+    """`evaluate` finds out from the policy that it needs masks, so a program passes no option for them."""
     model, _, env = learn(task_of())
     member = with_task(make_member(), task_of(Asked))
 

@@ -57,7 +57,7 @@ class Tree:
 
 
 class Treed(ReplayBuffer):
-    """It has an object of its own, and no methods for its state."""
+    """A buffer with an object that a checkpoint cannot store, and without `state_dict`."""
 
     def __init__(self, *args, **kwargs):
         super().__init__(*args, **kwargs)
@@ -65,7 +65,7 @@ class Treed(ReplayBuffer):
 
 
 class Stated(Treed):
-    """It says itself what is kept of that object."""
+    """The same buffer with methods that save and load the object."""
 
     def state_dict(self):
         return {"sums": self.tree.sums + self.pos}
@@ -75,7 +75,7 @@ class Stated(Treed):
 
 
 class Broken(Treed):
-    """Its state cannot be had."""
+    """The same buffer with a `state_dict` that raises an error."""
 
     def state_dict(self):
         return {"sums": self.trees}
@@ -85,7 +85,7 @@ class Broken(Treed):
 
 
 class Tail(ReplayBuffer):
-    """It has a deque, which JSON does not have."""
+    """A buffer with a deque, which JSON cannot represent."""
 
     def __init__(self, *args, **kwargs):
         super().__init__(*args, **kwargs)
@@ -93,15 +93,15 @@ class Tail(ReplayBuffer):
 
 
 class Steps(NStepReplayBuffer):
-    """Returns of n steps."""
+    """A buffer with returns of n steps."""
 
 
 class ForDict(DictReplayBuffer):
-    """For observations that are a Dict."""
+    """A buffer for observations of a Dict."""
 
 
 class Greedy(RolloutBuffer):
-    """Its advantages are the returns."""
+    """A buffer whose advantages are the returns."""
 
     def __init__(self, *args, scale=1.0, **kwargs):
         super().__init__(*args, **kwargs)
@@ -114,18 +114,18 @@ class Greedy(RolloutBuffer):
 
 
 class Ordered(RolloutBuffer):
-    """It yields its own batches."""
+    """A buffer that yields its own batches."""
 
     def get(self, batch_size=None):
         yield from super().get(batch_size)
 
 
 class Masks(MaskableRolloutBuffer):
-    """For MaskablePPO."""
+    """A buffer for MaskablePPO."""
 
 
 class PrioritizedDQN(sb3.DQN):
-    """It brings its buffer itself."""
+    """DQN that sets the class of its buffer itself."""
 
     def __init__(self, *args, **kwargs):
         super().__init__(*args, replay_buffer_class=Prioritized, **kwargs)

@@ -42,7 +42,7 @@ def play(recorder, rows):
 
 
 def test_an_environment_that_is_away_is_not_waited_for():
-    """The simulator of such an environment may take a minute to restart, or be given up."""
+    """The simulator of such an environment may take a minute to restart, or may never come back."""
     recorder = EpisodeRecorder(environments=2, wanted=2)
 
     play(

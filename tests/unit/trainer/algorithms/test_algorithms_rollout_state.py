@@ -144,7 +144,7 @@ def test_every_algorithm_has_an_entry(name):
 
 
 def test_a_class_without_a_known_ancestor_keeps_its_whole_policy():
-    """Each part of such a policy may change in a rollout."""
+    """A rollout may change each part of such a policy, so a checkpoint must contain all parts."""
     model = model_of("PPO")
     stranger = type("Stranger", (), {"policy": model.policy})()
 

@@ -10,7 +10,7 @@ from palaestra_trainer.bags.definitions import ODOMETRY, TRANSFORMS, TYPES, defi
 
 @pytest.mark.parametrize("type_name", TYPES)
 def test_a_definition_contains_each_type_that_it_names_once(type_name):
-    """A reader of the bag has no other source of definitions."""
+    """A reader has only the definitions in the bag, so a missing one would make messages unreadable."""
     own, *others = re.split(r"^=+\nMSG: ", definition(type_name), flags=re.MULTILINE)
     texts = {type_name.replace("/msg/", "/"): own} | dict(text.split("\n", 1) for text in others)
 
@@ -31,6 +31,6 @@ def test_the_header_is_that_of_ros_2():
 
 
 def test_a_type_that_no_message_has_is_refused():
-    """Its definition may differ between ROS 1 and ROS 2, as that of CameraInfo does."""
+    """The definition of such a type may differ between ROS 1 and ROS 2, like that of CameraInfo."""
     with pytest.raises(KeyError):
         definition("sensor_msgs/msg/CameraInfo")

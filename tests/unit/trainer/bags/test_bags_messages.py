@@ -20,7 +20,7 @@ def test_nine_ranges_are_a_scan_from_the_front_counterclockwise():
 
 
 def test_a_distance_out_of_range_is_infinite():
-    """The sensor then returns the bound of its range, which a reader would take for an obstacle (REP 117)."""
+    """The sensor then returns the bound of its range. A reader would take it for an obstacle (REP 117)."""
     scan = messages.ranges(0.0, [0.4, 0.5, 0.03, 0.2, math.nan], (0.03, 0.4))
 
     assert scan["ranges"][:4] == [math.inf, math.inf, -math.inf, 0.2]

@@ -14,7 +14,7 @@ from palaestra_trainer.bags.writer import BagWriter
 from palaestra_trainer.errors import ConfigurationError
 
 UNKNOWN_KIND = 0x7F  # reserved for later versions of MCAP
-LENGTH_OF_THE_HEADER = 9  # its first byte, after eight bytes of magic and the kind of the record
+LENGTH_OF_THE_HEADER = 9  # position of the length: after eight bytes of magic and the kind of the record
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +64,7 @@ def test_a_damaged_bag_is_refused_or_its_messages_are_right(whole, at, to, tmp_p
 
 
 def test_a_chunk_that_looks_like_another_record_is_missed(whole, tmp_path):
-    """Readers skip records of an unknown kind, so a second of a drive would be lost without a word."""
+    """Readers skip records of an unknown kind, so nobody would notice that a second of a drive is missing."""
     summary = make_reader(io.BytesIO(whole)).get_summary()
     damaged = bytearray(whole)
     damaged[summary.chunk_indexes[-1].chunk_start_offset] = UNKNOWN_KIND
@@ -85,7 +85,7 @@ def test_a_header_that_seems_to_contain_the_messages_is_found(whole, tmp_path):
 
 
 def test_a_large_file_is_refused_before_it_is_read(tmp_path, monkeypatch):
-    """A bag with pictures may be larger than the memory."""
+    """A bag with images may be larger than the memory, so the size is checked first."""
     monkeypatch.setattr(reader, "MOST_BYTES", 10)
     (tmp_path / "log.mcap").write_bytes(b"x" * 11)
 
@@ -103,7 +103,7 @@ def test_chunks_that_grow_too_much_are_refused(tmp_path, whole, monkeypatch):
 
 
 def test_a_bag_of_ros_1_is_refused(tmp_path):
-    """Its messages have another encoding."""
+    """The messages in a bag of ROS 1 have another encoding, so they would be read as wrong values."""
     file = io.BytesIO()
     writer = Writer(file)
     writer.start("ros1", "test")

@@ -1,4 +1,4 @@
-"""A bag has each message as it was written, also after a crash."""
+"""A bag has each message as it was written, even after a crash."""
 
 import math
 import signal
@@ -93,7 +93,7 @@ def killed(tmp_path):
 
 
 def test_a_crash_loses_less_than_the_last_second(killed):
-    """The seconds before a crash explain it."""
+    """A person finds the cause of a crash in the seconds before it."""
     read = read_bag(killed)
 
     assert read.metadata == {"robot": "robotino-3"}

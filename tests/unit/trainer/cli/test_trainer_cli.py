@@ -50,7 +50,7 @@ def test_help_says_what_is_read_and_written_and_the_exit_codes(program, codes, c
 
 @pytest.mark.parametrize("number", ["0", "-1", "many"])
 def test_an_evaluation_of_no_episodes_is_refused(number, capsys):
-    """The number is checked before a simulator is started in vain."""
+    """The number is checked before a simulator starts, so a person waits only a moment for the error."""
     with pytest.raises(SystemExit) as ended:
         evaluate(["run", "--episodes", number])
 

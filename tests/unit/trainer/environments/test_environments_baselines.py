@@ -22,7 +22,7 @@ def test_driving_straight_succeeds_until_something_is_in_the_way(make_env):
 
 
 def test_random_movements_hardly_ever_succeed(make_env):
-    """Otherwise the success of a trained policy could be luck."""
+    """If random movements often succeeded, the success of a trained policy could be luck."""
     assert success_rate(make_env(), random_movement, SEEDS) < 0.1
 
 

@@ -42,7 +42,7 @@ def rows(colors, color):
 
 
 def test_a_pole_straight_ahead_is_in_the_middle_at_its_distance(look):
-    """The distance is from the camera to the front of the pole, which is higher than the wall."""
+    """The distance is from the camera to the front of the pole. The pole is higher than the wall."""
     colors, depths = look(Pose(0.0, 0.0, 0.0), (1.0, 0.0))
 
     seen = columns(colors, POLE)

@@ -100,12 +100,12 @@ def test_a_batched_form_for_another_kind_of_robot_names_the_kind(batched):
     class OfJoints(BatchedHall):
         needs = (BatchedJointsAbc,)
 
-    with pytest.raises(ConfigurationError, match="needs BatchedJointsAbc, which the robot's form"):
+    with pytest.raises(ConfigurationError, match="needs BatchedJointsAbc, but the robot's form"):
         batched(OfJoints)
 
 
 def test_an_environment_without_a_batched_form_is_refused(batched):
-    """The remedy names both ways out."""
+    """The message names both remedies: register a batched form, or remove `batch` from the job."""
     with pytest.raises(ConfigurationError, match=r"has no batched form, .* register .* or remove batch"):
         batched(None)
 
@@ -123,7 +123,7 @@ def test_a_world_without_a_floor_has_no_layout(robot):
 
 
 def test_a_robot_with_its_own_batched_form_gets_it():
-    """A class that overrides a method cannot use the shipped form, which would not call the method."""
+    """The shipped form does not call `Slow.drive`, so such a class needs a batched form of its own."""
 
     class Slow(Robotino):
         batched = BatchedJointRobot

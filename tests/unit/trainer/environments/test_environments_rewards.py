@@ -110,7 +110,7 @@ def test_each_of_several_targets_is_worth_as_much_as_a_single_one(reward):
 
 @pytest.mark.parametrize("reward", WEIGHTS)
 def test_reaching_the_target_is_the_best_end(reward):
-    """If an early collision or waiting had a higher return, the policy would learn that."""
+    """If an early collision or waiting had a higher return, the policy would learn to collide or to wait."""
     worth = {it: sum(reward_terms(reward, transition(outcome=it)).values()) for it in SINGLE}
 
     assert max(worth, key=worth.__getitem__) is EpisodeOutcome.REACHED

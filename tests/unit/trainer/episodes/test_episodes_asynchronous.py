@@ -107,7 +107,7 @@ def test_a_pause_waits_for_pending_steps_and_loses_no_row(make_env, make_member,
 
 
 def test_an_error_of_a_pending_step_is_raised_in_a_later_step(make_env, make_member, make_slow):
-    """An error in code of the job's author ends the run, also if the step began before."""
+    """An error in code of the job's author must end the run, even if it is noticed some steps later."""
     slow = make_slow(turns=1)
     env = make_env(make_member("fast"), slow)
     env.reset()

@@ -92,7 +92,7 @@ def reference(request):
     if request.param == "in this process":
         env = DummyVecEnv([wrapped] * MEMBERS)
     else:
-        env = SubprocVecEnv([wrapped] * MEMBERS, start_method="fork")  # others import PyTorch in each
+        env = SubprocVecEnv([wrapped] * MEMBERS, start_method="fork")  # only a fork need not import PyTorch
     yield env
     env.close()
 

@@ -1,4 +1,4 @@
-"""The recorded episodes of a run as a bag have what the recordings have, in the order of time."""
+"""The bag of a run contains the values of its recorded episodes in the order of time."""
 
 import json
 import math
@@ -49,7 +49,7 @@ def test_the_command_of_the_page_writes_the_episodes(run, capsys):
 
 
 def test_the_episodes_follow_each_other_after_a_second(run):
-    """A player shows them as one drive, and the pause separates them."""
+    """A player shows the whole bag as one drive, so a pause of a second separates the episodes."""
     assert export([str(run), "--to", "mcap"]) == 0
 
     bag = read_bag(run / "episodes.mcap")

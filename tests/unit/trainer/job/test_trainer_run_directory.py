@@ -38,7 +38,7 @@ def test_a_line_that_a_crash_tore_is_left_out(tmp_path):
 
 
 def test_a_file_that_is_not_there_has_no_lines(tmp_path):
-    """At the start of a run, nothing has been evaluated."""
+    """At the start of a run, nothing has been evaluated, so the file of evaluations does not exist."""
     assert list(read_lines(tmp_path / "none")) == []
 
 

@@ -37,7 +37,7 @@ def test_a_picture_of_any_resolution_becomes_one_image(size):
         (b"<html>no camera</html>", "returned no JPEG picture"),
         (jpeg((64, 48), "PNG"), "returned no JPEG picture"),
         (jpeg((64, 48))[:-200], "returned no JPEG picture"),
-        (jpeg((160, 90)), "160 x 90 pixels has another shape than the policy's 64 x 48; set the camera"),
+        (jpeg((160, 90)), "x 90 pixels has another aspect ratio than the policy's 64 x 48; set the camera"),
         (jpeg((8192, 4096)), "8192 x 4096 pixels is too large"),
     ],
     ids=["empty", "text", "PNG", "cut off", "wide", "large"],

@@ -49,6 +49,6 @@ def test_odometry_is_extrapolated_along_the_robots_own_axes(velocity, pose):
 
 @given(angle=st.floats(-100.0, 100.0))
 def test_angles_are_in_the_interval_of_poses(angle):
-    """`Pose.heading_rad` is in (-pi, pi]."""
+    """The sum of two headings may be outside of (-pi, pi], the interval of `Pose.heading_rad`."""
     assert -math.pi < wrapped(angle) <= math.pi
     assert math.isclose(math.cos(wrapped(angle)), math.cos(angle), abs_tol=1e-9)

@@ -38,7 +38,7 @@ def test_distances_are_clipped_to_the_range_of_the_sensors():
 
 
 def test_clockwise_sensors_are_turned_around():
-    """One public project found this order on its robot."""
+    """One public project found that its robot numbers the sensors clockwise."""
     found = distances_of(body(NINE), SensorLayout(order="clockwise"))
 
     assert found == pytest.approx([0.05, 0.40, *NINE[7:0:-1]])

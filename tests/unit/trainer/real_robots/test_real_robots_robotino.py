@@ -14,7 +14,7 @@ from tests.waiting import eventually
 HERE = Pose(0.0, 0.0, 0.0)
 AGES_S = 1e6  # added to the robot's time, so a reading stays new for the whole test
 CLOCK = RobotClock(10.0)
-REAL = RobotClock()  # so a thread that a busy computer delays is not taken for a lost robot
+REAL = RobotClock()  # at real speed, a thread that a busy computer delays does not look like a lost robot
 
 
 class Link:
@@ -44,7 +44,7 @@ class Link:
 
     @property
     def late_s(self):
-        """The time of the readings, in the robot's future."""
+        """Return the time of the readings, which is in the robot's future."""
         return CLOCK.now_s() + AGES_S
 
     def report(self):
@@ -124,7 +124,7 @@ def test_a_robot_that_is_held_back_too_long_ends_the_drive(robot, monkeypatch):
 
 
 def test_a_camera_is_used_only_when_an_environment_wants_images(robot):
-    """Pictures need most of the robot's network."""
+    """Images would use most of the bandwidth of the robot's network."""
     seeing, link = robot()
     seeing.connect()
 

@@ -63,7 +63,7 @@ def test_the_angles_decide_which_sensor_a_ray_belongs_to(sign):
 
 
 def test_a_ray_without_an_obstacle_has_the_greatest_distance():
-    """ROS writes infinity for it."""
+    """ROS has infinity for such a ray, but the policy was trained with the limit of the sensor."""
     found = distances_of(scan([math.inf, *[RADIUS_M + 0.1] * 7, -math.inf]), SensorLayout())
 
     assert found == pytest.approx([0.40, *[0.1] * 7, 0.03])
@@ -87,7 +87,7 @@ def test_a_scan_of_another_sensor_is_refused(message):
 
 
 def test_a_simulation_that_begins_again_does_not_set_the_time_back():
-    """Otherwise the readings of the old simulation would be newer than those of the new one."""
+    """If the time went back, old readings would count as newer than those of the new simulation."""
     times = iter([5.0, 6.0, 0.5, 1.5])
     time = SimulationTime(lambda: next(times))
 
@@ -95,7 +95,7 @@ def test_a_simulation_that_begins_again_does_not_set_the_time_back():
 
 
 def test_a_wait_ends_when_the_simulation_has_reached_the_time():
-    """The real time of the wait depends on the simulation's speed."""
+    """A wait is in simulated time, so its real duration depends on the speed of the simulation."""
     times = iter([1.0, 1.1, 1.2, 1.3])
     clock = SimulationClock(time=SimulationTime(lambda: next(times)))
 
@@ -113,7 +113,7 @@ def test_at_the_end_a_paused_simulation_holds_nothing_up():
 
 
 def test_a_simulation_without_time_is_waited_for():
-    """Before the first message of /clock, the time is 0."""
+    """Before the first message of /clock, the time is 0, which is not yet the time of the simulation."""
     times = iter([0.0, 0.0, 0.1])
     checks = []
 

@@ -15,7 +15,7 @@ ORDERS = {"rgb8": (0, 1, 2), "bgr8": (2, 1, 0), "rgba8": (0, 1, 2, 3), "bgra8": 
 
 
 def message(encoding="rgb8", size=SIZE, padding=0, **changes):
-    """Return an object with the fields of a message, whose left half is red and whose right half is blue."""
+    """Return an object with the fields of a message; its picture is red on the left and blue on the right."""
     width, height = size
     pixels = np.zeros((height, width, 4), np.uint8)
     pixels[:, : width // 2, :3], pixels[:, width // 2 :, :3] = RED, BLUE
@@ -45,7 +45,7 @@ def test_a_larger_picture_is_reduced_as_one_of_the_rest_interface():
 
 
 def test_bytes_at_the_end_of_each_row_are_not_pixels():
-    """A driver may align rows; otherwise each row of the image would be shifted."""
+    """A driver may align rows. If the padding were read as pixels, each row would be shifted."""
     image = image_of(message("rgb8", padding=4), SIZE)
 
     assert tuple(image[47, 0]) == RED
@@ -53,7 +53,7 @@ def test_bytes_at_the_end_of_each_row_are_not_pixels():
 
 
 def test_the_bytes_may_be_an_array_as_rclpy_has_them():
-    """Messages of ROS 1 have bytes."""
+    """In rclpy the data of a message is an array, but in ROS 1 it is bytes."""
     sent = message()
     sent.data = array("B", sent.data)
 
@@ -69,7 +69,7 @@ def test_the_bytes_may_be_an_array_as_rclpy_has_them():
         ),
         (message("yuv422"), "the encoding 'yuv422'"),
         (message("8UC3"), "the encoding '8UC3'"),
-        (message(size=(160, 90)), "160 x 90 pixels has another shape than the policy's 64 x 48; set the"),
+        (message(size=(160, 90)), "another aspect ratio than the policy's 64 x 48; set the camera"),
         (message(width=0), "0 x 48 pixels in rgb8 cannot have 192 bytes a row"),
         (message(height=47), "64 x 47 pixels in rgb8 cannot have 192 bytes a row and 9216 in all"),
         (message(step=191), "64 x 48 pixels in rgb8 cannot have 191 bytes a row"),

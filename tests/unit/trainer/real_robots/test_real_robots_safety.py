@@ -80,7 +80,7 @@ def test_the_first_cause_is_the_most_important_one():
 
 
 def test_the_fence_is_closer_after_a_long_way():
-    """Odometry drifts, so after 10 m the robot may be half a meter from where it believes to be."""
+    """Odometry drifts, so after 10 m the true position may be half a meter from the measured one."""
     at = replace(DRIVING, pose=Pose(1.4, 0.0, 0.0))
 
     assert decide(at, RULES).cause is None

@@ -27,7 +27,7 @@ def write(folder, *points):
 
 
 def test_scalars_are_read_as_tensorboard_wrote_them(tmp_path):
-    """The report shows the same curves as TensorBoard."""
+    """A person must see the same curves in the report as in TensorBoard."""
     write(tmp_path, ("train/loss", 0.5, 100), ("train/loss", 0.25, 200), ("rollout/ep_rew_mean", -1.0, 100))
 
     assert read(tmp_path) == {"train/loss": {100: 0.5, 200: 0.25}, "rollout/ep_rew_mean": {100: -1.0}}
@@ -61,7 +61,7 @@ def test_any_bytes_are_read_without_an_error(content):
 
 
 def test_an_integer_without_end_ends_the_record(tmp_path):
-    """A damaged file may have any number of bytes with the bit that announces another one."""
+    """In a damaged file, any number of bytes may have the bit that announces another byte of the integer."""
     write(tmp_path, ("train/loss", 0.5, 100))
     [path] = tmp_path.iterdir()
     endless = b"\xff" * 30

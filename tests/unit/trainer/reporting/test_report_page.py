@@ -1,4 +1,4 @@
-"""A report is a single page of bounded size, which is safe to open whatever texts the run contains."""
+"""A report is one page of bounded size. A person can open it safely, whatever texts the run contains."""
 
 from __future__ import annotations
 
@@ -175,7 +175,7 @@ def large_run(number):
 def test_no_text_of_a_run_becomes_an_element_or_a_reference(drawn):
     """A person opens a report from a mail, so a job's name or a fault's message must not run as code.
 
-    The page must not load anything either, which would report to a server that it was opened.
+    The page must not load anything either: a request would show a server that somebody opened the page.
     """
     text = page(drawn)
 
@@ -208,7 +208,7 @@ def test_a_page_is_bounded_however_large_the_runs_are(number):
 
 
 def test_details_are_left_out_in_the_order_of_their_size():
-    """Two runs have their details. A page of many runs is for their comparison, which is always complete."""
+    """A page of many runs is read to compare them, so it keeps the comparison and leaves out run details."""
     few, many = page([large_run(1), large_run(2)]), page([large_run(index) for index in range(100)])
 
     assert few.count('<details class="run">') == 2
@@ -244,7 +244,7 @@ def test_the_replays_of_a_run_share_one_scene():
 
 
 def test_an_episode_that_is_not_shown_in_three_dimensions_has_the_reason():
-    """Without it, a reader would look for the picture."""
+    """Without the reason, a reader would search the page for the missing picture."""
     replay = Replay(
         title="best", facts="", poses=((0, 0, 0),), frame_s=0.2, not_in_space="the robot drove differently"
     )

@@ -28,7 +28,7 @@ def responding():
 
 
 def test_without_a_master_the_message_asks_whether_it_runs():
-    """The address is in it, because ROS_MASTER_URI may name another computer."""
+    """The message has the address of the master, because ROS_MASTER_URI may name another computer."""
     with pytest.raises(MasterLost, match=f"no ROS master responds at {NOWHERE} .*; is it running"):
         Master("/trainer", uri=NOWHERE).ping()
 
@@ -62,7 +62,7 @@ def test_a_node_whose_program_belongs_to_another_master_does_not_run(responding)
 
 
 def test_a_node_without_a_readable_address_of_its_master_counts_as_running(responding):
-    """Its names must not be given to a second simulator because of a detail of its client library."""
+    """If the client counted the node as gone, a second simulator would get the same names."""
     other = responding(getMasterUri=[1, "", "http://[::1"])
     master = responding(lookupNode=[1, "", other.uri])
 

@@ -74,7 +74,7 @@ def test_a_search_goes_up_to_the_root_and_only_looks_for_the_first_part():
 
 
 def test_a_root_that_is_no_dictionary_is_refused():
-    """The root must contain all namespaces."""
+    """The root contains all namespaces, so it must stay a dictionary."""
     with pytest.raises(TypeError, match="must be a dictionary"):
         Parameters().set("/", 5)
 

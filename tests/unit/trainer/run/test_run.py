@@ -181,7 +181,7 @@ def test_missing_members_are_reported(job, directory, last_word):
     ids=["type", "value", "space"],
 )
 def test_an_algorithm_that_does_not_fit_is_refused_before_a_simulator_starts(play, job, algorithm):
-    """Such a job can never train, so no simulator is started in vain."""
+    """Such a job can never train, so the error comes before a simulator starts."""
     code, members = play(job(algorithm=algorithm))
 
     assert code == 2

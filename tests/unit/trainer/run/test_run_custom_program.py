@@ -95,7 +95,7 @@ def test_a_program_that_reports_answers_as_the_built_in_loop_does(program, addre
 
 
 def test_what_a_program_spends_its_time_on_is_not_known(program, address):
-    """A second with a wrong cause would mislead more than an unknown one."""
+    """A second with a wrong cause would mislead more than a second with an unknown cause."""
     program(step=10)
 
     assert json.loads(answer(address, "/status"))["goodput"] == {}

@@ -1,4 +1,4 @@
-"""The first cause decides how a run ends, also if code of the job's author fails or ends the program."""
+"""The first cause decides how a run ends, even if code of the job's author fails or ends the program."""
 
 from __future__ import annotations
 
@@ -163,7 +163,7 @@ def test_an_environment_that_hangs_when_it_is_closed_does_not_keep_the_run():
 
 
 def test_nobody_watches_for_steps_while_everything_is_stopped(play):
-    """Otherwise a `close` of more than `stallDeadlineSeconds` would end a complete run as stalled."""
+    """A `close` may take longer than `stallDeadlineSeconds`, and must not end a complete run as stalled."""
     watching = []
 
     def close():

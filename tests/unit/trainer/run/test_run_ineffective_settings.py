@@ -79,7 +79,7 @@ def test_updates_that_are_rarer_than_the_steps_are_told(play, name, given, line)
 
 
 def test_a_run_that_learns_says_nothing_of_it(play):
-    """Without this control, a warning in every run would pass the tests above."""
+    """If every run logged these warnings, the tests above would pass and users would ignore the warnings."""
     assert play("DQN", learning_starts=10, buffer_size=100, batch_size=4) == (
         0,
         "Completed: the training is complete",

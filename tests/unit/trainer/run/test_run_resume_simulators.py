@@ -122,7 +122,7 @@ def fields(state):
 
 
 def test_an_episode_that_begins_anew_owes_no_reward_to_the_one_before(make_env, make_configuration):
-    """Rewards are normalized by the discounted return of the episode, which is 0 in a new one."""
+    """Rewards are normalized by the discounted return of the episode, and a new episode begins with 0."""
     env = make_env()
     model = make_model(make_configuration(algorithm=TINY | {"normalize": {}}).algorithm, env, seed=1)
     model.learn(10)

@@ -14,7 +14,7 @@ OURS = "MoveToTargetEnv-v0"
 
 @pytest.fixture
 def repository(tmp_path, monkeypatch):
-    """Return a repository with a module of a job in a folder, which can be imported."""
+    """Return a repository with an importable module of a job in a folder."""
     (tmp_path / "code").mkdir()
     (tmp_path / "code/lab_task.py").write_text("A = 1\n")
     git(tmp_path, "init", "--quiet")

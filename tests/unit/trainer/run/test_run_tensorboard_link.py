@@ -45,7 +45,7 @@ def shown(volume):
 
 
 def test_a_run_on_a_claim_is_linked_under_the_name_of_its_job(play, job, volume):
-    """The run's folder has the UID of the job as its name, which means nothing to a person."""
+    """The name of the run's folder is the UID of the job, and a UID means nothing to a person."""
     directory = RunDirectory(volume / UID / "0")
 
     assert play(job(uid=UID), into=directory)[0] == 0

@@ -77,7 +77,7 @@ class MlflowClient:
         self.statuses.append((run, status))
 
     def set_terminated(self, run):
-        """Keep that the run has finished."""
+        """Record that the run has finished."""
         self.update_run(run, "FINISHED")
 
     def _request(self):

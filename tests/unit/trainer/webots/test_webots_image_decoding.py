@@ -93,7 +93,7 @@ def test_no_pixel_is_copied(kind):
 
 
 def test_a_camera_may_change_its_size():
-    """The size may change when another world is loaded."""
+    """A camera may have another size after the simulator has loaded another world."""
     read = ImageReading("camera")
     read(color())
 

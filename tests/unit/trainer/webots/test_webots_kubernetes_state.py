@@ -46,19 +46,19 @@ def test_only_a_running_container_has_an_address():
     ],
 )
 def test_a_failure_is_known_at_once_and_everything_else_may_still_start(found, events, failure):
-    """A user must not wait five minutes for a pod that cannot run, and not lose one that is slow."""
+    """A user must neither wait five minutes for a pod that cannot run, nor lose a pod that is only slow."""
     assert failure_of(found, events) == failure
 
 
 def test_a_failed_init_container_is_the_failure():
-    """The ROS master's container starts first."""
+    """The ROS master runs in an init container, so the simulator's container has not started yet."""
     ended = {"name": "ros-master", "state": {"terminated": {"exitCode": 1, "message": "port in use"}}}
 
     assert failure_of({"status": {"initContainerStatuses": [ended]}}, []) == "port in use"
 
 
 def test_the_newest_warnings_are_told_once():
-    """The kubelet repeats an event, and the last one explains most."""
+    """The same warning may repeat many times. The newest warnings explain the current state."""
     events = [
         {"type": "Warning", "reason": "FailedScheduling", "message": text, "lastTimestamp": time}
         for text, time in (("no room", "2"), ("no node", "1"), ("no room", "3"))

@@ -18,7 +18,7 @@ def message(*numbers):
 
 
 def test_numbers_are_an_array_of_all():
-    """The numbers keep MuJoCo's order, by which an environment tells them apart."""
+    """The numbers keep MuJoCo's order, by which an environment finds each number."""
     numbers = read_numbers(message(1.0, -2.5, 0.0))
 
     assert numbers.dtype == np.float64

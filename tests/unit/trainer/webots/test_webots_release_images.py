@@ -38,6 +38,6 @@ def test_a_silence_that_a_busy_notebook_exceeds_is_refused():
 
 
 def test_a_name_of_loopback_counts_as_its_address():
-    """A pod or a container can reach neither."""
+    """Other pods cannot reach a loopback address, whether it is written as a name or as numbers."""
     assert [is_loopback(host) for host in ("::1", "127.3.4.5", "localhost")] == [True, True, True]
     assert [is_loopback(host) for host in ("10.0.0.1", "master", "")] == [False, False, False]

@@ -20,7 +20,7 @@ class NotedLink:
 
 
 def test_the_newest_goal_is_taken_and_then_no_goal_waits():
-    """A person who clicks twice means the second point."""
+    """A person who gives a second goal no longer wants the first one."""
     goals = Goals()
     goals.put((1.0, 0.0))
     goals.put((0.0, 0.0))
@@ -31,7 +31,7 @@ def test_the_newest_goal_is_taken_and_then_no_goal_waits():
 
 
 def test_the_wait_for_a_goal_ends_when_the_check_raises():
-    """Ctrl-C must end a node that has no goal."""
+    """Ctrl-C makes the check raise, and must end a node that has no goal."""
 
     def check():
         raise NewGoal

@@ -25,7 +25,7 @@ def test_the_second_report_begins_the_hold_even_after_a_long_first_pause():
 
 
 def test_the_hold_ends_a_quarter_of_a_second_after_the_last_report():
-    """A released key is not repeated."""
+    """A terminal does not report that a key is released, so a missing report must end the hold."""
     keys = presses(1.0, 1.5, 1.53)
 
     assert keys.held(1.7)

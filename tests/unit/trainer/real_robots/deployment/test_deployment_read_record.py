@@ -54,7 +54,7 @@ def test_each_episode_is_replayed_with_its_target(bag):
 
 
 def test_an_episode_that_a_rule_ended_is_shown_with_its_cause(bag):
-    """The cause is what the person wants to know."""
+    """A person reads the report to find out why the robot stopped."""
     drive(bag, 0.0, (1.0, 0.0), {"decision": "stand", "cause": "fence"})
     bag.close()
 
@@ -66,14 +66,14 @@ def test_an_episode_that_a_rule_ended_is_shown_with_its_cause(bag):
 
 
 def test_a_dry_run_has_no_episode(bag):
-    """Its record has a target and decisions, and nothing was driven after them."""
+    """The record of a dry run has a target and decisions, but the robot did not drive."""
     bag.close()
 
     assert read_record(bag.path).replays == ()
 
 
 def test_the_program_writes_the_report_beside_the_record(bag, capsys):
-    """The page has the episodes and the decisions, and no word about simulators."""
+    """The same page shows runs, but a deployment has no simulators to mention."""
     drive(bag, 0.0, (1.0, 0.0), REACHED)
     bag.close()
 
@@ -86,7 +86,7 @@ def test_the_program_writes_the_report_beside_the_record(bag, capsys):
 
 
 def test_a_damaged_record_is_refused(tmp_path, capsys):
-    """The message says how to recover it."""
+    """A page from half of a record would mislead its reader."""
     (tmp_path / "drive.mcap").write_bytes(b"not a bag")
 
     assert main([str(tmp_path / "drive.mcap")]) == 2
@@ -94,7 +94,7 @@ def test_a_damaged_record_is_refused(tmp_path, capsys):
 
 
 def test_a_film_of_a_record_is_refused(bag, capsys, tmp_path):
-    """Only runs have films."""
+    """Films are made only of runs, so the message asks for a run directory."""
     bag.close()
 
     assert main([str(bag.path), "--film", str(tmp_path / "film.gif")]) == 2

@@ -155,7 +155,7 @@ moves = st.recursive(
 
 
 def play(goodput, clock, move):
-    """Let time pass, or play inner moves with a cause, which may end by an error."""
+    """Let time pass, or play inner moves with a cause; the moves may end by an error."""
     if move[0] == "pass":
         clock.pass_(move[1], move[2])
         return

@@ -146,7 +146,7 @@ def test_idleness_ends_with_a_step_of_any_simulator(progress, clock):
 
 
 def test_the_age_of_progress_is_by_a_clock_that_nobody_sets(progress, clock, monkeypatch):
-    """The time of day of a node may jump by an hour, which must not look like a stall."""
+    """The time of day of a node may jump by an hour, and the jump must not look like a stall."""
     clock.now = 50.0
     progress.stepped(1)
     monkeypatch.setattr("time.time", lambda: 0.0)
@@ -286,7 +286,7 @@ def test_the_last_ten_faults_are_remembered(progress):
 
 
 def test_the_steps_of_an_episode_that_a_fault_cut_are_lost(progress):
-    """In training, nothing was learned from these steps; in an evaluation, they took time in vain."""
+    """The count shows the cost of faults: for example, an evaluation has to play the episode again."""
     progress.fault("collect-0", SimulatorDead("collect-0", "gone"), steps_lost=5)
 
     assert progress.status().steps_lost == 5

@@ -19,12 +19,12 @@ def scene(*robots):
 
 
 def test_the_clock_has_all_digits_of_the_simulated_time():
-    """Transforms of one time have one stamp, also after hours of simulated time."""
+    """Messages of one time must have equal stamps, even after hours of simulated time."""
     assert messages.clock(86400.032) == {"clock": {"sec": 86400, "nanosec": 32_000_000}}
 
 
 def test_a_pose_keeps_its_height_and_its_tilt():
-    """Robots that climb or fly are shown too."""
+    """A gateway also shows robots that climb or fly, whose pose is not only x, y and heading."""
     place = messages.odometry(1.5, POSE)["pose"]["pose"]
     moved = messages.transform(1.5, POSE)["transform"]
 
@@ -80,7 +80,7 @@ def test_a_robot_that_never_moved_stands_where_the_scene_has_it():
 
 
 def test_the_joints_of_other_robots_are_left_out():
-    """A robot model in RViz has the names of its own joints."""
+    """RViz draws one robot model, and joints of the same name in another robot would move this model."""
     state = SceneState(time_s=0.0, joints={"a/wheel": 1.0, "b/wheel": 2.0})
 
     assert messages.joints_of(scene("a", "b"), state, "b") == {"wheel": 2.0}
@@ -90,7 +90,7 @@ def test_the_joints_of_other_robots_are_left_out():
 
 
 def test_fields_of_inner_messages_are_set():
-    """The contents are the nested dicts that bags have too."""
+    """The gateway gets the content of a message as nested dicts, as for a bag."""
     message = SimpleNamespace(header=SimpleNamespace(stamp=SimpleNamespace(sec=0), frame_id=""), name=[])
 
     filled(message, {"header": {"stamp": {"sec": 7}, "frame_id": "odom"}, "name": ["a"]})
