@@ -2,18 +2,18 @@
 
 The simulator listens on a loopback address. The trainer sends one request and waits for its response; each
 request covers all rows, and a row is one copy of the world. Every frame begins with `HEADER`: a mark, the
-`FrameKind` of the frame, and the number of bytes that follow. Numbers are little-endian; arrays have their
-rows one after the other.
+`FrameKind` of the frame, and the number of bytes that follow. Numbers are little-endian. Arrays are stored
+row by row.
 
 | request    | content                                              | response  |
 |------------|------------------------------------------------------|-----------|
 | `OPEN`     | `BatchRequest` as JSON                               | `OPENED`  |
 | `STEP`     | float64 commands (rows, motors)                      | `READ`    |
-| `RESET`    | see `reset_parts`                                    | `READ`    |
+| `RESET`    | see `reset_frame`                                    | `READ`    |
 
 `OPENED` holds a `BatchDescription` as JSON. `READ` holds float64 values (rows, values), float64 poses (rows,
-3: x and y in meters, heading in radians), one byte for each row that is 1 if the row failed, and the reasons
-as JSON by row. The response to `RESET` has only the rows of the request. A `REFUSED` frame holds the reason
+3: x and y in meters, heading in radians), one byte for each row (1 if the row failed), and the reasons as
+JSON by row. The response to `RESET` has only the rows of the request. A `REFUSED` frame holds the reason
 as text. A command that is NaN leaves its motor as it is.
 
 The module neither opens a connection nor interprets an array.
@@ -35,8 +35,8 @@ VERSION: Final = 1
 MOST_ROWS: Final = 4096
 MOST_DEVICES: Final = 256
 MOST_SHAPES: Final = 4096
-MOST_BYTES: Final = 2**25  # of one frame: 4096 rows with 1024 numbers each
-MOST_REASONS: Final = 16  # the reasons of more rows are left out
+MOST_BYTES: Final = 2**25  # largest size of one frame: 4096 rows with 1024 numbers each
+MOST_REASONS: Final = 16  # if more rows fail, the frame leaves out their reasons
 LONGEST_REASON: Final = 200
 MARK: Final = b"PB"
 HEADER: Final = struct.Struct("<2sBxI")
@@ -62,7 +62,7 @@ _KINDS: Final = frozenset(int(kind) for kind in FrameKind)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BatchRequest(JsonRequest):
-    """What the trainer uses of the world.
+    """The devices, the robot and the joints of the world that the trainer uses, and the period of a step.
 
     Attributes:
         version: the version of this protocol.
@@ -70,9 +70,9 @@ class BatchRequest(JsonRequest):
         motors: the names of the commanded motors, in the order of the commands.
         commanded: the quantity of a command: `velocity`, `position`, `force`, `torque` or `control`.
         sensors: the names of the sensors, in the order of the values.
-        robot: the DEF name of the robot whose pose is reported and which a reset places; "": no pose.
+        robot: the DEF name of the robot; `READ` has its pose, and a reset sets its place. "": no robot.
         mark: the DEF name of a node that only shows a target; "": no mark.
-        joints: the DEF names of the joints that a reset sets.
+        joints: the DEF names of the joints whose positions a reset sets.
     """
 
     version: Annotated[int, Whole()] = VERSION
@@ -87,7 +87,7 @@ class BatchRequest(JsonRequest):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BatchShape(JsonMessage):
-    """A box or an upright cylinder of an object on the floor; lengths are in meters.
+    """One shape of an object on the floor: a box or an upright cylinder; lengths are in meters.
 
     Attributes:
         name: the DEF name of the object; `FLOOR` for the floor.
@@ -114,7 +114,7 @@ class BatchShape(JsonMessage):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BatchDescription(JsonMessage):
-    """What the simulator offers.
+    """The simulator's response to a `BatchRequest`.
 
     Attributes:
         version: the version of this protocol.
@@ -169,7 +169,7 @@ def kind_and_length(header: bytes | memoryview) -> tuple[FrameKind, int]:
     """Return the kind of a frame and the length of its content, from the header.
 
     Raises:
-        ProtocolError: the header is anything else.
+        ProtocolError: `header` is not a header of this protocol.
     """
     mark, kind, length = HEADER.unpack(header)
     if mark != MARK or kind not in _KINDS or length > MOST_BYTES:
@@ -186,7 +186,7 @@ def request_of(content: bytes) -> BatchRequest:
     """Return the request in an `OPEN` frame.
 
     Raises:
-        ProtocolError: the content is anything else, or of another version.
+        ProtocolError: the content is not a request, or has another version of the protocol.
     """
     return _of_this_version(BatchRequest.from_json(decoded(content, MOST_BYTES)))
 
@@ -195,7 +195,7 @@ def description_of(content: bytes) -> BatchDescription:
     """Return the description in an `OPENED` frame.
 
     Raises:
-        ProtocolError: the content is anything else, or of another version.
+        ProtocolError: the content is not a description, or has another version of the protocol.
     """
     return _of_this_version(BatchDescription.from_json(decoded(content, MOST_BYTES)))
 
@@ -214,7 +214,7 @@ def reset_parts(content: memoryview, *, robot: bool, joints: int, motors: int) -
     """Return the parts of a `RESET` frame.
 
     Raises:
-        ProtocolError: the frame has another length.
+        ProtocolError: the length of the frame does not fit these parts.
     """
     if len(content) < _ROW:
         raise ProtocolError("a reset without rows; name them")
@@ -231,10 +231,10 @@ def read_frame(values: bytes, poses: bytes, failed: bytes, reasons: Mapping[int,
 
 
 def read_parts(content: memoryview, *, rows: int, values: int) -> ReadParts:
-    """Return the parts of a `READ` frame with that number of rows, and of values in each row.
+    """Return the parts of a `READ` frame that has `rows` rows with `values` values each.
 
     Raises:
-        ProtocolError: the frame has another length, or its reasons are not reasons.
+        ProtocolError: the frame is too short, or its last part is not a JSON object of reasons by row.
     """
     sizes = [rows * values * _NUMBER, rows * POSE_VALUES * _NUMBER, rows]
     if len(content) < sum(sizes):

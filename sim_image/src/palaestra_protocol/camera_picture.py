@@ -51,7 +51,7 @@ class CameraPicture:
         """Return the object that `to_json` wrote.
 
         Raises:
-            ProtocolError: `content` is anything else.
+            ProtocolError: `content` does not have this format.
         """
         fields = Fields(content, path)
         width, height = fields.whole("width", 1, MOST_SIDE), fields.whole("height", 1, MOST_SIDE)

@@ -12,10 +12,10 @@ The response is a `SimulatorState`. Its status is 200, or 409 if the simulator's
 request. If the body of the request is wrong, the status is 400 and the response is
 {"error": "<field>: <fact>"}.
 
-If the user allowed it, a simulator leaves out nodes of its world that it cannot simulate. Before such a
-simulator becomes ready, it writes a report. The environment variable `LEFT_OUT_FILE` names the file. The
-report is UTF-8 text with one line for each kind of node. Example: "the stub simulates no Drone: 1 node left
-out (collect-0.wbt, line 12)".
+A user may allow a simulator to leave out the nodes of its world that it cannot simulate. Such a simulator
+writes a report before it becomes ready. The environment variable `LEFT_OUT_FILE` names the file. The report
+is UTF-8 text with one line for each kind of node. Example: "the stub simulates no Drone: 1 node left out
+(collect-0.wbt, line 12)".
 """
 
 from __future__ import annotations
@@ -120,8 +120,8 @@ class SimulatorState(JsonMessage):
         rss_bytes: the memory of the simulator's processes. It is set only in responses to GET while the
             simulator is ready; otherwise None.
         left_out: the nodes that the simulator left out of its world at its last start, in lines for people.
-        batch: the address on which a simulator with many copies of its world serves them; None until it does,
-            and for any other simulator. See `palaestra_protocol.batch`.
+        batch: the address on which the simulator serves many copies of its world; None if the simulator has
+            only one copy, or does not listen yet. See `palaestra_protocol.batch`.
     """
 
     state: Annotated[SidecarState, Choice(SidecarState)]

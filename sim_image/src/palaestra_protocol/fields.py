@@ -189,7 +189,7 @@ def _text(value: object, path: str, most: int, least: int = 0) -> str:
     """Return `value` if it is text of `least` to `most` characters; errors name its `path`.
 
     Raises:
-        ProtocolError: `value` is anything else, or has half of a surrogate pair.
+        ProtocolError: `value` is not such text, or has half of a surrogate pair.
     """
     if not isinstance(value, str):
         raise ProtocolError(f"{path}: {_kind(value)} is not text")

@@ -94,7 +94,7 @@ class Server(TcpServer):
 
     Args:
         address: the address on which the server listens. `0.0.0.0` and `::` both mean every address of the
-            machine, IPv4 and IPv6, because the cluster decides which of the two a pod has.
+            machine, IPv4 and IPv6, because the cluster decides whether a pod has an IPv4 or IPv6 address.
         routes: the function for each method and path.
         name: the name of the program, for the header `Server` and the thread.
         deadline_s: time limit for reading a request; the same limit applies to writing the response.

@@ -11,11 +11,11 @@ its status unreadable. A reader of responses ignores unknown fields, because a n
 
 Programs of different releases exchange messages, so each field has one of three kinds:
 
-- any other `ValueKind`: the writer always writes the field, and the reader refuses a message without it; a
-  default in the class is only for programs that create messages
 - `Maybe`: the writer always writes the field, as null if the value is unknown; a message of an older release
   may lack the field
 - `AddedLater`: release 0.1.0 does not have the field, so the writer leaves it out unless it is set
+- any other `ValueKind`: the writer always writes the field, and the reader refuses a message without it; a
+  default in the class is only for programs that create messages
 
 `palaestra_protocol.scene` has its own reader, which also checks references inside a message: for example,
 from a shape to its mesh.
@@ -56,7 +56,7 @@ class ValueKind(ABC):
         return value
 
     def absent(self, value: Any) -> bool:
-        """Return whether the writer leaves the field out of a message with this value."""
+        """Return whether the writer leaves out the field if it has this value."""
         del value
         return False
 
@@ -80,7 +80,7 @@ class JsonMessage:
             path: the path of the object, such as "simulators[1]"; "" for the whole body.
 
         Raises:
-            ProtocolError: `content` is anything else.
+            ProtocolError: `content` does not have this format.
         """
         fields = Fields(content, path)
         present = ((name, kind) for name, kind in _kinds(cls).items() if kind.required or fields.has(name))
@@ -97,7 +97,7 @@ class JsonRequest(JsonMessage):
         """Return the request.
 
         Raises:
-            ProtocolError: `content` is anything else, or has an additional field.
+            ProtocolError: `content` does not have this format, or has an additional field.
         """
         Fields(content, path).only(*_kinds(cls))
         return super().from_json(content, path)

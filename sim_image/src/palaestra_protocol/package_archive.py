@@ -1,8 +1,9 @@
-"""A policy package as one file: a zip with the files of the package, and nothing else to trust.
+"""A policy package as one file: a zip that holds only plain files with plain names.
 
 Nothing is unpacked to a disk. Before `zipfile` reads the archive's list of files, the size of the list is
-checked, because a list of millions of files would fill the memory. An archive with the name of a path, a
-link, or a name that stands twice is refused as a whole, because a person may unpack it with another program.
+checked, because a list of millions of files would fill the memory. The whole archive is refused if a name in
+it is a path, a name occurs twice, or an entry is a link. A person may unpack such an archive with a program
+that lacks these checks.
 """
 
 from __future__ import annotations
@@ -27,16 +28,16 @@ MEMBER_ERRORS: Final = (BadZipFile, EOFError, NotImplementedError, RuntimeError,
 _MOST_LIST_BYTES: Final = 2**17
 _ENCRYPTED: Final = 0x1
 _UNIX: Final = 3
-_EPOCH: Final = (1980, 1, 1, 0, 0, 0)  # the earliest time of the format, so that no clock changes the bytes
+_EPOCH: Final = (1980, 1, 1, 0, 0, 0)  # earliest time; if it is fixed, equal files give equal bytes
 # Source: APPNOTE.TXT of PKWARE, sections 4.3.16 and 4.3.15.
 _END: Final = struct.Struct("<4s4H2LH")
 _END_MARK: Final = b"PK\x05\x06"
-_LARGE_MARK: Final = b"PK\x06\x07"  # begins the 20 bytes before the end of an archive with 64-bit numbers
+_LARGE_MARK: Final = b"PK\x06\x07"  # starts 20 bytes before `_END`, in archives with 64-bit numbers only
 _LARGE_BYTES: Final = 20
 
 
 def archived(files: Mapping[str, bytes]) -> bytes:
-    """Return a zip with these contents, whose bytes depend only on names and contents.
+    """Return a zip of `files` (contents by name); its bytes depend only on the names and contents.
 
     The contents are not compressed: another release of zlib would write other bytes, and the weights of a
     network hardly become smaller.
@@ -79,7 +80,7 @@ def has_member(path: Path, name: str) -> bool:
 
 
 def _refuse_long_list(file: BinaryIO) -> None:
-    """Refuse a file that does not end as a zip of few files without a comment."""
+    """Raise `ProtocolError` unless the file ends like a zip that has few files and no comment."""
     size = file.seek(0, io.SEEK_END)
     file.seek(max(size - _END.size - _LARGE_BYTES, 0))
     tail = file.read()

@@ -45,7 +45,7 @@ class PackageFile:
 
     Attributes:
         name: its name in the folder.
-        size: its bytes.
+        size: the number of its bytes.
         sha256: the SHA-256 of its content, as 64 hexadecimal digits.
     """
 
@@ -55,7 +55,7 @@ class PackageFile:
 
     @classmethod
     def of(cls, name: str, content: bytes) -> PackageFile:
-        """Return the description of a content."""
+        """Return the description of a file with this name and content."""
         return cls(name=name, size=len(content), sha256=hashlib.sha256(content).hexdigest())
 
     @classmethod
@@ -63,7 +63,7 @@ class PackageFile:
         """Return the description in an entry of a manifest.
 
         Raises:
-            ProtocolError: the entry is not one, or its name is a path.
+            ProtocolError: the entry does not describe a file, or its name is a path.
         """
         fields = Fields(content, path)
         name, sha256 = fields.text("name", MOST_NAME), fields.text("sha256")
@@ -103,10 +103,10 @@ def read_package(place: Path, *needed: str) -> dict[str, Any]:
 def read_files(place: Path, *needed: str) -> tuple[dict[str, Any], dict[str, bytes]]:
     """Return the manifest of a package, and the contents of the needed files, after a check of every file.
 
-    The contents are those that were checked, even if another program replaces the files meanwhile.
+    The returned contents are the checked contents, even if another program replaces the files meanwhile.
 
     Raises:
-        PackageError: as in `read_package`.
+        PackageError: see `read_package`.
     """
     return _read(place, needed, frozenset(needed))
 
@@ -118,7 +118,7 @@ def is_package(place: Path) -> bool:
 
 class _Files(Protocol):
     def open(self, name: str) -> IO[bytes]:
-        """Open a file of the package for reading; raise OSError or KeyError without it."""
+        """Open a file of the package for reading; raise OSError or KeyError if the package lacks the file."""
         ...
 
 
@@ -176,7 +176,7 @@ def _parsed(text: bytes) -> tuple[dict[str, Any], tuple[PackageFile, ...]]:
 
 
 def _checked(files: _Files, place: Path, described: PackageFile, *, keep: bool) -> bytes:
-    """Return the content of a file if it has the described size and digest; b"" unless `keep`.
+    """Check the size and the digest of a file; return its content, or b"" if `keep` is false.
 
     Raises:
         PackageError: the file is missing or has changed.

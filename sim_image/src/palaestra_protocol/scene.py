@@ -38,7 +38,7 @@ MOST_TERMS: Final = 64
 LARGEST: Final = 1e9  # largest absolute value of any number
 AT_ORIGIN: Final[PoseNumbers] = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 WORLD: Final = "world"  # the name of the node that holds all shapes that do not move
-TARGET_M: Final = 0.2  # radius of a drawn target; tasks of the arena end when the robot is within this radius
+TARGET_M: Final = 0.2  # radius of a drawn target; a task of the arena ends when the robot is inside it
 _DIGITS: Final = 5  # digits after the decimal point: hundredths of a millimeter
 
 
@@ -79,7 +79,7 @@ class Triangles:
         """Return the object that `to_json` wrote.
 
         Raises:
-            ProtocolError: `content` is anything else, or a triangle has the index of a missing point.
+            ProtocolError: `content` does not have this format, or a triangle refers to a missing point.
         """
         fields = Fields(content, path)
         flat = _numbers(fields, "points", 3 * MOST_POINTS)
@@ -129,7 +129,7 @@ class VisualShape:
         """Return the object that `to_json` wrote.
 
         Raises:
-            ProtocolError: `content` is anything else.
+            ProtocolError: `content` does not have this format.
         """
         fields = Fields(content, path)
         kind = fields.choice("kind", ShapeKind)
@@ -178,7 +178,7 @@ class VisibleNode:
         """Return the object that `to_json` wrote.
 
         Raises:
-            ProtocolError: `content` is anything else.
+            ProtocolError: `content` does not have this format.
         """
         fields = Fields(content, path)
         return cls(
@@ -229,7 +229,7 @@ class VisibleScene:
         """Return the object that `to_json` wrote.
 
         Raises:
-            ProtocolError: `content` is anything else, or exceeds a bound.
+            ProtocolError: `content` does not have this format, or exceeds a bound.
         """
         fields = Fields(content, path)
         scene = cls(
@@ -271,7 +271,7 @@ class TargetMarker:
         """Return the object that `to_json` wrote.
 
         Raises:
-            ProtocolError: `content` is anything else.
+            ProtocolError: `content` does not have this format.
         """
         fields = Fields(content, path)
         return cls(
@@ -324,7 +324,7 @@ class SceneState:
         """Return the object that `to_json` wrote.
 
         Raises:
-            ProtocolError: `content` is anything else, or exceeds a bound.
+            ProtocolError: `content` does not have this format, or exceeds a bound.
         """
         fields = Fields(content, path)
         poses = fields.part("poses", Fields)

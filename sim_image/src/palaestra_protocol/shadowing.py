@@ -35,7 +35,7 @@ def settle_imports() -> None:
 
     Raises:
         ImportError: a module of the user shadows a module that Palaestra needs.
-        SystemExit: instead of ImportError in a program of Palaestra, after it has printed the reason.
+        SystemExit: the same mistake in a program of Palaestra; the program prints the reason first.
     """
     program = _program()
     if _is_ours(program) and program not in _WITH_CODE_OF_USERS:

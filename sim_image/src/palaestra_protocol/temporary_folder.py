@@ -2,7 +2,7 @@
 
 A second process, the keeper, removes the folder of a process that was killed. The standard input of the
 keeper is a pipe from the folder's owner. The kernel closes this pipe when the owner and its forked children
-have ended, in whatever way.
+have ended, for any reason.
 
 The owner starts this file as the keeper, so the file imports only the standard library.
 """
@@ -51,7 +51,8 @@ def temporary_folder(prefix: str, parent: Path | None = None) -> Iterator[Tempor
             os.write(pipe, os.fsencode(path))
             yield TemporaryFolder(path=Path(name), keeper=keeper.pid)
     finally:
-        # The end of the pipe may come late, if a child of this process has a copy of the pipe.
+        # Without the kill, the keeper would wait until all copies of the pipe are closed. A child of this
+        # process may have such a copy.
         if path is None or not os.path.lexists(path):
             keeper.kill()
             keeper.wait()
@@ -82,7 +83,7 @@ def _start_keeper() -> tuple[subprocess.Popen[bytes], int]:
 
 
 def _keep() -> None:
-    """Read the path of the folder from standard input; at its end, remove the folder if it still exists."""
+    """Read the folder's path until standard input is closed; then remove the folder if it still exists."""
     folder = os.fsdecode(sys.stdin.buffer.read())
     give_up = time.monotonic() + _GIVE_UP_S
     while os.path.lexists(folder) and time.monotonic() < give_up:

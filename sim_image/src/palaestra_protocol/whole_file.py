@@ -18,7 +18,7 @@ _NO_SUCH_CALL = frozenset({errno.EINVAL, errno.ENOTSUP, errno.ENOSYS, errno.EBAD
 def write_whole(path: Path, content: bytes) -> None:
     """Create or replace the file `path`, without waiting for the disk; its folder must exist.
 
-    This suits a simulator's files, because they are written again after a crash of the machine.
+    This is enough for a simulator's files, because they are written again after a crash of the machine.
 
     Raises:
         OSError: the file cannot be written; no partial file is left.

@@ -46,12 +46,13 @@ _NO_MASTER = 1
 
 _EPILOG = """\
 The program reads the world, and like every ROS node the variables ROS_MASTER_URI and ROS_HOSTNAME. A sidecar
-may set two more variables. PALAESTRA_SIMULATOR_LEFT_OUT names a file; the program writes to it which nodes it
-leaves out. PALAESTRA_SIMULATOR_VIEW names a Unix socket; on it the program describes its world to viewers.
+may set two more variables. PALAESTRA_SIMULATOR_LEFT_OUT names a file; in this file the program lists the
+nodes that it leaves out. PALAESTRA_SIMULATOR_VIEW names a Unix socket; on this socket the program describes
+its world to viewers.
 
 faults: for example crash:step=2000, or lost:topic=ir1/value,probability=0.01. docs/reference/faults.md lists
-all faults. PALAESTRA_STUB_FAULTS may hold several faults with spaces between them. Instead of --fault-seed
-you can set PALAESTRA_STUB_FAULT_SEED, instead of --fault-life PALAESTRA_SIMULATOR_START.
+all faults. PALAESTRA_STUB_FAULTS may hold several faults with spaces between them. Instead of --fault-seed,
+you can set PALAESTRA_STUB_FAULT_SEED; instead of --fault-life, you can set PALAESTRA_SIMULATOR_START.
 
 exit codes: 0 after SIGTERM; the status of `simulation_quit`; the code that a fault names;
 1 the ROS master does not respond, or has stopped responding; 2 the world or the options cannot be used
@@ -69,6 +70,9 @@ class Program:
         mjcf: returns the simulation of an MJCF world; None if the program does not simulate MJCF. The last
             argument of the function is the folder that holds all files of the world. If this argument is
             None, the simulation uses the nearest folder that holds all these files.
+        batched: returns a new physics object for a world of `--batch`; None if the program has no `--batch`.
+        check_batch: checks that copies of a world can be simulated.
+        serve_batch: serves copies of a world until a signal, and returns the exit code.
     """
 
     name: str
@@ -226,7 +230,7 @@ class _Process:
         self._loop.later(_CHECK_MASTER_S, self._check_master)
 
     def _viewing(self) -> LocalSocket | None:
-        """Return the socket for viewers; None if none is set in the environment, or if creating it fails."""
+        """Return the socket for viewers; None if the environment names none, or if it cannot be created."""
         path = os.environ.get(VIEW_SOCKET)
         if path is None:
             return None
@@ -324,7 +328,7 @@ def _parser(program: Program) -> argparse.ArgumentParser:
             "--root",
             type=Path,
             metavar="DIR",
-            help="folder that holds all files that an MJCF model names (default: the nearest such one)",
+            help="folder that holds all files that an MJCF model names (default: the nearest such folder)",
         )
     if program.serve_batch is not None:
         add(
@@ -333,7 +337,13 @@ def _parser(program: Program) -> argparse.ArgumentParser:
             metavar="N",
             help=f"simulate N copies, at most {MOST_ROWS}, for a trainer, without ROS",
         )
-        add("--batch-threads", type=whole(0), default=0, metavar="N", help="0: one for each processor")
+        add(
+            "--batch-threads",
+            type=whole(0),
+            default=0,
+            metavar="N",
+            help="threads for the copies; 0: one for each processor (default: 0)",
+        )
     faults.add_options(add)
     return parser
 

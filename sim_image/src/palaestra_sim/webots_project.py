@@ -2,7 +2,7 @@
 
 Webots searches a controller first in the project of the world, then in the folders of
 WEBOTS_EXTRA_PROJECT_PATH, and last in its own projects. So this project replaces the controller `ros` of
-R2023b, and provides it in later releases, which have none. A project with a controller `ros` of its own keeps
+R2023b, and provides it in later releases, which lack it. A project with a controller `ros` of its own keeps
 that controller. Source: WbRobot.cpp::updateControllerDir, WbProject.cpp::extraProjects of Webots.
 """
 

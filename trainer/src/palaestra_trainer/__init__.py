@@ -34,9 +34,9 @@ def load_policy(run_or_zip: str | Path) -> TrainedPolicy:
 def make_env(environment: str | None = None, *, role: str = "Collect", **options: Any) -> FaultTolerantEnv:
     """Return a gymnasium.Env that has its own simulator, for a training loop of any library.
 
-    A fault of the simulator truncates the episode. That step returns the last observation before the fault,
-    reward 0 and `info["palaestra"]["sim_fault"]`. The next `reset` waits until the simulator is restarted, if
-    its restart budget allows that.
+    A fault of the simulator truncates the episode. The step with the fault returns the last observation
+    before the fault, reward 0 and `info["palaestra"]["sim_fault"]`. If the restart budget allows a restart,
+    the next `reset` waits until the simulator runs again.
 
     If this process has `Webots` facades that no environment uses, the environment takes the simulator of the
     newest of these facades. Otherwise it takes a free simulator of PALAESTRA_CONFIG. If that variable is not

@@ -3,7 +3,7 @@
 TrainerError
 ├── ConfigurationError   the configuration is wrong; retrying cannot help     exit 2
 │   └── RobotUnfit       a real robot must not be driven now                  exit 2
-│       └── CameraUnfit  a NoSuchSensor too: no fitting picture arrives       exit 2
+│       └── CameraUnfit  also a NoSuchSensor: no usable image arrives         exit 2
 ├── UnreadableAnswer     the ROS master or a node sent an invalid ROS response
 ├── MasterLost           the ROS master is gone; nothing re-registers         exit 75
 ├── Interrupted          a signal asked the run to end (run.signals)          exit 75
@@ -12,15 +12,15 @@ TrainerError
 ├── FaultBudgetSpent     a simulator failed too often; don't retry            exit 80
 ├── Diverged             a loss, weight or reward is not finite; don't retry  exit 81
 ├── ExportError          an exported policy would act differently; nothing is written
-├── NoSuchSensor         this robot does not have it
-│   └── MissingCapability  a ConfigurationError too: the task needs it        exit 2
+├── NoSuchSensor         this robot does not have the sensor
+│   └── MissingCapability  also a ConfigurationError: the task needs it       exit 2
 ├── NoReading            a sensor was read before its first message arrived
 ├── NotConforming        a robot breaks a rule of the interface (testing.conformance)
 ├── Paused               a step was requested while the simulation is paused
 ├── RobotStopped         a safety rule stopped a real robot; a person decides
 ├── NewGoal              a person sent another goal (deployment.goals)
 ├── NotFilmed            an episode has no recording in 3D (episodes.scene_film)
-├── LinkError            a real robot did not respond in time, or not as a robot
+├── LinkError            a real robot did not respond in time, or its response is invalid
 └── SimulatorFault       one simulator failed; restart it and continue
     ├── SimulatorDead    its connections are refused or were closed
     │   └── SimulatorRefused  its process ended with the exit code of a wrong input
@@ -35,8 +35,8 @@ import traceback
 from typing import ClassVar, Literal
 
 FaultKind = Literal["dead", "hung", "wrong_data"]
-# A mistake of a job's author is never in a line of these libraries. Such a line only calls the author's code,
-# or the author's code calls the library.
+# A message does not name lines of these libraries, because a mistake of a job's author is in the author's own
+# code, even if a library raises the error.
 _LIBRARIES = {
     "gymnasium",
     "importlib",
@@ -118,15 +118,15 @@ class RobotUnfit(ConfigurationError):
 
 
 class CameraUnfit(RobotUnfit, NoSuchSensor):
-    """No picture arrives from the camera of a real robot, or none that becomes an image of the policy."""
+    """The camera of a real robot sends no image, or no image that can be converted for the policy."""
 
 
 class RobotStopped(TrainerError, RuntimeError):
-    """A safety rule has stopped a real robot; only a person may decide to go on."""
+    """A safety rule has stopped a real robot; only a person may decide to continue."""
 
 
 class LinkError(TrainerError, ConnectionError):
-    """A real robot did not confirm a request in time, or responded as no robot does."""
+    """A real robot did not confirm a request in time, or sent an invalid response."""
 
 
 class SimulatorFault(TrainerError):

@@ -26,7 +26,7 @@ _COLUMNS = (
         "Restarts",
         "integer",
         ".status.restarts",
-        "Highest number of a replica's pods that were replaced because the trainer failed",
+        "Largest number of pods of one replica that were replaced because the trainer failed",
         1,
     ),
     (

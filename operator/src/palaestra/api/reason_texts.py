@@ -38,7 +38,7 @@ ROWS: dict[Reason, ReasonText] = {
         "{problem}; the operator ignores the job; upgrade the operator, or create a new TrainingJob",
         "this release cannot read the status that another release or program wrote, so it cannot "
         "determine which replicas have ended",
-        "run the release that wrote it, or create a new TrainingJob",
+        "run the release that wrote the status, or create a new TrainingJob",
     ),
     Reason.WORLD_MISSING: ReasonText(
         "{field}: {fact}; {remedy} and the job starts",
@@ -95,8 +95,8 @@ ROWS: dict[Reason, ReasonText] = {
     Reason.POD_METADATA_NOT_ALLOWED: ReasonText(
         "{field}: key {key} is not allowed in this cluster; allow it with the chart's value {value}, "
         "or create a new TrainingJob without it",
-        "other controllers act on labels and annotations of pods, so an author of TrainingJobs without "
-        "permission to create pods must not set them; an installation allows only the keys that it names",
+        "other controllers act on labels and annotations of pods, and an author of TrainingJobs may have no "
+        "permission to create pods, so a job may set only the keys that the chart's values allow",
         "add the key, or its domain with a `/` at the end, to `jobs.allowedPodLabels` or "
         "`jobs.allowedPodAnnotations` ([install](../howto/install.md#what-pods-may-carry)); "
         "the job then starts",
@@ -104,7 +104,7 @@ ROWS: dict[Reason, ReasonText] = {
     Reason.SCHEDULING_NOT_ALLOWED: ReasonText(
         "{field}: {fact} is not allowed in this cluster; {remedy}",
         "a priority, a runtime class, a toleration or an affinity to other pods affects the pods of other "
-        "users; an installation allows only the settings that it names",
+        "users, so a job may use only the settings that the chart's values allow",
         "allow the setting by the chart's value that the message names "
         "([install](../howto/install.md#what-pods-may-ask-for)); the job then starts",
     ),
@@ -127,8 +127,8 @@ ROWS: dict[Reason, ReasonText] = {
         "pod {pod} of an earlier TrainingJob of this name has not ended and mounts claim {claim}; "
         "if node {node} is lost, delete the Node object or taint it node.kubernetes.io/out-of-service",
         "a pod of a deleted TrainingJob of the same name still terminates, for example on a lost node, and "
-        "both use the same `existingClaim`. The operator creates no second pod while the first may still "
-        "write",
+        "the two jobs use the same `existingClaim`. The operator creates no second pod while the first may "
+        "still write",
         "wait; if the node is lost and its machine is off, run `kubectl delete node NODE`; or use another "
         "claim",
     ),
@@ -142,7 +142,8 @@ ROWS: dict[Reason, ReasonText] = {
     Reason.RUN_RESTARTED: ReasonText(
         "the run that was at step {step} is lost; the annotation palaestra.dev/restart-lost-runs was set, so "
         "the replica resumes from its run directory, or starts at step 0 if the directory is empty",
-        "a person gave a lost run up, or has restored it",
+        "a person set the annotation `palaestra.dev/restart-lost-runs`, to give up a lost run or after "
+        "restoring it",
         "nothing",
         warning=False,
     ),
@@ -151,8 +152,8 @@ ROWS: dict[Reason, ReasonText] = {
     ),
     Reason.QUEUED: ReasonText(
         "waits in queue {queue} for Kueue{taken}{why}{again}",
-        "Kueue has not admitted the replica yet, or has evicted it; after the colon, the message has Kueue's "
-        "own message",
+        "Kueue has not admitted the replica yet, or has evicted it; the text after the colon is "
+        "Kueue's own message",
         "wait, or change what the message names: see [queues](../howto/queues.md#train-in-a-queue)",
         warning=False,
     ),
@@ -181,23 +182,23 @@ ROWS: dict[Reason, ReasonText] = {
     Reason.TRAINING: ReasonText("{what}", "at least one trainer runs", "nothing", warning=False),
     Reason.DISRUPTED: ReasonText(
         "pod {pod} was disrupted ({words}); {next_pod}",
-        "an eviction, a preemption, a drain, a lost node or a deletion ended the pod; "
-        "it does not count against `backoffLimit`, unless the trainer had no time to save (`TrainerFailed`)",
+        "an eviction, a preemption, a drain, a lost node or a deletion ended the pod; the disruption does "
+        "not count against `backoffLimit`, unless the trainer had no time to save (`TrainerFailed`)",
         "nothing; if it recurs, use non-preemptible nodes",
         warning=False,
     ),
     Reason.INTERRUPTED: ReasonText(
         "the trainer of pod {pod} was interrupted ({how}); {next_pod}",
         "the trainer received an unexplained signal, or lost the ROS master; "
-        "it does not count against `backoffLimit`",
+        "the interruption does not count against `backoffLimit`",
         "nothing; if it recurs, read `lastAttempt.log` in the status",
         warning=False,
     ),
     Reason.PROBE_FAILED: ReasonText(
         "the kubelet ended the trainer of pod {pod}, because its {probe} probe failed ({how}); "
-        "give it more CPU with spec.trainer.resources, or use a node with less load; {next_pod}",
-        "the trainer did not respond to the kubelet for a minute, or not once within `startTimeoutSeconds` "
-        "after its start; it counts against `backoffLimit`",
+        "give the trainer more CPU with spec.trainer.resources, or use a node with less load; {next_pod}",
+        "the trainer did not respond to the kubelet for a minute, or did not respond at all within "
+        "`startTimeoutSeconds` after its start; the failure counts against `backoffLimit`",
         "raise `spec.trainer.resources.limits.cpu`, request more CPU, or run fewer jobs on the node; "
         "for a slow start raise `startTimeoutSeconds`, in a new TrainingJob",
     ),
@@ -355,8 +356,8 @@ ROWS: dict[Reason, ReasonText] = {
     Reason.NO_PROGRESS: ReasonText(
         "{pods} pods were disrupted or interrupted since the last new step; "
         "use non-preemptible nodes, or save checkpoints more often",
-        "as many pods as `noProgressLimit` ended without a new step: the cluster disrupts pods before they "
-        "make progress, or the trainer always exits with 75",
+        "the number of pods that ended without a new step reached `noProgressLimit`: the cluster disrupts "
+        "pods before they make progress, or the trainer always exits with 75",
         "use non-preemptible nodes, or lower `spec.trainer.checkpoint.everySteps` in a new TrainingJob; your "
         "own program (`trainer.command`) must report its steps with `palaestra_trainer.report`",
     ),
@@ -367,7 +368,7 @@ ROWS: dict[Reason, ReasonText] = {
     ),
     Reason.KEPT_ALIVE: ReasonText(
         "the trainer of pod {pod} has ended, and container {containers} keeps the pod alive; the operator "
-        "ends the pod {seconds} s after the trainer; inject native sidecars, or none",
+        "ends the pod {seconds} s after the trainer; let the injector add native sidecars, or none",
         "a container that a mesh or an agent has added to the pod still runs after the trainer has ended; "
         "the operator reports the result of the trainer",
         "inject native sidecars or none: see [install](../howto/install.md#containers-that-others-add)",
@@ -382,7 +383,7 @@ ROWS: dict[Reason, ReasonText] = {
     ),
     Reason.EXPIRED: ReasonText(
         "ended more than {seconds} s ago and is deleted because of ttlSecondsAfterFinished",
-        "the operator deletes the TrainingJob; its claims stay unless `retain: Delete`",
+        "the operator deletes the TrainingJob; its claims stay unless `retain` is `Delete`",
         "nothing",
         warning=False,
     ),

@@ -88,8 +88,8 @@ class WorldSource(ApiModel):
 
     root: Annotated[str, Field(max_length=1024, pattern=ABSOLUTE_FOLDER)] | None = None
     """Absolute path of a folder above `file` that contains all files to which the world refers. A world that
-    refers to a file outside of this folder is refused; a model of MuJoCo must not do so through a link
-    either. Absent: the nearest folder that contains all these files."""
+    refers to a file outside of this folder is refused. A model of MuJoCo is also refused if a link leads
+    outside of the folder. Absent: the nearest folder that contains all these files."""
 
     rules = (
         Rule(
@@ -199,9 +199,9 @@ class SimulatorGroup(ApiModel):
     or `mujoco`, absent means never, because these simulators neither leak memory nor slow down."""
 
     reset: ResetMethod | None = Field(default=None, strict=False)
-    """How each episode begins. `Reset`, or absent: the simulator resets its world. `Reload`: it loads the
-    world again first, which forgets all that a reset leaves. `Restart`: a new process of the simulator loads
-    the world, as with `recycle: {afterResets: 1}`."""
+    """How each episode begins. `Reset`, or absent: the simulator resets its world. `Reload`: the
+    simulator first loads the world again, which removes all state that a reset leaves. `Restart`: a new
+    process of the simulator loads the world, as with `recycle: {afterResets: 1}`."""
 
     standby: bool = False
     """`true` runs a second simulator in the same container. The second simulator takes over at once when the
@@ -234,7 +234,7 @@ class SimulatorGroup(ApiModel):
             field="command",
             holds=lambda group: (group.driver is Driver.COMMAND) == bool(group.command),
             cel="(self.driver == 'command') == (size(self.command) > 0)",
-            message="is for driver command, which requires it; set both or neither",
+            message="is for driver command only, and is required with that driver; set both or neither",
         ),
         Rule(
             field="image",
@@ -279,7 +279,7 @@ class SimulatorGroup(ApiModel):
                 "!has(self.batch) || (self.count == 1 && !self.standby && !has(self.reset)"
                 " && !has(self.recycle))"
             ),
-            message="excludes count, standby, reset and recycle; remove them, or remove batch",
+            message="cannot be combined with count, standby, reset and recycle; remove them, or remove batch",
         ),
     )
     guards = (NO_PASSWORD_IN_COMMAND, NO_PASSWORD_IN_WORDS)

@@ -356,7 +356,7 @@ class Status(StatusModel):
     """Highest attempt of all replicas; absent: no pod yet."""
 
     restarts: Count | None = None
-    """Highest number of a replica's pods that were replaced because the trainer failed; absent: none."""
+    """Largest number of pods of one replica that were replaced because the trainer failed; absent: none."""
 
     last_checkpoint_time: datetime | None = Field(default=None, strict=False)
     """Earliest of the times at which replicas saved their newest checkpoints; absent: no replica has one."""

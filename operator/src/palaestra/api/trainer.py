@@ -83,8 +83,8 @@ class Task(ApiModel):
     """Keyword arguments of the environment, as in `gymnasium.make`."""
 
     wrappers: Annotated[Listed[EnvironmentWrapper], Field(max_length=16)] | None = None
-    """Wrappers around the environment, the first one innermost. Training and evaluations use the wrapped
-    environment, and the exported policy has its observations and actions."""
+    """Wrappers around the environment, the first one innermost. Training, evaluations and the exported
+    policy use the observations and actions of the wrapped environment."""
 
     frame_stack: Annotated[int, Field(ge=2, le=64)] | None = None
     """Number of newest observations that are stacked into one for the policy, in the layout of
@@ -302,8 +302,8 @@ class Trainer(ApiModel):
 
     collection: Collection | None = Field(default=None, strict=False)
     """`Synchronous`: each step waits for all collecting simulators. `Asynchronous`: a slow simulator does not
-    hold back the others; only off-policy algorithms such as DQN and SAC learn so, and a resumed run does not
-    equal the uninterrupted one. Absent: `Synchronous`."""
+    hold back the others. Only off-policy algorithms, such as DQN and SAC, support `Asynchronous`, and a
+    resumed run then differs from an uninterrupted run. Absent: `Synchronous`."""
 
     evaluation: Evaluation = Evaluation()
     """Evaluation of the policy during training."""

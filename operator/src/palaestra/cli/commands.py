@@ -34,7 +34,7 @@ COMMANDS: Mapping[str, Command] = MappingProxyType(
         "from-zoo": Command("from_zoo", "write a job from a file of RL-Baselines3-Zoo"),
         "explain": Command("explain", "show what a field of a job means"),
         "plan": Command("offline_commands", "print the objects that a job needs"),
-        "world": Command("offline_commands", "print one simulator's own world"),
+        "world": Command("offline_commands", "print the copy of a world that one simulator gets"),
         "webots-project": Command("webots_project", "write the controller `ros` for Webots on a desktop"),
         "crd": Command("offline_commands", "print the CustomResourceDefinition"),
         "operator": Command("operator", "reconcile the jobs of a cluster"),

@@ -155,7 +155,8 @@ def _add_users(parser: argparse.ArgumentParser) -> None:
         "--host-users",
         action=argparse.BooleanOptionalAction,
         default=True,
-        help="let training pods use their nodes' user IDs; no: a user namespace for each pod; default: yes",
+        help="run training pods with the user IDs of their nodes; --no-host-users: with a user namespace for "
+        "each pod; default: yes",
     )
 
 
@@ -183,7 +184,11 @@ def _node_label(text: str) -> tuple[str, str]:
 
 
 def _add_cluster(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--kubeconfig", metavar="FILE", help="kubeconfig; default: as kubectl")
+    parser.add_argument(
+        "--kubeconfig",
+        metavar="FILE",
+        help="kubeconfig; default: $KUBECONFIG, then ~/.kube/config, then the pod's service account",
+    )
     parser.add_argument(
         "--context", metavar="NAME", help="context of the kubeconfig; default: the current one"
     )

@@ -51,8 +51,8 @@ EXIT_CODES = """\
 exit codes:
   0    all trials are complete or pruned
   1    a trial failed, or the cluster refused; the table or the last line gives the reason
-  2    the sweep, its job, a world or this machine is not suitable; nothing was started, or the
-       environment reports no success and the sweep compares it: runs stop after a checkpoint
+  2    the sweep, its job, a world or this machine is not suitable; nothing was started; or the
+       sweep compares success rates and the environment reports no success: the runs stop after a checkpoint
   75   interrupted after checkpoints; run the same command to resume
   130  killed by a second Ctrl-C, or with --cluster by the first; run the same command to resume
 """

@@ -10,8 +10,9 @@ from palaestra_sim.webots_project import EXTRA_PROJECTS, foreign_controller, wri
 
 WEBOTS_PROJECT = """\
 Writes a Webots project with the controller `ros` of Palaestra into the folder DIR, and prints the environment
-variable that makes Webots use it. Webots then starts it for each robot whose controller is "ros".
-It works with Webots R2023b and later; later releases have no `ros` controller of their own.
+variable that makes Webots find the project. Webots then starts this controller for each robot whose field
+`controller` is "ros". The controller works with Webots R2023b and later; later releases have no `ros`
+controller of their own.
 """
 EXIT_CODES = """\
 exit codes:

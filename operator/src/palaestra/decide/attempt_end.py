@@ -130,7 +130,8 @@ def deleted(attempt: EndedAttempt) -> Explanation | None:
     # The trainer did not save and exit with 75 in time. The Job counts such an end as a failure, so this
     # function does too.
     if attempt.code not in {None, ExitCode.INTERRUPTED} or failed_by_itself(pod):
-        how = f"{how_it_failed(attempt.situation, pod)}; its pod was deleted, and it did not save in time"
+        how = how_it_failed(attempt.situation, pod)
+        how = f"{how}; the pod was deleted, and the trainer did not save in time"
         return explain(Reason.TRAINER_FAILED, how=how)
     return _disrupted(attempt, "it was deleted")
 

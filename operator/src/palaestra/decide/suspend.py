@@ -75,7 +75,8 @@ def suspended_by(job: TrainingJob, seen: ReplicaObserved) -> str:
     if seen.job is None or not overruled(job, seen.job):
         return BY_SPEC
     return (
-        f"{seen.switcher or SOMEBODY}, not by spec.suspend; it continues when Job {seen.job.name} is resumed"
+        f"{seen.switcher or SOMEBODY}, not by spec.suspend; "
+        f"the replica continues when Job {seen.job.name} is resumed"
     )
 
 

@@ -66,7 +66,7 @@ async def run_replica(planned: ReplicaPlan, setting: Setting) -> RunOutcome:
                 return outcome
             say(
                 f"the trainer ended with {meaning(outcome.exit_code)}; "
-                f"the next pod starts in {tries.wait_s:g} s"
+                f"the next attempt starts in {tries.wait_s:g} s"
             )
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(interrupt.asked.wait(), tries.wait_s)

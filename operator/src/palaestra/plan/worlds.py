@@ -172,8 +172,8 @@ def _source(group: SimulatorGroup, field: str, config_maps: ConfigMaps) -> bytes
             content = config_maps.get((reference.name, reference.key))
             if content is None:
                 raise PlanError(
-                    f"{field}.configMap: ConfigMap {reference.name} has no key "
-                    f"{reference.key} here; use inline, builtin or file"
+                    f"{field}.configMap: key {reference.key} of ConfigMap {reference.name} "
+                    "can be read only in a cluster; use inline, builtin or file"
                 )
             return content
         case _:

@@ -69,8 +69,8 @@ class ClusterBackend:
         named = job.metadata.namespace if "namespace" in job.metadata.model_fields_set else None
         if named not in {None, self._client.namespace}:
             raise PalaestraError(
-                f"metadata.namespace: is {named}, and the sweep is for {self._client.namespace}; "
-                "choose the namespace with -n"
+                f"metadata.namespace: is {named}, but the sweep creates its jobs in namespace "
+                f"{self._client.namespace}; choose the namespace with -n"
             )
 
     def has_room(self) -> bool:

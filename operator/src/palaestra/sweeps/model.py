@@ -37,7 +37,7 @@ class Distribution(ApiModel):
     """The distribution of a field's random values: a range, or a choice."""
 
     low: Number | None = None
-    """Least value of a range. If `low` and `high` are whole numbers, all values are."""
+    """Least value of a range. If `low` and `high` are whole numbers, all values are whole numbers."""
 
     high: Number | None = None
     """Largest value of a range."""
@@ -111,7 +111,7 @@ class SweepSpec(ApiModel):
     """Figure by which trials are compared."""
 
     optuna: Optuna | None = None
-    """Search by Optuna instead of chance, with `random` only."""
+    """Search by Optuna instead of independent random draws; needs `random`."""
 
     rules = (
         Rule(

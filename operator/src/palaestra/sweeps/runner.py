@@ -84,7 +84,7 @@ def _refuse_without_success(figures: TrialFigures, objective: Objective) -> None
     """Check that the figures can be compared, or do not exist yet; raise NoSuccess otherwise."""
     if objective is Objective.SUCCESS_RATE and figures.lacks(objective):
         raise NoSuccess(
-            "spec.objective: SuccessRate is compared, and the environment reports no success; write "
+            "spec.objective: is SuccessRate, but the environment reports no success; write "
             "objective: MeanReturn, or set is_success in the info of an episode's last step"
         )
 

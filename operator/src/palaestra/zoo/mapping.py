@@ -49,7 +49,7 @@ def note_together(draft: Draft) -> None:
     """Add notes about combinations of keys, after all keys were converted."""
     normalized = draft.algorithm.get("normalize", {}).get("observations", False)
     if draft.frame_stack is not None and normalized:
-        draft.note("frame_stack", "a run normalizes the stacked observation; Zoo stacks normalized ones")
+        draft.note("frame_stack", "a run stacks observations, then normalizes; Zoo normalizes, then stacks")
 
 
 def put(draft: Draft, word: str, value: Any) -> None:
@@ -235,7 +235,7 @@ def _wrappers(draft: Draft, value: Any) -> None:
         if name.startswith("rl_zoo3."):
             draft.note("env_wrapper", f"{name} needs the package rl_zoo3; install it in the trainer's image")
     if draft.wrappers:
-        draft.note("env_wrapper", "a run counts returns outside of the wrappers, and Zoo inside of them")
+        draft.note("env_wrapper", "a run sums the rewards after the wrappers, Zoo the rewards before them")
 
 
 def _vector_wrappers(draft: Draft, value: Any) -> None:

@@ -125,8 +125,8 @@ class TrainerStatus(JsonMessage):
         last_progress: time of the last environment step (RFC 3339); None before the first step.
         last_progress_age_s: seconds since the last environment step; None before the first step. The trainer
             measures them with a monotonic clock, so a change of the wall clock has no effect.
-        attempt: number of this attempt, counted from 1 in the run directory's record; None if not recorded
-            yet.
+        attempt: number of this attempt, counted from 1 in the run directory's record; None if it is not yet
+            recorded.
         faults: number of faults of each `FaultKind`, over all attempts.
         goodput: seconds spent on each `Cause`, over all attempts.
         steps_lost: valid steps that were lost, over all attempts: steps after the checkpoint from which an
@@ -189,7 +189,7 @@ class Termination(JsonMessage):
         success_interval: the confidence interval of `success_rate`; None if `success_rate` is None.
         last_checkpoint: the newest checkpoint; None if there is no checkpoint.
         attempt: number of this attempt, counted from 1 in the run directory's record; None if not recorded.
-        restarts: number of restarts of simulators after faults in this attempt; None if not reported.
+        restarts: number of restarts of simulators after faults in this attempt; None if it is unknown.
         log: the last lines of the trainer's log, at most ten, the newest last.
         faults: the last faults of this attempt, at most ten, the newest last.
     """
@@ -229,7 +229,7 @@ class Termination(JsonMessage):
         """Return the object that `to_message` wrote.
 
         Raises:
-            ProtocolError: `message` is anything else, such as the end of a log, or is too long.
+            ProtocolError: `message` is too long, or is not a termination message but, say, the end of a log.
         """
         return cls.from_json(decoded(message.encode("utf-8", "replace"), MOST_TERMINATION_BYTES))
 

@@ -12,5 +12,5 @@ All modules except `sockets` are pure.
 - `rostypes`: the types of the interface, each with its md5 sum and its codecs
 - `topic_headers`: the headers that a publisher and a subscriber exchange
 - `sockets`: the socket options of both ends of a connection
-- `shutdown`: the reason of a shutdown, which names the node that the master wants to end
+- `shutdown`: reads the name of the node that the master wants to end from the reason of a shutdown
 """

@@ -39,7 +39,7 @@ class Codec(Protocol):
         ...
 
     def decode(self, payload: bytes | memoryview) -> Any:
-        """Return a named tuple of the fields; a Python keyword as name gets an underscore: `from_`.
+        """Return a named tuple of the fields; the field `from`, a keyword of Python, is called `from_`.
 
         An array of numbers is a tuple, or bytes for `uint8` and `char`. Any other array is a list. Bytes of a
         string that are not UTF-8 are replaced.

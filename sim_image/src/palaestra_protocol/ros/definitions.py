@@ -1,7 +1,8 @@
 """The definitions of ROS types, as text and parsed, so that no ROS package has to be installed.
 
 The file `definitions.txt` holds the types of the interface, with their nested messages. The file
-`common_types.txt` holds the other types of ROS's common packages, and is read only when a program uses one.
+`common_types.txt` holds the other types of ROS's common packages. It is read only when a program uses such a
+type.
 """
 
 from __future__ import annotations

@@ -94,7 +94,7 @@ def service_type(name: str) -> ServiceType:
 def last_field(name: str) -> struct.Struct | None:
     """Return the layout of the last field of the message type `package/Name`.
 
-    Return None if the field is a time, a string or an array, so that it has no layout of numbers.
+    Return None if the field is a time, an array, or of variable size.
 
     Raises:
         KeyError: no such message is known.

@@ -1,4 +1,4 @@
-"""The reason in the call `shutdown` of ROS's Slave API, which names the node that the master wants to end."""
+"""In ROS's Slave API, the call `shutdown` has a reason: it names the node that the master wants to end."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """The parser for the text of a ROS message: its fields and constants.
 
-The parser has the rules of ROS's own parser, even surprising ones. For example, the value of a constant of
-type `string` is the rest of its line, so a `#` in that line does not begin a comment.
+The parser follows the rules of ROS's own parser, even surprising rules. For example, the value of a constant
+of type `string` is the rest of its line, so a `#` in that line does not begin a comment.
 Source: http://wiki.ros.org/msg
 """
 
@@ -104,7 +104,7 @@ def _field(message: str, bare: str) -> MessageField:
 
 
 def _resolved(type_: str, message: str) -> str:
-    """Return a type name with its package; without one, the type is in the package of the message."""
+    """Return a type name with its package; a name without a package means the package of the message."""
     if type_ == "Header":
         return "std_msgs/Header"
     if type_ in BUILT_IN or "/" in type_:

@@ -76,7 +76,7 @@ class Sections:
             pieces: the bytes written so far.
 
         Raises:
-            ValueError: a value does not fit its field, or the message has no field of a name in `value`.
+            ValueError: a value does not fit its field, or a name in `value` is not a field of the message.
         """
         fields = dict(zip(self._names, value, strict=True)) if isinstance(value, tuple) else value
         if not fields.keys() <= self._known:

@@ -46,8 +46,8 @@ def _parts(uri: str) -> tuple[str, int, str]:
     try:
         parts = urlsplit(uri)
         if parts.scheme == "http" and parts.hostname and parts.port and uri.isascii():
-            # An invalid host name raises UnicodeError, which is a ValueError, already here and not later in
-            # the lookup of the address.
+            # For an invalid host name, `encode` raises UnicodeError, a ValueError. Without this call, the
+            # lookup of the address would raise it later.
             parts.hostname.encode("idna")
             return parts.hostname, parts.port, parts.path or "/"
     except ValueError:

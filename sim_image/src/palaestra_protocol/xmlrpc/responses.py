@@ -24,7 +24,7 @@ def response_of(value: Any) -> RpcResponse | None:
 
 
 def address_of(response: RpcResponse) -> tuple[str, int] | None:
-    """Return host and port in the response to `requestTopic`; None if it is not an address of TCPROS."""
+    """Return the host and port in the response to `requestTopic`; None if it has no TCPROS address."""
     match response.value:
         case [str(), str(host), int(port)] if response.code == OK:
             return host, port

@@ -40,7 +40,7 @@ Method = Callable[[tuple[Any, ...]], Any]
 
 
 def host_name(environment: Mapping[str, str]) -> str:
-    """Return the name by which other nodes reach this machine: ROS_HOSTNAME, ROS_IP, or its host name."""
+    """Return the name by which other nodes reach this machine: ROS_HOSTNAME, else ROS_IP, else host name."""
     return environment.get("ROS_HOSTNAME") or environment.get("ROS_IP") or socket.gethostname()
 
 

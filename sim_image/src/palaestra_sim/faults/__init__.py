@@ -4,7 +4,7 @@
 - `parser`: parses a description such as `crash:probability=0.0005`
 - `options`: reads the faults from the command line and the environment
 - `schedule`, pure: decides which faults occur at the k-th step, reset, call or start of a process
-- `fault_state`, pure: decides what happens to each request and message
+- `fault_state`, pure: decides which faults affect each request and message
 - `corruption`, pure: changes the bytes of messages and responses
 - `known_paths`: lists the paths that a world serves, so that a misspelled path is an error
 - `faulty_node`, with I/O: a ROS node that drops, delays or changes its requests and messages

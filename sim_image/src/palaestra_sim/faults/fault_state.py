@@ -1,4 +1,4 @@
-"""Decide which faults each request and message suffers, in one run of the simulator's process (a life).
+"""Decide which faults affect each request and message, in one run of the simulator's process (a life).
 
 Pure: this module only counts events, and uses no socket, process or clock. If a fault names a service and
 its trigger is a step or a reset, the service has the fault from that event to the end of the process. A
@@ -90,7 +90,7 @@ class FaultState:
         return self._with_service_faults(path, delay_s, tuple(effects))
 
     def message(self, path: str) -> Ruling:
-        """Return the decision about a message of the topic `path`, relative to the robot, or global (`/`)."""
+        """Return the decision about a message; `path` is its topic, relative to the robot or global (`/`)."""
         number = self._counts[FaultEvent.STEP]
         faults = [message for message in self._messages if _matches(path, message.topic)]
         if not faults:

@@ -1,8 +1,8 @@
 """A ROS node that applies faults to its requests, responses and messages.
 
 The node wraps each connection. After the header of a connection, the wrapper forwards, changes, delays or
-drops each message, as the fault state decides. The node inherits everything else from the `RosNode` of a stub
-without faults.
+drops each message, as the fault state decides. In all other respects, the node behaves like a `RosNode`. A
+stub without faults uses `RosNode` itself.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class FaultyNode(RosNode):
         self._master_lost = False
 
     def lose_master(self) -> None:
-        """Make `close` leave the names of this node registered at the master."""
+        """Record that `close` must leave the names of this node registered at the master."""
         self._master_lost = True
 
     def close(self) -> None:

@@ -18,8 +18,8 @@ class FaultEvent(StrEnum):
 
     A life is one run of the stub's process. In each life, the events of each kind are counted from 1.
 
-    - step: a `time_step` request of one robot: the robot that was the first to send such a request. So in a
-      world with several robots, too, each step is one event.
+    - step: a `time_step` request of the robot that sent the first such request. So each step is one event,
+      even in a world with several robots.
     - reset: a request for a reset of the world.
     - call: a call of a service that the fault names.
     - start: a start of the stub. The program that starts the stub counts the starts.

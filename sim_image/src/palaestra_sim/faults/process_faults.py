@@ -1,4 +1,4 @@
-"""Apply faults to the process: send a signal, allocate memory, exit. Other modules decide when."""
+"""Apply faults to the process: send a signal, allocate memory, exit. Other modules choose the time."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ class ProcessFaults:
 
     def _hang(self, _fault: Hang) -> bool:
         signal.raise_signal(signal.SIGSTOP)
-        return True  # a SIGCONT has continued the process
+        return True  # reached after a SIGCONT
 
     def _lose_master(self, _fault: MasterLostFault) -> bool:
         self._endings.lose_master()

@@ -17,10 +17,11 @@ _GENERATORS = {"genmsg", "genpy"}  # modules of ROS; Debian's package python3-ge
 
 _EPILOG = """\
 The program writes FOLDER/webots_ros. ROS's tools find the package if FOLDER is /usr/share, or is on
-ROS_PACKAGE_PATH. If another webots_ros is importable, or is earlier on ROS_PACKAGE_PATH, ROS uses that one.
+ROS_PACKAGE_PATH. If another webots_ros is importable, or is earlier on ROS_PACKAGE_PATH, ROS uses the other
+package.
 
-exit codes: 0; 2 genpy is not installed, the folder cannot be written, or it has a webots_ros that Palaestra
-did not write
+exit codes: 0; 2 genpy is not installed, the folder cannot be written, or the folder has a webots_ros that
+Palaestra did not write
 """
 
 

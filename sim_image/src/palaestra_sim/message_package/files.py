@@ -8,8 +8,8 @@ Two details make the package work next to an installed webots_ros and on a plain
   package. The manifest names no dependencies, because roslib requires a manifest of each dependency. Debian
   installs the manifests of std_msgs, geometry_msgs and sensor_msgs only with their C++ packages.
 
-Only this module imports genpy and genmsg. They are available wherever the generated modules are useful,
-because rospy depends on both.
+Only this module imports genpy and genmsg. Programs that use the generated modules have both packages, because
+rospy depends on them.
 """
 
 from __future__ import annotations

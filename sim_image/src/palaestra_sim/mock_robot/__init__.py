@@ -1,6 +1,7 @@
-"""The mock robot: a real Robotino's network interface and its habits, over a scene of the stub.
+"""The mock robot: it has the network interface and the habits of a Robotino, in a scene of the stub.
 
-People try the program that deploys a policy with this mock, before they use a real robot.
+With this mock, people test the program that deploys a policy before they use a real robot. The *habits* of
+the robot are its delays, limits and errors.
 
 - `entry`: checks that the system is Linux, then starts `cli`; `cli`: the program `palaestra-mock-robot`
 - `base`: the firmware of the base: the dead man's switch and the limits of the acceleration
@@ -13,6 +14,6 @@ People try the program that deploys a policy with this mock, before they use a r
 - `rest`: the routes of a Robotino and of the mock, with the delays of a network
 - `server`: an HTTP server whose connections stay open
 
-All habits count *robot time*, which is real time times `--speed`. Sources of the robot's habits: the page
-Rest_api of wiki.openrobotino.org, and the driver robotino-ros-pkg. They were not measured on a robot.
+All durations are in *robot time*, which is real time times `--speed`. Sources of the robot's habits: the page
+Rest_api of wiki.openrobotino.org, and the driver robotino-ros-pkg. The habits were not measured on a robot.
 """

@@ -1,8 +1,8 @@
 """The firmware of a Robotino's base: it decides the velocity of the robot from the commands that arrive.
 
 A dead man's switch stops the robot: without a command for more than 200 ms, the target velocity is 0. Source:
-wiki.openrobotino.org, Rest_api, /data/omnidrive. The acceleration has the limits of `mobile_base`, for a stop
-too. The firmware does not know its clients: the newest command is valid, from any connection.
+wiki.openrobotino.org, Rest_api, /data/omnidrive. The limits of `mobile_base` apply to every acceleration,
+also to a stop. The firmware obeys the newest command, from any connection.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class BaseFirmware:
 def approach(current: Twist, target: Twist, step_s: float) -> Twist:
     """Return the velocity after `step_s` seconds of acceleration from `current` toward `target`.
 
-    The slowest of the three axes decides, and the other two axes accelerate in proportion, as in
+    The axis that needs the longest time sets the duration. The other two axes accelerate in proportion, as in
     `base_accelerate` of Webots' controller robotino3.
     """
     needed = max(

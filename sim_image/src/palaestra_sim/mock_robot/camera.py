@@ -38,7 +38,7 @@ def picture(x: float, y: float, heading_rad: float) -> bytes:
 
 
 def _pole(x: float, y: float, heading_rad: float) -> tuple[range, int, int]:
-    """Return the columns of the pole, its first row, and the row below its last one."""
+    """Return the columns of the pole, its first row, and the row below its last row."""
     c, s = math.cos(heading_rad), math.sin(heading_rad)
     forward, left = -x * c - y * s, x * s - y * c
     if forward < _NEAR_M:

@@ -76,7 +76,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _wait(ending: threading.Event, parent: int) -> None:
-    """Return at a signal, or when the parent process has ended, except for a program under nohup."""
+    """Return at a signal; unless nohup started the program, also when the parent process has ended."""
     outlives = signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
     while not ending.wait(_PARENT_CHECK_S):
         if os.getppid() != parent and not outlives:
@@ -84,10 +84,10 @@ def _wait(ending: threading.Event, parent: int) -> None:
 
 
 def _robot(options: argparse.Namespace) -> MockRobot:
-    """Return the robot at its start.
+    """Return the robot at its start pose.
 
     Raises:
-        SimError: the world or the start is wrong.
+        SimError: the world or the start pose is wrong.
     """
     world = located(options.world)
     try:
@@ -160,7 +160,12 @@ def _parser() -> argparse.ArgumentParser:
         metavar="X,Y,HEADING",
         help="pose at the start in m and rad, such as --start=-1,0.5,3.14 (default: the pose in the world)",
     )
-    add("--drift", type=_number(1.0), default=0.02, help="errors of the odometry (default: %(default)s)")
+    add(
+        "--drift",
+        type=_number(1.0),
+        default=0.02,
+        help="size of the errors of the odometry, as a share (default: %(default)s)",
+    )
     add(
         "--noise",
         type=_number(1.0),

@@ -1,7 +1,7 @@
 """The habits of a Robotino's driver for ROS 1, `robotino_node`, as a pure function of its inputs.
 
-The driver's loop runs 30 times a second. It forwards each command once, up to one period late, and it has no
-watchdog: without a new command it forwards nothing, so the base's own dead man's switch stops the robot.
+The driver's loop runs 30 times a second. The driver forwards each command once, up to one period late. It has
+no watchdog: without a new command it forwards nothing, so the base's own dead man's switch stops the robot.
 Between two periods, only the newest command is kept. Source: OmniDriveROS.cpp and RobotinoNode.cpp of
 robotino-ros-pkg. The driver was not measured on a robot.
 """
@@ -23,11 +23,11 @@ _BETWEEN_RAD: Final = math.radians(40.0)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
-    """The private parameters of the driver; the defaults are the driver's own.
+    """The private parameters of the driver; the defaults are those of the driver.
 
     Attributes:
-        max_linear_vel: greatest speed of each axis of the floor, in m/s; a faster command is clipped.
-        min_linear_vel: least speed of each axis of the floor, in m/s; a slower command is raised.
+        max_linear_vel: greatest speed along x and along y, in m/s; a faster command is clipped.
+        min_linear_vel: least speed along x and along y, in m/s; a slower command is raised.
         max_angular_vel: greatest rate of turning, in rad/s.
         min_angular_vel: least rate of turning, in rad/s.
     """
@@ -38,7 +38,7 @@ class Limits:
     min_angular_vel: float = 0.1
 
     def within(self, command: Twist) -> Twist:
-        """Return a command with each axis clipped or raised by itself; a speed of 0 stays 0."""
+        """Return the command with the speed of each axis clipped or raised separately; 0 stays 0."""
         vx, vy, omega = command
         return (
             _within(vx, self.min_linear_vel, self.max_linear_vel),

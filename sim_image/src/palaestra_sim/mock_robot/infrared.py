@@ -14,14 +14,14 @@ from typing import Final
 from palaestra_sim.scene.lookup_table import Row
 
 OUT_OF_RANGE_M: Final = 0.41
-_DEVIATIONS: Final = 4.0  # noise of more standard deviations occurs once in 30,000 readings
+_DEVIATIONS: Final = 4.0  # standard deviations; in one direction, noise exceeds them once in 30,000 readings
 
 
 def distance_m(rows: Sequence[Row], value: float) -> float:
     """Return the distance in meters to which a lookup table assigns `value`, at most `OUT_OF_RANGE_M`.
 
-    Several distances may have the same value; then the farthest distance is returned. A value within the
-    noise of the table's end is out of range, because a sensor that sees nothing has such values.
+    If several distances have this value, the farthest one is returned. If only noise separates the value from
+    the last value of the table, the result is `OUT_OF_RANGE_M`: a sensor that sees nothing has such values.
     """
     _, last, noise = rows[-1]
     margin = _DEVIATIONS * noise * abs(last)

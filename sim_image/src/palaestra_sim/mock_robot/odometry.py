@@ -21,10 +21,10 @@ from typing import Final
 
 from palaestra_sim.scene.wheel_kinematics import Twist
 
-_FARTHEST_M: Final = 5.0  # the largest coordinate of the start
+_FARTHEST_M: Final = 5.0  # largest absolute x and y of the start position
 
 Reading = tuple[float, float, float, float, float, float, int]
-"""x, y in m, rot in rad, in (-pi, pi], vx, vy in m/s, omega in rad/s, in the robot's axes, and seq."""
+"""x and y in m; rot in rad, in (-pi, pi]; vx, vy in m/s and omega in rad/s, in the robot's axes; seq."""
 
 
 class DriftingOdometry:

@@ -17,8 +17,8 @@ from palaestra_sim.mock_robot.robot import MockRobot
 
 log = logging.getLogger(__name__)
 
-MOST_BEHIND_S: Final = 0.1  # of robot time; half of the timeout of the dead man's switch
-_REPORT_S: Final = 10.0  # of real time, between two reports
+MOST_BEHIND_S: Final = 0.1  # in robot time; half of the timeout of the dead man's switch
+_REPORT_S: Final = 10.0  # in real time, between two reports
 # If the clock loses a larger share of the time, an overload is logged. Every machine loses a smaller share.
 _OVERLOAD: Final = 0.05
 
@@ -29,7 +29,7 @@ class Clock:
     Args:
         speed: seconds of robot time for each second of real time.
         start_s: the robot time now.
-        most_behind_s: the largest delay of the robot, in robot time; the clock loses what exceeds this delay.
+        most_behind_s: the largest delay of the robot, in robot time; the clock loses any longer delay.
         monotonic: returns real time in seconds.
 
     Attributes:

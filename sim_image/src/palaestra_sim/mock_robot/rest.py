@@ -35,18 +35,18 @@ from palaestra_sim.mock_robot.server import BadRequestError, Routes
 from palaestra_sim.ros_interfaces import UnsimulatedError
 
 TIMEOUT_S: Final = 1.0
-"""Robot time by which a lost response comes late; clients of a Robotino give up after 0.1 to 0.2 s."""
+"""The delay of a lost response, in robot time; clients of a Robotino have timeouts of 0.1 to 0.2 s."""
 _IMAGE_VERSION: Final = {"version": "4.20.9"}
 _CONTROLLER: Final = {"TYPE": "controllerinfo", "payload": {"hardware": "3.0.0", "software": "1.2.3"}}
 _THREE: Final = 3
 
 
 class PoorNetwork:
-    """The delays of a network; both apply to the routes of the robot, not to the routes of the mock.
+    """The delays of a network; they apply to the routes of the robot, but not to the routes of the mock.
 
     Args:
         clock: converts robot time to real time.
-        delay_ms: robot time by which every response is delayed.
+        delay_ms: the delay of every response, in milliseconds of robot time.
         timeouts: share of the requests whose responses are lost.
         random: decides which responses are lost.
     """
@@ -58,7 +58,7 @@ class PoorNetwork:
         self._random = random
 
     def wait_s(self, path: str) -> float:
-        """Return the seconds of real time by which the next response comes late."""
+        """Return the delay of the next response, in seconds of real time."""
         if path.startswith("/mock/"):
             return 0.0
         if self._timeouts and self._random.random() < self._timeouts:

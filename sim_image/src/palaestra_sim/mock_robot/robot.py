@@ -42,8 +42,8 @@ class Truth(NamedTuple):
         x, y, heading: the pose in the world, in m and rad.
         vx, vy, omega: the motion over the last step in the robot's axes, in m/s and rad/s.
         time_s: the robot time of the last step.
-        contacts: how often the bumper was hit.
-        commands: how many commands have arrived.
+        contacts: the number of times that the bumper was hit.
+        commands: the number of commands that have arrived.
         last_command_s: the robot time of the last command, at most one step after `time_s`; None before the
             first command.
     """
@@ -65,7 +65,7 @@ class Habits:
     """The errors of a robot's sensors.
 
     Attributes:
-        drift: the share of `DriftingOdometry`.
+        drift: the argument `drift` of `DriftingOdometry`.
         noise_m: standard deviation of the distances, in addition to the noise of the world.
         seed: the seed of all random numbers.
     """
@@ -135,7 +135,7 @@ class MockRobot:
             self._base.command(velocity, now_s)
 
     def place(self, x: float, y: float, heading_rad: float) -> None:
-        """Carry the robot to another place, as a person does; the odometry does not notice that.
+        """Carry the robot to another place, as a person does; the odometry does not change.
 
         Raises:
             MockRobotError: an obstacle is there; the robot stays where it is.
@@ -161,7 +161,7 @@ class MockRobot:
         return self._bumped
 
     def distances_m(self) -> list[float]:
-        """Return the distances in meters, counter-clockwise from the front; `OUT_OF_RANGE_M` for none."""
+        """Return the distances in meters, counter-clockwise from the front; `OUT_OF_RANGE_M`: no obstacle."""
         with self._lock:
             if not self._distances_m:
                 self._distances_m = [self._measured(sensor) for sensor in self._devices.infrared]
@@ -210,7 +210,7 @@ class MockRobot:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Devices:
-    """The parts of the scene that are a Robotino."""
+    """The Robotino's parts in the scene."""
 
     robot: Robot
     body: Body

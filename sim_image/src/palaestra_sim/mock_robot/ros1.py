@@ -94,7 +94,7 @@ class Ros1Driver:
 
     def _heard(self, twist: Any) -> None:
         command = (twist.linear.x, twist.linear.y, twist.angular.z)
-        if all(map(math.isfinite, command)):  # the simulation cannot compute with others
+        if all(map(math.isfinite, command)):  # the simulation cannot compute with infinities and NaN
             self._slot.put(command)
 
     def _period(self) -> None:

@@ -43,7 +43,7 @@ class RestServer(TcpServer):
     Args:
         address: the address on which the server listens; port 0 means that the system chooses a free port.
         routes: the route for each method and path.
-        wait_s: returns for a path the seconds of real time by which the response comes late.
+        wait_s: returns the delay of the next response for a path, in seconds of real time.
 
     Raises:
         OSError: the address is in use, or does not belong to this machine.

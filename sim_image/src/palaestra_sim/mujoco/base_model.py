@@ -12,7 +12,7 @@ from palaestra_sim.scene.physics_settings import PhysicsSettings
 
 MASS_KG: Final = 23.0  # mass of a robot without Physics: the mass of a Robotino 3 with batteries
 STANDING_KG: Final = 1e5  # mass of a robot without a drive, so that other robots cannot push it
-_FOUND: Final = (1, 0, 1)  # of a contact sensor: the data `found`, no reduction, one slot
+_FOUND: Final = (1, 0, 1)  # parameters of a contact sensor: the data `found`, no reduction, one slot
 _LEAST_KG: Final = 1e-6
 _LEAST_KG_M2: Final = 1e-9
 
@@ -20,7 +20,7 @@ _LEAST_KG_M2: Final = 1e-9
 def build_free(body: MujocoBody, height_m: float, surroundings: PhysicsSettings) -> Any:
     """Return a model with one robot and no shapes: the motion of the robot while it touches nothing.
 
-    MuJoCo computes the same bits for it as for the whole model, in about a third of the time.
+    With this model, MuJoCo computes the same bits as with the whole model, in about a third of the time.
     """
     spec = mujoco.MjSpec()
     add_base(spec, body, height_m, 0)

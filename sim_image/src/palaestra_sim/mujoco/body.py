@@ -139,7 +139,7 @@ class MujocoBody:
 
 
 _RESERVE: Final = 2.0  # multiplies the force for the largest acceleration, so that a servo can catch up
-# The servos cannot accelerate a free robot more, in m/s2, m/s2 and rad/s2.
+# The largest accelerations that the servos can give to a free robot, in m/s2, m/s2 and rad/s2.
 LARGEST_ACCELERATIONS: Final = tuple(_RESERVE * largest for largest in ACCELERATIONS)
 GAIN: Final = 500.0  # in 1/s: a servo reaches its target speed within one or two MuJoCo steps of 4 ms
 

@@ -42,7 +42,7 @@ _GEOMS: Final = {
 
 @dataclass(frozen=True, slots=True)
 class Touch:
-    """The bits of MuJoCo that decide what a geom touches: its own types, and the types that it may touch."""
+    """The bits that decide which geoms touch each other: a geom's types, and the types that it may touch."""
 
     contype: int
     conaffinity: int

@@ -148,7 +148,7 @@ class MujocoPhysics:
         return cast
 
     def see(self, figure: Figure, beams: Sequence[Beam]) -> Cast:
-        """Return a function as `look` does, for beams that stop at visible shapes, but not at the robot."""
+        """Return a function like `look`; but the beams stop at visible shapes, except those of the robot."""
         return LidarBeams(self._pictures, figure, beams).cast
 
     def push(self, target: Figure | DynamicSolid, push: Push) -> None:

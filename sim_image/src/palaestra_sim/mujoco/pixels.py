@@ -16,7 +16,7 @@ def blue_first(read: Any) -> memoryview:
     """
     height, width, _ = read.shape
     pixels = np.empty((height, width, 4), np.uint8)
-    for channel in range(3):  # a copy of one channel at a time is four times as fast as one copy of all
+    for channel in range(3):  # three copies of one channel are four times as fast as one copy of all three
         pixels[:, :, channel] = read[::-1, :, 2 - channel]
     pixels[:, :, 3] = _OPAQUE
     return pixels.data.cast("B")

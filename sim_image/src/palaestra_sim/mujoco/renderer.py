@@ -23,7 +23,7 @@ from palaestra_sim.scene.geometry import Pose
 from palaestra_sim.scene.visuals import Drawn, View
 
 _HORIZON_M: Final = 1000.0  # the view distance of a camera without `far`
-_BEYOND: Final = 1.1  # end of the frustum, as a multiple of the distance to the sky; the sky must be inside
+_BEYOND: Final = 1.1  # far end of the frustum divided by the distance to the sky, so that the sky is inside
 # Webots' cameras look along x with z up; MuJoCo's look along -z with y up. Columns: right, up, back.
 _TURNED: Final = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 

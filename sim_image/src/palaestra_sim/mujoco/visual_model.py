@@ -40,7 +40,7 @@ class VisualModel:
         model, data: the model and the data of MuJoCo.
         positions, rotations: arrays of the geoms' poses in the frames of their shapes, (n, 3) and (n, 3, 3).
         planes: the ids of the geoms that are Planes.
-        sun: unit vector in which the sun's light travels.
+        sun: the direction in which the sun's light travels, as a unit vector.
         scene, option, camera: the objects of MuJoCo's visualizer.
     """
 
@@ -62,7 +62,7 @@ def build(things: Sequence[Drawn], sky: Vector, sun: Vector) -> VisualModel:
     Args:
         things: all visible shapes, without the sky.
         sky: the color of the sky: red, green and blue from 0 to 1.
-        sun: unit vector in which the sun's light travels.
+        sun: the direction in which the sun's light travels, as a unit vector.
     """
     spec = mujoco.MjSpec()
     for name, value in _QUALITY.items():
@@ -107,7 +107,7 @@ def _light(spec: Any, sun: Vector) -> None:
 
 
 def _hang_sky(spec: Any) -> None:
-    """Add the sky as a flat box behind all shapes; MuJoCo's own sky takes longer than all other shapes."""
+    """Add the sky as a flat box behind all shapes; MuJoCo's own sky takes longer than all shapes together."""
     material = spec.add_material(name="sky")
     material.emission = 0.5  # replaced before each image
     spec.worldbody.add_geom(

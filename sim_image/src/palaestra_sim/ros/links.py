@@ -1,4 +1,4 @@
-"""TCPROS connections: to a client of a service, to a subscriber of a topic, or to its publisher.
+"""TCPROS connections: to a client of a service, and to a subscriber or publisher of a topic.
 
 Sockets are non-blocking. Responses to the client of a service are queued without loss. A subscriber that
 reads too slowly gets only the newest message, as from a publisher with queue size 1.

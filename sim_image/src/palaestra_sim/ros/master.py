@@ -141,7 +141,7 @@ class Bus(Protocol):
         ...
 
     def publishers_changed(self, topic: str, uris: list[str]) -> None:
-        """Connect to the publishers of a topic, which have these URIs now."""
+        """Connect to the publishers of a topic; `uris` are their current URIs."""
         ...
 
 

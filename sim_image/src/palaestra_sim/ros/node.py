@@ -223,7 +223,7 @@ class RosNode:
         return [*self._subscribers.values(), *incoming]
 
     def publishers_changed(self, topic: str, uris: list[str]) -> None:
-        """Connect to the publishers of a topic, which have these URIs now."""
+        """Connect to the publishers of a topic; `uris` are their current URIs."""
         subscription = self._subscriptions.get(topic)
         if subscription is not None:
             self._loop.post(lambda: subscription.set_publishers(uris))

@@ -1,8 +1,8 @@
 """The topics to which a node subscribes; a node has a connection to each publisher of such a topic.
 
 The master reports the addresses of the publishers, first as the response to the registration and then after
-each change. A connection begins in a thread of its own, because a publisher may take seconds to respond;
-afterwards the event loop reads the connection. If a connection fails while its publisher is registered, the
+each change. Each connection is opened in a separate thread, because a publisher may take seconds to respond;
+then the event loop reads the open connection. If a connection fails while its publisher is registered, the
 next attempt begins after `RETRY_S`.
 """
 
@@ -88,7 +88,7 @@ class Subscription:
             Thread(target=self._dial, args=(uri,), name=f"connect-{self.topic}", daemon=True).start()
 
     def _dial(self, uri: str) -> None:
-        """Connect to a publisher; runs in a thread of its own."""
+        """Connect to a publisher; runs in a separate thread."""
         try:
             connection = _connected(uri, self._caller, self.topic)
         except (OSError, UnreadableDocument, xmlrpc.client.Fault) as error:

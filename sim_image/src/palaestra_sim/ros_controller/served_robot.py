@@ -1,7 +1,7 @@
 """A robot as its controller serves it: devices, services and steps.
 
-The controller knows only this interface. `scene_robot` makes it from a robot of this package's simulators,
-`palaestra_sim.webots` makes it from a robot in Webots.
+The controller uses only this interface. `scene_robot` makes a `ServedRobot` from a robot of this package's
+simulators, and `palaestra_sim.webots` makes a `ServedRobot` from a robot in Webots.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class ServedDevice:
 
 
 class Steps(Protocol):
-    """The steps of one robot; the world moves when each robot that holds it has requested a step."""
+    """The steps of one robot; the world advances when each robot for which it waits has requested a step."""
 
     def join(self) -> None:
         """Let the world wait for this robot from now on."""
@@ -58,7 +58,7 @@ class Steps(Protocol):
         ...
 
     def ask(self, duration_ms: int, done: Callable[[bool], None]) -> None:
-        """Request a step; call `done`, maybe immediately, with whether the world has advanced."""
+        """Request a step; later or at once, call `done` with True if the world has advanced, else False."""
         ...
 
 
@@ -90,7 +90,7 @@ class ServedRobot:
         services: all services, except `time_step`, the services of devices and `device_list`.
         devices: the devices in the order of the world file.
         inputs: the devices that are not nodes of the world; `auto_publish` does not enable them.
-        device_list: the service that is advertised last, so that clients that wait for it find all others.
+        device_list: the last service to be advertised. A client that waits for it finds all other services.
     """
 
     basic_step_ms: int

@@ -28,7 +28,7 @@ def answers(simulator: RunningSimulator) -> Mapping[bytes, Callable[[], bytes]]:
         return simulation.appearance.state(simulation.time_ms)
 
     def camera() -> bytes:
-        """Return the newest picture of the first camera that has sent a picture; null without a picture."""
+        """Return the newest picture of the first camera that has sent one; `null` if no camera has."""
         controllers = simulator.controllers.values()
         newest = next((picture for controller in controllers for picture in controller.pictures()), None)
         return b"null" if newest is None else _written(_reduced(*newest))

@@ -59,7 +59,7 @@ class MeshTable:
 
     Attributes:
         meshes: the meshes so far.
-        refused: how often a mesh exceeded a limit.
+        refused: the number of times that a mesh exceeded a limit.
     """
 
     meshes: list[Triangles] = field(default_factory=list)
@@ -256,7 +256,7 @@ def _carrier(place: Frame) -> Frame:
 
 
 def _offset(place: Frame, carrier: Frame) -> Pose:
-    """Return the pose of a frame in an outer frame, bit for bit the same wherever the outer frame is."""
+    """Return the pose of a frame in an outer frame; its bits do not depend on the outer frame's pose."""
     pose = Pose()
     for frame in place.chain():
         if frame is carrier:

@@ -8,8 +8,8 @@ from typing import Final
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.validation import NodeReader
 
-# These arguments let the controller step by itself, or let other programs control the motors. Our simulators
-# support neither.
+# With these arguments, the controller of Webots steps by itself, or lets other programs control the motors.
+# Our simulators do not support these arguments.
 _REFUSED: Final = ("--use-sim-time", "--use-ros-control")
 
 

@@ -1,7 +1,7 @@
 """Determine which axis of a world points up.
 
 Before R2020b the y axis of every world pointed up. Since then WorldInfo.coordinateSystem selects the axis.
-Until R2022a its default was y. Source: WbWorldInfo of Webots.
+Before R2022a, the default value meant y, and since then it means z. Source: WbWorldInfo of Webots.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ _SYSTEMS: Final = ("ENU", "NUE", "EUN")
 
 
 def read_axes(reading: NodeReader, node: SceneNode) -> Frame | None:
-    """Return the frame around a world whose y axis points up, None if z points up; set `reading.system`.
+    """Return a frame around the world if its y axis points up, else None; also set `reading.system`.
 
     `node` is the WorldInfo of the world, or its first node.
     """

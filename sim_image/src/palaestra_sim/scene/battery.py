@@ -1,4 +1,4 @@
-"""The battery of a robot; the robot's CPU drains it. A robot with an empty battery stands still.
+"""The battery of a robot; the robot's CPU drains it. A robot with an empty battery does not move.
 
 `Robot.battery` has the energy in joules, the capacity, and the power of a charger; chargers are not
 simulated. Motors consume no energy here. In Webots their consumption depends on their torque, which is 0

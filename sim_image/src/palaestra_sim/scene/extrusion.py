@@ -22,8 +22,8 @@ _DEFAULTS: Final = {
     "orientation": (0.0, 0.0, 1.0, 0.0),
     "splineSubdivision": (4.0,),
 }
-# Maximum number of points of a spine or a cross-section; the time to divide faces into triangles is
-# quadratic.
+# Maximum number of points of a spine or a cross-section. The time to divide a face into triangles grows with
+# the square of this number.
 _MOST: Final = 1000
 _STRAIGHT: Final = 1e-9
 _LEAST_SPINE: Final = 2
@@ -128,7 +128,10 @@ def _axes(spine: Sequence[Vector]) -> list[tuple[Vector, Vector]]:
 
 
 def _first_z(spine: Sequence[Vector], y: Vector) -> Vector:
-    """Return z at the start of an open spine: z at its first bend; without a bend, z turned like y."""
+    """Return z at the start of an open spine: the z of its first bend.
+
+    Without a bend, return the z axis, rotated by the rotation from the y axis to `y`.
+    """
     bends = (
         cross(minus(spine[k + 1], spine[k]), minus(spine[k - 1], spine[k])) for k in range(1, len(spine) - 1)
     )

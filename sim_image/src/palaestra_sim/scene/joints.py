@@ -1,4 +1,4 @@
-"""Joints, and the frames of their end points, which move as the motors turn.
+"""Joints, and the frames of their end points; these frames move with the joints.
 
 A hinge turns its end point about an axis through the anchor. A slider moves its end point along the axis. The
 world file gives the pose of the end point at the `position` that the joint has in that file.

@@ -34,7 +34,7 @@ _FROM_MOUNTAINS: Final = (0.55, -0.6, -1.0)  # direction of the light of "mounta
 _OF_MOUNTAINS, _AMBIENT_OF_MOUNTAINS = 2.7, 1.0  # intensities of the direct and the ambient light
 _EVERYWHERE: Final = (1.0, 0.0, 0.0)  # an attenuation that does not depend on the distance
 _FAR_M: Final = 1000.0  # the length of a ray to a light without location, in Webots
-_LEAST: Final = 1e-300  # replaces an attenuation of 0; the lookup table limits the quotient, as in Webots
+_LEAST: Final = 1e-300  # divisor instead of an attenuation of 0; the lookup table limits the quotient
 _WIDEST_RAD: Final = 0.785398  # the default of SpotLight.cutOffAngle
 _BEAM_RAD: Final = 1.570796
 

@@ -71,7 +71,7 @@ class _Part(NamedTuple):
 
 
 def _part(corners: list[Corners]) -> _Part:
-    """Return the bounding-box tree of triangles; the longest side of a box decides how they are halved."""
+    """Return the bounding-box tree of triangles; each box is divided along its longest side."""
     points = [point for three in corners for point in three]
     middle, size = box_of(points)
     low, high = (

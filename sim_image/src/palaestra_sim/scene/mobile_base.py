@@ -5,7 +5,8 @@ acceleration of a robot. Here three limits replace torque and friction: 10 m/s2 
 20 rad/s2 about z. These limits come from the Robotino 3's own controller (Webots,
 projects/robots/festo/robotino3/controllers/robotino3/base.c). The same factor slows all three axes, as in
 `base_accelerate` of that controller. A motor's own `acceleration` is an additional limit. The three limits do
-not apply to a robot without physics, whose wheel accelerations Webots itself limits (`Motor.kinematic`).
+not apply to a robot without physics. For such a robot, Webots limits the acceleration of each wheel
+(`Motor.kinematic`).
 
 Every simulator uses this module, so a robot responds to the same commands in the same way in all simulators.
 """
@@ -87,7 +88,7 @@ class MobileBase:
         speeds = [wheel.speed_rad_s for wheel in wheels]
         demands = [wheel.demand(step_s) for wheel in wheels]
         vx, vy, omega = law.twist(list(map(sub, demands, speeds)))
-        # The number of steps that the change takes at the largest accelerations; the slowest axis decides.
+        # The number of steps that the slowest axis needs for its change at its largest acceleration.
         steps = max(abs(vx) / (_X * step_s), abs(vy) / (_Y * step_s), abs(omega) / (_TURN * step_s))
         if steps > 1.0 and not self._kinematic:
             demands = [

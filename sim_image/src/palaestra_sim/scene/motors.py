@@ -245,7 +245,7 @@ class Motor:
         return math.copysign(min(abs(gap) / step_s, self._rate), gap)
 
     def _at_limit(self) -> bool:
-        """Return whether a position limit stops a motor without a finite target; for a kinematic motor."""
+        """Return whether a position limit stops a kinematic motor that has no finite target."""
         low, high, velocity = self.spec.min_rad, self.spec.max_rad, self.velocity_rad_s
         if low == high:
             return False

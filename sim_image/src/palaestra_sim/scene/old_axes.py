@@ -1,4 +1,4 @@
-"""Nodes of files from before R2022a, whose axes Webots converts when it loads the files.
+"""Nodes of files from before R2022a; Webots converts the axes of these nodes when it loads the files.
 
 In these files robots looked along -z, cylinders stood along y, and many devices looked along other axes.
 Webots rotates these nodes, and the instances of its own PROTOs, whose files have the current axes. This

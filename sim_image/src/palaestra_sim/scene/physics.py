@@ -119,15 +119,15 @@ class Physics(Protocol):
         ...
 
     def reset(self) -> None:
-        """Discard what earlier steps left: the motion then depends only on the state and the commands."""
+        """Discard internal data of earlier steps: the motion then depends only on state and commands."""
         ...
 
     def look(self, figure: Figure, beams: Sequence[Beam]) -> Cast:
-        """Return a function that returns how far each beam of a robot travels, in meters."""
+        """Return a function that returns the distance in meters that each beam of a robot travels."""
         ...
 
     def see(self, figure: Figure, beams: Sequence[Beam]) -> Cast:
-        """Return a function as `look` does, for beams that stop at visible shapes, but not at the robot."""
+        """Return a function like `look`; but the beams stop at visible shapes, except those of the robot."""
         ...
 
     def push(self, target: Figure | DynamicSolid, push: Push) -> None:

@@ -27,8 +27,8 @@ from palaestra_sim.scene.shapes import Shape, bounding_shapes
 from palaestra_sim.scene.tree.scene_tree import SceneTree
 from palaestra_sim.scene.validation import ELSEWHERE, LeaveOut, NodeReader
 
-# The physics ignores these nodes. Most of them only affect what people and cameras see; other code reads
-# WorldInfo.
+# The physics ignores these nodes. Most of these nodes are only visible to people and cameras. WorldInfo is
+# among them, because other code reads it.
 DRAWN_ONLY: Final = frozenset(
     (
         "Background",
@@ -95,7 +95,7 @@ def read_scene(tree: SceneTree, physics: Physics, leave_out: LeaveOut | None = N
     """
     reading = NodeReader(tree.refused, leave_out, physics.abilities.name)
     scene = SceneContents(physics=physics)
-    # WorldInfo is read first, wherever it is in the file, because devices read it too.
+    # WorldInfo is read before all other nodes, because devices use its fields.
     for node in tree.root.nodes():
         if node.type_name == "WorldInfo":
             reading.world_info = node

@@ -94,11 +94,11 @@ class Robot:
         self.parts.node.fields["customData"] = FieldContent([text])
 
     def look(self, beams: Sequence[Beam]) -> Cast:
-        """Return a function that returns how far each beam travels, in meters; see `Carrier`."""
+        """Return a function that returns the distance that each beam travels; see `Carrier`."""
         return self._physics.look(self, beams)
 
     def see(self, beams: Sequence[Beam]) -> Cast:
-        """Return a function as `look` does, for beams that stop at visible shapes; see `Carrier`."""
+        """Return a function like `look`; but the beams stop at visible shapes; see `Carrier`."""
         return self._physics.see(self, beams)
 
     def reflect(self, beams: Sequence[Beam]) -> Callable[[], Sequence[Glance]]:
@@ -129,7 +129,7 @@ class Robot:
         return trail.acceleration
 
     def begin(self, step_s: float) -> None:
-        """Begin a basic step; a robot with an empty battery stands still."""
+        """Begin a basic step; a robot with an empty battery does not move."""
         self.time_s += step_s
         if self._has_battery:
             self.powered = not self._exhausted(step_s)
@@ -140,7 +140,7 @@ class Robot:
             trail.begin(step_s)
 
     def turn(self, step_s: float) -> None:
-        """Turn for one basic step the motors that neither drive a wheel nor are moved by forces."""
+        """Turn the motors for one basic step, except motors that drive a wheel or that forces move."""
         if self.powered:
             for motor in self._stray_motors:
                 motor.advance(step_s)

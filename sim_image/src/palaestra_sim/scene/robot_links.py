@@ -1,7 +1,7 @@
 """Find the joints of a robot that forces move, in a physics with forces.
 
-The parts on such a joint have physics. A joint that drives or steers a wheel does not count, nor does a joint
-on a wheel. A caster on the floor does not count either, because it only follows the motion of the robot.
+The parts on such a joint have physics. Joints that drive or steer a wheel do not count, and joints on a wheel
+do not count. The joints of a caster do not count, because a caster only follows the motion of the robot.
 """
 
 from __future__ import annotations

@@ -71,7 +71,7 @@ class Shape:
         return z - half, z + half
 
     def half_along(self, rotation: Matrix, axis: int) -> float:
-        """Return half the shape's length along an axis, 0 to 2, of a frame in which it has that rotation."""
+        """Return half the shape's length along axis 0, 1 or 2 of a frame; its rotation is in this frame."""
         if self.kind == "ball":
             return self.size[2] / 2.0
         if self.kind == "capsule":

@@ -124,7 +124,7 @@ class Simulation:
 
     @property
     def unread_textures(self) -> int:
-        """How many visible shapes have a texture that infra-red sensors do not see."""
+        """The number of visible shapes with a texture that infra-red sensors do not see."""
         return self._view.unread_textures()
 
     @property

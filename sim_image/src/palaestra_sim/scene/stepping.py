@@ -1,8 +1,8 @@
-"""The steps that robots request; the world moves when each robot with `synchronization` requested a step.
+"""The steps that robots request, and the time by which the world advances.
 
-A robot whose `synchronization` is TRUE holds the world until it requests a step. Steps of different lengths
-are served in parts: the world advances by the shortest remaining time. While the simulation is paused, all
-steps wait.
+The world advances when each robot whose `synchronization` is TRUE has requested a step. Steps of different
+lengths are served in parts: the world advances by the shortest remaining time. While the simulation is
+paused, all steps wait.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ Done = Callable[[bool], None]
 
 
 class Simulated(Protocol):
-    """The interface of a simulation for its steps; another simulator can implement it, too.
+    """The interface of a simulation for its steps; another simulator can implement it.
 
     Attributes:
         mode: the simulation mode; in PAUSE the world does not move.

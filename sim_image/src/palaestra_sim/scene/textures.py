@@ -105,7 +105,7 @@ class Textures:
             look: the Appearance or PBRAppearance of the shape.
             geometry: the type of the shape's geometry.
             opaque: 1 minus the transparency of the shape.
-            tiles: how often the texture repeats along u and v, from the lower left.
+            tiles: the number of copies of the texture along u and along v, from the lower left.
         """
         mapped = MAPPINGS.get(geometry)
         node = texture_of(look)

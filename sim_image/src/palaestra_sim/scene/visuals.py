@@ -80,7 +80,7 @@ class Drawn:
         look: the shape's appearance; None without an appearance, or if the texture's position on the shape is
             unknown.
         textured: whether the appearance has a texture.
-        tiles: how often the texture repeats along x and y.
+        tiles: the number of copies of the texture along x and along y.
     """
 
     kind: Kind
@@ -108,8 +108,9 @@ class View:
     Attributes:
         root: the root of the world.
         textures: the images of the world's textures.
-        changes: how often a node was added or removed, or the look of a node changed.
-        moves: how often a client or a reset moved a node; motion by motors and by the physics does not count.
+        changes: the number of times that a node was added or removed, or that the look of a node changed.
+        moves: the number of times that a client or a reset moved a node; motion by motors and by the physics
+            does not count.
     """
 
     def __init__(self, root: SceneNode) -> None:

@@ -78,7 +78,7 @@ class Wheel:
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """The motion of a robot as a linear function of its wheels' speeds, and the reverse.
+    """Two linear functions: from a robot's wheel speeds to its motion, and from its motion to wheel speeds.
 
     Attributes:
         to_twist: one row per wheel: the vx, vy and omega of the robot's origin for 1 rad/s of this wheel.
@@ -110,7 +110,7 @@ class Drive:
 
 @dataclass(frozen=True, slots=True)
 class Ring(Drive):
-    """Three omnidirectional wheels around the middle, in closed form, which keeps zeros exact.
+    """Three omnidirectional wheels around the middle; the closed form of the equations keeps zeros exact.
 
     Source: Webots, projects/robots/festo/robotino3/controllers/robotino3/base.c. In that file the first wheel
     is at the rear. The rotation by `c`, `s` turns the frame of that file into the robot's frame.

@@ -23,7 +23,7 @@ def read_rolling(
 ) -> Rolling | None:
     """Return the end of a joint as a wheel, or None if the end cannot be a wheel.
 
-    The end cannot be a wheel if it has no round shape, or if the motor of an outer joint does not steer it.
+    The end cannot be a wheel if it has no round shape, or if an outer joint has a motor that does not steer.
     `place` is the frame that contains the joint, and `shapes` are the shapes of the end.
     """
     round_ones = [shape for shape in shapes if shape.kind not in _FLAT]

@@ -42,7 +42,7 @@ class Described(Protocol):
 
     @property
     def unread_textures(self) -> int:
-        """How many visible shapes have a texture that infra-red sensors do not see."""
+        """The number of visible shapes with a texture that infra-red sensors do not see."""
         ...
 
     @property

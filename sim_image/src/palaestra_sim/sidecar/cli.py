@@ -46,7 +46,7 @@ def work_folder(given: argparse.Namespace) -> Iterator[None]:
     """Set `given.work` to a temporary folder for the block, if a folder is needed and --work is not given.
 
     The generated world of --suffix needs a folder, and so do the socket for viewers and the controller for
-    Webots. The sidecar makes the folder itself, because its parent process may be killed.
+    Webots. The sidecar makes the folder itself: a parent process that is killed could not remove the folder.
     """
     needed = given.suffix or Driver(given.driver) in SHOWN or _has_own_controller(given)
     if not needed or given.job is not None or given.work is not None:
@@ -245,7 +245,7 @@ def _view_socket(given: argparse.Namespace, driver: Driver, world: Path) -> Path
 
 
 def _batch_file(given: argparse.Namespace, driver: Driver, world: Path) -> Path | None:
-    """Return the file for the address of a MuJoCo with many copies of its world; None without a folder."""
+    """Return the file for the address of MuJoCo's copies of the world; None if there is no such file."""
     if given.work is None or driver is not Driver.MUJOCO:
         return None
     return Path(given.work).absolute() / f"{world.stem}.batch"

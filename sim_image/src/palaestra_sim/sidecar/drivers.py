@@ -16,12 +16,12 @@ WORLD = "{world}"  # represents the path of the world in the arguments of a prog
 _NOT_ROOT = "palaestra"
 _MESA_THREADS = "LP_NUM_THREADS"
 
-_FIRST_PORT, _PORTS = 10_000, 20_000  # below the range from which Linux gives out ports
+_FIRST_PORT, _PORTS = 10_000, 20_000  # below the ports that Linux assigns to clients
 
 # Source: Webots' guide, "Command Line Arguments". --batch prevents dialogs that wait for a click.
 # With --minimize but without --mode, Webots would start in fast mode.
 _WEBOTS = ("--batch", "--mode=pause", "--stdout", "--stderr")
-# --no-rendering turns off only the main 3D view: Webots renders cameras in each step, whatever the view does
+# --no-rendering turns off only the main 3D view: Webots renders cameras in each step, even without this view
 # (WbSimulationWorld::step). Movies, the stream mjpeg and, in R2023b, exported images show the main 3D view.
 # Webots' simulation_server.py leaves out both options for the stream mjpeg.
 _WITHOUT_VIEW = ("--minimize", "--no-rendering")

@@ -20,18 +20,20 @@ EPILOG = """
 This program does not start the simulator by itself. A client starts it with POST /start on the control port;
 see palaestra_protocol.control. The simulator inherits the environment, with ROS_MASTER_URI and ROS_HOSTNAME.
 
-reads   the world; with --job it writes a copy, GROUP-INDEX.wbt, with other ROS names to the --work folder;
-        for Webots the copy is in a project, with links to the controllers and PROTOs around the world; the
+reads   the world
+writes  with --job a copy of the world with other ROS names, GROUP-INDEX.wbt, to the folder of --work; for
+        Webots the copy is in a project, with links to the controllers and PROTOs around the world, and the
         project `webots` in that folder has the controller ros
-prints  first the two addresses; then its own lines, as "palaestra-sidecar: ...", and the simulator's
+prints  first the two addresses; then its own lines, which begin with "palaestra-sidecar: ", and the lines of
+        the simulator
 serves  control: /start /ready /stop /state; health: /healthz /state /metrics; both: /scene /watch /camera
 
-With --standby the sidecar has a second simulator, slot b, which can start while the first one works. It has
-its own world (GROUP-INDEXb.wbt), ROS names, process and paths (/standby/start and so on). Output lines begin
-with "a: " or "b: ". The variable PALAESTRA_SIMULATOR_SLOT holds the slot of a simulator.
+With --standby the sidecar has a second simulator, slot b, which can start while the first one works. Slot b
+has its own world (GROUP-INDEXb.wbt), ROS names, process and paths (/standby/start and so on). Output lines
+begin with "a: " or "b: ". The variable PALAESTRA_SIMULATOR_SLOT holds the slot of a simulator.
 
-With --work, PALAESTRA_SIMULATOR_LEFT_OUT names a file. Before the simulator is ready, it may write to this
-file which nodes it leaves out of the world: one line for each kind of node. /state returns these lines.
+With --work, PALAESTRA_SIMULATOR_LEFT_OUT names a file. Before the simulator is ready, it may list in this
+file the nodes that it leaves out of the world: one line for each kind of node. /state returns these lines.
 
 exit codes: 0 after SIGTERM or SIGINT, if all processes ended; 1 if a process hung and still runs;
             2 wrong options or world, a port in use, a missing program: no simulator was started
@@ -100,14 +102,14 @@ def _add_listeners(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--allow-remote-control",
         action="store_true",
-        help="the control port may be no loopback address; only in a network that keeps others out",
+        help="allow a control address other than loopback; only in a network that others cannot reach",
     )
     group.add_argument("--until-stdin-closes", action="store_true", help="exit also when stdin closes")
     group.add_argument(
         "--until-silent",
         type=whole(1),
         metavar="SECONDS",
-        help="exit also after so many seconds without a request to the control port",
+        help="exit also after this many seconds without a request to the control port",
     )
 
 
@@ -121,7 +123,7 @@ def _add_identity(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--index", type=whole(), default=0, metavar="N")
     group.add_argument("--work", type=Path, metavar="DIR", help="folder for the generated world")
     group.add_argument(
-        "--clock", action="store_true", help="this simulator may publish /clock; one per ROS master"
+        "--clock", action="store_true", help="let this simulator publish /clock; only one for each ROS master"
     )
     group.add_argument(
         "--suffix",

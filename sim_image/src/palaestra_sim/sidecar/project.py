@@ -150,7 +150,8 @@ def _is_ours(link: Path, sources: Collection[Path]) -> bool:
 def _link(link: Path, target: Path) -> None:
     """Make a link, unless an equal link or a file already exists.
 
-    The other simulator of this sidecar may be using an equal link. A file is a generated world.
+    An equal link is kept, because the other simulator of this sidecar may be using it. A file is kept,
+    because it is a generated world.
     """
     if link.is_symlink():
         if link.readlink() == target:

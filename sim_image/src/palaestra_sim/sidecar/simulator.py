@@ -117,13 +117,13 @@ class SupervisedSimulator:
         self._inbox.put(_Message(event=LifecycleEvent.SHUTDOWN))
 
     def as_answered(self) -> SimulatorState:
-        """Return the state, with the address of the copies, and the memory in use if it is ready."""
+        """Return the state with the address of the copies and, if the simulator is ready, its memory."""
         state = replace(self.state, batch=self._address())
         ready = state.state is SidecarState.READY
         return replace(state, rss_bytes=self.usage().rss_bytes) if ready else state
 
     def _address(self) -> str | None:
-        """Return the address at which the running process serves its copies; None before it has one."""
+        """Return the address at which the running process serves its copies; None if it has none yet."""
         if self._batch is None or self._process is None:
             return None
         try:
@@ -156,7 +156,7 @@ class SupervisedSimulator:
             return _Message(event=LifecycleEvent.DEADLINE)
 
     def _take(self, message: _Message) -> None:
-        """Run the action that the table has for one message, and send the result to the caller of `ask`."""
+        """Run the action that `lifecycle` lists for a message; send the result to the caller of `ask`."""
         self._closing |= message.event is LifecycleEvent.SHUTDOWN
         step = lifecycle.step(self.state.state, message.event)
         if step is not None:

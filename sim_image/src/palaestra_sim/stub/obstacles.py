@@ -294,7 +294,7 @@ class Neighborhood:
         self._squares: dict[int, tuple[FlatObstacle, ...]] = {}
 
     def near(self, x: float, y: float) -> tuple[FlatObstacle, ...]:
-        """Return all obstacles within reach of x, y, in their order; the result may have other obstacles."""
+        """Return all obstacles within reach of x, y, in their order; the result may contain others."""
         column = int(x * 8.0 + 4096.0)  # 8 = 1 / SIDE_M; the shift makes usual coordinates positive
         row = int(y * 8.0 + 4096.0)
         key = column * 65536 + row

@@ -47,7 +47,7 @@ class OtherRobot:
     def hit(self, origin: Vector, direction: Vector) -> float:
         """Return the distance in meters from `origin` to the robot along the unit vector `direction`.
 
-        Both are in the axes of the ground. The distance is infinite if the ray misses the robot.
+        Both arguments are in the axes of the ground. The distance is infinite if the ray misses the robot.
         """
         body = self._body
         dx, dy = origin[0] - body.x, origin[1] - body.y

@@ -134,7 +134,7 @@ class StubPhysics:
         return lambda: level.cast((body.x, body.y, body.c, body.s), place.height_m)
 
     def see(self, figure: Figure, beams: Sequence[Beam]) -> Cast:
-        """Return a function as `look` does, for beams that stop at visible shapes, but not at the robot."""
+        """Return a function like `look`; but the beams stop at visible shapes, except those of the robot."""
         sight = VisualRays(self._view, figure.place, beams)
         return lambda: [glance.distance_m for glance in sight.cast()]
 
@@ -171,8 +171,8 @@ class StubPhysics:
     ) -> None:
         """Set the obstacles of horizontal beams.
 
-        Upright obstacles at the height of every beam go to `level.fan`, which is fast. All others go to
-        `level.rest`.
+        Upright obstacles at the height of every beam go to `level.fan`, which is fast. All other obstacles go
+        to `level.rest`.
         """
         low, high = level.heights[0] + height, level.heights[1] + height
         whole, partly = [], []

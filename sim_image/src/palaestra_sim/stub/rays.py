@@ -80,7 +80,7 @@ class Rounded(NamedTuple):
     def hit(self, origin: Vector, direction: Vector) -> float:
         """Return the distance in meters from `origin` to the surface along the unit vector `direction`.
 
-        Both are in the axes of the ground. The distance is infinite if the ray misses the shape.
+        Both arguments are in the axes of the ground. The distance is infinite if the ray misses the shape.
         """
         return first_hit(self.shape, self.inward.carry(origin), self.inward.turned(direction))
 
@@ -91,7 +91,7 @@ class Met(Protocol):
     def hit(self, origin: Vector, direction: Vector) -> float:
         """Return the distance in meters from `origin` to the surface along the unit vector `direction`.
 
-        Both are in the axes of the ground. The distance is infinite if the ray misses the shape.
+        Both arguments are in the axes of the ground. The distance is infinite if the ray misses the shape.
         """
         ...
 
@@ -140,7 +140,7 @@ class SlopedBeams:
         return self.distances
 
     def cast_from(self, pose: Pose) -> list[float]:
-        """Return the distances for a robot that may be tilted, whose pose in the ground's axes is `pose`."""
+        """Return the distances for a robot that may be tilted; `pose` is its pose in the ground's axes."""
         for index, beam in enumerate(self._beams):
             self.distances[index] = self._first(beam.seen_from(pose), _GROUND, 0.0)
         return self.distances

@@ -23,8 +23,8 @@ _OF_A_SIDECAR: Final = "PALAESTRA_SIMULATOR_SLOT"  # every sidecar sets this var
 def main(arguments: Sequence[str] | None = None) -> int:
     """Serve the robot of this process.
 
-    Return the exit code: 2 if an option, a fault or libController is wrong. A sidecar's Webots then ends with
-    this code, too, because the robot would stand still for ever.
+    Return the exit code: 2 if an option, a fault or libController is wrong. After a wrong option or fault, a
+    supervisor in the Webots of a sidecar also ends Webots with this code, because the robot would never move.
     """
     given = sys.argv[1:] if arguments is None else arguments
     logging.basicConfig(level=logging.INFO, format="ros: %(message)s", stream=sys.stderr)

@@ -1,6 +1,6 @@
-"""libController, the C library with which a controller talks to Webots.
+"""libController, the C library through which a controller communicates with Webots.
 
-The class declares the types of every function that it calls, so that a wrong call is an error in Python and
+`Library` declares the types of every function that it calls, so that a wrong call is an error in Python and
 not a crash. Strings are `str`, and arrays of a fixed length are tuples.
 
 libController has one lock for all functions: while one thread waits in `robot_step`, every other call waits.

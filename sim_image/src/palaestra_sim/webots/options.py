@@ -36,8 +36,7 @@ def read_options(arguments: Sequence[str]) -> ControllerOptions:
     """Return the options in controllerArgs.
 
     Raises:
-        OptionError: an argument that this controller needs is missing, or one that it does not support is
-            there.
+        OptionError: a required argument is missing, or this controller does not support an argument.
     """
     names = [it.removeprefix(_NAME) for it in arguments if it.startswith(_NAME)]
     if not names or not names[-1]:

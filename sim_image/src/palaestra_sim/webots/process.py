@@ -23,7 +23,7 @@ log = logging.getLogger(__name__)
 _CHECK_MASTER_S: Final = 1.0
 _NO_MASTER: Final = 1
 _DEFAULT_MASTER: Final = "http://localhost:11311"
-# robot_init sets handlers for these signals, which end the process without a message to the ROS master.
+# The handlers that robot_init sets for these signals end the process without a message to the ROS master.
 _SIGNALS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGQUIT, signal.SIGHUP)
 
 
@@ -115,7 +115,7 @@ class ControllerProcess:
         self.end(0)
 
     def _check(self, node: RosNode) -> None:
-        """End the process if the ROS master does not respond; a restarted master does not know its names."""
+        """End the process if the ROS master does not respond; a restarted master has lost its names."""
         try:
             node.check_master()
         except MasterUnreachable as error:

@@ -94,7 +94,7 @@ def _ending(service: Service, library: Library, await_end: Callable[[], None]) -
 
     def handle(request: Any) -> Any:
         if service.path == _LOAD and not Path(request.value).is_file():
-            # Webots would keep its world, and `await_end` would wait for an end that does not come.
+            # Webots would keep its world, and `await_end` would wait forever.
             return {"success": False}
         response = service.handler(request)
         if service.path != _RESTART or request.node == library.supervisor_node_get_self():

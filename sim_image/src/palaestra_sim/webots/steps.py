@@ -15,7 +15,7 @@ from typing import Final
 from palaestra_sim.ros.loop import Loop
 from palaestra_sim.webots.library import Library
 
-_QUIT: Final = -1  # robot_step returns it when Webots wants the controller to end
+_QUIT: Final = -1  # the result of robot_step if the controller has to end
 
 Done = Callable[[bool], None]
 
@@ -26,7 +26,7 @@ class WebotsSteps:
     Args:
         library: the library of Webots.
         loop: the event loop, in which the callbacks run.
-        ended: called once Webots wants the controller to end.
+        ended: called when Webots requests the end of the controller.
     """
 
     def __init__(self, library: Library, loop: Loop, ended: Callable[[], None]) -> None:
@@ -43,11 +43,11 @@ class WebotsSteps:
         """Do nothing: Webots stops waiting for a controller that ends."""
 
     def ask(self, duration_ms: int, done: Done) -> None:
-        """Request a step; `done` gets whether Webots has simulated it."""
+        """Request a step; then call `done` with True if Webots has simulated the step, else with False."""
         self._requests.put((duration_ms, done))
 
     def await_end(self, duration_ms: int) -> None:
-        """Wait for the end of this controller, after an order that ends or reloads the world.
+        """Wait for the end of this controller, after a request that ends or reloads the world.
 
         Webots announces the end in the response to a step. Otherwise it would terminate the controller one
         second later.

@@ -56,8 +56,8 @@ def no_robot_speaks_ros(candidate: Candidate) -> Iterator[WorldError]:
 def robot_used_twice(candidate: Candidate) -> Iterator[WorldError]:
     """A `USE` repeats a robot with the same ROS name.
 
-    All DEFs with that name are compared, although a `USE` refers only to the last DEF before the `USE`. A
-    world with different DEF names is clearer anyway.
+    A `USE` refers only to the last DEF of that name before it, but this check compares all DEFs of that name.
+    So it also refuses some valid worlds; with different DEF names, these worlds are clearer.
     """
     starts = [robot.span[0] for robot in candidate.robots]
     containers = {}
@@ -170,14 +170,14 @@ CHECKS: tuple[Check, ...] = (
 """The checks for every world."""
 
 CHECKS_WITHOUT_FILE: tuple[Check, ...] = (*CHECKS, relative_address)
-"""The additional check for a world without a file, which has no files next to it."""
+"""The checks for a world without a file; such a world cannot use relative addresses."""
 
 
 def candidate(source: bytes, name: str, *, relative_addresses: bool) -> Candidate:
     """Return a world that passes every check.
 
     Raises:
-        WorldError: as `check` does.
+        WorldError: see `check`.
     """
     world = parse(source, name)
     found = Candidate(source=Source(data=source, name=name), world=world, robots=ros_robots(world))

@@ -2,8 +2,8 @@
 
 A world or a PROTO file has an EXTERNPROTO line with an address for each PROTO that it uses. An address with a
 scheme (https://, webots://) belongs to a PROTO that Webots provides. This module does not read the file of
-such a PROTO, and records only its name. A relative address is relative to the folder of the file with the
-line.
+such a PROTO, and records only its name. A relative address is relative to the folder of the file that has the
+EXTERNPROTO line.
 
 Files from before R2022b do not have such lines: Webots found PROTOs by their names in the folder `protos/` of
 the world's project, and in its subfolders. This module does the same for such files.

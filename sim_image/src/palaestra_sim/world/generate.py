@@ -32,10 +32,10 @@ def generate(
     """Return the world of one simulator, generated from the world `source`.
 
     `clock` is True if this simulator may publish `/clock` when its world requests it. `clock` must be True
-    for at most one simulator of a ROS master. `name` and `relative_addresses` are as for `check`.
+    for at most one simulator of a ROS master. See `check` for `name` and `relative_addresses`.
 
     Raises:
-        WorldError: as for `check`.
+        WorldError: see `check`.
     """
     found = candidate(source, name, relative_addresses=relative_addresses)
     names = [ros_name(identity, robot_name(robot)) for robot in found.robots]
@@ -45,11 +45,11 @@ def generate(
 def rename(source: bytes, suffix: str, *, name: str = "world", relative_addresses: bool = False) -> bytes:
     """Return the world with `suffix` appended to each of its ROS names, and without any `--clock`.
 
-    Use this world for a second simulator on the same ROS master. `name` and `relative_addresses` are as for
-    `check`.
+    Use this world for a second simulator on the same ROS master. See `check` for `name` and
+    `relative_addresses`.
 
     Raises:
-        WorldError: as for `check`; or a robot has no ROS name, or its new name is too long.
+        WorldError: see `check`; or a robot has no ROS name, or its new name is too long.
     """
     found = candidate(source, name, relative_addresses=relative_addresses)
     return _named(found, [_longer(found, robot, suffix) for robot in found.robots], clock=False)

@@ -123,7 +123,8 @@ def _unexpanded(source: Source, error: TemplateError, start: int) -> WorldError:
     """Return the error for a template that is not expanded; `start` is the offset of its first code."""
     fact = f"this PROTO has a template with code that is not expanded ({error})"
     remedy = (
-        "only if, else, declarations and outputs are; add this type to a file of stand-ins, or leave it out"
+        "only if, else, declarations and outputs are expanded; "
+        "add this type to a file of stand-ins, or leave it out"
     )
     return source.error(start, fact, remedy)
 
@@ -171,7 +172,7 @@ class _ProtoReader(Reader):
     _access_needed = True
 
     def head(self) -> dict[str, ProtoField]:
-        """Return the fields of a PROTO, whose text may end in its body."""
+        """Return the fields of a PROTO; the text may end inside the body of the PROTO."""
         return self._head()[2]
 
     def _head(self) -> tuple[list[Token], str, dict[str, ProtoField]]:

@@ -9,7 +9,7 @@ A file of stand-ins is a TOML file with one table for each type:
     '''
     box = "size"
 
-`fields` declares the fields and their defaults as a PROTO does, and as Webots' manual prints them. Every
+`fields` declares the fields and their defaults in the syntax of a PROTO, which Webots' manual uses too. Every
 object also has `translation`, `rotation` and `name`. An entry has one shape (`box`, `cylinder`, `sphere`,
 `plane`, `ring` or `wall`), or a list of shapes in `parts`. Lengths are numbers or formulas
 (`expressions.py`). The lists `flat` and `drawn` at the top of the file name types without obstacles: `flat`

@@ -37,7 +37,7 @@ _LEVELS: Final = (("||",), ("&&",), ("===", "!==", "==", "!="), tuple(_COMPARED)
 
 
 class TemplateError(ValueError):
-    """Code in a template that is not computed; the text names it."""
+    """A template has code that this module does not support; the error text is the code or the problem."""
 
 
 def cut(code: str) -> list[str]:
@@ -148,7 +148,7 @@ class CodeTokens:
 
 
 def truth(value: Result) -> bool:
-    """Return whether JavaScript takes a value for true."""
+    """Return whether JavaScript treats a value as true."""
     return bool(value)
 
 
@@ -177,7 +177,7 @@ def _found(names: Names, name: str, written: str) -> Result:
 
 
 def _axis(value: Result, axis: str | None, written: str) -> Result:
-    """Return a value, or its number of an axis."""
+    """Return a value; if `axis` is given, return the number of a vector along this axis."""
     if axis is None:
         return value
     if not isinstance(value, dict) or axis not in value:
@@ -197,7 +197,7 @@ def _joined(mark: str, left: Computed, right: Computed) -> Computed:
 def _applied(mark: str, left: Result, right: Result) -> Result:
     """Return the value of an operator for two values."""
     if mark in ("==", "!=", "===", "!=="):
-        if type(left) is not type(right) and mark in ("==", "!="):  # both operators would convert
+        if type(left) is not type(right) and mark in ("==", "!="):  # JavaScript would convert a value
             raise TemplateError(f"{left!r} {mark} {right!r}")
         return (type(left) is type(right) and left == right) == mark.startswith("=")
     if mark == "+" and str in (type(left), type(right)):

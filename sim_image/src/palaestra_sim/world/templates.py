@@ -8,8 +8,8 @@
 
 Webots runs a template as a program in JavaScript or Lua. This module runs only JavaScript without loops and
 functions: declarations, assignments, `if` and `else`, and outputs of expressions (`template_code.py`). Any
-other template raises TemplateError, whose text is the code that is not expanded. The expanded file keeps the
-line numbers of the template.
+other template raises TemplateError; the error text is the unsupported code or the problem. The expanded file
+keeps the line numbers of the template.
 """
 
 import re
@@ -80,7 +80,7 @@ class Template:
 
 
 def parse_template(data: bytes, start: int) -> Template:
-    """Return the template of a file, whose first code is at the offset `start`.
+    """Return the template of a file; the first code of the file is at the offset `start`.
 
     Raises:
         TemplateError: the template has code that this module does not expand.
@@ -92,7 +92,7 @@ def parse_template(data: bytes, start: int) -> Template:
 
 
 def _tokens(data: bytes, parts: list[bytes | Computed], fields: set[str]) -> list[str]:
-    """Return the tokens of all code; each text and each output between is one token and one of `parts`."""
+    """Return the tokens of all code; each text and each output is one token, and is added to `parts`."""
     tokens: list[str] = []
     at = size = 0
     for match in _PIECE.finditer(data):

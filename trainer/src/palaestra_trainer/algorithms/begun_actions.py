@@ -17,7 +17,7 @@ class BegunActions:
         self._actions: dict[int, np.ndarray] = {}
 
     def taken(self, actions: np.ndarray, infos: Sequence[Mapping[str, Any]]) -> np.ndarray:
-        """Return the actions that the rows of a vector step belong to; shape (n_envs, ...), as `actions`.
+        """Return, for each row of a vector step, the action with which its step began; shaped as `actions`.
 
         The actions of pending rows are kept until their steps end.
         """

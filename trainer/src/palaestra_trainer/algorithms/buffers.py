@@ -175,9 +175,8 @@ class ValidRolloutBuffer(RolloutBuffer):
     def compute_returns_and_advantage(self, last_values: torch.Tensor, dones: np.ndarray) -> None:
         """Compute returns and advantages as if the rollout was truncated before each invalid row.
 
-        An invalid row ends its episode. The reward of that row is set to the row's value estimate, so its
-        advantage is 0. So the row before the invalid row bootstraps from the value of the state between the
-        two rows.
+        An invalid row ends its episode. Its reward is set to its value estimate, so its advantage is 0. The
+        row before the invalid row then bootstraps from the value of the state between the two rows.
         """
         self.rewards[~self.valid] = self.values[~self.valid]
         super().compute_returns_and_advantage(last_values, dones)

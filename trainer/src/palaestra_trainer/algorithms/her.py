@@ -124,7 +124,8 @@ class ValidHerReplayBuffer(ValidDictReplayBuffer, HerReplayBuffer):
             rows = 0 if start is None else (self._next[column] - start) % self.buffer_size
             self._under_way[column] = self.buffer_size if start == self._next[column] else rows
             open_rows = self._rows_under_way(column)
-            # A rollout that was later dropped had closed the episode.
+            # These rows are marked as a closed episode if a rollout closed it and the resume dropped that
+            # rollout.
             if self.ep_length[open_rows, column].any():
                 self._set_episode(open_rows, column, self._start(column), 0)
 

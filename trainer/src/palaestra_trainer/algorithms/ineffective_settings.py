@@ -23,18 +23,19 @@ def futile(model: BaseAlgorithm, steps: int) -> Iterator[str]:
         )
     if isinstance(model, OffPolicyAlgorithm) and (rollout := _steps_of_rollout(model)) > steps:
         yield (
-            f"{FIELD}.train_freq: {rollout} steps come before each update, and the run has {steps}, so it "
-            "learns once; lower it, or raise steps"
+            f"{FIELD}.train_freq: {rollout} steps come before each update, but the run has only {steps}, "
+            "so the policy is updated once; lower train_freq, or raise steps"
         )
     if isinstance(model, REINFORCE) and model.episodes_per_update >= steps:
         yield (
             f"{FIELD}.episodes_per_update: {model.episodes_per_update} episodes are more than the run has in "
-            f"{steps} steps, so it takes more steps, and learns once; lower it, or raise steps"
+            f"{steps} steps, so the run takes more steps and updates the policy once; lower this field, or "
+            "raise steps"
         )
     if isinstance(model, OnPolicyAlgorithm) and (rollout := model.n_steps * model.n_envs) > steps:
         yield (
             f"{FIELD}.n_steps: a rollout is {rollout} steps ({model.n_steps} of each simulator), so the run "
-            f"takes {rollout} steps, not {steps}, and learns once; lower it, or raise steps"
+            f"takes {rollout} steps, not {steps}, and updates the policy once; lower n_steps, or raise steps"
         )
 
 

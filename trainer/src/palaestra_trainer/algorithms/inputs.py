@@ -1,4 +1,4 @@
-"""Give the networks of a job's author copies of their inputs.
+"""Pass copies of the inputs to networks whose code comes from a job's author.
 
 Stable-Baselines3 passes an array to a network, and later stores the same array as a row. It also passes the
 same batch to the networks of actor and critic. A network that writes into its input would change the data for

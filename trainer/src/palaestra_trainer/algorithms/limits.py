@@ -98,7 +98,10 @@ def out_of_range(cls: type, given: Mapping[str, Any]) -> Iterator[tuple[str, str
             ranges["batch_size"] = Range(LEAST_BATCH[ancestor.__name__])
     yield from _outside("", given, ranges)
     if given.get("gradient_steps") == 0:
-        yield "gradient_steps", "with 0 nothing is learned; give a number above 0, or -1 for as many as steps"
+        yield (
+            "gradient_steps",
+            "with 0 nothing is learned; give a number above 0, or -1 for one per environment step",
+        )
     policy = given.get("policy_kwargs")
     if isinstance(policy, dict):
         yield from _outside("policy_kwargs.", policy, RANGES_OF_POLICY)
@@ -130,7 +133,7 @@ def _layers(layers: Any) -> Iterator[tuple[str, str]]:
 
 
 def _first(frequency: Any) -> Any:
-    """Return the number in a frequency, or in its list of number and unit; None without a number."""
+    """Return the number of `train_freq`, given alone or in a list with its unit; None without a number."""
     value = frequency[0] if isinstance(frequency, list | tuple) and frequency else frequency
     return value if _is_number(value) else None
 

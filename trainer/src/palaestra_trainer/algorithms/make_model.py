@@ -34,8 +34,8 @@ def check(algorithm: Algorithm) -> RegisteredAlgorithm:
     """Return the entry of the algorithm, after a check of its name and all its hyperparameters.
 
     Raises:
-        ConfigurationError: a name is unknown or a value is wrong; the message has one line for each, and
-            suggests the nearest known name.
+        ConfigurationError: a name is unknown or a value is wrong; the message has one line for each mistake,
+            and suggests the nearest known name.
     """
     entry = entry_of(algorithm.name)
     policy = hyperparameters.policy_class(entry.original, named_policy(algorithm, entry))
@@ -77,7 +77,7 @@ def _refuse_members(chosen: Mapping[str, Any], members: int) -> None:
     if limits.needs_one_member(chosen) and members > 1:
         raise ConfigurationError(
             f"{hyperparameters.FIELD}.train_freq: counts in episodes, which only one collecting simulator "
-            f"allows, not {members}; count in steps, or use one collecting simulator"
+            f"allows, but the job has {members}; count in steps, or use one collecting simulator"
         )
     if chosen.get("normalize_advantage") and (chosen.get("n_steps"), members) == (1, 1):
         raise ConfigurationError(
@@ -166,12 +166,12 @@ def _usable(wanted: Device) -> Device:
     """Return the wanted device; if PyTorch does not find a GPU, log a warning and return the CPU.
 
     The default is the CPU even on a node with a GPU, because networks of some hundred units learn faster on
-    the CPU. A resumed run ends with exactly the same numbers only on the CPU.
+    the CPU. A resumed run ends with exactly the numbers of an uninterrupted run only if both use the CPU.
     """
     if wanted == "cuda" and not torch.cuda.is_available():
         log.warning(
             "PyTorch sees no GPU, so the CPU is used",
-            remedy="a trainer image that is built with TORCH=cuda, on a node with a GPU",
+            remedy="use a trainer image that is built with TORCH=cuda, on a node with a GPU",
         )
         return "cpu"
     return wanted

@@ -56,7 +56,7 @@ def positions(noise: ActionNoise | None) -> np.ndarray | None:
 
 
 def put_back(noise: ActionNoise | None, before: np.ndarray) -> None:
-    """Set the noise processes to the states in `before`; a member that has no state in it starts at 0."""
+    """Set the noise processes to the states in `before`; a member without a state there starts at 0."""
     for process, position in zip(_processes(noise), before, strict=False):
         process.noise_prev = position
 

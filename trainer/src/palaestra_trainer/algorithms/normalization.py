@@ -35,7 +35,10 @@ class Moments:
 
     @classmethod
     def of(cls, running: RunningMeanStd) -> Self:
-        """Return the moments of Stable-Baselines3's statistics, whose updates replace these arrays."""
+        """Return the moments of Stable-Baselines3's statistics.
+
+        The arrays are not copied, because an update of the statistics replaces them.
+        """
         return cls(running.mean, running.var, running.count)
 
     def put_back(self, running: RunningMeanStd) -> None:

@@ -58,7 +58,9 @@ _STATE_METHODS = ("state_dict", "load_state_dict")
 
 
 class OwnBuffer(BaseBuffer):
-    """The base of an author's buffer in use; it gives checkpoints the state that the author's class adds.
+    """The base of the subclass that a run uses instead of an author's buffer.
+
+    This class returns the state that the author's class adds, for checkpoints.
 
     If the class has the methods `state_dict` and `load_state_dict`, this state is the result of `state_dict`.
     Otherwise this state is every attribute that the class adds.

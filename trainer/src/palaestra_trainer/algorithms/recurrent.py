@@ -1,8 +1,8 @@
 """Rollout buffers of RecurrentPPO that do not sample invalid rows.
 
 An LSTM learns from whole sequences, so rows are not shuffled. Sequences do not contain invalid rows. The
-first valid row after an invalid row begins an episode. At that row the LSTM restarts, both in the collection
-of rows and in the update.
+first valid row after an invalid row begins an episode. At that row the state of the LSTM is reset, both in
+the collection of rows and in the update.
 """
 
 from __future__ import annotations

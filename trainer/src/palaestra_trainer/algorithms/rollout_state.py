@@ -1,4 +1,4 @@
-"""The state of each algorithm that a rollout changes and a resume needs, besides the saved tensors.
+"""For each algorithm, the state that a rollout changes and a resume needs, besides the saved tensors.
 
 Every algorithm counts steps, and keeps its last observation and statistics of episodes. `checkpoint.state`
 saves these values and the action noise. The table of this module lists the rest for each class: networks that

@@ -87,6 +87,6 @@ def _value(schedule: Callable[[float], float], left: float, subject: str) -> flo
         return float(schedule(left))
     except Exception as error:  # the author's code may raise anything
         raise ConfigurationError(
-            f"{subject} cannot be used ({fact_of(error)}); name a function that takes the share of the steps "
-            "that is left, 1.0 to 0.0, and returns a number"
+            f"{subject} cannot be used ({fact_of(error)}); name a function that takes the remaining share "
+            "of the steps, from 1.0 to 0.0, and returns a number"
         ) from error

@@ -47,7 +47,8 @@ _MASKED: Mapping[type[RolloutBuffer], type[Any]] = {
     RecurrentRolloutBuffer: ValidRecurrentRolloutBuffer,
     RecurrentDictRolloutBuffer: ValidRecurrentDictRolloutBuffer,
 }
-# Evaluations and exported policies pass masks only to MaskablePPO and its subclasses.
+# Only MaskablePPO and its subclasses may use these buffers, because evaluations and exported policies pass
+# masks to no other algorithm.
 _WITH_MASKS = (MaskableRolloutBuffer, MaskableDictRolloutBuffer)
 _BUFFERS = ("replay_buffer_class", "replay_buffer_kwargs", "rollout_buffer_class", "rollout_buffer_kwargs")
 
@@ -118,7 +119,10 @@ class OffPolicyRows(ValidRowsCounted, OffPolicyAlgorithm):
         super()._store_transition(replay_buffer, taken, new_obs, reward, dones, infos)
 
     def _on_step(self) -> None:
-        """Count a vector step, for example for the target network; with `n_envs` rows if asynchronous."""
+        """Count a vector step, for example for the target network.
+
+        In an asynchronous environment, `n_envs` valid rows count as one vector step.
+        """
         if not _is_asynchronous(self.env):
             super()._on_step()
         elif abs(self.num_timesteps - self._counted_at) >= self.n_envs:  # a resume may lower the count

@@ -21,7 +21,7 @@ Content = dict[str, Any]
 Pose = tuple[float, float, float]  # x in m, y in m, heading in rad
 Velocity = tuple[float, float, float]  # forward in m/s, to the left in m/s, turn in rad/s
 
-BASE = "base_link"  # Source: https://www.ros.org/reps/rep-0105.html, as the other frames
+BASE = "base_link"  # Source of BASE, ODOM and MAP: https://www.ros.org/reps/rep-0105.html
 ODOM = "odom"
 MAP = "map"
 CAMERA = "camera"
@@ -40,7 +40,7 @@ def nanoseconds(stamp_s: float) -> int:
     """
     if not 0.0 <= stamp_s < _LATEST_S:
         raise ConfigurationError(f"stamp: {stamp_s} s is not a time of ROS 2; give 0 to {_LATEST_S - 1} s")
-    whole_s = int(stamp_s)  # one product of all digits would round them to a quarter of a microsecond
+    whole_s = int(stamp_s)  # the float stamp_s * _NS would be rounded to a quarter of a microsecond
     return whole_s * _NS + round((stamp_s - whole_s) * _NS)
 
 

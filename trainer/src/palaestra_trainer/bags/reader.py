@@ -94,7 +94,7 @@ def _records(content: bytes) -> Iterator[McapRecord]:
         if uncompressed > MOST_UNCOMPRESSED_BYTES:
             raise ValueError(f"it has more than {MOST_UNCOMPRESSED_BYTES:,} bytes of messages")
         yield from breakup_chunk(record, validate_crc=True)
-    if not ended:  # a damaged length may put all messages into another record
+    if not ended:  # a record with a damaged length may have swallowed all records after it
         raise ValueError("the end of its data is missing")
 
 

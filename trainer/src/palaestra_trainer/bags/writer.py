@@ -105,7 +105,7 @@ class BagWriter:
             self._flush()
 
     def close(self) -> None:
-        """Complete the file and give it its name; a second call does nothing.
+        """Complete the file and rename it to `path`; a second call does nothing.
 
         Raises:
             OSError: the file could not be written; the `.part` file stays.

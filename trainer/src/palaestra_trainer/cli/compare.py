@@ -27,16 +27,17 @@ if TYPE_CHECKING:
     from palaestra_trainer.run.compare import Comparison, Rules
 
 COMPARE = """\
-Play the policies of two run directories on the same fresh episodes, in the simulator that evaluates A's,
-until their success rates are known to differ, or known to differ by no more than a margin.
+Play the policies of two run directories on the same fresh episodes, in the simulator that evaluates A's
+policy, until the results show that the success rates differ, or that they differ by no more than a margin.
 
 reads:
   model.zip, training.yaml and hyperparameters.json of both run directories, and A's worlds
 writes:
   a line for each batch of episodes and a sentence to standard output, or with --json one JSON object
 
-No run uses the seeds. The bounds are right after any number of episodes, so a comparison may be ended, or
-continued with more --episodes, whenever you like. The probability that a comparison is wrong is at most 5 %.
+No run uses the seeds of these episodes. The bounds are right after any number of episodes, so you may end a
+comparison at any time, or continue it with more --episodes. The probability that a comparison is wrong is at
+most 5 %.
 """
 EXIT_CODES = """\
 exit codes:
@@ -71,9 +72,9 @@ def compare_and_leave() -> int:
 def _options() -> argparse.ArgumentParser:
     options = parser("palaestra-compare", COMPARE, EXIT_CODES)
     options.add_argument("a", type=Path, metavar="A", help="run directory with a model.zip")
-    options.add_argument("b", type=Path, metavar="B", help="another one")
+    options.add_argument("b", type=Path, metavar="B", help="run directory of the other policy")
     options.add_argument(
-        "--episodes", type=whole(1), default=1000, help="each policy plays at most this many (default: 1000)"
+        "--episodes", type=whole(1), default=1000, help="most episodes that each policy plays (default: 1000)"
     )
     options.add_argument(
         "--margin",
@@ -82,7 +83,9 @@ def _options() -> argparse.ArgumentParser:
         metavar="SHARE",
         help="success rates that differ by no more than this count as equal (default: 0.05)",
     )
-    options.add_argument("--in", dest="driver", choices=DRIVERS, help="simulator to play in (default: A's)")
+    options.add_argument(
+        "--in", dest="driver", choices=DRIVERS, help="simulator to play in (default: the simulator of A)"
+    )
     options.add_argument(
         "--seeds", default="compare", metavar="NAME", help="name of the seed stream (default: compare)"
     )

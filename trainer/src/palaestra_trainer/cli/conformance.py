@@ -84,17 +84,17 @@ def _parser() -> argparse.ArgumentParser:
     )
     add = parser.add_argument
     add("--master", metavar="URI", help="address of the ROS master (default: $ROS_MASTER_URI)")
-    add("--name", metavar="ROBOT", help="ROS name of the robot (default: that in the world of --world)")
+    add("--name", metavar="ROBOT", help="ROS name of the robot (default: its name in the world of --world)")
     add(
         "--claims",
         choices=subjects(),
         default="webots",
-        help="the column of the page, or what a training needs (default: webots)",
+        help="claims to check: those of a simulator, or those that a training needs (default: webots)",
     )
     add(
         "--files", type=Path, default=Path(), metavar="DIR", help="folder of the world (default: this folder)"
     )
-    add("--world", action="store_true", help="write the world of these claims into the folder, and end")
+    add("--world", action="store_true", help="write the world for these claims into the folder, and exit")
     add("--all", action="store_true", help="also make the calls that restart and end the simulator")
     add("--report", type=Path, metavar="FILE", help="write a report in Markdown")
     return parser

@@ -40,14 +40,14 @@ reads:
 writes:
   a record of poses, readings, commands and decisions as a ROS 2 bag, by default deployment-<time>.mcap
 
-First the policy acts on live readings without driving, and the commands are shown. After a question, the
-robot drives while a key is held. Before you drive, read the page docs/howto/real-robot.md, and have the
-robot's emergency stop in reach: this program is not a safety function.
+First, the program shows the commands of the policy for live readings, and sends no command to the robot.
+After you confirm, the robot drives while you hold a key. Before you drive, read the page
+docs/howto/real-robot.md, and have the robot's emergency stop in reach: this program is not a safety function.
 """
 EXIT_CODES = """\
 exit codes:
-  0    every episode ended as a success, or the task counts none; or only a dry run was asked for
-  1    an episode ended without success, after which no further one begins; or any other error
+  0    every episode ended as a success, or the task reports no success; or only a dry run was asked for
+  1    an episode ended without success, and no further episode was started; or any other error
   2    the package, the robot or an option is wrong; the robot has not moved
   3    a safety rule stopped the robot, or the person did not confirm
   130  ended by Ctrl-C; the robot was commanded to stand
@@ -95,7 +95,7 @@ def _drive(options: argparse.Namespace, interruption: Interruption) -> int:
         stack.enter_context(robot)
         robot.connect(muted=True)
         stack.enter_context(record)
-        stack.callback(robot.close)  # before the record is closed, so the record contains the stop
+        stack.callback(robot.close)  # runs before the record is closed, so the record contains the stop
         robot.stand_at(options.start)
         deployment = Deployment(package, robot, record, terminal.show)
         targets: list[tuple[float, float] | None] = list(options.target) or [None]
@@ -106,7 +106,7 @@ def _drive(options: argparse.Namespace, interruption: Interruption) -> int:
         if not options.yes and not terminal.confirms(options.robot, interruption.check):
             return STOPPED
         stack.enter_context(terminal.holding())
-        stack.callback(robot.close)  # before the terminal is restored, because the restoring may wait
+        stack.callback(robot.close)  # runs before the terminal is restored, because restoring it may block
         robot.unmute()
         return _drive_all(deployment, targets, terminal)
 
@@ -114,7 +114,7 @@ def _drive(options: argparse.Namespace, interruption: Interruption) -> int:
 def _drive_all(
     deployment: Deployment, targets: Sequence[tuple[float, float] | None], terminal: Terminal
 ) -> int:
-    """Drive the episodes up to the first one without success, after which the robot may touch something."""
+    """Drive the episodes; end after the first without success, because the robot may then touch an object."""
     for target in targets:
         end = deployment.drive(target)
         terminal.end_line()
@@ -168,11 +168,11 @@ def arguments_parser() -> argparse.ArgumentParser:
 
 
 _ROBOT = "http://HOST of the robot, ros1://HOST:PORT[/NAMESPACE] of its ROS master, or ros2:[/NAMESPACE]"
-_TARGET = "target of an episode in m; repeatable: each further episode begins where the one before ended"
+_TARGET = "target of an episode in m; repeatable: each further episode begins where the last one ended"
 _START = "where the robot stands, in m and rad of the task's frame (default: 0,0,0)"
 _FENCE = "least x and y, then greatest, in m: the robot stays inside (default: 1 m around start and targets)"
 _TOPIC = "over ROS: topic in place of the driver's, such as odom=/robot/odom; repeatable"
-_NO_HOLD = "drive without a held key; use it only where the robot cannot hit a person"
+_NO_HOLD = "drive without a held key; use it only if the robot cannot hit a person"
 _NEGATIVE = ("--target", "--start", "--fence")
 
 
@@ -188,7 +188,7 @@ def _joined(arguments: Sequence[str]) -> list[str]:
 
 
 def _typed(read: Callable[[str], Typed]) -> Callable[[str], Typed]:
-    """Return a type of an option, whose mistakes argparse reports with the option's name."""
+    """Return a `type` for argparse, which then reports an error of `read` with the option's name."""
 
     def value(text: str) -> Typed:
         try:

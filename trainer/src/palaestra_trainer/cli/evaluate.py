@@ -32,8 +32,8 @@ reads:
   RUN_DIR/model.zip, RUN_DIR/training.yaml, RUN_DIR/hyperparameters.json; the simulators in
   {CONFIG_VARIABLE}, or, if it is not set, local processes that load the worlds in RUN_DIR
 writes:
-  one JSON object to standard output; with --in a table, one row a simulator, in which all rows are of the
-  same episodes, or with --json one JSON object a line for each simulator
+  one JSON object to standard output; with --in, a table with a row for each simulator, all on the same
+  episodes; with --in and --json, a line with a JSON object for each simulator
 """
 EXIT_CODES = """\
 exit codes:

@@ -24,10 +24,10 @@ Write the best policy of a run, or its recorded episodes, as one file for other 
 reads:
   RUN_DIR/model.zip, RUN_DIR/training.yaml; for mcap only RUN_DIR/replays.json
 writes:
-  the file, or the folder or zip of a package, once it has acted as the policy on 1,000 observations:
-  discrete actions are equal, continuous ones within 1e-5; its path and its largest difference as one JSON
-  object to standard output
-  mcap is a ROS 2 bag of the recorded episodes; the object has the number of episodes and messages
+  the file, or the folder or zip of a package, only if it returns the actions of the policy for 1,000
+  observations: discrete actions are equal, continuous actions differ by at most 1e-5; to standard output, one
+  JSON object with the path and the largest difference
+  for mcap, a ROS 2 bag of the recorded episodes; the JSON object then has the number of episodes and messages
 
 The extra `export` of palaestra-trainer has the libraries, and the extra `deploy` has those for mcap.
 Stable-Baselines3 unpickles model.zip, so export only runs that you trust.

@@ -45,8 +45,8 @@ parameters:
   speed_limit (0.2 m/s), turn_limit (1.0 rad/s), fence (least x and y, then greatest, in m of the frame of
   odometry), use_sim_time (false)
 
-The policy acts with the rate of its package. The node asks no question and needs no held key: a node above
-it, such as a twist mux, or the driver decides whether the robot obeys. Nothing of it is a safety function.
+The policy acts at the rate in its package. The node asks no question and needs no held key: another node,
+such as a twist mux, or the driver decides whether the robot obeys. This program is not a safety function.
 """
 EXIT_CODES = """\
 exit codes:
@@ -117,7 +117,7 @@ def _serve(options: argparse.Namespace, ros_arguments: Sequence[str], interrupti
         about = {"package": str(options.package), "robot": link.address}
         record = DeploymentRecord(options.record or Path(), about)
         if options.record is not None:
-            stack.enter_context(record)  # closed after the robot, so it contains the robot's stop
+            stack.enter_context(record)  # closed after the robot, so the record contains the robot's stop
         hooks = Hooks(check=check, decided=record.decided)
         robot = RealRobotino(quiet, rules, package.period_s, clock, hooks)
         stack.callback(robot.close)
@@ -152,7 +152,7 @@ def _connect(
 
 
 def _wait_for_images(robot: RealRobotino, size: ImageSize | None, warn: Callable[[str], object]) -> None:
-    """Wait for the camera of a policy that sees images, because its node may start later than this one."""
+    """If the policy uses images, wait for the camera, because its node may start after this node."""
     if size is None:
         return
     robot.image_size = size
@@ -166,7 +166,7 @@ def _wait_for_images(robot: RealRobotino, size: ImageSize | None, warn: Callable
 
 
 def _simulation(node: Ros2Node) -> SimulationTime | None:
-    """Return the time of the simulation if the node has `use_sim_time`."""
+    """Return the time of the simulation; None if the parameter `use_sim_time` is false."""
     if not node.ros.get_parameter("use_sim_time").value:
         return None
     clock = node.ros.get_clock()
@@ -187,7 +187,7 @@ def _rules(node: Ros2Node) -> SafetyRules:
 
 
 def _declared(node: Ros2Node, name: str, default: Any) -> Any:
-    """Declare a parameter that is read once, and return its value; the default may be a type without value.
+    """Declare a read-only parameter and return its value; for no default value, `default` is the type.
 
     Raises:
         ConfigurationError: the value has another type.
@@ -200,15 +200,15 @@ def _declared(node: Ros2Node, name: str, default: Any) -> Any:
 
 
 def _subscribe(node: Ros2Node, link: Ros2Link, goals: Goals, fence: Fence | None) -> None:
-    """Put each goal in the frame of odometry, and within the fence, into `goals`."""
+    """Add to `goals` each goal whose frame is that of odometry, and whose position is within the fence."""
     warn = node.ros.get_logger().warning
 
     def take(message: Any) -> None:
         frame, x_m, y_m = message.header.frame_id, message.pose.position.x, message.pose.position.y
         if frame not in {"", link.frame_id}:
             warn(
-                f"goal ignored: its frame is {frame}, that of odometry is {link.frame_id}; set the fixed "
-                "frame of RViz to it, or transform the goal"
+                f"goal ignored: its frame is {frame}, but the frame of odometry is {link.frame_id}; set the "
+                f"fixed frame of RViz to {link.frame_id}, or transform the goal"
             )
         elif not (math.isfinite(x_m) and math.isfinite(y_m)):
             warn("goal ignored: its position is not finite")
@@ -234,7 +234,7 @@ def _parser() -> argparse.ArgumentParser:
         action="append",
         default=[],
         metavar="NAME=TOPIC",
-        help="topic in place of one above, such as odom=/robot/odom; repeatable",
+        help="use TOPIC instead of the topic NAME above, such as odom=/robot/odom; repeatable",
     )
     return options
 

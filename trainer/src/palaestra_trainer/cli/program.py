@@ -37,7 +37,7 @@ def parser(name: str, description: str, exit_codes: str) -> argparse.ArgumentPar
 
 
 def refuse(error: BaseException) -> int:
-    """Log each line of an error, write it as the termination message, and return its exit code."""
+    """Log each line of an error, write the error as the termination message, and return its exit code."""
     end = end_of(error)
     for line in end.message.splitlines():
         log.error(line, reason=end.reason)
@@ -63,7 +63,8 @@ def write_line(line: str) -> None:
 def leaving(program: Callable[[], int]) -> int:
     """Run a program and return its exit code; the process ends soon even if a thread of the job still runs.
 
-    The libraries of an extra may be missing: a robot's computer needs no PyTorch, and a trainer no robot.
+    The libraries of an extra may be missing, because a robot's computer does not need PyTorch, and a trainer
+    does not need the libraries for robots. The logged error then names the extra.
     """
     try:
         code = program()

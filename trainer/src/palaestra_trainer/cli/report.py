@@ -14,10 +14,10 @@ from palaestra_trainer.job.run_directory import RunDirectory
 from palaestra_trainer.reporting.run_data import RunData
 
 REPORT = """\
-Write the report of a run, or of several runs side by side, as one HTML file of at most 2.5 MB. It refers to
-no address, so it can be mailed. A running or damaged run is reported as far as its files can be read.
-A file .mcap is the record of a deployment on a real robot, whose episodes the report replays.
-With --film, write instead the best recorded episode of one run from above.
+Write the report of a run, or of several runs side by side, as one HTML file of at most 2.5 MB. The report
+refers to no address, so it can be mailed. A running or damaged run is reported as far as its files can be
+read. A file .mcap is the record of a deployment on a real robot, whose episodes the report replays.
+With --film, write instead a film of the best recorded episode of one run, seen from above.
 
 reads:
   RUN_DIR/*.json, *.jsonl, *.yaml, tensorboard/; or FILE.mcap
@@ -82,7 +82,7 @@ def _report(runs: Sequence[RunDirectory], records: Sequence[Path], out: Path | N
 
 
 def _deployments(records: Sequence[Path]) -> list[RunData]:
-    """Return the data of deployments; without records, the libraries of bags are not needed."""
+    """Return the data of deployments; import the libraries for bags only if there are records."""
     if not records:
         return []
     from palaestra_trainer.real_robots.deployment.read_record import read_record

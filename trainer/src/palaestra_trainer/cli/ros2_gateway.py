@@ -32,7 +32,8 @@ from palaestra_trainer.simulators.ros2_gateway.simulators import (
 
 ABOUT = """\
 Publish a robot of a running simulator in ROS 2. rclpy must be installed. The simulator must be the stub or
-MuJoCo. It is only read: no step, no command, no sensor that the training does not read already.
+MuJoCo. This program makes no step, sends no command and enables no sensor: it reads only sensors that the
+training reads too.
 
 reads:
   the run directory and the simulator's sidecar; with --master a service of the simulator, ten times a second
@@ -46,7 +47,7 @@ EXIT_CODES = """\
 exit codes:
   0  ended by Ctrl-C or SIGTERM
   1  any other error
-  2  an argument is wrong, the run does not run, it has no such simulator or robot, or rclpy is missing
+  2  an argument is wrong, the run is not running or has no such simulator or robot, or rclpy is missing
 """
 NAME: Final = "palaestra_ros2"
 
@@ -92,7 +93,7 @@ def _serve(finder: RobotFinder, ros_arguments: Sequence[str], interruption: Inte
 def _finder(chosen: argparse.Namespace) -> RobotFinder:
     if chosen.master is None:
         return RunRobotFinder(chosen.run, chosen.simulator, chosen.robot)
-    os.environ["ROS_MASTER_URI"] = chosen.master  # services use the master of the process
+    os.environ["ROS_MASTER_URI"] = chosen.master  # calls of services use the master of this variable
     return MasterRobotFinder(chosen.master, chosen.robot)
 
 

@@ -23,7 +23,7 @@ EXIT_CODES = """\
 exit codes:
   0   done
   2   the configuration is wrong; a retry cannot help
-  75  interrupted by a signal or the loss of the ROS master; state saved; start it again to resume
+  75  interrupted by a signal or the loss of the ROS master; state saved; run the same command to resume
   80  a simulator failed more often than its restart budget allows
   81  diverged: a number of the environment, a loss or a weight is NaN or infinite
   82  stalled, or a simulator hung: no environment step for stallDeadlineSeconds
@@ -36,7 +36,7 @@ reads:
   the configuration ({CONFIG_VARIABLE}), the newest checkpoint of the run directory
 writes:
   the run directory ({RUN_VARIABLE}): attempts.jsonl, checkpoints/, tensorboard/,
-  evaluations.jsonl, confirmations.jsonl, model.zip (the best by evaluation), training.yaml,
+  evaluations.jsonl, confirmations.jsonl, model.zip (the policy with the best evaluation), training.yaml,
   hyperparameters.json, faults.jsonl, replays.json and, at the end, summary.json, end.json and report.html;
   the termination message
   (PALAESTRA_TERMINATION_LOG); on a claim, the link

@@ -58,7 +58,9 @@ def attempt(arguments: Sequence[str] | None = None) -> int:
     """Run `palaestra-try`; return its exit code."""
     options = parser("palaestra-try", TRY, EXIT_CODES)
     options.add_argument("run", type=Path, metavar="RUN_DIR", help="run directory with a training.yaml")
-    options.add_argument("--agent", choices=AGENTS, default="random", help="what acts (default: random)")
+    options.add_argument(
+        "--agent", choices=AGENTS, default="random", help="source of the actions (default: random)"
+    )
     options.add_argument("--episodes", type=whole(1), default=10, help="number of episodes (default: 10)")
     options.add_argument("--json", action="store_true", help="print one JSON object at the end")
     chosen = options.parse_args(arguments)

@@ -1,8 +1,8 @@
 """The base of environments that are written with arrays: one object has many copies of a task.
 
-A class says so with `batched = True`, which this base sets. It is a `gymnasium.vector.VectorEnv` whose
-`reset` takes `options={"reset_mask": ...}`, as gymnasium's own vector environments do with
-`AutoresetMode.DISABLED`: the caller resets the rows whose episodes have ended.
+The class attribute `batched = True` marks such an environment; this base sets the attribute. The environment
+is a `gymnasium.vector.VectorEnv` whose `reset` takes `options={"reset_mask": ...}`, as gymnasium's own vector
+environments do with `AutoresetMode.DISABLED`: the caller resets the rows whose episodes have ended.
 
 The batched form of a registered environment is its `vector_entry_point`. Each row equals the single
 environment with the same seeds and actions.
@@ -82,7 +82,7 @@ class BatchedEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         Args:
             seed: the seed of row 0, with the next numbers for the other rows; or a seed for each row; None:
                 each row continues with the number after its last seed.
-            options: see above, and the options of the task.
+            options: `reset_mask`, and the options of the task.
         """
         given = dict(options or {})
         mask = np.asarray(given.pop(RESET_MASK, np.ones(self.num_envs, dtype=bool)), dtype=bool)

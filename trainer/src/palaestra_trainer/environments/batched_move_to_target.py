@@ -1,7 +1,7 @@
 """The batched form of `MoveToTargetEnv`: the same task, with arrays.
 
-The order of the arithmetic is the one of the single environment, so that each row has the same bits. Where
-NumPy's functions round differently from Python's, Python's are used.
+The arithmetic operations have the same order as in the single environment, so the numbers of each row are
+equal bit by bit. If a function of NumPy rounds differently from that of Python, this module uses Python's.
 """
 
 from __future__ import annotations
@@ -212,7 +212,7 @@ def _reward_terms(
 
 
 def _velocities(before: Floats, after: Floats, elapsed_s: float) -> tuple[Floats, Floats, Floats]:
-    """Return the mean velocities between poses, as `observation.velocity`."""
+    """Return the mean velocities between poses, as `observation.velocity` does for one robot."""
     turned = _within_half_turn(after[:, 2] - before[:, 2])
     way = after - before
     forward, left = _in_frame(before[:, 2] + 0.5 * turned, way[:, 0], way[:, 1])
@@ -225,7 +225,7 @@ def _in_frame(headings: Floats, x: Floats, y: Floats) -> tuple[Floats, Floats]:
 
 
 def _within_half_turn(angles: Floats) -> Floats:
-    """Return each angle in [-pi, pi], as `math.remainder(angle, 2 * pi)`; every operation is exact."""
+    """Return each angle in [-pi, pi], as `math.remainder(angle, 2 * pi)` does, without rounding errors."""
     rest = np.fmod(angles, _TURN)
     return np.where(np.abs(rest) > math.pi, rest - np.copysign(_TURN, rest), rest)
 

@@ -1,4 +1,4 @@
-"""The part of a policy's data sheet that an environment determines: its spaces, and what the numbers mean.
+"""The part of a policy's data sheet that an environment determines: spaces, and meanings of the numbers.
 
 Meanings and units come from the tables under the headings for actions and observations in the environment's
 docstring. If the docstring has no tables, the sheet has only the spaces.

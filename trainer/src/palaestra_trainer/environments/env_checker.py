@@ -62,7 +62,7 @@ def refuse_statistics(env: gymnasium.Env[Any, Any], name: str) -> None:
         if isinstance(env, NormalizeObservation | NormalizeReward):
             raise ConfigurationError(
                 f"environment.id: {name}: {type(env).__name__} has statistics that the policy's file lacks, "
-                "and each simulator has different ones; remove the wrapper, and set algorithm.normalize"
+                "and they differ between simulators; remove the wrapper, and set algorithm.normalize"
             )
         env = env.env
 

@@ -1,4 +1,4 @@
-"""Limit the steps of an episode for whose end another part of the program waits."""
+"""Limit the steps of an episode while another part of the program waits for its end."""
 
 from __future__ import annotations
 

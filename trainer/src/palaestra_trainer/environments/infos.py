@@ -6,8 +6,8 @@ those of Palaestra cannot be confused:
 
 - `valid`: False in a row that the algorithm must not learn from
 - `sim_fault`: the kind, simulator, fact, episode and step of a fault; only in the row of that fault
-- `recovering`: True in the rows after the fault until the simulator is up again; False in the rows after the
-  simulator was given up
+- `recovering`: True in the rows after the fault until the simulator is up again; False in the rows of a
+  simulator without which the run continues
 - `pending`: True in the invalid rows of a simulator whose step has not ended yet, in asynchronous collection
 - `extra_steps`: simulation steps in addition to the usual one, because a message was late
 - `hidden`: the environment's own values for keys that Stable-Baselines3 or Palaestra uses
@@ -40,7 +40,7 @@ def is_valid(info: Mapping[str, Any]) -> bool:
 
 
 def is_pending(info: Mapping[str, Any]) -> bool:
-    """Return whether a row only holds the place of a step that has not ended yet."""
+    """Return whether the step of a row has not ended yet; such a row is only a placeholder."""
     return ours(info).get("pending") is True
 
 
@@ -51,7 +51,7 @@ def extra_steps(info: Mapping[str, Any]) -> int:
 
 
 def of_environment(info: Mapping[str, Any], **words: Any) -> dict[str, Any]:
-    """Return an environment's info with our `words`; move its values for reserved keys to `hidden`."""
+    """Return an environment's info with Palaestra's `words`; move the values of reserved keys to `hidden`."""
     taken = {name: info[name] for name in OF_STABLE_BASELINES3 if name in info}
     if OURS in info and ours(info).keys() != {"extra_steps"}:
         taken[OURS] = info[OURS]

@@ -82,8 +82,8 @@ def make_batched(wanted: Environment, robot: BatchedRobotAbc, scene: BatchedScen
         )
     if not isinstance(robot, env.needs or (object,)):
         raise ConfigurationError(
-            f"trainer.robot: the batched form of {wanted.id} needs {env.needs[0].__name__}, which the robot's"
-            f" form {type(robot).__name__} is not; choose another robot"
+            f"trainer.robot: the batched form of {wanted.id} needs {env.needs[0].__name__}, but the robot's"
+            f" form is {type(robot).__name__}; choose another robot"
         )
     return env
 

@@ -26,8 +26,8 @@ from palaestra_trainer.robots.capabilities import Localization, Scanner, Steerin
 from palaestra_trainer.robots.geometry import Point, Pose
 
 REACHED_M = 0.15
-# If an object is nearer than this to the robot's outline, it counts as touched, because a scanner may not
-# detect it.
+# If an object is nearer than this to the robot's outline, the robot counts as collided, because a scanner may
+# not detect an object that touches the robot.
 BUMPED_M = 0.05
 SECTORS = 24
 SEEN_M = 0.8  # a sector counts as empty if its nearest object is farther than this

@@ -76,7 +76,7 @@ def proximity(step: Transition) -> float:
 
 
 def time_up(step: Transition) -> float:
-    """Return 1 if this was the last step and the robot did not reach the target, else 0."""
+    """Return 1 if time is up and the robot has neither reached the target nor collided, else 0."""
     return float(step.outcome is EpisodeOutcome.TIME_UP)
 
 

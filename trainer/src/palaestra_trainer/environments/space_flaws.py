@@ -17,7 +17,7 @@ def refuse_flaws(seen: spaces.Space[Any], acted: spaces.Space[Any]) -> None:
     """Refuse spaces that every algorithm of Stable-Baselines3 would misread, or does not support.
 
     Raises:
-        ConfigurationError: one line for each reason.
+        ConfigurationError: a space is refused; the message has one line for each reason.
     """
     if lines := [*flaws_of_observation(seen), *flaws_of_action(acted)]:
         raise ConfigurationError("\n".join(lines))

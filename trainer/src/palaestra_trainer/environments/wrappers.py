@@ -38,7 +38,7 @@ def mistakes(wanted: Environment) -> Iterator[str]:
 
 
 def wrapped(env: gymnasium.Env[Any, Any], wanted: Environment) -> gymnasium.Env[Any, Any]:
-    """Return the environment in the wrappers of a job, the first wrapper innermost; stack observations last.
+    """Return the environment in the wrappers of a job, the first wrapper innermost, frame stacking outermost.
 
     Raises:
         ConfigurationError: a wrapper cannot be created, or the observations cannot be stacked.

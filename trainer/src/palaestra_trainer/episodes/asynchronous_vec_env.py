@@ -1,12 +1,12 @@
 """A VecEnv that does not wait for slow simulators: a step returns as soon as one member has a new row.
 
 The rows of the other members are invalid and pending: they repeat the member's last observation and have
-reward 0. Their simulators keep computing, also while the algorithm learns. The row of a step comes in the
-vector step after its end. The algorithm's action for a pending member is not taken; the row belongs to the
-action with which the step began.
+reward 0. Their simulators keep computing, also while the algorithm learns. A vector step returns the rows of
+the steps that have ended since the previous vector step. The algorithm's new action for a pending member is
+ignored, because the member's row belongs to the action with which its step began.
 
-Which row comes first depends on the speed of the simulators, so a resumed run differs from an uninterrupted
-one. A resume does not repeat the steps that were pending at the checkpoint.
+The order of the rows depends on the speed of the simulators, so a resumed run differs from an uninterrupted
+run. A resume does not repeat the steps that were pending at the checkpoint.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from palaestra_trainer.waiting.greenlets import OpenWorks
 
 
 class AsynchronousVecEnv(SimulatorsVecEnv):
-    """The collecting simulators of a run whose rows come in the order in which the steps end."""
+    """The collecting simulators of a run; their rows come in the order in which their steps end."""
 
     asynchronous = True
 
@@ -41,7 +41,7 @@ class AsynchronousVecEnv(SimulatorsVecEnv):
         super().pause()
 
     def reset(self) -> VecEnvObs:
-        """Begin new episodes in all members, without the rows of pending steps."""
+        """Begin new episodes in all members; drop the rows of pending steps."""
         self._forget_steps()
         return self._showing(super().reset())
 
@@ -56,7 +56,7 @@ class AsynchronousVecEnv(SimulatorsVecEnv):
         super().set_attr(attr_name, value, indices)
 
     def close(self) -> None:
-        """Stop the pending steps where they are, and close the environments."""
+        """Abort the pending steps, and close the environments."""
         self._works.abort()
         super().close()
 
@@ -92,7 +92,7 @@ def pending(shown: Any) -> CollectedRow:
 
 
 def _is_news(row: CollectedRow) -> bool:
-    """Return whether a row has something to learn or ends an episode; a recovering row may have neither."""
+    """Return whether a row is valid or ends an episode; neither may be true for a recovering row."""
     return is_valid(row.info) or row.done
 
 

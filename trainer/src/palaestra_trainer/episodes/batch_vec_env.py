@@ -47,7 +47,7 @@ class BatchVecEnv(CollectingVecEnv):
 
     Args:
         restarter: the restarter of the simulator, whose member is a `BatchSimulator`.
-        run_seed: the replica's seed; the seed of each episode is derived from it, the row and the number.
+        run_seed: the replica's seed; it decides each episode's seed, with the row and the episode's number.
         check: called every tenth of a second during a restart; it raises to end the wait.
     """
 
@@ -283,11 +283,11 @@ class BatchVecEnv(CollectingVecEnv):
             self._training_progress = now
             if step:
                 over = self._repeat(taken, lengths, step)
-                lengths[over], progress[over] = 0, now  # the last round begins the next episode of such rows
+                lengths[over], progress[over] = 0, now  # the round of step 0 begins their next episodes
         self._running = True
 
     def _repeat(self, taken: Sequence[np.ndarray], lengths: Any, left: int) -> NDArray[np.bool_]:
-        """Take one step of the `left` steps; return the rows whose episodes end too early."""
+        """Repeat one of the `left` remaining steps; return the rows whose episodes end too early."""
         actions: Any = np.zeros_like(self._env.action_space.sample())
         playing = lengths >= left
         for row in np.flatnonzero(playing).tolist():
@@ -320,7 +320,7 @@ class BatchVecEnv(CollectingVecEnv):
         self._restarter.begin_restart(fault, lost)
 
     def _all_invalid(self, seen: Any = None, *, done: bool, **words: Any) -> VecEnvStepReturn:
-        """Return invalid rows; row 0 of the first of them holds the fault."""
+        """Return invalid rows; the first call after a fault puts the fault into the info of row 0."""
         last = self._observed() if seen is None else seen
         infos: list[dict[str, Any]] = [
             {OURS: {"valid": False, **words}, TRUNCATED: done, "terminal_observation": np.array(last[row])}

@@ -1,4 +1,4 @@
-"""What a run needs of the VecEnv in which it collects: pauses, positions in the episodes, a resume."""
+"""The interface of the VecEnv in which a run collects rows: pauses, positions in episodes, and a resume."""
 
 from __future__ import annotations
 

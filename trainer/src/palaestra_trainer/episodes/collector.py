@@ -7,7 +7,7 @@ as the Monitor wrapper sets it.
 The collector converts a fault into invalid rows (`valid` is False), so the other members need not wait for
 the faulty member. The row of the fault ends the episode (done, truncated, `sim_fault`). In the following
 rows, `recovering` is True. The last recovering row has `done=True` and the first observation of the next
-episode. If the member is given up, all further rows are invalid and `recovering` is False.
+episode. If the run continues without the member, all its further rows are invalid and `recovering` is False.
 `palaestra_trainer.environments.infos` describes these keys.
 """
 
@@ -238,7 +238,7 @@ class Collector:
         for word in hidden.keys() - self._hidden if hidden else ():
             self._hidden.add(word)
             log.warning(
-                "info key of the environment moved: Stable-Baselines3 or Palaestra uses it",
+                "a key of the info of the environment was moved: Stable-Baselines3 or Palaestra uses it",
                 word=word,
                 now=f'info["{OURS}"]["{HIDDEN}"]["{word}"]',
             )

@@ -167,8 +167,8 @@ def evaluate_on_all(
 ) -> EvaluationResult:
     """Evaluate as `evaluate` does, but distribute the episodes over several simulators.
 
-    If a simulator fails, another simulator plays its episode. Meanwhile the faulty simulator is restarted or
-    given up.
+    If a simulator fails, another simulator plays its episode. Meanwhile the faulty simulator is restarted, or
+    the evaluation continues without it.
     """
     started = time.monotonic()
     games = _Games(policy, seeds)
@@ -219,7 +219,7 @@ class _Games:
         return tuple(self._played[place] for place in sorted(self._played))
 
     def play_on(self, restarter: Restarter, check: Check) -> None:
-        """Play until all episodes are complete, or the simulator is given up."""
+        """Play until all episodes are complete, or until the run continues without this simulator."""
         while self.missing and not restarter.lost:
             check()
             if work := restarter.under_way:

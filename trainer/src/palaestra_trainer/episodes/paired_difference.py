@@ -95,7 +95,9 @@ class Verdict(StrEnum):
 
 
 def verdict(pairs: Pairs, margin: float) -> Verdict:
-    """Return the verdict of the episodes so far; it is ever wrong with a probability of at most 5 %.
+    """Return the verdict of the episodes so far.
+
+    If this function is called after every episode, the probability that any verdict is wrong is at most 5 %.
 
     Args:
         pairs: the episodes so far.

@@ -1,4 +1,4 @@
-"""The actions of many rows since the begin of their episodes, in one array."""
+"""The actions of many rows since the start of their episodes, in one array."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _FEWEST = 64
 class RowLog:
     """The actions of `rows` rows, one array for each step of all rows.
 
-    Reading a row's actions does not copy them; later steps do not change what was read.
+    Reading a row's actions does not copy them; later steps do not change an array that was read.
 
     Args:
         rows: the number of rows.
@@ -44,7 +44,7 @@ class RowLog:
         return self._length - self._begun
 
     def _grow(self, actions: np.ndarray) -> None:
-        """Move the steps that are still needed into a new array, because the old one may be in use."""
+        """Copy the steps that are still needed to a new array; a caller may still read the old array."""
         first = int(self._begun.min())
         kept = self._taken[first : self._length]
         larger = np.empty((max(_FEWEST, 2 * len(kept)), *actions.shape), actions.dtype)

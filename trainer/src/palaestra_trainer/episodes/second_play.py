@@ -1,7 +1,7 @@
 """Play a chosen episode of an evaluation a second time, to record it in three dimensions.
 
-A recording is kept only if the robot drives exactly as in the evaluation. Otherwise it would show an episode
-that was not evaluated.
+A recording is kept only if the robot drives exactly as in the evaluation. Otherwise the recording would show
+an episode that was not evaluated.
 """
 
 from __future__ import annotations

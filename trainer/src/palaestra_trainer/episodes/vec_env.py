@@ -1,9 +1,9 @@
 """A Stable-Baselines3 VecEnv of many simulators that tolerates their faults.
 
 All members step at the same time: the caller's thread sends a step to every simulator before it waits for the
-first response. A faulty member is restarted in the background, while the other members continue. Its rows are
-invalid until it is up again, see `palaestra_trainer.episodes.collector`. The thread waits for a restart only
-if no member can step.
+first response. A faulty member is restarted in the background, while the other members continue. The rows of
+the faulty member are invalid until it is up again, see `palaestra_trainer.episodes.collector`. The thread
+waits for a restart only if no member can step.
 """
 
 from __future__ import annotations

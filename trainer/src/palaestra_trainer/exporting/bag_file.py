@@ -51,7 +51,7 @@ def write_bag(run: RunDirectory, path: Path) -> tuple[int, int]:
 
     def write(name: Path) -> None:
         part = name.with_name(name.name + PART)
-        for left in (name, part):  # by an export that was killed
+        for left in (name, part):  # a killed export may have left these files
             left.unlink(missing_ok=True)
         try:
             with BagWriter(name, metadata) as bag:

@@ -80,10 +80,10 @@ def results_of(file: Path, model: Path) -> list[dict[str, Any]]:
 
     Args:
         file: the file.
-        model: the model whose results they must be.
+        model: the model to which the results must belong.
 
     Raises:
-        ConfigurationError: the file is too large, a line is no result, or is that of another policy.
+        ConfigurationError: the file is too large, or a line is not a result, or is one of another policy.
         OSError: a file cannot be read.
     """
     with file.open("rb") as lines:

@@ -64,8 +64,8 @@ def _converted(acting: PolicyModule) -> onnx.ModelProto:
     axes |= {prefix + name: {1: "batch"} for name in STATE for prefix in ("", "next_")}
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         written = Path(folder) / "policy.onnx"
-        # The exporter warns about Python values that it treats as constants. The comparison with the policy
-        # detects a value that is not constant.
+        # The exporter warns about Python values that it treats as constants. If such a value is not constant,
+        # the later comparison of the file with the policy fails.
         warnings.simplefilter("ignore")
         torch.onnx.export(
             acting,

@@ -50,7 +50,7 @@ def write_package(
         results: a file with further results of the policy, as `palaestra-eval --json` prints them.
 
     Raises:
-        ConfigurationError: the place is not a package, the robot's class is unknown, or a result is that of
+        ConfigurationError: the place is not a package, the robot's class is unknown, or a result belongs to
             another policy.
         OSError: a file cannot be read or written.
     """
@@ -75,7 +75,10 @@ def _write_zip(path: Path, files: Mapping[str, bytes]) -> None:
 
 
 def _write_folder(folder: Path, files: Mapping[str, bytes]) -> None:
-    """Write the manifest last: until then, a reader refuses an older manifest with other checksums."""
+    """Write the files, the manifest last.
+
+    Until then, a reader refuses the folder, because the checksums in the older manifest do not match.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     if others := sorted({path.name for path in folder.iterdir()} - _OURS):
         raise ConfigurationError(

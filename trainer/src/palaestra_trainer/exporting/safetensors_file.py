@@ -23,7 +23,8 @@ from palaestra_trainer.exporting.verify import Arrays, Run
 
 def content(acting: PolicyModule, sheet: Mapping[str, Any]) -> bytes:
     """Return the bytes of the file, with the data sheet in its metadata."""
-    # Some policies have a network under two names, but the format does not allow tensors to share memory.
+    # Each tensor is copied. Some policies have a network under two names, and the format does not allow
+    # tensors that share memory.
     tensors = {name: tensor.detach().clone().contiguous() for name, tensor in acting.state_dict().items()}
     return safetensors.torch.save(tensors, {KEY: json.dumps(sheet)})
 

@@ -94,7 +94,7 @@ def _difference(
 
 
 _REMEDY = "nothing was written; use load_policy in the program that needs this policy"
-_NOTHING = "so a comparison would show nothing; normalize observations, train it longer, or use load_policy"
+_NOTHING = "so a comparison would show nothing; normalize observations, train longer, or use load_policy"
 
 
 def _apart(ours: np.ndarray, expected: np.ndarray) -> np.ndarray:

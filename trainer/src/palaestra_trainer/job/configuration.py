@@ -38,7 +38,7 @@ log = structlog.get_logger(__name__)
 _UNKNOWN = "extra_forbidden"  # pydantic's type of the error for an unknown field
 
 CONFIG_VARIABLE = "PALAESTRA_CONFIG"
-CONFIRM_EPISODES = 100  # a measured success rate of 95 % is then right to about 4 points
+CONFIRM_EPISODES = 100  # a measured success rate of 95 % is then accurate to about 4 percentage points
 
 Reward = Literal["Dense", "Sparse"]
 Device = Literal["cpu", "cuda"]

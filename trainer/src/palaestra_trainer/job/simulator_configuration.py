@@ -12,7 +12,7 @@ from palaestra_trainer.job.section import ConfigurationSection, Positive
 
 
 class Recycle(ConfigurationSection):
-    """Limits for a healthy simulator, which is restarted after its episode when it reaches a limit.
+    """Limits for a healthy simulator; when it reaches a limit, it is restarted after its current episode.
 
     Attributes:
         after_resets: greatest number of resets since the simulator was started, or took over as a standby.

@@ -1,4 +1,4 @@
-"""A real Robotino behind the interface of robots, so that an environment drives it without a change.
+"""A real Robotino behind the interface of robots, so that an environment can drive it without changes.
 
 - `frames`: poses of odometry in the frame of the task
 - `safety`: the rules that decide, for each command, whether the robot may move
@@ -14,5 +14,5 @@
 - `ros_images`: pictures in messages of both ROS
 - `robotino`: the robot; `scene`: its floor, on which a person places it
 - `robot_clock`: the time of a robot, which may run faster than real time in a mock robot
-- `deployment`: a policy package that drives the robot; no other module knows a task or a policy
+- `deployment`: a policy package that drives the robot; no other module depends on a task or a policy
 """

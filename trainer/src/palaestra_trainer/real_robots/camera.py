@@ -1,7 +1,7 @@
 """Pictures of a robot's camera as images of the size that a policy learned with.
 
-Pillow decodes and reduces a picture. It is imported with the first picture, because most policies need no
-camera.
+Pillow decodes and reduces a picture. This module imports Pillow at the first picture, because most policies
+need no camera.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 MOST_BYTES: Final = 2**22
 _MOST_PIXELS: Final = 2**24
-_ASPECT_SLACK: Final = 0.02  # by which the shape of the picture may differ from that of the image
+_ASPECT_SLACK: Final = 0.02  # largest relative difference between the aspect ratios of picture and image
 
 ImageSize = tuple[int, int]  # width and height in pixels
 
@@ -55,7 +55,7 @@ def reduced(picture: Picture, size: ImageSize) -> NDArray[np.uint8]:
         raise LinkError(f"camera: a picture of {wide} x {high} pixels is too large")
     if abs(wide * height / (high * width) - 1.0) > _ASPECT_SLACK:
         raise LinkError(
-            f"camera: a picture of {wide} x {high} pixels has another shape than the policy's "
-            f"{width} x {height}; set the camera to that ratio"
+            f"camera: a picture of {wide} x {high} pixels has another aspect ratio than the "
+            f"policy's {width} x {height}; set the camera to the ratio of the policy"
         )
     return np.asarray(picture.convert("RGB").resize(size, Image.Resampling.BOX), np.uint8).copy()

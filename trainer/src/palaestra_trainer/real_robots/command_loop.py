@@ -1,7 +1,7 @@
 """The loop that sends the command of a policy to a robot, 20 times a second, as far as the rules allow.
 
 The loop runs in its own thread, so that it notices a policy that hangs. If the whole process hangs or dies,
-no command is sent, and the robot's own timeout stops it.
+no command is sent, and the robot's own timeout stops the robot.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ from palaestra_trainer.waiting.check import Check, go_on
 log = structlog.get_logger(__name__)
 
 PERIOD_S: Final = 0.05
-_END_S: Final = 0.5  # at the end, zero is sent at least this long, and until the robot has confirmed it
-_MOST_END_S: Final = 2.0
+_END_S: Final = 0.5  # at the end, zero is sent until the robot has confirmed it for this long
+_MOST_END_S: Final = 2.0  # if the robot does not confirm it, zero is sent for this long
 _STUCK_S: Final = 2.0  # of real time; a request normally ends by its timeout of 0.1 s
 
 
@@ -107,7 +107,7 @@ class CommandLoop:
 
     @property
     def cause(self) -> StopCause | None:
-        """Why the robot is held back or stopped now; None while it may move."""
+        """The cause that holds the robot back or stops it now; None while the robot may move."""
         with self._lock:
             turned_s = self._clock.real_s(self._clock.now_s() - self._turn_s)
             if self._failed is None and self._thread.is_alive() and turned_s > _STUCK_S:
@@ -132,7 +132,7 @@ class CommandLoop:
             self._command, self._alive_s = twist, self._clock.now_s()
 
     def show_life(self) -> None:
-        """Note that the policy's program runs, since it calls the robot."""
+        """Store the time of a call from the policy's program, as a sign that the program runs."""
         with self._lock:
             self._alive_s = self._clock.now_s()
 
@@ -166,11 +166,11 @@ class CommandLoop:
                 with self._lock:
                     fact = f"{type(error).__name__}: {error}; report this error"
                     self._failed = StopCause("internal error", fact, stops=True)
-                ending.close()  # a log may wait for a disk or a terminal, so the zeros come first
+                ending.close()  # zero is sent before the log, because a log may wait for a disk or a terminal
                 log.exception("no more commands are sent")
 
     def _decided(self) -> SafetyDecision:
-        """Decide, and return what to send now and why."""
+        """Return the velocity to send now, and the cause if the robot is held back or stopped."""
         permitted = self._hooks.permitted()
         seen = self._store.newest
         with self._lock:
@@ -180,7 +180,7 @@ class CommandLoop:
                 decision = SafetyDecision(STANDING, self._cause)
             self._cause = decision.cause
             if decision.cause is not None and decision.cause.name != SILENCE:
-                self._command = None  # the policy must see the robot before it moves again
+                self._command = None  # the robot moves again only after a command from newer readings
         if self.muted:
             decision = SafetyDecision(STANDING, decision.cause)
         self._hooks.decided(situation, decision)
@@ -213,7 +213,8 @@ class CommandLoop:
         if self.muted:
             self._confirmed_s = self._clock.now_s()
             return
-        # Counted in commands: a clock would also count the time in which this thread did not run.
+        # The time is counted in commands, because a clock would also count time in which this thread did not
+        # run.
         self._rested_s = self._rested_s + PERIOD_S if decision.twist == STANDING else 0.0
         self._sent = decision.twist
         try:
@@ -223,7 +224,7 @@ class CommandLoop:
             log.debug("no command", error=str(error))
 
     def _stand(self) -> None:
-        """Send zero until the robot has confirmed it for some time, or until the end of the time for it."""
+        """Send zero until the robot has confirmed it for `_END_S`, but for at most `_MOST_END_S`."""
         end_s = self._clock.now_s() + (0.0 if self.muted else _MOST_END_S)
         confirmed_s = 0.0
         pause = threading.Event()

@@ -42,8 +42,8 @@ def link_to(
         topics: topics with other names than those of the driver.
 
     Raises:
-        ConfigurationError: the scheme is not known, the address is not one of its scheme, the connection
-            does not have one of the topics, or it needs rclpy, which is not installed.
+        ConfigurationError: the scheme is not known, the address does not have the form of its scheme, the
+            connection does not have one of the topics, or it needs rclpy, which is not installed.
     """
     for scheme, link in LINKS.items():
         if address.startswith(scheme):

@@ -22,7 +22,7 @@ class OdometryFrame:
 
     @classmethod
     def through(cls, reported: Pose, known: Pose) -> Self:
-        """Return the frame in which odometry that is `reported` stands for the pose `known`."""
+        """Return the frame that maps the odometry `reported` to the pose `known`."""
         turned = known.heading_rad - reported.heading_rad
         x_m, y_m = _rotated(turned, reported.x_m, reported.y_m)
         return cls(Pose(known.x_m - x_m, known.y_m - y_m, wrapped(turned)))

@@ -37,8 +37,8 @@ class RobotLink(Protocol):
     def use_camera(self, store: ReadingStore, size: ImageSize) -> None:
         """Begin to put images of a size into `store`, after `start`; further calls have no effect.
 
-        Until the first image, and after each picture that does not become one, `store.image_fault` has the
-        reason.
+        Until the first image arrives, and after each picture that cannot be converted to an image,
+        `store.image_fault` has the reason.
         """
         ...
 

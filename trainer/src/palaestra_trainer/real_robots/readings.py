@@ -26,7 +26,7 @@ class Odometry:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Readings:
-    """The newest readings; a kind that has not arrived is None.
+    """The newest readings; a kind of reading that has not arrived is None.
 
     Attributes:
         odometry: the newest odometry.
@@ -89,7 +89,7 @@ class ReadingStore:
                 self._newest = replace(self._newest, bumped=bumped, bumped_s=at_s)
 
     def set_image(self, image: NDArray[np.uint8], at_s: float) -> None:
-        """Store an image of a time; from the first one on, its age counts as that of the other readings."""
+        """Store an image of a time; from the first image on, `oldest_s` also includes the image's time."""
         with self._lock:
             if self._newest.image is None or at_s >= self._newest.image_s:
                 self._newest = replace(self._newest, image=image, image_s=at_s)

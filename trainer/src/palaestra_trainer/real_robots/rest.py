@@ -1,8 +1,8 @@
-"""The connection to a Robotino over REST, as all its images since V4 have it.
+"""The connection to a Robotino over REST, which all system images of the robot since V4 provide.
 
 Commands and each kind of reading have a persistent connection and a thread of their own. On one connection a
-request would wait for the response to the request before, and a delay of 50 ms would hold back the commands
-until the robot's timeout of 200 ms stops it.
+request would wait for the response to the previous request, and a delay of 50 ms would hold back the commands
+until the robot's timeout of 200 ms stops the robot.
 """
 
 from __future__ import annotations
@@ -48,8 +48,8 @@ _CAMERA: Final = "/cam0"
 _CAMERA_S: Final = 0.2
 _HTTP: Final = 80
 _CLIENT: Final = {"sid": "palaestra"}  # the clients in the official example send a name as `sid`
-# A command that was not confirmed must not arrive later, after a command to stand. So the system
-# neither sends what a closed connection has not sent yet, nor repeats a packet for long.
+# A command that was not confirmed must not arrive later, after a command to stand. So the operating system
+# drops the unsent data of a closed connection, and repeats a lost packet only for a short time.
 _SOCKET_OPTIONS: Final[list[SocketOption]] = [
     (socket.IPPROTO_TCP, socket.TCP_NODELAY, 1),
     (socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0)),
@@ -68,7 +68,7 @@ class RestLink:
         clock: the robot's clock.
 
     Raises:
-        ConfigurationError: the address is not one of HTTP.
+        ConfigurationError: the address is not an HTTP address.
     """
 
     def __init__(
@@ -117,7 +117,7 @@ class RestLink:
             self._threads.append(thread)
 
     def use_camera(self, store: ReadingStore, size: ImageSize) -> None:
-        """Begin to request pictures of /cam0; each replaces the one before."""
+        """Begin to request pictures of /cam0; each picture replaces the previous picture."""
         if any(thread.name == _CAMERA for thread in self._threads):
             return
 
@@ -168,7 +168,7 @@ class RestLink:
         """Store odometry, unless a robot that moves returns the same odometry again."""
         number, odometry = odometry_of(body)
         if (number, odometry.velocity) == self._newest and not stands(odometry.velocity):
-            raise LinkError(f"/data/odometry: returned number {number:g} again")
+            raise LinkError(f"/data/odometry: returned the odometry with number {number:g} again")
         self._newest = (number, odometry.velocity)
         store.set_odometry(odometry, at_s)
 
@@ -229,7 +229,7 @@ def _parts(address: str) -> tuple[str, str, int]:
     """Return an address without a slash at its end, its host and its port.
 
     Raises:
-        ConfigurationError: the address is not one of HTTP, or has more than host and port.
+        ConfigurationError: the address is not an HTTP address, or has more parts than host and port.
     """
     try:
         parts = urlsplit(address)

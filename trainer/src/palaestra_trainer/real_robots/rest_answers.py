@@ -36,7 +36,7 @@ def odometry_of(body: bytes) -> tuple[float, Odometry]:
 
 
 def distances_of(body: bytes, layout: SensorLayout) -> NDArray[np.float32]:
-    """Return the distances in a response to /data/distancesensorarray, as `SensorLayout.meters_of`.
+    """Return the distances in a response to /data/distancesensorarray, converted by `layout`.
 
     Raises:
         LinkError: the response is not nine numbers.
@@ -61,7 +61,7 @@ def charges(body: bytes) -> bool:
     """Return whether a response to /data/powermanagement reports external power.
 
     Raises:
-        LinkError: the response does not say so.
+        LinkError: the response does not report the power.
     """
     match _json("powermanagement", body):
         case {"ext_power": bool() | int() as external}:
@@ -91,4 +91,4 @@ def _json(route: str, body: bytes) -> Any:
 
 
 def _unreadable(route: str, found: object) -> LinkError:
-    return LinkError(f"/data/{route}: returned {str(found)[:80]!r}, which a Robotino does not")
+    return LinkError(f"/data/{route}: returned {str(found)[:80]!r}, which a Robotino does not send")

@@ -1,7 +1,7 @@
 """The time of a robot, in seconds.
 
-A real robot has real time. A mock robot with `--speed N` lives N seconds in each second, so a program that
-drives it multiplies all its times by the same factor.
+A real robot has real time. The time of a mock robot with `--speed N` runs N times as fast, so a program that
+drives this robot multiplies all its times by the same factor.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class RobotClock:
         return time.clock_gettime(_CLOCK) * self.speed
 
     def real_s(self, robot_s: float) -> float:
-        """Return the seconds of real time in which the robot lives `robot_s` seconds."""
+        """Return the seconds of real time in which `robot_s` seconds of the robot's time pass."""
         return robot_s / self.speed
 
     def wait(self, event: threading.Event, until_s: float) -> bool:

@@ -41,8 +41,8 @@ _MOST_HELD_BACK_S: Final = 600.0
 class RealRobotino(RobotinoAbc, Cameras):
     """A Robotino on a real floor.
 
-    Odometry stands for the pose, so the pose drifts. `advance` waits for the end of the period in real time.
-    While the robot is held back, `advance` waits longer, and returns the periods that passed as extra ones.
+    The pose comes from odometry, so it drifts. `advance` waits for the end of the period in real time. While
+    the robot is held back, `advance` waits longer, and returns the number of extra periods that passed.
     Use the robot as a context manager: at its end, also after an exception, the robot gets the command to
     stand.
 
@@ -140,7 +140,7 @@ class RealRobotino(RobotinoAbc, Cameras):
         """Wait until the period is over and the robot is not held back; return the extra periods.
 
         Raises:
-            RobotStopped: a safety rule has stopped the robot; after a bump, `bumped` returns it instead.
+            RobotStopped: a safety rule has stopped the robot, but not after a bump, which `bumped` returns.
         """
         due_s = self._tick_s + self._period_s
         most_s = self._clock.now_s() + _MOST_HELD_BACK_S
@@ -173,7 +173,7 @@ class RealRobotino(RobotinoAbc, Cameras):
         self._look(self._clock.now_s())
 
     def stand_at(self, start: Pose) -> None:
-        """Begin an episode where the robot stands, which a person says is `start` in the frame of the task.
+        """Begin an episode at the robot's current pose; a person has confirmed that this pose is `start`.
 
         Raises:
             RobotStopped: the robot does not stop.
@@ -185,7 +185,7 @@ class RealRobotino(RobotinoAbc, Cameras):
         self._look(self._clock.now_s())
 
     def begin(self, frame: OdometryFrame | None = None) -> None:
-        """Begin an episode where the robot stands, by its odometry.
+        """Begin an episode at the robot's current pose, as odometry reports it.
 
         Args:
             frame: the frame of the task; None: the frame stays.
@@ -270,7 +270,7 @@ class RealRobotino(RobotinoAbc, Cameras):
             self._pose = self._loop.frame.of_task(reported)
 
     def _stands_since(self, begin_s: float) -> bool:
-        """Return whether odometry that was measured after a time says that the robot stands."""
+        """Return whether odometry that was measured after `begin_s` reports that the robot stands."""
         seen = self._store.newest
         return seen.odometry_s > begin_s and _stands(seen.odometry)
 

@@ -2,10 +2,11 @@
 
 The connection needs no installed ROS. Four facts about the driver matter:
 
-- The driver is the node that publishes `odom` and subscribes to `cmd_vel`. Other subscribers, such as a
-  recorder, confirm no command; and the driver obeys every publisher of `cmd_vel`, so there must be no other.
-- It forwards each command once, up to 33 ms late, and has no watchdog. So the base's own timeout stops the
-  robot.
+- The driver is the node that publishes `odom` and subscribes to `cmd_vel`. A connected subscriber other than
+  the driver, such as a recorder, confirms no command. The driver obeys every publisher of `cmd_vel`, so no
+  other node may publish it.
+- It forwards each command once, up to 33 ms late, and has no watchdog. If commands stop, only the timeout of
+  the robot's base stops the robot.
 - It clips each axis of a command to its limits, and raises a small speed to its minimum, without a notice.
 - It publishes the bumper's state only when the state changes, as a latched message. So the bumper counts as
   not pressed until the first message, and the last state stays after a new connection. A message of `odom` or
@@ -158,9 +159,10 @@ class Ros1Link:
         self._listen_in_thread("robot-topics", self._readers(node, store), lambda: store.newest.oldest_s)
 
     def use_camera(self, store: ReadingStore, size: ImageSize) -> None:
-        """Begin to receive pictures of `image_raw`, apart from the other topics; each replaces the last.
+        """Begin to receive pictures of `image_raw` in a separate thread; each picture replaces the last.
 
-        Another node than the driver may publish them, and its failure must not delay the driver's readings.
+        A node other than the driver may publish the pictures. A failure of that node must not delay the
+        driver's readings.
         """
         if self._sees or self._node is None:
             return
@@ -191,7 +193,8 @@ class Ros1Link:
         """
         if self._commands is not None:
             self._commands.publish(**fields_of(twist))
-            if self._driver in self._commands.subscribers:  # `publish` drops one that takes no message
+            # `publish` drops a subscriber that takes no message.
+            if self._driver in self._commands.subscribers:
                 return
         raise LinkError(f"{self._name('cmd_vel')}: the driver is not connected")
 
@@ -226,7 +229,7 @@ class Ros1Link:
         raise RobotUnfit(f"{self.address}: {fact}; {remedy}")
 
     def _listen_in_thread(self, name: str, readers: Readers, newest_s: Callable[[], float]) -> None:
-        """Receive messages until `close`; `newest_s` returns the time since which no kind has arrived."""
+        """Receive messages until `close`; `newest_s` returns the time of the oldest of these readings."""
         thread = threading.Thread(target=self._listen, args=(readers, newest_s), name=name, daemon=True)
         self._open.callback(thread.join, _END_S)
         thread.start()
@@ -278,7 +281,7 @@ class Ros1Link:
             at_s = self._clock.now_s()
             # A topic that is not ready may have a message too: a latched one, which came with the header.
             for topic, read in readers.items():
-                for message in topic.arrived():  # all of them: the bumper may have been pressed and released
+                for message in topic.arrived():  # of all messages, only one may report a press of the bumper
                     try:
                         read(message, at_s)
                     except LinkError as error:

@@ -18,8 +18,8 @@ from palaestra_trainer.real_robots.sensor_layout import SensorLayout
 from palaestra_trainer.robots.base import SENSORS
 from palaestra_trainer.robots.geometry import Pose, Twist
 
-_RADIUS_M: Final = 0.2  # the driver adds it to each distance, from the center of the robot to the sensor
-_UNIT_SLACK: Final = 0.01  # by which the length of a quaternion may differ from 1
+_RADIUS_M: Final = 0.2  # from the robot's center to a sensor; the driver adds it to each distance
+_UNIT_SLACK: Final = 0.01  # largest difference between the length of a quaternion and 1
 
 
 def odometry_of(message: Any) -> Odometry:
@@ -43,7 +43,7 @@ def odometry_of(message: Any) -> Odometry:
 
 
 def distances_of(message: Any, layout: SensorLayout) -> NDArray[np.float32]:
-    """Return the distances in a sensor_msgs/PointCloud of the driver, as `SensorLayout.meters_of`.
+    """Return the distances in a sensor_msgs/PointCloud of the driver, converted by `layout`.
 
     Args:
         message: the point of each sensor's obstacle, in the frame of the robot.

@@ -9,14 +9,15 @@
 | image_raw | sensor_msgs/msg/Image | read if the policy sees images |
 | cmd_vel | geometry_msgs/msg/Twist | published |
 
-A best-effort subscription matches reliable publishers too, and an old reading is of no use.
+Odometry, distances and images have best-effort subscriptions. Such a subscription matches reliable publishers
+too, and a lost message does no harm, because an old reading is of no use.
 
 rto_node publishes the bumper only when it changes, and keeps no message for later subscribers. So the bumper
 counts as not pressed before the first message. While a node publishes the topic, each odometry confirms the
 bumper's last state. Another driver may latch the state. A latched message arrives only in a subscription
-that is transient local, and both sides warn if such a subscription meets a volatile publisher. So a second
-subscription of the bumper begins when a publisher is transient local. A bumper that the driver never reports
-cannot be noticed.
+that is transient local, and both sides warn if such a subscription meets a volatile publisher. So the bumper
+has a subscription for each combination of reliability and durability that its publishers offer. If the driver
+never reports the bumper, a bump cannot be detected.
 """
 
 from __future__ import annotations
@@ -65,12 +66,12 @@ class Ros2Link:
         sensors: the order of the distance sensors; the driver's unit is always meters.
         clock: the robot's clock. The time of a reading is the time at which its message arrived.
         topics: topics of a new node with other names than those of the driver; see `topics`.
-        node: the node that subscribes and publishes, which its maker closes; None: a new one.
+        node: the node that subscribes and publishes, which the caller closes; None: a new node.
         check: called often while the connection waits for the robot; it may raise.
 
     Attributes:
-        frame_id: the frame of the newest odometry, such as `odom`; empty before it.
-        odometry: the newest odometry; None before it.
+        frame_id: the frame of the newest odometry, such as `odom`; empty before the first odometry.
+        odometry: the newest odometry; None before the first odometry.
 
     Raises:
         ConfigurationError: the address or a name of a topic is wrong, or rclpy is not installed.
@@ -110,7 +111,7 @@ class Ros2Link:
         Topics show neither a charger nor the driver's limit of speed.
 
         Raises:
-            RobotUnfit: within 5 s, no odometry arrived, or nobody subscribed the commands.
+            RobotUnfit: within 5 s, no odometry arrived, or no node subscribed to the commands.
         """
         del speed_m_s, turn_rad_s
         end_s = time.monotonic() + _FIRST_S
@@ -125,7 +126,7 @@ class Ros2Link:
         self._store = store
 
     def use_camera(self, store: ReadingStore, size: ImageSize) -> None:
-        """Begin to receive pictures of `image_raw`; each replaces the one before."""
+        """Begin to receive pictures of `image_raw`; each picture replaces the previous picture."""
         if self._sees:
             return
         self._sees = True
@@ -158,7 +159,7 @@ class Ros2Link:
             self._node.close()
 
     def _subscribe(self) -> Any:
-        """Subscribe all readings, and return the publisher of the commands."""
+        """Subscribe to odometry and distances, and return the publisher of the commands."""
         qos = require("rclpy.qos")
         sensor_messages = require("sensor_msgs.msg")
         for kind, topic, read in (

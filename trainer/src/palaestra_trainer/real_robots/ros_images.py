@@ -1,7 +1,7 @@
 """Pictures of a camera in ROS 1 and ROS 2 as images of the size that a policy learned with.
 
 The message is data of another program, so each field is checked before it is used. The function reads only
-fields, so a sensor_msgs/Image of either ROS will do.
+fields, so it accepts a sensor_msgs/Image of ROS 1 and of ROS 2.
 """
 
 from __future__ import annotations

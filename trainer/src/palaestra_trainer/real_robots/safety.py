@@ -1,8 +1,8 @@
 """The rules that decide, for each command, whether a real robot may move: a pure function of the situation.
 
 A rule either holds the robot back until its cause has ended, or stops the robot until a person begins a new
-episode. The order of `CHECKS` is the order of importance. These rules are no safety function: only the
-robot's own emergency stop is one.
+episode. The order of `CHECKS` is the order of importance. These rules are not a safety function; only the
+robot's own emergency stop is a safety function.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ STANDING: Final[Twist] = (0.0, 0.0, 0.0)
 _REACTION_S: Final = 0.25
 _SETTLED_S: Final = 1.0  # within this time, a robot obeys a command to move or to stand
 _ASLEEP_S: Final = 2.0  # after a longer suspension of program or computer, the robot must not drive on
-# Source: ~min_linear_vel and ~min_angular_vel of robotino_node, which raises slower commands to these.
+# Source: ~min_linear_vel and ~min_angular_vel of robotino_node, which raises slower commands to these values.
 _LEAST_M_S, _LEAST_RAD_S = 0.05, 0.1
-# The odometry of a standing robot may have some noise, up to _STANDING. A robot that is faster than _MOVING
-# moves.
+# The odometry of a standing robot may have noise up to _STANDING. A robot that is faster than _MOVING counts
+# as moving.
 _STANDING: Final = (0.01, 0.01, 0.02)
 _MOVING: Final = (0.02, 0.02, 0.05)
 
@@ -66,7 +66,8 @@ class SafetyRules:
         speed_m_s: greatest speed along the floor; a faster command is scaled, its direction stays.
         turn_rad_s: greatest rate of turning.
         fence: the rectangle for the robot; None: no fence.
-        odometry_error: the share of the driven way by which odometry may be wrong; the fence is closer by it.
+        odometry_error: largest error of odometry, as a share of the driven distance. The robot keeps this
+            error as a distance from the fence.
         silence_s: seconds without a call of the policy's program, after which the robot is held back.
         stale_s: age of the oldest reading, above which the robot is held back.
         lost_s: age of the oldest reading, above which the robot is stopped.
@@ -83,21 +84,21 @@ class SafetyRules:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Situation:
-    """All that a decision depends on.
+    """The values on which a decision depends.
 
     Attributes:
         command: the newest command of the policy; None: the policy has sent none.
-        silent_s: seconds since the program of the policy last called the robot; it calls while it waits.
+        silent_s: seconds since the policy's program last called the robot; while it waits, it calls often.
         permitted: whether the person allows motion now, for example by holding a key.
         readings_age_s: age of the oldest of the newest readings; infinite without readings.
         unconfirmed_s: seconds since the robot last confirmed a command.
-        asleep_s: seconds of real time since the decision before.
+        asleep_s: seconds of real time since the previous decision.
         bumped: whether the bumper touches something.
         pose: the pose by odometry, in the task's frame; None before the first reading.
         velocity: the velocity by odometry, in the robot's frame.
         driven_m: meters driven since a person confirmed the pose.
         rested_s: seconds for which only zero has been commanded.
-        pushing_s: seconds for which motion has been commanded while odometry stands.
+        pushing_s: seconds for which motion has been commanded while odometry reports no motion.
     """
 
     command: Twist | None
@@ -115,7 +116,7 @@ class Situation:
 
 
 class StopCause(NamedTuple):
-    """Why a robot may not move.
+    """The reason why a robot may not move.
 
     Attributes:
         name: a short name, for logs.
@@ -129,7 +130,7 @@ class StopCause(NamedTuple):
 
 
 class SafetyDecision(NamedTuple):
-    """The velocity that is sent to the robot, and why the robot is held back or stopped, if it is."""
+    """The velocity to send to the robot, and the cause if the robot is held back or stopped."""
 
     twist: Twist
     cause: StopCause | None = None
@@ -203,9 +204,8 @@ def _foreign(situation: Situation, rules: SafetyRules) -> StopCause | None:
     moving = any(abs(part) > most for part, most in zip(situation.velocity, _MOVING, strict=True))
     if not moving or situation.rested_s <= _SETTLED_S:
         return None
-    return StopCause(
-        "another client", "moves without a command of this program; end the other client", stops=True
-    )
+    fact = "the robot moves without a command of this program; end the other client"
+    return StopCause("another client", fact, stops=True)
 
 
 def _unconfirmed(situation: Situation, rules: SafetyRules) -> StopCause | None:
@@ -219,7 +219,7 @@ def _asleep(situation: Situation, rules: SafetyRules) -> StopCause | None:
     del rules
     if situation.asleep_s <= _ASLEEP_S:
         return None
-    fact = f"this program did not run for {situation.asleep_s:.0f} s; begin again"
+    fact = f"this program did not run for {situation.asleep_s:.0f} s; begin the episode again"
     return StopCause("suspended", fact, stops=True)
 
 
@@ -227,7 +227,9 @@ def _without_effect(situation: Situation, rules: SafetyRules) -> StopCause | Non
     del rules
     if situation.pushing_s <= _SETTLED_S:
         return None
-    fact = "the robot does not move; release its emergency stop, look at its motors, and begin again"
+    fact = (
+        "the robot does not move; release its emergency stop, look at its motors, and begin the episode again"
+    )
     return StopCause("no effect", fact, stops=True)
 
 

@@ -21,7 +21,7 @@ _OPEN_FLOOR_M: Final = 1000.0
 
 
 class RealScene(Scene):
-    """Begins episodes on a real floor: nothing is moved, except the robot, and that by a person.
+    """Begins episodes on a real floor, on which only the robot is moved, and only by a person.
 
     The layout is the fence without obstacles, because nobody has measured the floor.
 
@@ -41,7 +41,7 @@ class RealScene(Scene):
         self._robot.stand()
 
     def layout(self) -> FloorLayout:
-        """Return the floor within the fence; without a fence, a floor without an end."""
+        """Return the floor within the fence; without a fence, a floor of 2 km x 2 km."""
         if (fence := self._robot.rules.fence) is not None:
             return FloorLayout(low=fence.low, high=fence.high)
         return FloorLayout(low=(-_OPEN_FLOOR_M, -_OPEN_FLOOR_M), high=(_OPEN_FLOOR_M, _OPEN_FLOOR_M))

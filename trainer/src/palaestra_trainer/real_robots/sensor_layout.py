@@ -22,7 +22,7 @@ class SensorLayout:
 
     Attributes:
         order: the order of the sensors after the one that points forward, one of `ORDERS`.
-        unit: the unit of their values, one of `UNITS`; volts are those of the GP2Y0A41.
+        unit: the unit of their values, one of `UNITS`; volts are the output of the sensor GP2Y0A41.
 
     Raises:
         ConfigurationError: a value is not one of these.

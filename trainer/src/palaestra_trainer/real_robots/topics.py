@@ -1,6 +1,6 @@
 """Topics that a person names in place of those of a robot's driver, as NAME=TOPIC.
 
-NAME is the driver's own name of the topic, so a driver with all of its own names needs none of them.
+NAME is the driver's default name of the topic. If no topic of the driver is renamed, none needs to be given.
 """
 
 from __future__ import annotations

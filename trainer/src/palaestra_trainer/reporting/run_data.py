@@ -43,7 +43,7 @@ class ReportedFault:
         kind: kind of the fault, `dead`, `hung` or `wrong_data`.
         fact: message of the fault.
         steps_lost: steps of the episode that the fault truncated.
-        seconds: seconds from the fault until the simulator was up again; None: the simulator did not come up
+        seconds: seconds from the fault until the simulator was up again; None: the simulator was not up again
             in that attempt.
     """
 

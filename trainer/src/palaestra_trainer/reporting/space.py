@@ -1,6 +1,6 @@
 """The parts of a page that show recorded episodes in three dimensions; the script space.js draws them.
 
-The page contains the shapes of each world once. It has no names of a world.
+The page contains the shapes of each world once. It does not contain the names of the world's nodes.
 """
 
 from __future__ import annotations

@@ -31,7 +31,7 @@ class RobotAbc(ABC):
     a reading raises `NoReading`.
 
     Attributes:
-        real: whether the robot is a real one, which a task must not disturb to make a policy robust.
+        real: whether the robot is real. Disturbances that make a policy robust are only for simulated robots.
     """
 
     real: ClassVar[bool] = False

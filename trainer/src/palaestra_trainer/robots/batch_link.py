@@ -1,7 +1,7 @@
 """A client of the socket on which a simulator serves copies of its world: one request, one response.
 
-`palaestra_protocol.batch` defines the messages. Every wait has a deadline. A response that does not come in
-time, or is not of the protocol, is a fault of the simulator, and the connection is closed.
+`palaestra_protocol.batch` defines the messages. Every wait has a deadline. A response that is late or
+violates the protocol is a fault of the simulator, and the connection is closed.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ class BatchLink:
         answer_s: the longest time for a response to a step or reset.
 
     Attributes:
-        description: what the simulator offers; None before `open`.
+        description: the simulator's description of its copies and devices; None before `open`.
     """
 
     def __init__(self, name: str, answer_s: float = ANSWER_S) -> None:

@@ -1,7 +1,7 @@
 """The copies of one robot in a simulator with many copies of its world: readings and commands are arrays.
 
 Each class is the batched form of a robot class, whose class attributes it uses: names of devices, the period.
-Row i of every array belongs to copy i. The arithmetic has the bits of the single robot.
+Row i of every array belongs to copy i. The numbers of a row equal those of the single robot bit by bit.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class BatchedRobot(BatchedRobotAbc):
         rows: see above.
         period_s: simulated seconds of one `advance`.
         failed: for each row, whether its copy failed since its last reset: its readings are not valid.
-        reasons: why rows failed, by row; not for every row.
+        reasons: the reasons of failures, by row; a failed row may lack a reason.
         simulated_s: seconds of simulated time of all rows together.
     """
 
@@ -192,9 +192,9 @@ class BatchedRobotino(BatchedRobot, BatchedRobotinoAbc):
 
     @staticmethod
     def _converted(readings: Floats) -> NDArray[np.float32]:
-        # A message of a DistanceSensor has 32 bits for its value.
+        # The single robot gets each value in a message, which has 32 bits for the value.
         volts = np.maximum(readings.astype(np.float32).astype(np.float64), LEAST_VOLTS)
-        # Python's power, because NumPy's power may differ in the last bit.
+        # Python's power is used, because NumPy's power may differ in the last bit.
         powers = np.fromiter(map(pow, volts.ravel().tolist(), repeat(RANGE_EXPONENT)), float, volts.size)
         meters = RANGE_SCALE * powers.reshape(volts.shape) + RANGE_OFFSET_M
         return np.minimum(np.maximum(meters, SENSOR_RANGE_M[0]), SENSOR_RANGE_M[1]).astype(np.float32)
@@ -301,10 +301,10 @@ BATCHED_FORMS: Final[tuple[tuple[type[SimulatedRobot], type[BatchedRobot]], ...]
 
 
 def batched_form(robot: type[SimulatedRobot]) -> type[BatchedRobot]:
-    """Return the batched form of a robot class: its attribute `batched`, or the form of a class above it.
+    """Return the batched form of a robot class: its attribute `batched`, or the form of its shipped ancestor.
 
     A class that overrides a method of a shipped class needs its own form, because the shipped form would not
-    do what the method does.
+    call that method.
 
     Raises:
         ConfigurationError: the class has no batched form.

@@ -26,7 +26,7 @@ class BatchedRobotAbc(ABC):
         rows: the number of copies.
         period_s: simulated seconds of one `advance`.
         failed: for each row, whether its copy failed since its last reset: its readings are not valid.
-        reasons: why rows failed, by row; not for every row.
+        reasons: the reasons of failures, by row; a failed row may lack a reason.
     """
 
     rows: int
@@ -110,7 +110,7 @@ class BatchedSceneAbc(ABC):
         joints: Floats | None = None,
         commands: Floats | None = None,
     ) -> None:
-        """Begin an episode in rows, which increase, and simulate one period of these rows.
+        """Begin an episode in rows, in increasing order, and simulate one period of these rows.
 
         All random values of a row until its next `begin` follow from its seed.
 
@@ -119,8 +119,8 @@ class BatchedSceneAbc(ABC):
             seeds: one seed for each of these rows.
             starts: the pose of each row's robot; None for robots that do not drive.
             joints: the positions of the joints of `use_joints`: (rows, joints).
-            commands: the commands of the motors: (rows, motors); None: wheels stand, other motors keep what
-                the world sets.
+            commands: the commands of the motors: (rows, motors); None: wheels stand, and other motors keep
+                the commands that the world sets.
 
         Raises:
             SimulatorDead, SimulatorHung, WrongData

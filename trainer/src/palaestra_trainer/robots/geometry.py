@@ -38,7 +38,7 @@ class Movement(IntEnum):
         return _TWISTS[self.value]
 
 
-# By the number of the movement.
+# The index is the number of the movement.
 _TWISTS: tuple[Twist, ...] = (
     (0.0, 0.0, 0.0),
     (SPEED_M_S, 0.0, 0.0),

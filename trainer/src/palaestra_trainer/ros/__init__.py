@@ -7,7 +7,7 @@ one persistent connection each. They wait with a deadline, reconnect after a fai
 hung and wrong data. One thread uses the services and subscribers of one simulator.
 
 A program for a real robot names its master itself, and publishes too. So it has a node of its own kind
-(`topic_node`), with publishers (`publisher`). All nodes of ours serve the methods of `slave_api`. A node of
+(`topic_node`), with publishers (`publisher`). All our own nodes serve the methods of `slave_api`. A node of
 ROS 2 (`ros2_node`) needs rclpy, which a person's installation of ROS 2 brings; this project does not install
 it.
 

@@ -26,14 +26,14 @@ def node_of(name: str) -> str:
 
 
 def known_type(find: Callable[[str], Type], name: str) -> Type:
-    """Return the type `package/Name`, which `find` returns.
+    """Return the type with this name, `package/Name`, from `find`.
 
     Raises:
         ConfigurationError: the type is not known.
     """
     try:
         return find(name)
-    except (KeyError, ValueError):  # ValueError: a service was asked for as a message, or the reverse
+    except (KeyError, ValueError):  # ValueError: a message type where a service type is needed, or vice versa
         raise ConfigurationError(
             f"{name}: is not a known type of this kind; use a type of {_PACKAGES}, or a client of rospy"
         ) from None

@@ -127,7 +127,7 @@ class Master:
         return uri is not None and self._is_node(uri)
 
     def _registered(self) -> list[dict[str, set[str]]]:
-        """Return the nodes of each topic with a publisher, each topic with a subscriber, each service."""
+        """Return three dicts: the nodes of each published topic, each subscribed topic, and each service."""
         answer = self._call("getSystemState")
         try:
             parts = [{str(name): set(map(str, nodes)) for name, nodes in part} for part in answer.value]

@@ -22,7 +22,8 @@ from palaestra_trainer.ros.topic_node import TopicNode
 
 _HEADER_S: Final = 5.0
 _MOST_HEADER_BYTES: Final = 1 << 16
-# Commands that wait in the kernel are late commands. So the kernel may keep little, and not for long.
+# Commands that wait in the kernel reach the robot late. So the kernel's buffer is small, and a connection
+# with unconfirmed data is closed soon.
 _BUFFER_BYTES: Final = 1 << 14
 _UNCONFIRMED_MS: Final = 1000
 
@@ -92,7 +93,7 @@ class RosPublisher:
 
     def close(self) -> None:
         """Unregister the topic, and close the connections; further calls have no effect."""
-        # A master that does not respond has no registration that others could read.
+        # If the master does not respond, no other node can read the registration.
         with contextlib.suppress(MasterLost, UnreadableAnswer):
             self._node.remove_publisher(self._topic)
         self._server.close()
@@ -125,7 +126,7 @@ class RosPublisher:
                 self._drop(connection)
 
     def _drop(self, connection: socket.socket) -> None:
-        """Remove a subscriber, if it is one, and end its thread, which then closes the connection."""
+        """Remove the subscriber of a connection, if any, and end its thread, which closes the connection."""
         if connection in self._subscribers:
             del self._subscribers[connection]
             with contextlib.suppress(OSError):  # the subscriber may have closed the connection

@@ -33,11 +33,11 @@ def require(module: str) -> Any:
 class Ros2Node:
     """A node of ROS 2, whose callbacks run one after another in a thread of its own.
 
-    The signals SIGINT and SIGTERM stay with the program.
+    rclpy does not handle SIGINT and SIGTERM, so the program's own signal handlers stay in place.
 
     Args:
         name: the name of the node, unless the arguments rename it.
-        namespace: its namespace, such as `/robot1`; None: the one of the arguments, or `/`.
+        namespace: its namespace, such as `/robot1`; None: the namespace in the arguments, or `/`.
         arguments: the arguments of ROS, from `--ros-args` on.
 
     Attributes:
@@ -83,6 +83,6 @@ class Ros2Node:
         self._context.try_shutdown()
 
     def _spin(self) -> None:
-        """Call callbacks until `close`; after an unforeseen error, all readings become old."""
+        """Call callbacks until `close`; if a callback fails, no more readings arrive, so all become old."""
         with suppress(self._ended):
             self._executor.spin()

@@ -54,7 +54,7 @@ class RosService:
         """Send a request; call `finish` exactly once before the next `begin`.
 
         Raises:
-            SimulatorDead, SimulatorHung, WrongData: as a call.
+            SimulatorDead, SimulatorHung, WrongData: for the reasons of a call.
         """
         self.send(self._type.request.frame(fields))
 
@@ -67,10 +67,10 @@ class RosService:
         return self._type.request.frame(fields)
 
     def send(self, data: bytes) -> None:
-        """Send a request that `packed` has returned; otherwise as `begin`.
+        """Send a request that `packed` has returned; see `begin`.
 
         Raises:
-            SimulatorDead, SimulatorHung, WrongData: as a call.
+            SimulatorDead, SimulatorHung, WrongData: for the reasons of a call.
         """
         try:
             (self._wire or self._connect()).send(data)
@@ -82,7 +82,7 @@ class RosService:
         """Return the response to the request that `begin` sent.
 
         Raises:
-            SimulatorDead, SimulatorHung, WrongData: as a call.
+            SimulatorDead, SimulatorHung, WrongData: for the reasons of a call.
         """
         wire = self._wire or self._asked()
         try:

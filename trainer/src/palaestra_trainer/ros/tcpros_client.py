@@ -27,7 +27,8 @@ _MOST_KEPT_BYTES = 4 << 20  # an image arrives at each step, so a buffer of its 
 _QUICK_S = 200e-6
 _LOOKS = 30
 
-# Plain numbers: a step reads a dozen messages, and each use of the flag's enum takes two lookups more.
+# The flag is stored as a plain number. A step reads a dozen messages, and each use of the enum in `socket`
+# would need two more lookups.
 _NOW = int(socket.MSG_DONTWAIT)
 _FIRST_BYTES = sockets.FIRST_BYTES
 _LENGTH_BYTES = LENGTH.size

@@ -89,7 +89,7 @@ class TopicNode:
 
 
 def host_toward(uri: str, environment: Mapping[str, str]) -> str:
-    """Return ROS_HOSTNAME or ROS_IP; without them, the address with which this machine reaches a server.
+    """Return ROS_HOSTNAME or ROS_IP; without them, this machine's address in the network of a server.
 
     rospy would use the name of the machine, which a robot in a network without a name server cannot resolve.
 

@@ -1,7 +1,7 @@
 """The methods of the Master API and the Parameter Server API, and the updates that they cause.
 
-A call only changes registrations and parameters, and returns the response and the updates. It does not send
-them. Make only one call at a time. Source: http://wiki.ros.org/ROS/Master_API and
+A call only changes registrations and parameters, and returns the response and the updates. The module
+`updates` sends the updates. Make only one call at a time. Source: http://wiki.ros.org/ROS/Master_API and
 http://wiki.ros.org/ROS/Parameter%20Server%20API
 """
 

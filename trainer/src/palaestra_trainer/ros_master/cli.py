@@ -21,8 +21,8 @@ EXIT_WRONG = 2
 _DESCRIPTION = """\
 A ROS 1 master with its parameters, without any package of ROS.
 
-Prints its URI once it answers, and ends at SIGTERM or SIGINT.
-A call is answered for every program that can connect, so listen on an address that only yours can reach.
+Prints its URI when it is ready, and ends at SIGTERM or SIGINT.
+The master answers every program that can connect, so listen on an address that only your programs can reach.
 
 exit codes: 0 after a signal, or when standard input has closed; 2 a wrong option, or a port in use
 """

@@ -207,8 +207,8 @@ class Attempt:
         found = self._newest()
         before = RunDirectory(found.path.parent.parent) if found else None
         self._algorithm = algorithms.begin_with(configuration, self._directory, before)
-        # This call precedes the start of the server, because Prometheus would count a later jump as new
-        # events.
+        # The counters of previous attempts are set before the server starts, because Prometheus would count a
+        # later jump of a counter as new events.
         self._take_over(found)
         known = constants(configuration)
         stack.enter_context(status_server(configuration.status_address, progress, known))

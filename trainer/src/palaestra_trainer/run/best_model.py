@@ -146,7 +146,7 @@ class Selection:
         return confirmation.success_rate is not None and confirmation.success_rate >= goal
 
     def _confirm(self, step: int, now: int) -> EvaluationResult:
-        """Confirm the model, with the policy of `step`, on the next episodes of the stream."""
+        """Confirm the policy of `step`, which the model now has, on the next episodes of the stream."""
         before = sum(int(line["episodes"]) for line in read_lines(self._directory.confirmations))
         evaluation = self._measure(CONFIRM, self._run.configuration.evaluation.confirming, before)
         self._log("confirm", now, evaluation, of_step=step)
@@ -171,7 +171,7 @@ class Selection:
 
     @contextmanager
     def _playing(self) -> Iterator[None]:
-        """Let the evaluating simulators play in the context, and the collecting simulators rest."""
+        """Within the context, run the evaluating simulators, and pause the collecting simulators."""
         run = self._run
         with (
             run.progress.spending(Cause.EVALUATING),

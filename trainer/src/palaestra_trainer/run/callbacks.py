@@ -46,7 +46,7 @@ def make_callbacks(wanted: Sequence[Callback]) -> JobCallbacks:
 
     Raises:
         ConfigurationError: a class cannot be imported, is not a callback, or refuses its options; the message
-            has one line for each.
+            has one line for each mistake.
     """
     mistakes: list[str] = []
     made: list[_Named] = []

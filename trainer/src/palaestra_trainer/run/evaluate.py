@@ -49,7 +49,7 @@ class Playing:
 def playing(
     configuration: Configuration, model: Path, make_members: MakeMembers, check: Check = go_on
 ) -> Iterator[Playing]:
-    """Start simulators; yield the policy of a model.zip with them; stop the simulators at the end.
+    """Start simulators; yield them and the policy of a model.zip; stop the simulators at the end.
 
     Args:
         configuration: the configuration of the run; its simulators are started, and all must evaluate.

@@ -3,7 +3,7 @@
 The collecting environments cannot compute these rewards, because their simulators may be restarting in other
 threads while the algorithm learns. This environment is never reset or stepped. Its robot has the job's class
 and is never connected. The environments of simulators are also created before their robots are connected. So
-every environment of a run can be created here too.
+the class of every job's environment can be created with an unconnected robot.
 """
 
 from __future__ import annotations

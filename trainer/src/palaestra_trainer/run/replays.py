@@ -65,7 +65,7 @@ def _in_space(
 ) -> dict[str, Any]:
     """Return the recording of an episode in three dimensions, or the reason for its absence.
 
-    Episodes with an equal scene share it. A scene that is not in `scenes` is added.
+    Episodes with equal scenes share one scene. A scene that is not in `scenes` is added.
     """
     try:
         film = record_again(game)

@@ -66,12 +66,12 @@ def _resized(values: np.ndarray, length: int) -> np.ndarray:
 
 
 def _returns_left(saved: TrainingState, begun: np.ndarray) -> np.ndarray | None:
-    """Return the discounted rewards of continued episodes, 0 for new ones; None without normalization."""
+    """Return the discounted rewards of continued episodes, 0 for new episodes; None without normalization."""
     known = saved.running_returns
     return None if known is None else np.where(begun, 0.0, _resized(known, len(begun)))
 
 
 def _terms_left(saved: TrainingState, begun: np.ndarray) -> list[dict[str, float]]:
-    """Return the sums of reward terms of continued episodes, empty for new ones."""
+    """Return the sums of reward terms of continued episodes, empty for new episodes."""
     known = [*saved.rollout["terms"], *[{}] * len(begun)]
     return [{} if new else terms for new, terms in zip(begun, known, strict=False)]

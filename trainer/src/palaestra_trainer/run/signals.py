@@ -2,10 +2,11 @@
 
 The handler records the first signal, and the run ends at its next check for signals. During training, the run
 then saves a checkpoint of the last boundary between rollouts. While simulators start, the run does not save a
-checkpoint, because it has no progress yet. The handler does not raise, because it may run while a lock is
-released. Waits may continue for `shutdown_deadline.LEFT_S` seconds. A second signal ends the process at once,
-and so does a signal that arrives before the run listens. After the run's end, while Python exits, signals are
-ignored. If SIGINT was ignored when the program started, as in the background of a script, it stays ignored.
+checkpoint, because it has no progress yet. The handler does not raise an exception, because an exception in
+the middle of a lock's release could leave the lock held. Waits may continue for `shutdown_deadline.LEFT_S`
+seconds. A second signal ends the process at once, and so does a signal that arrives before the run listens.
+After the run's end, while Python exits, signals are ignored. If SIGINT was ignored when the program started,
+as in the background of a script, it stays ignored.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Determine the git commit of a job's own code, so that a person can train the policy again.
 
-git runs without a shell, without the repository's programs, and for a bounded time. A machine without git, as
-most images are, and a folder outside of a repository have no commit.
+git runs without a shell, without the repository's programs, and for a bounded time. The commit is unknown if
+git is not installed, as in most images, or if the folder is outside of a repository.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import Any, Final
 _OURS: Final = __name__.partition(".")[0]
 _GIT_S: Final = 5.0
 _INSTALLED: Final = {"site-packages", "dist-packages"}
-# Without these, git would take locks, or start the file monitor that the repository names.
+# Without these options, git would take locks, or start the file monitor that the repository names.
 _HARMLESS: Final = ("--no-optional-locks", "-c", "core.fsmonitor=false")
 
 

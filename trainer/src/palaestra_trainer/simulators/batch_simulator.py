@@ -59,7 +59,7 @@ class BatchSimulator:
         return self._robot.failed
 
     def reason(self, row: int) -> str:
-        """Return why a row failed."""
+        """Return the reason why a row failed."""
         return self._robot.reasons.get(row, "its simulation failed")
 
     @property
@@ -132,7 +132,7 @@ class BatchSimulator:
 
 
 class OneOfMany(gymnasium.Env[Any, Any]):
-    """The spaces and attributes of one copy of a batched environment, which itself takes no steps.
+    """An environment with the spaces and attributes of one copy of a batched environment; it cannot step.
 
     Attributes that a program sets are set on the batched environment.
 
@@ -154,7 +154,10 @@ class OneOfMany(gymnasium.Env[Any, Any]):
         return getattr(self.batched, name)
 
     def set_wrapper_attr(self, name: str, value: Any, *, force: bool = True) -> bool:
-        """Set an attribute of the batched environment, with `force` also a new one; return whether it is."""
+        """Set an attribute of the batched environment; return whether it was set.
+
+        Without `force`, only an existing attribute is set.
+        """
         if not (force or hasattr(self.batched, name)):
             return False
         setattr(self.batched, name, value)

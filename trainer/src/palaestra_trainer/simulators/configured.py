@@ -79,8 +79,8 @@ def require_driver(driver: str) -> None:
     """
     if driver == "mujoco" and importlib.util.find_spec("mujoco") is None:
         raise ConfigurationError(
-            "simulator: none was given, and the Python package mujoco, which starts one, is not installed; "
-            "install palaestra-sim[mujoco]"
+            "simulator: none was given, and driver mujoco needs the Python package mujoco, which is not "
+            "installed; install palaestra-sim[mujoco]"
         )
 
 
@@ -108,6 +108,6 @@ def configured_simulator(role: Role) -> Configured:
 
 
 def _alone(configuration: Configuration, name: str) -> Configuration:
-    """Return an unvalidated copy with only this simulator, because validation requires one that collects."""
+    """Return a copy with only this simulator; validation would refuse it without a collecting simulator."""
     chosen = tuple(simulator for simulator in configuration.simulators if simulator.name == name)
     return configuration.model_copy(update={"simulators": chosen})

@@ -60,7 +60,7 @@ def connect_members(configuration: Configuration) -> list[Member]:
 
 
 def _member(configuration: Configuration, entry: SimulatorConfiguration) -> Member:
-    """Return the simulator of an entry: one with copies, a single one, or one with its standby."""
+    """Return the member of an entry: a simulator with copies, a single simulator, or one with a standby."""
     sidecar = Sidecar(entry.control, entry.name)
     if entry.batch:
         return BatchSimulator(sidecar, configuration, entry)

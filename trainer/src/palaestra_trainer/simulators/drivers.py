@@ -15,7 +15,9 @@ _MJCF = ".xml"
 
 
 def in_driver(entry: SimulatorConfiguration, driver: str) -> SimulatorConfiguration:
-    """Return the simulator with the same world in another program, without options of the old program.
+    """Return the simulator with the same world in another program.
+
+    The command-line options stay only if both programs accept the same options.
 
     Raises:
         ConfigurationError: the program is not installed, or cannot load the world.

@@ -148,7 +148,7 @@ class Watcher(Protocol):
         ...
 
     def given_up(self, simulator: str) -> None:
-        """Receive the name of a simulator that failed too often and stays down; its group is large enough."""
+        """Receive the name of a simulator that failed too often; the run continues without this simulator."""
         ...
 
     def spending(self, cause: Cause) -> AbstractContextManager[None]:

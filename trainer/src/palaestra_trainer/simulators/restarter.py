@@ -58,7 +58,7 @@ class Restarter:
         watcher: receives every fault and restart.
         group: the member's group of simulators.
         tried: whether the first start of the member has ended, successfully or not.
-        lost: whether the member was given up, because its group is large enough without it.
+        lost: whether the member failed for good; the run continues, because its group is large enough.
         stepped: whether the run has taken a step, which proves that its worlds are right.
         meter: statistics of the member's steps and resets.
     """

@@ -105,7 +105,7 @@ class Camera(_Rendered):
         """Set the exposure, in J/m2; the stub and MuJoCo keep it, but their images do not depend on it.
 
         Raises:
-            ConfigurationError: it is negative; Webots would ignore it.
+            ConfigurationError: the exposure is negative; Webots would ignore such a value.
         """
         if not exposure >= 0.0:
             raise ConfigurationError(f"{self.device}: the exposure {exposure:g} is refused; use 0 or more")
@@ -147,7 +147,7 @@ class RecognizedObject(NamedTuple):
 
 
 class _Recognition(_Rendered):
-    """Something that a camera with a Recognition node publishes."""
+    """The base of sensors whose readings a camera with a Recognition node publishes."""
 
     __slots__ = ()
     nodes = ("Camera",)
@@ -178,7 +178,8 @@ class _Recognition(_Rendered):
     def _lacks_recognition(self) -> bool:
         """Return whether the simulator responds that the camera has no Recognition node.
 
-        The fact `recognizes` would call `explained` again if the simulator is dead.
+        This method does not use the fact `recognizes`, which would call `explained` again if the simulator is
+        dead.
         """
         try:
             answer = self._services.call_once(f"{self._path}/has_recognition", "get_bool", ask=True)

@@ -59,7 +59,9 @@ class Radar(NodeSensor):
         self._unread = 0
 
     def read(self) -> bool:
-        """Read the targets of the next measurement; without one in time, keep the old ones and return False.
+        """Read the targets of the next measurement.
+
+        If no measurement arrives in time, keep the old targets and return False.
 
         Raises:
             SimulatorDead, WrongData: as `RosSubscriber`.
@@ -89,10 +91,10 @@ class Radar(NodeSensor):
         self._targets.close()
 
     def _read_targets(self, count: int) -> tuple[RadarTarget, ...]:
-        """Read the targets of one measurement, after those of an interrupted one.
+        """Read the targets of one measurement, after the rest of a measurement that was read only in part.
 
         Raises:
-            WrongData: also if the number of targets is too large for its message, and so is negative.
+            WrongData: also if the number of targets is negative, because it is too large for its message.
         """
         if count < 0:
             raise WrongData(self.robot, f"{self.device} has over 127 targets; reduce its field of view")
@@ -164,7 +166,7 @@ class Receiver(NodeSensor):
         strength = float(self._ask("get_signal_strength", "get_float"))
         self._fresh = False
         self._ask("next_packet", "get_bool")
-        # Webots publishes bytes behind the packet too.
+        # Webots also publishes bytes that follow the packet in memory.
         text = self.value.encode()[:size].decode(errors="ignore")
         if len(text.encode()) != size:
             raise WrongData(self.robot, f"{self.device} has received {size} bytes that are not a text")

@@ -74,7 +74,8 @@ class Device:
     def explained(self, fault: SimulatorFault) -> SimulatorFault:
         """Return the reason of a fault: a `WorldMisfit` if the device is another node in the world.
 
-        Such a device lacks some of the services, which otherwise looks like a simulator that has died.
+        Such a device lacks some of the services. Without this check, the fault would look like a dead
+        simulator.
         """
         found = self._node_in_world() if self.nodes else ""
         if not found or found in self._wanted_nodes():
@@ -192,7 +193,7 @@ def lookup_table_fact() -> Fact[tuple[tuple[float, float, float], ...]]:
 
 
 def named(service: str, names: Sequence[str], doc: str) -> Fact[str]:
-    """Declare a fact whose number, of the type webots_ros/get_int, is the place of a name."""
+    """Declare a fact whose number, of the type webots_ros/get_int, is the index of a name in `names`."""
 
     def name_of(response: Any) -> str:
         number = int(response.value)

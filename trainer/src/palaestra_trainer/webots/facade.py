@@ -51,7 +51,7 @@ class Webots:
         world_path: path of the world to load, or the name of a shipped world, e.g. "arena".
         launcher: the place in which a new simulator starts, by its name or with settings: "process" or
             `ThisMachine()`, "docker" or `Docker(...)`, "kubernetes" or `Kubernetes(...)`. For a simulator
-            that already runs: "attach" or `Attached()`. Or an object that starts the simulator.
+            that already runs: "attach" or `Attached()`. Any other `Launcher` is accepted too.
         driver: the simulator program: "stub", "mujoco" or "webots".
         options: command-line options of the simulator program, e.g. ["--step-sleep-ms=5"].
         start_deadline_s: the longest time from the start until the simulator responds.
@@ -87,7 +87,7 @@ class Webots:
         # The probe has its own connection with a shorter deadline, because it must detect a hang early.
         self._probe = RosService(f"/{supervisor_node_name}/robot/get_time", "webots_ros/get_float", _PROBE_S)
         self._start_deadline_s = start_deadline_s
-        # By name: the function to call, and the robots that must respond before.
+        # For each name: the function to call, and the robots that must respond before the call.
         self._at_start: dict[str, tuple[Callable[[], None], tuple[str, ...]]] = {}
         self._entered = 0
         self._stopped = False
@@ -135,8 +135,8 @@ class Webots:
         """Wait until the simulator and the controllers of its robots respond, after a start or a reload.
 
         Raises:
-            SimulatorDead: the simulator's process ended; SimulatorRefused, a subclass, if it refused its
-                input. Also if a robot has no controller.
+            SimulatorDead: the simulator's process ended, or a robot has no controller; SimulatorRefused, a
+                subclass, if the simulator refused its input.
             SimulatorHung: it did not respond in time.
         """
         give_up = time.monotonic() + self._start_deadline_s

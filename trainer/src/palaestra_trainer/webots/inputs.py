@@ -31,8 +31,9 @@ class _Input(Sensor):
     def read(self) -> bool:
         """Read the messages of the last step.
 
-        The number of messages is unknown. But the stub and MuJoCo respond to a request only after they have
-        sent the messages of the step. Webots may send them later; they are then read in the next step.
+        The number of messages is unknown, so this method first sends a request. The stub and MuJoCo respond
+        to this request only after they have sent the messages of the step. Webots may send the messages
+        later; they are then read in the next step.
 
         Raises:
             SimulatorDead, SimulatorHung, WrongData: as `RosService` and `RosSubscriber`.
@@ -98,7 +99,7 @@ class JoystickState(NamedTuple):
 
     Attributes:
         buttons: the number of the button that was pressed in the last step. If several buttons are pressed,
-            a simulator sends only the first one.
+            a simulator sends only the first button.
         axes: the position of each axis, -128 to 127; 0 until a joystick is connected.
         povs: the direction of each hat switch (point of view); 0 until a joystick is connected.
     """

@@ -40,7 +40,7 @@ class FocusInfo(NamedTuple):
 
 
 class ZoomInfo(NamedTuple):
-    """The fields of view that a camera can have, in rad; both are the present one without a Zoom node."""
+    """The least and the greatest field of view of a camera, in rad; equal if it has no Zoom node."""
 
     min_rad: float
     max_rad: float

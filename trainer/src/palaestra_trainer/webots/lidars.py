@@ -18,7 +18,10 @@ from palaestra_trainer.webots.lenses import LIDAR_FREQUENCY, LIDAR_INFO
 
 
 class _LidarSensor(NodeSensor):
-    """Something that a lidar publishes; every method may raise SimulatorDead, SimulatorHung or WrongData."""
+    """The base of sensors whose readings a lidar publishes.
+
+    Every method may raise SimulatorDead, SimulatorHung or WrongData.
+    """
 
     __slots__ = ()
     nodes = ("Lidar",)
@@ -26,7 +29,7 @@ class _LidarSensor(NodeSensor):
     frequency = LIDAR_FREQUENCY
 
     def _require_layer(self, number: int) -> None:
-        """Check a request for a layer, because Webots ends if it cannot answer.
+        """Check a request for a layer, because Webots ends if it cannot fulfill the request.
 
         Raises:
             NoReading: the lidar has not measured yet.

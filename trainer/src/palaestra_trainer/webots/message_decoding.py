@@ -49,7 +49,8 @@ class NumberReading:
             struct.error: the message ends within its header.
         """
         layout = self._layout
-        # This is `_numbers` for the usual case, without a call: a step reads a dozen messages.
+        # The next lines repeat the usual case of `_numbers` without a call, because a step reads a dozen
+        # messages.
         numbers = layout.unpack(message) if len(message) == layout.size else (-1,)
         if numbers[0] != self._frame_id_bytes:
             numbers = self._numbers(message)

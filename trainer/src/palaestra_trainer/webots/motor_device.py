@@ -63,10 +63,10 @@ class MotorDevice(JointDevice):
         )
 
     def set_acceleration(self, acceleration: float) -> None:
-        """Set the greatest acceleration under position and velocity control; -1 means without a limit.
+        """Set the greatest acceleration under position and velocity control; -1 means no limit.
 
         Raises:
-            ConfigurationError: it is neither -1 nor 0 or more; Webots would ignore it.
+            ConfigurationError: the value is not finite, or is negative and not -1; Webots would ignore it.
         """
         if not (math.isfinite(acceleration) and (acceleration >= 0.0 or acceleration == NO_LIMIT)):
             raise ConfigurationError(
@@ -79,8 +79,8 @@ class MotorDevice(JointDevice):
         """Set the torque or force that the motor may use, from 0 to `limits.max_effort`.
 
         Raises:
-            ConfigurationError: it is outside of this range; Webots would use the limit instead.
-            WrongData: also in the stub, if it is neither 0 nor the limit.
+            ConfigurationError: the effort is outside this range; Webots would use the limit instead.
+            WrongData: also if the simulator is the stub, and the effort is neither 0 nor the limit.
         """
         effort_name = self._effort()
         most = self._number(f"get_max_{effort_name}")

@@ -188,7 +188,7 @@ class Observer:
         """Return the node with this `id`.
 
         Raises:
-            WrongData: also if no node has it.
+            WrongData: also if no node has this `id`.
         """
         service = self._services.get("supervisor/get_from_id", "supervisor_get_from_id")
         return self._found(service(id=number).node, f"no node has the id {number}")
@@ -203,7 +203,7 @@ class Observer:
         return WorldNode(self._services, int(handle)) if handle else None
 
     def headset_pose(self) -> tuple[Vector, Quaternion] | None:
-        """Return the pose, in the world, of a virtual-reality headset; None if none is used."""
+        """Return the pose, in the world, of a virtual-reality headset; None if no headset is used."""
         if not self._services.ask(f"{_HEADSET}_is_used", "get_bool"):
             return None
         at, turn = (

@@ -98,7 +98,7 @@ class Connector(OutputDevice):
     locked = flag_fact("is_locked", "Whether the connector is locked, with or without a partner.")
 
     def lock(self) -> None:
-        """Lock to the connector in front; if the world sets `autoLock`, also to one that comes later."""
+        """Lock to the connector in front; with `autoLock` in the world, also to one that arrives later."""
         self._command("lock", "set_bool", value=True)
 
     def unlock(self) -> None:
@@ -109,7 +109,7 @@ class Connector(OutputDevice):
 class ConnectorPresence(NodeSensor):
     """The sensor in a connector; `value` is 1 if another connector can be locked, else 0.
 
-    A passive connector cannot detect another one; its `value` is -1.
+    A passive connector cannot detect another connector; its `value` is -1.
     """
 
     __slots__ = ()
@@ -123,10 +123,10 @@ class ConnectorPresence(NodeSensor):
 
 
 class VacuumGripper(OutputDevice):
-    """A gripper that holds what it touches while it is on.
+    """A gripper that, while it is switched on, holds the object that touches it.
 
-    The stub and MuJoCo hold nothing, so they refuse to switch a gripper with a boundingObject on. Every
-    method may raise SimulatorDead, SimulatorHung or WrongData.
+    The stub and MuJoCo do not simulate this, so they refuse to switch on a gripper with a boundingObject.
+    Every method may raise SimulatorDead, SimulatorHung or WrongData.
     """
 
     __slots__ = ()
@@ -181,7 +181,7 @@ class Emitter(OutputDevice):
         self._require_kept("channel", channel, self.channel)
 
     def set_range(self, range_m: float) -> None:
-        """Set the range in meters; -1 means without a limit.
+        """Set the range in meters; -1 means no limit.
 
         Raises:
             WrongData: also if the range is larger than the emitter's maxRange.

@@ -54,7 +54,7 @@ class RobotController(Device):
     )
     custom_data = text_fact(
         "get_custom_data",
-        "The field `customData` of the robot; a reset of an environment writes its seed to the supervisor's.",
+        "The robot's field `customData`; a reset of an environment writes the seed to the supervisor's one.",
     )
     control_mode = Fact(
         "get_mode", "get_int", lambda response: RobotMode(response.value), "The robot that is controlled."
@@ -90,7 +90,7 @@ class RobotController(Device):
             timeout_s: the longest wait in seconds of real time, at most an hour.
 
         Raises:
-            ConfigurationError: the timeout is negative or longer.
+            ConfigurationError: the timeout is negative, or longer than an hour.
             SimulatorDead: also if Webots ends during the wait.
         """
         if not 0.0 <= timeout_s <= _LONGEST_WAIT_S:

@@ -66,7 +66,7 @@ class Services:
             raise WrongData(self.node_name, f"{what} is not finite: {numbers}")
 
     def require_kept(self, device: str, what: str, wanted: float, actual: float) -> None:
-        """Check that the simulator has not only confirmed a value of a device, but also set it.
+        """Check that the simulator has set a value of a device; its confirmation does not prove this.
 
         Raises:
             WrongData: the simulator ignored the value, as Webots does with some values.

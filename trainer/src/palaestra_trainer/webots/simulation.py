@@ -226,7 +226,7 @@ class Stepper:
             silent = self._read_sensors()
             for name in self._tracked:
                 self._tracked[name] = self._observer.finish_pose(name)
-        except BaseException:  # for Ctrl-C too: messages of this step may arrive later
+        except BaseException:  # also Ctrl-C, because messages of this step may arrive later
             for sensor in self._sensors:
                 sensor.late = True
             raise

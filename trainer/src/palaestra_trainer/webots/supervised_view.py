@@ -35,7 +35,7 @@ class SupervisedView:
             visible: whether the viewer shows the node.
 
         Raises:
-            ConfigurationError: the viewer is another node.
+            ConfigurationError: the viewer is a node of another type.
         """
         source = self._observer.node(viewer) if viewer else self._viewpoint()
         kind = self._observer.find(viewer).base_type_name if viewer else "Viewpoint"
@@ -56,7 +56,7 @@ class SupervisedView:
             quality: 1 to 100, for JPEG.
 
         Raises:
-            WrongData: also if the simulator cannot render, as the stub cannot, or cannot write the file.
+            WrongData: also if the simulator cannot render (the stub cannot), or cannot write the file.
         """
         self._confirm("export_image", "save_image", path, filename=str(path), quality=quality)
 
@@ -68,7 +68,7 @@ class SupervisedView:
             settings: size, quality and speed; None: the defaults of `MovieSettings`.
 
         Raises:
-            WrongData: also if the simulator does not render, as the stub.
+            WrongData: also if the simulator cannot render (the stub cannot).
         """
         wanted = settings or MovieSettings()
         width, height = wanted.size

@@ -69,7 +69,7 @@ class Supervisor(SupervisedView):
         The supervisor of the new world must have the same ROS name.
 
         Raises:
-            WrongData: also if the simulator refuses the world; it then keeps the old one.
+            WrongData: also if the simulator refuses the world; it then keeps the old world.
         """
         service = self._services.get("supervisor/world_load", "set_string")
         service.begin(value=str(path))
@@ -135,7 +135,7 @@ class Supervisor(SupervisedView):
     def track_field(self, name: str, field: str, period_ms: int) -> None:
         """Make Webots send a field of one value every `period_ms`, so that reading it takes less time.
 
-        0 ends this. The stub and MuJoCo confirm the call, and are as fast without it.
+        A period of 0 ends this. The stub and MuJoCo confirm the call, and are as fast without it.
         """
         where, handle = f"{name}.{field}", self._observer.field(name, field)
         if tracks(period_ms):
@@ -187,7 +187,7 @@ class Supervisor(SupervisedView):
         self._confirm(f"field/insert_{kind}", f"field_set_{kind}", f"{name}.{field}", index=index, **request)
 
     def remove_value(self, name: str, field: str, index: int = -1) -> None:
-        """Remove a value, or a node, from a field with several values; -1: the last one.
+        """Remove a value, or a node, from a field with several values; `index` -1 is the last.
 
         Raises:
             WrongData: also if the field has no such value.
@@ -233,7 +233,7 @@ class Supervisor(SupervisedView):
             relative: whether the force is in the axes of the node; if not, it is in the axes of the world.
 
         Raises:
-            WrongData: also if the simulator does not simulate forces; an example is the stub.
+            WrongData: also if the simulator does not simulate forces (the stub does not).
         """
         push = {"node": self._observer.node(name), "force": _xyz(force), "relative": relative}
         if offset is None:

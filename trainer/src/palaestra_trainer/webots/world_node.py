@@ -38,7 +38,7 @@ class WorldNode:
         self.handle = handle
 
     def __eq__(self, other: object) -> bool:
-        """Return whether both are the same node of the same simulator."""
+        """Return whether the other object is the same node of the same simulator."""
         return isinstance(other, WorldNode) and other._key() == self._key()
 
     def __hash__(self) -> int:
@@ -55,7 +55,7 @@ class WorldNode:
 
     @property
     def definition(self) -> str:
-        """The DEF name; "" without one."""
+        """The DEF name; "" if the node has none."""
         return str(self._ask("get_def", "node_get_name").name)
 
     @property
@@ -90,12 +90,12 @@ class WorldNode:
         return tuple(self._field(index) for index in range(count))
 
     def nodes(self, field: str = "children") -> tuple[WorldNode, ...]:
-        """Return the nodes in a field; a field of one node has at most one.
+        """Return the nodes in a field; a field for a single node holds one node or none.
 
-        A node without the field `children` has no children.
+        If the node has no field `children`, the result is empty.
 
         Raises:
-            WrongData: also if the node has no such other field, or the field does not hold nodes.
+            WrongData: also if the node has no such field, except `children`, or the field holds values.
         """
         handle = self._ask_for_field(field)
         if not handle and field == "children":
@@ -129,7 +129,7 @@ class WorldNode:
         The rotation is a quaternion: x, y, z, w.
 
         Raises:
-            WrongData: also if the node has no position, as a Group.
+            WrongData: also if the node has no position (a Group has none).
         """
         at = self._ask("get_position", "node_get_position").position
         turn = self._ask("get_orientation", "node_get_orientation").orientation
@@ -156,7 +156,7 @@ class WorldNode:
     def track_pose(self, frame: WorldNode, period_ms: int) -> None:
         """Make Webots send `pose_in(frame)` every `period_ms`, so that reading it takes less time.
 
-        0 ends this. The stub and MuJoCo confirm the call, and are as fast without it.
+        A period of 0 ends this. The stub and MuJoCo confirm the call, and are as fast without it.
         """
         if tracks(period_ms):
             self._command("enable_pose_tracking", sampling_period=period_ms, from_node=frame.handle)

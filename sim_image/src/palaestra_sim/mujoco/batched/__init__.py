@@ -4,7 +4,7 @@
 - `world`: the interface of a batched world, and the readings of a step
 - `rows`: MuJoCo's batch of one model: steps, failed rows, a saved state
 - `scene_batch`: a world with a robot on wheels
-- `scene_checks`: lists what `scene_batch` cannot do
+- `scene_checks`: lists the parts of a world that `scene_batch` cannot simulate
 - `clearance`: finds the rows whose robot cannot touch anything
 - `program`: loads the world and serves its copies until a signal
 - `wheels`: the bases of all rows, as arrays
@@ -13,5 +13,6 @@
 - `model_batch`: a world that is a model of MuJoCo
 - `trigonometry`: functions of arrays that return the same bits as Python's `math`
 
-Every row gives the values of the single simulation, bit for bit: the same arithmetic, on arrays.
+A *row* is one copy. The *single simulation* is the simulation of one copy, without this package. Every row
+has the same values as the single simulation, bit for bit, because both use the same arithmetic.
 """

@@ -1,8 +1,8 @@
-"""Find the rows whose robot cannot touch anything for some milliseconds, whatever its motors do.
+"""Find the rows whose robot cannot touch anything for some milliseconds, for any commands of its motors.
 
-These rows are stepped with a model without shapes. The answer is a bound, not an estimate: seen from above, a
-circle around the robot, grown by the longest way that its servos allow, does not meet the outline of any
-obstacle.
+These rows are stepped with a model without shapes. A row counts as free only if, seen from above, a circle
+around its robot does not meet the outline of any obstacle. The circle has the size of the robot plus the
+longest way that the robot's servos allow.
 """
 
 from __future__ import annotations

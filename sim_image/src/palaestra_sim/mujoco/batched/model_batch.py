@@ -25,7 +25,7 @@ _QUANTITIES: Final = {
     Control.VELOCITY: ("velocity",),
     Control.POSITION: ("position",),
 }
-# The device of such a sensor limits the value. This class does not limit it, and so refuses the sensor.
+# The device of such a sensor limits the value. This class cannot limit values, so it refuses the sensor.
 _CLIPPED: Final = int(mujoco.mjtSensor.mjSENS_RANGEFINDER)
 
 
@@ -33,7 +33,7 @@ class ModelBatch:
     """`count` copies of a model; see `BatchWorld`.
 
     Args:
-        simulation: the single simulation.
+        simulation: the simulation of one copy.
         name: the name of the model's file, in errors.
         count: the number of copies.
         threads: the number of threads; 0: one for each processor.
@@ -44,7 +44,7 @@ class ModelBatch:
         self._count, self._threads = count, threads
 
     def open(self, request: BatchRequest) -> BatchDescription:
-        """Use these devices from now on; see `BatchWorld`."""
+        """Use the devices of the request from now on; see `BatchWorld`."""
         if lacks := list(self._lacks(request)):
             raise BatchRefusedError(self._name, lacks, "change the robot of the job, or the model")
         simulation, equipment = self._simulation, self._simulation.equipment
@@ -85,7 +85,7 @@ class ModelBatch:
         return self._period(rows)
 
     def _command(self, rows: Any, commands: Any) -> None:
-        """Set the controls that a motor sets for its command; NaN leaves a control as it is."""
+        """Set the controls of the motors for these commands; a command of NaN does not change a control."""
         held = self._scale * np.maximum(self._low, np.minimum(self._high, commands))
         for column, control in enumerate(self._controls):
             known = self._rows.ctrl[rows, control]
@@ -104,13 +104,13 @@ class ModelBatch:
         return BatchReadings(values, np.zeros((len(values), 3)), failed, dict(self._rows.reasons))
 
     def _read_limits(self, request: BatchRequest) -> None:
-        """Read what a command of 1 means for the control of each motor, and the limits of its commands."""
+        """Read, for each motor, the control that a command of 1 sets, and the limits of the commands."""
         rows = [_limits(device) for device in map(self._device, request.motors)]
         table = np.array(rows, np.float64).reshape(len(rows), 3)
         self._scale, self._low, self._high = table.T
 
     def _joints(self, request: BatchRequest) -> Iterator[int]:
-        """Yield the numbers of the joints of a request, without the unknown ones."""
+        """Yield the numbers of the joints of a request; skip the names of unknown joints."""
         for name in request.joints:
             node = self._simulation.tree.of_def(name)
             if node is not None and node in self._simulation.nodes.joints:
@@ -147,7 +147,7 @@ _ENDLESS: Final = (-math.inf, math.inf)
 
 
 def _lack_of_motor(device: object, commanded: str) -> str:
-    """Return the reason that refuses a command of this kind for a device; "" if the device takes it."""
+    """Return the reason why a device refuses this kind of command; "" if the device accepts it."""
     if isinstance(device, MujocoActuator):
         return "" if commanded == "control" else "is commanded by control"
     if not isinstance(device, ActuatorMotor):
@@ -157,7 +157,7 @@ def _lack_of_motor(device: object, commanded: str) -> str:
 
 
 def _limits(device: object) -> tuple[float, float, float]:
-    """Return the control for a command of 1, and the least and the greatest command, as `ActuatorMotor`."""
+    """Return the control for a command of 1, and the least and greatest command, as in `ActuatorMotor`."""
     if isinstance(device, MujocoActuator):
         return 1.0, device.low, device.high
     if not isinstance(device, ActuatorMotor):

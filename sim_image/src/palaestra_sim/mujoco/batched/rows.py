@@ -10,7 +10,7 @@ import numpy as np
 from palaestra_sim.mujoco.library import mujoco
 
 _STATE: Final = mujoco.mjtState.mjSTATE_INTEGRATION
-_TIMES: Final = 1  # the index, in a warning, of the number of its occurrences
+_TIMES: Final = 1  # index of the field of a warning that counts its occurrences
 _BAD: Final = [
     int(kind)
     for kind in (
@@ -33,14 +33,15 @@ class Rows:
         sleeping: whether bodies may sleep, if the model allows it.
 
     Attributes:
-        count: see above.
+        count: the number of copies.
         batch: MuJoCo's batch.
         qpos, qvel, ctrl, sensordata: live arrays of all rows.
-        reasons: for each failed row, what happened.
+        reasons: the reason of the failure, for each failed row.
     """
 
     def __init__(self, model: Any, data: Any, count: int, threads: int, *, sleeping: bool = True) -> None:
-        # By default MuJoCo resets a copy silently when a value is not finite. The trainer must see it.
+        # By default, MuJoCo resets a copy silently if a value is not finite. Without this reset, `failed`
+        # reports the row to the trainer.
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
         # Bodies that sleep need one MjData for each copy; the bodies of a scene's batch never sleep.
         if not sleeping:
@@ -57,18 +58,18 @@ class Rows:
         self.qpos, self.qvel = self.batch.bind("qpos"), self.batch.bind("qvel")
         self.ctrl, self.sensordata = self.batch.bind("ctrl"), self.batch.bind("sensordata")
         self._warm_start = self.batch.bind("qacc_warmstart")
-        self._motion = (self.qpos, self.qvel, self._warm_start)  # what a step without contacts changes
+        self._motion = (self.qpos, self.qvel, self._warm_start)  # arrays that a step without contacts changes
         self.batch.forward()
 
     def restart(self, rows: Any) -> None:
-        """Return rows to the start; a failed row is whole again."""
+        """Return rows to the start; a failed row can then be used again."""
         self.batch.state[rows] = self._start
         self.batch.warning[rows] = 0
         for row in rows.tolist():
             self.reasons.pop(row, None)
 
     def step(self, rows: Any, count: int) -> None:
-        """Take `count` of MuJoCo's steps in these rows, None for all; record the rows in which it raised."""
+        """Take `count` MuJoCo steps in these rows (None: all); record the rows for which MuJoCo raised."""
         try:
             self.batch.step(rows, count)
         except self._error:
@@ -96,9 +97,10 @@ class Rows:
             self._note(rows)
 
     def failed(self, rows: Any) -> Any:
-        """Return for each of these rows, None for all, whether it failed.
+        """Return for each of these rows (None: all rows) whether it failed.
 
-        A row fails if MuJoCo raised, or if a position, speed or control is not finite, or huge for MuJoCo.
+        A row fails if MuJoCo raised an error, or if a position, speed or control is not finite or is larger
+        than MuJoCo allows.
         """
         chosen = slice(None) if rows is None else rows
         finite = np.isfinite(self.qpos[chosen]).all(axis=1) & np.isfinite(self.qvel[chosen]).all(axis=1)

@@ -1,7 +1,7 @@
 """Many copies of a world in which one robot drives on wheels.
 
-The single simulation of the world gives the model, the sensors and the state to which a reset returns. The
-arrays of this module then do what its robot does: wheels, servos, contacts, rays.
+A simulation of one copy gives the model, the sensors and the state to which a reset returns. The arrays of
+this module then compute the wheels, servos, contacts and rays of the robot in each copy.
 """
 
 from __future__ import annotations
@@ -38,7 +38,8 @@ class SceneBatch:
     """`count` copies of a world; see `BatchWorld`.
 
     Args:
-        simulation: the single simulation, whose physics has contact sensors (`MujocoPhysics(feeling=True)`).
+        simulation: the simulation of one copy; its physics, `MujocoPhysics(feeling=True)`, has contact
+            sensors.
         name: the name of the world file, in errors.
         count: the number of copies.
         threads: the number of threads; 0: one for each processor.
@@ -57,7 +58,7 @@ class SceneBatch:
         self._numbers = np.arange(count)
 
     def open(self, request: BatchRequest) -> BatchDescription:
-        """Use these devices from now on; see `BatchWorld`."""
+        """Use the devices of the request from now on; see `BatchWorld`."""
         if lacks := list(lacks_of_request(self._simulation, request)):
             raise BatchRefusedError(self._name, lacks, "change the robot of the job, or the world")
         self._simulation.reset()
@@ -103,7 +104,8 @@ class SceneBatch:
         self._bases.restart(rows, self._start)
         self._touched[rows] = False
         self._noise.sow(rows, reset.seeds)
-        self._noise.draw(rows)  # the single simulation samples once between its reset and the placement
+        # Skip one sample, because the single simulation also samples once between reset and placement.
+        self._noise.draw(rows)
         if reset.places.size:
             placed = np.array([_pose(place) for place in reset.places.tolist()])
             self._bases.x[rows], self._bases.y[rows], self._bases.heading_rad[rows] = placed.T
@@ -126,7 +128,7 @@ class SceneBatch:
         return bases
 
     def _of_wheels(self, commands: Any) -> Any:
-        """Return commands for all wheels, NaN for those that the trainer does not command."""
+        """Return commands for all wheels; NaN for the wheels that the trainer does not command."""
         found = np.full((len(commands), self._wheels), np.nan)
         found[:, self._motors] = commands
         return found
@@ -146,7 +148,7 @@ class SceneBatch:
         self._bases.follow(chosen, np.where(np.isfinite(positions), positions, 0.0), self._step_s)
 
     def _advance(self, rows: Any, steps: int) -> None:
-        """Take `steps` of MuJoCo's steps in rows; a row that may touch something takes them in two halves."""
+        """Take `steps` MuJoCo steps in rows, in two halves for a row whose robot may touch something."""
         stepped = self._rows
         free = self._clearance.free(stepped.qpos[rows], stepped.qvel[rows], steps * self._timestep_s)
         if free.any():
@@ -183,7 +185,7 @@ class SceneBatch:
 
 
 def _pose(place: list[float]) -> tuple[float, float, float]:
-    """Return x, y and heading for x, y and a quaternion, as a write of the fields of the robot sets them."""
+    """Return the x, y and heading that a robot gets if a client writes this position and quaternion."""
     x, y, *quaternion = place
     rotation = from_axis_angle(quaternion_to_axis_angle(*quaternion))
     return x, y, Pose(rotation=rotation).heading_rad

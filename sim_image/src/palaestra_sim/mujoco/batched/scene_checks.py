@@ -1,4 +1,4 @@
-"""List what the batch form of a world with a robot on wheels cannot do; nothing is approximated."""
+"""List the parts of a world with a wheeled robot that the batch form cannot simulate exactly."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _SIMPLE = (DistanceSensorType.GENERIC, DistanceSensorType.LASER)
 
 
 def lacks_of_world(simulation: Simulation) -> Iterator[str]:
-    """Yield what the batch form does not simulate in a world."""
+    """Yield, in words, each part of a world that the batch form does not simulate."""
     if len(simulation.robots) != 1:
         yield f"simulates one robot, and the world has {len(simulation.robots)}"
     if simulation.scene.loose:
@@ -35,7 +35,7 @@ def lacks_of_world(simulation: Simulation) -> Iterator[str]:
 
 
 def lacks_of_request(simulation: Simulation, request: BatchRequest) -> Iterator[str]:
-    """Yield what a trainer needs and the batch form of this world does not have."""
+    """Yield, in words, each part of a trainer's request that the batch form of this world does not have."""
     [robot] = simulation.robots
     if request.period_ms % simulation.basic_step_ms:
         yield f"{request.period_ms} ms is not a multiple of the basic step of {simulation.basic_step_ms} ms"
@@ -67,7 +67,7 @@ def _lacks_of_robot(robot: Robot) -> Iterator[str]:
 
 
 def _lack_of_device(robot: Robot, device: object, node: str) -> str:
-    """Return the kind of a device that is not simulated; "" if it is."""
+    """Return the kind of a device that is not simulated; "" if the device is simulated."""
     match device:
         case Motor():
             wheel = robot.body is not None and robot.body.base.has(device)

@@ -1,7 +1,8 @@
 """The readings of all rows as arrays: the samplers of DistanceSensor, TouchSensor and PositionSensor.
 
-The noise of a row comes from Python's generator, in the order in which the robot's samplers draw it. So this
-loop over rows is the price of equal bits: about 0.2 microseconds for each number.
+The noise of a row comes from Python's generator, in the order in which the robot's samplers draw it. Only so
+do the rows have the same bits as the single simulation. This needs a loop over rows, which takes about 0.2
+microseconds for each number.
 """
 
 from __future__ import annotations
@@ -26,11 +27,11 @@ UNITS: Final = {DistanceSensor: "of its lookupTable", TouchSensor: "0 or 1", Pos
 
 
 class Noise:
-    """The noise of all rows, which are independent generators.
+    """The noise of all rows; each row has its own generator.
 
     Args:
         count: the number of rows.
-        draws: the numbers that a row draws at each sample.
+        draws: the number of random numbers that a row draws at each sample.
     """
 
     def __init__(self, count: int, draws: int) -> None:
@@ -38,12 +39,12 @@ class Noise:
         self._draws = range(draws)
 
     def sow(self, rows: Any, seeds: Any) -> None:
-        """Restart the noise of rows."""
+        """Restart the noise of rows with these seeds."""
         for row, seed in zip(rows.tolist(), seeds.tolist(), strict=True):
             self._generators[row].seed(seed)
 
     def draw(self, rows: Any) -> Any:
-        """Return the next numbers of rows, None for all: (rows, draws)."""
+        """Return the next random numbers of rows (None: all rows), as an array (rows, draws)."""
         chosen = self._generators if rows is None else [self._generators[row] for row in rows.tolist()]
         draws = self._draws
         numbers = [gauss(0.0, 1.0) for gauss in _gausses(chosen) for _ in draws]
@@ -58,12 +59,12 @@ class Sensors:
     """The sensors of one robot in all rows.
 
     Args:
-        robot: the robot of the single simulation, whose sensors these are.
-        built: its model, with one contact sensor for each part of the robot.
+        robot: the robot of the single simulation; it has the sensors.
+        built: the model of the robot, with one contact sensor for each part of the robot.
 
     Attributes:
         names: the names of the sensors, in the order of `values`.
-        draws: the random numbers that a row draws at each sample.
+        draws: the number of random numbers that a row draws at each sample.
     """
 
     def __init__(self, robot: Robot, built: Built) -> None:
@@ -96,7 +97,7 @@ class Sensors:
         """Return the readings of some rows: (rows, sensors).
 
         Args:
-            cast: the distances of `cast`.
+            cast: the distances that the method `cast` returned.
             touched: whether each part of the robot was touched since the last sample (rows, parts).
             angles_rad: the angles of the wheels (rows, wheels).
             noise: random numbers (rows, draws).

@@ -1,7 +1,7 @@
 """The socket on which a trainer requests steps and resets of many copies of a world.
 
-One client at a time: a new connection replaces the old one, because a trainer that lost a response connects
-again. While no request is there, the simulator uses no processor time.
+The server has one client at a time. A new connection replaces the old one, because a trainer that lost a
+response connects again. Between requests, the simulator uses no processor time.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ from palaestra_protocol.whole_file import write_whole
 from palaestra_sim.errors import SimError
 from palaestra_sim.mujoco.batched.world import BatchReadings, BatchWorld, Reset
 
-FRAME_S: Final = 10.0  # the longest time for the rest of a frame that has begun, and for a response
+FRAME_S: Final = 10.0  # time limit for reading a frame after its first byte, and for sending a response
 _LOOPBACK: Final = "127.0.0.1"
 
 log = logging.getLogger(__name__)
 
 
 class Stopped(Exception):
-    """The program was asked to end."""
+    """`BatchServer.stop` was called, so `run` has to return."""
 
 
 class BatchServer:
@@ -50,7 +50,7 @@ class BatchServer:
     Args:
         world: the world.
         rows: the number of copies.
-        address_file: the file that gets the address, `host:port`; None: it is only logged.
+        address_file: the file to which the address is written, as `host:port`; None: it is only logged.
     """
 
     def __init__(self, world: BatchWorld, rows: int, address_file: Path | None) -> None:
@@ -156,7 +156,7 @@ class BatchServer:
 
 
 def _read(readings: BatchReadings) -> bytes:
-    failed = readings.failed[:, None]  # a failed row may have any number; its readings are 0
+    failed = readings.failed[:, None]  # the numbers of a failed row are meaningless, so zeros are sent
     values = np.where(failed, 0.0, readings.values).astype("<f8").tobytes()
     poses = np.where(failed, 0.0, readings.poses).astype("<f8").tobytes()
     return read_frame(values, poses, readings.failed.astype(np.uint8).tobytes(), readings.reasons)
@@ -167,7 +167,7 @@ def _received(client: socket.socket) -> tuple[FrameKind, bytes]:
 
     Raises:
         EOFError, OSError: the connection ended, or the frame did not come in time.
-        ProtocolError: it is not a frame.
+        ProtocolError: the bytes are not a frame.
     """
     give_up = time.monotonic() + FRAME_S
     kind, length = kind_and_length(_exactly(client, HEADER.size, give_up))

@@ -1,4 +1,4 @@
-"""Functions of arrays that return the same bits as Python's `math`, which NumPy's own functions do not."""
+"""Functions of arrays that return the same bits as Python's `math`; NumPy's results have other bits."""
 
 from __future__ import annotations
 
@@ -28,7 +28,8 @@ def arc_tangents(y: Any, x: Any) -> Any:
 def within_half_turn(angles: Any) -> Any:
     """Return each angle in [-pi, pi], as `math.remainder(angle, 2 * pi)`.
 
-    Both C's fmod and the subtraction of one turn from a rest between half a turn and a turn are exact.
+    Both operations are exact: C's fmod, and the subtraction of a whole turn from a rest that is between half
+    a turn and a whole turn.
     """
     rest = np.fmod(angles, TURN)
     return np.where(np.abs(rest) > math.pi, rest - np.copysign(TURN, rest), rest)

@@ -1,6 +1,6 @@
-"""The bases of all rows as arrays: what `MobileBase` and `MujocoBody` compute for one robot.
+"""The bases of all rows as arrays; `MobileBase` and `MujocoBody` compute the same values for one robot.
 
-The order of the arithmetic is the one of those classes, so that each row has the same bits.
+The arithmetic operations have the same order as in those classes, so that each row has the same bits.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class Bases:
         self.x[rows], self.y[rows], self.heading_rad[rows] = start
 
     def command(self, rows: Any, commands: Any) -> None:
-        """Set the velocities of the motors in rad/s, clipped to their limits; NaN leaves a motor as it is."""
+        """Set the motors' velocities in rad/s, clipped to their limits; for NaN, keep the old velocity."""
         clipped = np.maximum(-self._limits, np.minimum(self._limits, commands * self._multipliers))
         self._commands[rows] = np.where(np.isnan(commands), self._commands[rows], clipped)
 

@@ -11,7 +11,7 @@ from palaestra_sim.errors import SimError
 
 
 class BatchRefusedError(SimError, ValueError):
-    """The batch form of the simulator cannot do what a world or a trainer needs; the message lists it all."""
+    """The batch form of the simulator lacks parts that a world or a trainer needs; the message lists them."""
 
     def __init__(self, world: str, lacks: Sequence[str], remedy: str) -> None:
         super().__init__(f"{world}: --batch: {'; '.join(dict.fromkeys(lacks))}; {remedy}")
@@ -31,7 +31,7 @@ class Reset:
     """A reset of some rows.
 
     Attributes:
-        rows: the numbers of the rows, which increase.
+        rows: the numbers of the rows, in increasing order.
         seeds: the seed of each row's noise.
         places: for each row, x, y and the quaternion of the robot; an empty array leaves the robot where the
             world has it.
@@ -50,7 +50,7 @@ class BatchWorld(Protocol):
     """Many copies of one world."""
 
     def open(self, request: BatchRequest) -> BatchDescription:
-        """Use these devices from now on; return the number of copies, the basic step and the units.
+        """Use the devices of the request from now on; return the number of copies, basic step and units.
 
         Raises:
             BatchRefusedError: the world lacks a device or node, or the period does not fit.

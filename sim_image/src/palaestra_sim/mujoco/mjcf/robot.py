@@ -60,8 +60,9 @@ def equip(model: Model, description: Description, leave_out: LeaveOut) -> Equipm
 def body_of(model: Any) -> int | None:
     """Return the number of the robot's body.
 
-    It is the top-level body that contains the joint or site of the first actuator that has one. If actuators
-    move only tendons, it is the first body. Return None if the model has no body.
+    The first actuator with a joint or a site decides: the robot is the top-level body that contains this
+    joint or site. If actuators move only tendons, the robot is the first body. Return None if the model has
+    no body.
     """
     for index in range(model.nu):
         joint, site = motors.joint_of(model, index), int(model.actuator_trnid[index][0])
@@ -183,9 +184,9 @@ class _Fitter:
     def _name(self, section: str, default: str, other: str, folder: str = "") -> str | None:
         """Return the name of a device, with the prefix `folder`; None if the user left the device out.
 
-        MuJoCo allows all characters in names, but ROS allows only a few, so the others are replaced. In a
-        model, names are unique only within a section. If a device of another section already has the name,
-        this device gets the name `other`.
+        MuJoCo allows all characters in names; characters that ROS does not allow are replaced. In a model, a
+        sensor and a camera, for example, may have the same name. If a device of another `section` already has
+        the name, this device gets the name `other`.
         """
         key = f"{section}/{default}"
         self._known.add(key)
@@ -204,7 +205,7 @@ class _Fitter:
         return True
 
     def _unknown(self) -> Iterator[WorldError]:
-        """Yield an error for each device that `<custom>` names and that the model does not have."""
+        """Yield an error for each device in `<custom>` that the model does not have."""
         for key in self._names:
             if key not in self._known:
                 section = key.partition("/")[0] + "/"

@@ -24,7 +24,7 @@ Fields = dict[str, Any]
 class _Codec(NamedTuple):
     """Converts the values of a field type to and from messages.
 
-    `absent` is the result of a read of a field that has no such value; None if the read fails.
+    `absent` is the result of a read if the field has no value of this type. None means that the read fails.
     """
 
     type: FieldType

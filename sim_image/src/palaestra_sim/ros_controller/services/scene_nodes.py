@@ -1,7 +1,7 @@
 """Services under `supervisor/node/`: read the type and the pose of a node, and change the node.
 
 If the simulator does not support a request, such as a force in the stub, the call fails with the reason. A
-call without an effect never returns success.
+hint that affects only Webots' speed or rendering returns success and has no effect.
 """
 
 from __future__ import annotations

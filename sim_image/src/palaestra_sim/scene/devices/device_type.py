@@ -81,7 +81,7 @@ class DevicePart:
         reading: the reader of the world's nodes.
         lacks: records that a node of the robot cannot be simulated.
         node: the node of the device.
-        name: the name of the device in the world file; without one, the default name of its type.
+        name: the name of the device in the world file, or else the default name of its type.
         place: the device's frame, in the robot's frame; for a device on a joint, the frame of the joint.
         shaft: the joint on which the device is; None if the device is not on a joint.
         outline: the shapes with which the robot collides.
@@ -163,11 +163,11 @@ class Carrier(Protocol):
         ...
 
     def look(self, beams: Sequence[Beam]) -> Callable[[], Sequence[float]]:
-        """Return a function that returns how far each beam travels, in meters."""
+        """Return a function that returns the distance in meters that each beam travels."""
         ...
 
     def see(self, beams: Sequence[Beam]) -> Callable[[], Sequence[float]]:
-        """Return a function as `look` does, for beams that stop at visible shapes, but not at the robot."""
+        """Return a function like `look`; but the beams stop at visible shapes, except those of the robot."""
         ...
 
     def reflect(self, beams: Sequence[Beam]) -> Callable[[], Sequence[Glance]]:

@@ -1,6 +1,6 @@
 """Display: an image that a program draws, optionally on top of the image of a camera.
 
-Text uses Pillow's built-in font, whatever font a client requests. Cameras do not see displays.
+Text always uses Pillow's built-in font; the name of a requested font is ignored. Cameras do not see displays.
 Source: WbDisplay.cpp of Webots.
 """
 

@@ -166,7 +166,7 @@ def _many(count: int) -> list[tuple[float, float]]:
 
 
 def _direction(alpha: float, theta: float) -> Vector:
-    """Return the direction at the angle `theta` to the axis; `alpha` rotates it about the axis, 0 is up."""
+    """Return the direction at the angle `theta` to the axis, rotated about the axis by `alpha` from up."""
     alpha += math.pi / 2.0
     return math.cos(theta), math.sin(theta) * math.sin(alpha), -math.sin(theta) * math.cos(alpha)
 

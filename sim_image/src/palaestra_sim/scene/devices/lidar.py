@@ -1,8 +1,8 @@
 """Lidar: layers of rays, whose distances are published as a range image, laser scans and a point cloud.
 
-Each layer is a row of the image, from the top down. In a row, the rays go from left to right. The rays are
-cast at each step, but only while the lidar is enabled, because they cost time. The distance of an object
-nearer than `minRange` or beyond `maxRange` is infinite.
+Each layer is a row of the image, from the top down. In a row, the rays go from left to right. While the lidar
+is enabled, its rays are cast at each step. At other times no ray is cast, to save time. The distance of an
+object nearer than `minRange` or beyond `maxRange` is infinite.
 
 At each step, a rotating lidar casts the rays over which its head has turned since the step before. The first
 ray of a layer points ahead, and the following rays go to the right, through a full turn. The distance of a

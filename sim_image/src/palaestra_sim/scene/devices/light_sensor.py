@@ -35,7 +35,7 @@ class LightSensor:
         axes: the axes of the world that point east, north and up.
         filter: the shares of red, green and blue light that the sensor measures.
         occlusion: whether shapes hide lights.
-        period_ms: the sampling period; 0 while the sensor is not enabled, so that it measures darkness.
+        period_ms: the sampling period; 0 while the sensor is not enabled, and its measured irradiance is 0.
     """
 
     name: str

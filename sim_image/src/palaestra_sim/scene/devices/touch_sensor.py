@@ -82,7 +82,7 @@ def _read(part: DevicePart) -> TouchSensor:
     kind = _TYPES.index(type_name) if type_name in _TYPES else _BUMPER
     if type_name != "bumper" and not part.forces:
         part.lack("a touch sensor that measures force")
-    # A bumper without a Physics node is part of the robot in Webots too.
+    # As in Webots, a bumper without a Physics node is a part of the robot, so its shapes join the outline.
     sensor = TouchSensor(
         name=part.name,
         model=part.text("model"),

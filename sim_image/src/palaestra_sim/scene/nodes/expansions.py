@@ -8,7 +8,7 @@ from palaestra_sim.scene.nodes.scope import Scope
 from palaestra_sim.world import Node, Proto, Value
 
 MAX_BYTES = 64 * 1024 * 1024
-"""Maximum size of all expanded files of a world, because every instance may have its own."""
+"""Maximum size of all expanded files of a world together; each instance may need a separate file."""
 
 Bindings = Mapping[str, tuple[Value, Scope]]
 
@@ -42,7 +42,7 @@ class Expansions:
 
 
 def _plain(value: Value) -> tuple[object, ...]:
-    """Return the items of a value, each with its type, because 1 equals TRUE; nodes are equal here."""
+    """Return the items of a value with their types, because 1 equals True; all nodes count as equal."""
     return tuple((type(item), None if isinstance(item, Node) else item) for item in value.items)
 
 

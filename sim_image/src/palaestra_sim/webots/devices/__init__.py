@@ -73,7 +73,11 @@ def devices(library: Library) -> Iterator[ServedDevice]:
         elif not is_ros_name(name):
             log.warning("the device %r is left out, because ROS does not accept its name; rename it", name)
         elif path in paths:
-            log.warning("the device %r is left out, because another has the path %s; rename it", name, path)
+            log.warning(
+                "the device %r is left out, because another device has the path %s; rename it",
+                name,
+                path,
+            )
         else:
             paths.add(path)
             kind, make = _BY_NUMBER[number]

@@ -135,7 +135,7 @@ def skin(calls: DeviceCalls) -> ServedDevice:
 
 
 def _of_bone(calls: DeviceCalls, handler: Handler) -> Handler:
-    """Return the handler, for requests whose bone exists; Webots' controller would crash."""
+    """Return a handler that refuses a bone that does not exist; Webots' controller would crash instead."""
 
     def handle(request: Any) -> Any:
         count = calls.get_bone_count()

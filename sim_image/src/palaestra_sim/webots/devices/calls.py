@@ -133,8 +133,8 @@ def switch(calls: Calls, end: str = "", begin: str = "") -> Callable[[int], None
 
     Args:
         calls: the functions of the device or the input.
-        end: what follows "enable" and "disable" in the names of the two functions, such as "_presence".
-        begin: what precedes them, such as "recognition_".
+        end: the text after "enable" and "disable" in the names of the two functions, such as "_presence".
+        begin: the text before "enable" and "disable", such as "recognition_".
     """
 
     def enabled(period_ms: int) -> None:
@@ -147,12 +147,12 @@ def switch(calls: Calls, end: str = "", begin: str = "") -> Callable[[int], None
 
 
 def facts(calls: Calls, type_name: str, *names: str) -> tuple[Row, ...]:
-    """Return services with the names of functions without arguments, whose value they return."""
+    """Return services that are named after functions without arguments, and return their values."""
     return tuple((name, type_name, partial(_fact, getattr(calls, name))) for name in names)
 
 
 def commands(calls: Calls, type_name: str, *names: str) -> tuple[Row, ...]:
-    """Return services with the names of functions that get the request's value and always succeed."""
+    """Return services that pass the request's value to the function of the same name, and always succeed."""
     return tuple((name, type_name, partial(_command, getattr(calls, name))) for name in names)
 
 

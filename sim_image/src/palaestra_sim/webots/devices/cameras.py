@@ -109,7 +109,7 @@ def _zoom_info(calls: DeviceCalls) -> Fields:
 
 def _fov_setter(calls: DeviceCalls, lens: Lens) -> Handler:
     def set_fov(request: Any) -> Fields:
-        """Set the field of view; the projection follows what Webots accepted."""
+        """Set the field of view; the projection uses the value that Webots has accepted."""
         calls.set_fov(request.value)
         lens.field_of_view_rad = calls.get_fov()
         return {"success": True}

@@ -124,7 +124,7 @@ def _images(calls: DeviceCalls) -> tuple[Row, ...]:
 
 
 def _new(calls: DeviceCalls, request: Any) -> int:
-    """Return the handle of a new image, or 0 if Webots has no such image.
+    """Return the handle of a new image, or 0 if the image cannot be created.
 
     Missing bytes are 0; Webots would read beyond the end of the data.
     """

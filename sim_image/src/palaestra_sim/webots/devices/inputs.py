@@ -12,7 +12,7 @@ from palaestra_sim.webots.devices.calls import InputCalls, Reading, commands, fa
 from palaestra_sim.webots.library import Library
 
 _NO_KEY: Final = -1
-_AXES: Final = 6  # as many topics as the simulators of this package have
+_AXES: Final = 6  # the number of topics of the joystick in this package's own simulators
 _POVS: Final = 1
 _NUMBER: Final = "webots_ros/Int32Stamped"
 
@@ -44,7 +44,7 @@ def _keyboard(library: Library) -> ServedDevice:
 def _joystick(library: Library) -> ServedDevice:
     joystick = InputCalls(library, "joystick")
     axes, povs = joystick.get_number_of_axes, joystick.get_number_of_povs
-    button = Reading(joystick.get_pressed_button)  # -1 without a button; one message for each step
+    button = Reading(joystick.get_pressed_button)  # -1 if no button is pressed; one message for each step
     return ServedDevice(
         path="joystick",
         topics=(

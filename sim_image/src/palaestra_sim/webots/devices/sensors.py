@@ -69,7 +69,7 @@ def _touch_topic(calls: DeviceCalls) -> DeviceTopic:
 
 
 def light_sensor(calls: DeviceCalls) -> ServedDevice:
-    """Return a LightSensor; its value is what its lookup table makes of the irradiance."""
+    """Return a LightSensor; its value is the output of its lookup table for the irradiance."""
     value = Reading(calls.get_value)
     topic = DeviceTopic(
         name="value", type_name="sensor_msgs/Illuminance", source=value, reading="illuminance"

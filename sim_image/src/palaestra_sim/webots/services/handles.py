@@ -45,7 +45,7 @@ class WebotsHandles:
         return handle
 
     def other_node(self, handle: int) -> int | None:
-        """Return the pointer of a node to which another node refers; None, for the world, for the handle 0.
+        """Return the pointer of the second node of a request; for the handle 0, None, which means the world.
 
         Raises:
             UnknownHandleError: no service has returned this handle as that of a node.

@@ -24,7 +24,7 @@ def supervisor_services(library: Library, handles: WebotsHandles) -> tuple[Servi
 
 
 def _ordered(action: Callable[[], Any]) -> Handler:
-    """Return the handler of an order without arguments."""
+    """Return the handler of a command without arguments."""
 
     def handle(_request: Any) -> Fields:
         action()
@@ -34,7 +34,7 @@ def _ordered(action: Callable[[], Any]) -> Handler:
 
 
 def _told(action: Callable[[Any], Any]) -> Handler:
-    """Return the handler of an order with a value."""
+    """Return the handler of a command with a value."""
 
     def handle(request: Any) -> Fields:
         action(request.value)

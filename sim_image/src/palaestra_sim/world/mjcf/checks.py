@@ -91,7 +91,7 @@ def unfit_step(found: Description) -> Iterator[WorldError]:
 
 
 def unknown_devices(found: Description) -> Iterator[WorldError]:
-    """An element `text` that renames a device has a name of a wrong form, or no new name."""
+    """An element `text` that renames a device has a name in a wrong form, or gives no new name."""
     for key, name in found.devices.items():
         kind, slash, old = key.partition("/")
         if kind not in DEVICE_KINDS or not slash or not old or not name:
@@ -133,14 +133,14 @@ CHECKS: Final[tuple[Check, ...]] = (
 """The checks for every MJCF world."""
 
 CHECKS_WITHOUT_FILE: Final[tuple[Check, ...]] = (*CHECKS, relative_address)
-"""The additional check for a world without a file, which has no files next to it."""
+"""The checks for a world without a file; such a world cannot use relative addresses."""
 
 
 def checked(source: bytes, name: str = "world", *, relative_addresses: bool) -> Description:
     """Return the description of a world that passes every check.
 
     Raises:
-        WorldError: as `check` does.
+        WorldError: see `check`.
     """
     found = describe(source, name)
     checks = CHECKS if relative_addresses else CHECKS_WITHOUT_FILE

@@ -31,9 +31,9 @@ DEVICE: Final = "device:"
 LEFT_OUT: Final = "-"  # name for a device that the user leaves out
 DEVICE_KINDS: Final = ("actuator", "camera", "sensor")
 _TIMESTEP_S: Final = 0.002  # MuJoCo's default
-_LONGEST_MS: Final = 100  # largest default basic step; robots need shorter steps
+_LONGEST_MS: Final = 100  # largest default basic step; a longer one is too coarse for a robot
 _MOST_STEPS: Final = 10_000  # steps of MuJoCo in a basic step; more would take seconds
-# A message recommends two timesteps: 1/n ms and 1/(n + 1) ms. This is the greatest n.
+# A message recommends two timesteps: 1/n ms and 1/(n + 1) ms. `_SHORTEST_PART` is the greatest n.
 _SHORTEST_PART: Final = 99
 _NEAR: Final = 1e-4  # relative tolerance: 0.0041666 s counts as 1/240 s
 _BYTE_ORDER_MARK: Final = b"\xef\xbb\xbf"
@@ -90,7 +90,7 @@ class Description:
         return None if element is None else _number(element.attributes.get("data", ""))
 
     def error(self, section: str, name: str, fact: str, remedy: str) -> WorldError:
-        """Return an error at the element `name` in a section such as "sensor"; without it, at the root."""
+        """Return an error at the element `name` of a section such as "sensor", or at the root without it."""
         if section not in self._places:
             elements = (it for section_ in self.root.named(section) for it in section_.walk())
             named = ((it.attributes.get("name", ""), it.start) for it in elements)

@@ -30,7 +30,7 @@ def generate(
     """Return the world of one simulator; the parameters are the same as for `world.generate`.
 
     Raises:
-        WorldError: as for `check`.
+        WorldError: see `check`.
     """
     found = checked(source, name, relative_addresses=relative_addresses)
     return _named(found, ros_name(identity, found.robot), clock=clock)
@@ -40,7 +40,7 @@ def rename(source: bytes, suffix: str, *, name: str = "world", relative_addresse
     """Return the world with `suffix` appended to its ROS name, and without `--clock`.
 
     Raises:
-        WorldError: as for `check`; or the robot has no ROS name, or its new name is too long.
+        WorldError: see `check`; or the robot has no ROS name, or its new name is too long.
     """
     found = checked(source, name, relative_addresses=relative_addresses)
     present = _robot(found).ros_name

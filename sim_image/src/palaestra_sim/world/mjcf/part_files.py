@@ -1,7 +1,7 @@
-"""Count how often each file of a model is part of the model.
+"""Count the copies of each file in a model.
 
-If a model attaches itself, MuJoCo attaches the model without end. Even a few files, of which each attaches
-the next file twice, make more bodies than fit into memory.
+If a model attaches itself, MuJoCo attaches the model without end. In a chain of files, each file may attach
+the next file twice; then a few files make more bodies than fit into memory.
 """
 
 from __future__ import annotations

@@ -54,7 +54,7 @@ class CheckedPackage:
     def refuse_other(self, env: gymnasium.Env[Any, Any]) -> None:
         """Refuse an environment whose numbers differ from those that the policy learned with.
 
-        Another release, or another version of a user's module, may order or scale them otherwise.
+        Another release, or another version of a user's module, may order or scale the numbers in another way.
 
         Raises:
             ConfigurationError: a space or a table of the data sheet differs.

@@ -26,7 +26,7 @@ class DrivenEpisode:
 
     Attributes:
         steps: steps of the policy.
-        success: whether the task counts it as a success; None if the task has no success.
+        success: whether the task counts the episode as a success; None if the task does not report success.
         outcome: the task's word for the end.
     """
 

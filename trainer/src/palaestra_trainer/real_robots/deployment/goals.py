@@ -120,8 +120,8 @@ class GoalDriver:
         """Drive to each goal that arrives, until `check` raises.
 
         Args:
-            check: called often while no goal is there.
-            say: called with a line at the begin and the end of each episode.
+            check: called often while no goal waits.
+            say: called with a line at the start and the end of each episode.
             warn: called with a line if an episode cannot begin, or a safety rule has stopped the robot.
         """
         while True:
@@ -132,7 +132,7 @@ class GoalDriver:
             except NewGoal:
                 continue
             except (ConfigurationError, RobotStopped) as error:
-                warn(f"{error}; standing until the next goal")
+                warn(f"{error}; the robot stands until the next goal")
             self._rest()
 
     def _outcome(self, goal: Point) -> str:
@@ -147,8 +147,8 @@ class GoalDriver:
         return f"{end.outcome} after {end.steps} steps"
 
     def _rest(self) -> None:
-        # If a safety rule has stopped the robot, it may still move for a moment. A newer goal begins with a
-        # stop anyway.
+        # These errors are ignored. If a safety rule has stopped the robot, the robot may still move for a
+        # moment. If a newer goal has arrived, its episode begins with a stop anyway.
         with suppress(NewGoal, RobotStopped):
             self._robot.stand()
         self._link.quiet = True

@@ -1,7 +1,7 @@
 """Permit motion only while a person holds a key in the terminal.
 
 A terminal reports no release of a key. It repeats a held key instead, after a first pause of up to 0.7 s. So
-the second report of a key permits motion, and a pause after that ends it.
+the second report of a key permits motion, and the next pause without a report ends the permission.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class KeyPresses:
 
 
 class HoldKey:
-    """Reads keys of the terminal without echo, as a context manager; then the terminal is as before.
+    """Reads keys of the terminal without echo, as a context manager, which restores the terminal at its end.
 
     Outside of the context, no key counts as held.
 

@@ -45,7 +45,7 @@ class OnnxPolicy:
         return _MASKS in self._inputs
 
     def begin(self) -> None:
-        """Begin an episode: a recurrent policy forgets the episode before."""
+        """Begin an episode: reset the state of a recurrent policy."""
         if self._state_shape is not None:
             layers, units = self._state_shape
             self._state = {name: np.zeros((layers, 1, units), np.float32) for name in _STATE}
@@ -69,7 +69,8 @@ class OnnxPolicy:
 
 def _session(network: bytes, file: Path) -> Any:
     options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = 1  # a small network; idle threads would spin beside the robot's programs
+    # More threads would not help a small network, and would take processor time from the robot's programs.
+    options.intra_op_num_threads = 1
     try:
         return onnxruntime.InferenceSession(network, options, providers=["CPUExecutionProvider"])
     except Exception as error:  # onnxruntime raises classes of its own, without a common base

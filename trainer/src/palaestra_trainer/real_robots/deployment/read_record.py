@@ -67,7 +67,7 @@ def _decided(bag: Bag) -> Iterator[tuple[float, dict[str, Any]]]:
 
 
 def _episodes(bag: Bag) -> Iterator[_Ended]:
-    """Yield the parts of the record; the last part may have no outcome, because a rule stopped the robot."""
+    """Yield the episodes of a record; if the last episode has no recorded end, its outcome is "stopped"."""
     begin_s = None
     for stamp_s, decision in _decided(bag):
         if decision.get("begin") == "episode":

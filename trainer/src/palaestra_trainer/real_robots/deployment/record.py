@@ -44,14 +44,14 @@ Entry = tuple[str, str, Mapping[str, Any], float]
 
 
 class DeploymentRecord:
-    """Writes a bag in a thread of its own, as a context manager; before its begin, entries are ignored.
+    """Writes a bag in a thread of its own, as a context manager; before the context, entries are ignored.
 
     Args:
         path: the new file.
         about: names and values for the metadata of the bag.
 
     Attributes:
-        dropped: the number of entries that the disk was too slow for.
+        dropped: the number of entries that were dropped because the disk was too slow.
     """
 
     def __init__(self, path: Path, about: Mapping[str, str]) -> None:
@@ -75,7 +75,7 @@ class DeploymentRecord:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Write what waits, and close the file."""
+        """Write the waiting entries, and close the file."""
         with suppress(queue.Full):  # the thread that writes has ended, or its disk hangs
             self._waiting.put(None, timeout=_END_S)
         self._thread.join(_END_S)
@@ -98,7 +98,7 @@ class DeploymentRecord:
             self.note({"decision": "drive" if name is None else "stand", "cause": name})
 
     def step(self, distances_m: Floats, observation: Any, action: Any) -> None:
-        """Record a step of the policy: the distances, and the numbers that it saw and returned.
+        """Record a step of the policy: the distances, the observation and the action.
 
         An observation with parts or more than `MOST_NUMBERS` numbers is left out; `image` records images.
         """
@@ -138,4 +138,4 @@ class DeploymentRecord:
                 while (entry := self._waiting.get()) is not None:
                     bag.write(*entry)
         except OSError as error:
-            log.error("the record ends here; the robot drives on", error=str(error))
+            log.error("the record ends here; the robot continues to drive", error=str(error))

@@ -28,7 +28,7 @@ class Terminal:
         self._asked = False  # whether the person has been asked to hold the key
 
     def permits(self) -> bool:
-        """Return whether the person permits motion now; before `holding`, in the dry run, nothing moves."""
+        """Return whether the person permits motion now; True before `holding`, when only a dry run runs."""
         return self._key is None or not self._asked or self._key.held()
 
     @contextmanager

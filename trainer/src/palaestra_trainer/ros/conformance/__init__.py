@@ -1,6 +1,6 @@
-"""The conformance of a simulator: the claims of the page "The ROS interface", called one by one.
+"""The conformance of a simulator: the claims of the page "The ROS interface", checked one by one.
 
 `interface.json` has the claims; `make golden` writes this file from tools/interface. `claims` reads it and
-judges responses, `player` makes the calls with any client, `wire_client` is the client, and `report` writes
-the results. `rehearsal` checks time, steps and resets for the claims of a training.
+evaluates responses, `player` makes the calls with any client, `wire_client` is the client, and `report`
+writes the results. `rehearsal` checks time, steps and resets for the claims of a training.
 """

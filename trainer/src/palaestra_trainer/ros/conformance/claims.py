@@ -32,7 +32,7 @@ class Claims:
         topics: the type of each topic, by path.
         last: the calls that restart or end the simulator, in their order.
         expected: the fields of a response that are known in advance, by path.
-        fails: the paths that must fail.
+        fails: the paths whose calls must fail.
         step_ms: the period of a step of the world, in ms of simulated time.
     """
 

@@ -1,7 +1,7 @@
 """Makes the calls of the claims with a client of any library.
 
-In a request, the text "@name" stands for the first value in the response to that call, e.g. the handle of a
-node. The text "$FILES" stands for the folder of the files that the simulator reads and writes.
+In a request, the text "@name" stands for the first value in the response to the call `name`, e.g. the handle
+of a node. The text "$FILES" stands for the folder of the files that the simulator reads and writes.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ class RosClient(Protocol):
     """A client of ROS."""
 
     def call(self, path: str, type_name: str, request: Mapping[str, Any]) -> Answer:
-        """Call a service; return the response as a mapping, or its reason under `failed`."""
+        """Call a service; return the response as a mapping, or the reason of a failure under `failed`."""
         ...
 
     def listen(self, topic: str, type_name: str) -> None:
@@ -85,7 +85,7 @@ class Player:
         heard: dict[str, Any] = {}
         while topics.keys() - heard.keys() and time.monotonic() < end:
             self._client.call(step, "webots_ros/set_int", {"value": self._step_ms})
-            # A refused sampling period is logged to /rosout.
+            # The simulator refuses this sampling period and logs the refusal, so /rosout sends a message.
             self._client.call(self._full("battery_sensor/enable"), "webots_ros/set_int", {"value": 1})
             found = self._client.heard()
             heard = {topic: found[self._full(topic)] for topic in topics if self._full(topic) in found}

@@ -1,7 +1,7 @@
 """The claims about time, steps and resets: a client drives the cart of the world as a training does.
 
 Each claim is a sentence with a function, which raises `Broken` if the claim does not hold. `CLAIMS` lists
-them in their order. Every function begins with a reset, so a wrong result affects no later claim.
+them in their order. A reset comes before each function, so a wrong result affects no later claim.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ from palaestra_trainer.ros import RosService, RosSubscriber
 from palaestra_trainer.ros.conformance.claims import FAILED, Answer
 from palaestra_trainer.ros.conformance.player import plain
 
-_DEADLINE_S: Final = 30.0  # the first camera makes a simulator load OpenGL
+_DEADLINE_S: Final = 30.0  # at the first camera a simulator loads OpenGL, which may take long
 
 
 class WireClient:

@@ -122,7 +122,7 @@ def newest(folder: Path) -> SavedCheckpoint | None:
 
     Raises:
         ConfigurationError: this release cannot read the format of a checkpoint, or all checkpoints are
-            damaged. A run from the beginning would replace these checkpoints.
+            damaged. The run must not start from the beginning, because it would replace these checkpoints.
     """
     rest, damage = None, ""
     for path in sorted(_steps(folder), key=_step, reverse=True):

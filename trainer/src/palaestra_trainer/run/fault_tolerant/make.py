@@ -134,7 +134,7 @@ def _in_own(environment: Environment, number: int, world: str, driver: str) -> E
 def _allocated(
     stack: ExitStack, configuration: Configuration, number: int | None, role: Role
 ) -> tuple[SimulatorConfiguration, ...]:
-    """Reserve simulators until `stack` closes; return them so that none of them can be given up."""
+    """Reserve simulators until `stack` closes; return their entries, which require all of them to work."""
     every = max(1, len(configuration.with_role(role)))
     entries = []
     for _ in range(number or every):

@@ -56,7 +56,7 @@ class Counters:
             not faults.
         restarts: number of restarts of simulators after faults.
         recycled: number of restarts of healthy simulators.
-        given_up: number of simulators that were given up while the run continued.
+        given_up: number of failed simulators that are not restarted, because the run continues without them.
         extra_steps: simulation steps taken because a message was late.
         steps_lost: number of valid steps that were lost, see `TrainerStatus`.
         goodput: seconds spent, by cause.
@@ -212,7 +212,7 @@ class Progress:
             self._standings.add(simulator, role)
 
     def has_standby(self, simulator: str, ask: AskStandby) -> None:
-        """Set the function, called by any thread, that returns the state of the simulator's spare."""
+        """Set the function, called by any thread, that returns the state of the simulator's standby."""
         self._standings.has_standby(simulator, ask)
 
     def reports_left_out(self, simulator: str, ask: AskLeftOut) -> None:

@@ -9,7 +9,7 @@ from palaestra_trainer.simulators.interface import Member, ReportsLeftOut, Spare
 
 
 def follow(progress: Progress, members: Iterable[Member]) -> None:
-    """Let `progress` report the state of members' spares, and the parts that simulators left out."""
+    """Let `progress` report the state of members' standbys, and the parts that simulators left out."""
     for member in members:
         if isinstance(member, Spared):
             progress.has_standby(member.name, member.spare)

@@ -16,7 +16,7 @@ AskLeftOut = Callable[[], tuple[str, ...]]
 
 
 def _none() -> None:
-    """Return None, the state of the spare for a simulator without a spare."""
+    """Return None, the state of the standby for a simulator without a standby."""
 
 
 def _nothing() -> tuple[str, ...]:
@@ -89,7 +89,7 @@ class SimulatorStatuses:
         standing.state, standing.given_up = "failed", True
 
     def has_standby(self, simulator: str, ask: AskStandby) -> None:
-        """Set the function, called by any thread, that returns the state of the simulator's spare."""
+        """Set the function, called by any thread, that returns the state of the simulator's standby."""
         self._all[simulator].standby = ask
 
     def reports_left_out(self, simulator: str, ask: AskLeftOut) -> None:

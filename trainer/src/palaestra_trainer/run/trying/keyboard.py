@@ -24,7 +24,7 @@ _MOST_BYTES = 64
 
 @contextmanager
 def keys_at_once() -> Iterator[int]:
-    """Make each key of the terminal arrive at once; yield its descriptor; restore the terminal at the end."""
+    """Make each key arrive at once; yield the terminal's descriptor; restore the terminal at the end."""
     descriptor = sys.stdin.fileno()
     before = termios.tcgetattr(descriptor)
     try:
@@ -35,7 +35,7 @@ def keys_at_once() -> Iterator[int]:
 
 
 class KeyboardDriver:
-    """Waits for a key and returns its action; other keys have no effect.
+    """Waits for a key that has an action, and returns this action; other keys have no effect.
 
     Args:
         terminal: descriptor of a terminal from which each key arrives at once.

@@ -81,7 +81,8 @@ class Gateway:
                 scene = _scene(robot)
                 node = shown_node(scene, robot.name)
             self._publishers.publish("/clock", "rosgraph_msgs/Clock", messages.clock(state.time_s))
-            # For each transform whose time it already has, tf logs a warning.
+            # A state is published only once, because tf logs a warning for each transform whose time it
+            # already has.
             if (state.time_s, state.revision) != last:
                 last = (state.time_s, state.revision)
                 self._publish(scene, state, node)
@@ -135,6 +136,6 @@ def _scene(robot: ShownRobot) -> VisibleScene:
     scene = robot.reader.scene()
     if scene is None:
         raise ConfigurationError(
-            f"{robot.place}: does not describe its world, as Webots; use the driver stub or mujoco"
+            f"{robot.place}: does not describe its world; use the driver stub or mujoco, which do"
         )
     return scene

@@ -20,7 +20,7 @@ IMAGE: Final = "sensor_msgs/Image"
 RANGE: Final = "sensor_msgs/Range"
 SCAN: Final = "sensor_msgs/LaserScan"
 _KINDS: Final = (IMAGE, RANGE, SCAN)
-_DEADLINE_S: Final = 0.5  # a simulator may stand still for seconds while the policy learns
+_DEADLINE_S: Final = 0.5  # short, because a simulator may take no step for seconds while the policy learns
 _LOOK_S: Final = 5.0
 
 
@@ -47,7 +47,7 @@ class WatchedTopics:
         """Return the type of each topic, by the topic's name without the robot's, such as `ir1/value`.
 
         Raises:
-            MasterLost, UnreadableAnswer: as `Master`; the next 5 s, the list of before is returned.
+            MasterLost, UnreadableAnswer: see `Master`; for the next 5 s, calls return the previous list.
         """
         if time.monotonic() >= self._due_s:
             self._due_s = time.monotonic() + _LOOK_S
@@ -62,7 +62,7 @@ class WatchedTopics:
         return self._types
 
     def next(self, topics: Sequence[str]) -> list[Any]:
-        """Return the next message of each topic; all connections are open before the first is read.
+        """Return the next message of each topic; all connections are open before the first message is read.
 
         So the messages come from steps that are close to each other.
 

@@ -24,9 +24,9 @@ def clock(time_s: float) -> Content:
 
 
 def odometry(time_s: float, pose: PoseNumbers) -> Content:
-    """Return an Odometry with a pose in the world's frame, which it calls `odom`; its velocity is unknown.
+    """Return an Odometry with a pose in the world's frame, here named `odom`, and an unknown velocity.
 
-    The time between two states of a fast simulator is too long for a velocity from their difference.
+    In a fast simulator, two states are too far apart in time to compute a velocity from their difference.
     """
     content = messages.odometry(time_s, _FLAT, None)
     position, orientation = _parts(pose)
@@ -56,7 +56,7 @@ def infrared_scan(time_s: float, volts: Sequence[float]) -> Content:
 
 
 def image(time_s: float, message: Any) -> Content:
-    """Return an Image with the pixels of one in ROS 1; `message` has the fields of sensor_msgs/Image."""
+    """Return an Image with the pixels of `message`, which has the fields of sensor_msgs/Image of ROS 1."""
     return {
         "header": messages.header(time_s, message.header.frame_id),
         "height": int(message.height),
@@ -64,12 +64,12 @@ def image(time_s: float, message: Any) -> Content:
         "encoding": str(message.encoding),
         "is_bigendian": int(message.is_bigendian),
         "step": int(message.step),
-        "data": array.array("B", bytes(message.data)),  # rclpy checks each element of any other type
+        "data": array.array("B", bytes(message.data)),  # for any other type, rclpy checks each element
     }
 
 
 def laser_scan(time_s: float, message: Any) -> Content:
-    """Return a LaserScan with the ranges of one in ROS 1."""
+    """Return a LaserScan with the ranges of `message`, a LaserScan of ROS 1."""
     angles = ("angle_min", "angle_max", "angle_increment", "time_increment", "scan_time")
     limits = ("range_min", "range_max")
     return {
@@ -88,7 +88,10 @@ def robot_pose(scene: VisibleScene, state: SceneState, node: str) -> PoseNumbers
 
 
 def joints_of(scene: VisibleScene, state: SceneState, robot: str) -> dict[str, float]:
-    """Return the joints of one robot; in a world with several robots, their names begin with the robot's."""
+    """Return the joints of one robot, by names without the robot's name.
+
+    In a world with several robots, the name of a joint in `state` begins with the name of its robot.
+    """
     if not any(node.robot and node.name != robot for node in scene.nodes):
         return dict(state.joints)
     above = f"{robot}/"

@@ -1,4 +1,4 @@
-"""The publishers of one robot in ROS 2; each begins with its first message."""
+"""The publishers of one robot in ROS 2; each publisher is created with its first message."""
 
 from __future__ import annotations
 
@@ -12,13 +12,16 @@ _SENSORS: Final = frozenset(("Image", "LaserScan"))
 
 
 class RobotPublishers:
-    """Publishes messages from plain dicts; a message without a package that has its type is left out.
+    """Publishes messages from plain dicts.
 
     Readings of sensors are best effort, because an old reading is of no use. Other topics are reliable, so
     that tools with either setting receive them.
 
     Args:
-        node: the node that publishes, which its maker closes.
+        node: the node that publishes, which the caller closes.
+
+    Attributes:
+        has_transforms: whether tf2_msgs, which has the type of /tf, is installed.
     """
 
     def __init__(self, node: Ros2Node) -> None:

@@ -39,7 +39,7 @@ class ShownRobot:
     """A robot of a running simulator.
 
     Attributes:
-        place: the simulator, for people.
+        place: a description of the simulator, for messages.
         reader: reads the scene of the simulator.
         name: the name of the robot in the world, which only a world with several robots needs.
         ros_name: the name of the robot's node in ROS 1.
@@ -60,7 +60,7 @@ class RobotFinder(Protocol):
         """Check that the simulator exists.
 
         Raises:
-            ConfigurationError: it does not exist; the message names those that do.
+            ConfigurationError: the simulator does not exist; the message names the existing simulators.
         """
         ...
 
@@ -199,7 +199,8 @@ def shown_node(scene: VisibleScene, name: str) -> str:
 def _master_of(state: SimulatorState) -> str | None:
     """Return the master of a simulator's process.
 
-    training.yaml does not have it, and the environment of a process on this machine is readable by its user.
+    training.yaml does not name the master. The environment variables of the process name it, and a user may
+    read those of the user's own processes.
     """
     try:
         entries = Path(f"/proc/{state.pid}/environ").read_bytes().split(b"\0")

@@ -23,7 +23,7 @@ _LABELS = {"palaestra.launcher": "docker"}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ContainerPlan:
-    """All that a container depends on, except its simulator.
+    """The settings of a container, except its simulator.
 
     Attributes:
         image: the image of the simulator.

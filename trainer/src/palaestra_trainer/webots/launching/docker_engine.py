@@ -63,7 +63,7 @@ def ended(container: Any) -> None:
         SimulatorHung: the engine cannot end the container.
     """
     with engine_errors(container.id), contextlib.suppress(NotFound):
-        with contextlib.suppress(APIError):  # it was never started, or the engine is removing it
+        with contextlib.suppress(APIError):  # the container was never started, or is being removed
             container.stop(timeout=_STOP_S)  # the sidecar ends at SIGTERM
         with contextlib.suppress(APIError):
             container.remove(force=True)

@@ -23,7 +23,7 @@ _WITH_ADDRESS = f'ROS_IP=$(hostname -i) && export ROS_IP && exec {SIDECAR} "$@"'
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ContainerNetwork:
-    """How a sidecar in a container listens, and how this machine reaches it.
+    """The settings with which a sidecar in a container listens, and with which this machine reaches it.
 
     Attributes:
         listeners: the sidecar's options for its listeners.

@@ -93,7 +93,8 @@ class NamespaceClient:
         """Return the response; None if the object does not exist.
 
         Raises:
-            ConfigurationError: the server refuses the request or does not respond; the message has its words.
+            ConfigurationError: the server refuses the request, for the reason in the error's message, or does
+                not respond.
         """
         serialized = self._client.param_serialize(
             method=method,

@@ -1,8 +1,9 @@
 """Run simulators in pods of a Kubernetes cluster, for a notebook in a pod of the same cluster.
 
 Each simulator is a Job with one pod: a sidecar with its simulator, and a ROS master unless one runs. The
-sidecar ends if it hears nothing from this program, so the Job ends also if the program is killed, and the
-cluster removes it. The Job belongs to the pod of this program too, and goes with that pod.
+sidecar ends if it gets no request from this program for some time. So the Job also ends after a kill of this
+program, and the cluster removes the Job. The owner of the Job is the pod of this program, so the cluster also
+removes the Job when that pod is deleted.
 """
 
 from __future__ import annotations
@@ -40,8 +41,8 @@ class Kubernetes(Place):
             MuJoCo, from the registry of this program's own image.
         resources: requests and limits of the simulator's container, as in a pod.
         start_s: the longest time until the pod responds, including the time to download images.
-        silence_s: the pod ends after so many seconds without a sign of life of this program, at least 10.
-        lifetime_s: the pod ends after so many seconds in any case.
+        silence_s: the pod ends after this number of seconds without a request from this program; at least 10.
+        lifetime_s: the pod ends after this number of seconds in any case.
     """
 
     image: str | None = None

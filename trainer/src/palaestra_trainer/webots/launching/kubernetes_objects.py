@@ -31,14 +31,14 @@ Object = dict[str, Any]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PodPlan:
-    """All that the objects of one simulator depend on.
+    """The values on which the objects of one simulator depend.
 
     Attributes:
         name: the name of all objects.
         session: a word that the simulators of this program have in common.
         image: the image of the simulator.
-        master_image: the image of the ROS master, or None if `master_uri` names one.
-        master_uri: the URI of a ROS master that runs.
+        master_image: the image of a ROS master in the same pod; None if a ROS master already runs.
+        master_uri: the URI at which the simulator reaches the ROS master.
         options: the sidecar's options for the simulator.
         world: name and content of a world file that is not in the image.
         notebook: the pod of this program: its metadata and the names of its pull secrets.

@@ -32,7 +32,7 @@ _OWN_POD = "PALAESTRA_POD"  # the chart sets it; HOSTNAME may differ from the po
 _POLL_S = 0.25
 _REMOVED_S = 60.0
 _REACHED_S = 20.0
-_SIGNS_OF_LIFE = 4  # requests within the time after which a sidecar without requests ends
+_SIGNS_OF_LIFE = 4  # number of requests to a sidecar within `silence_s` seconds
 _MOST_WORLD_BYTES = 700_000  # a ConfigMap may have 1 MiB, and base64 needs a third more
 _session = secrets.token_hex(4)
 _pods = PodsByMaster()
@@ -70,7 +70,7 @@ def start_pod(settings: PodSettings, request: SimulatorRequest) -> KubernetesLau
 
 
 class KubernetesLauncher(OwnedSidecar):
-    """A sidecar in a pod that this program started; a thread sends it signs of life until `close`.
+    """A sidecar in a pod that this program started; a thread sends it regular requests until `close`.
 
     Args:
         cluster: the client of the cluster.
@@ -116,7 +116,7 @@ class KubernetesLauncher(OwnedSidecar):
 def _keep_alive(url: str, closed: threading.Event, every_s: float) -> None:
     sidecar = Sidecar(url, "sign of life")
     while not closed.wait(every_s):
-        with suppress(SimulatorFault):  # the next call of the program reports it
+        with suppress(SimulatorFault):  # the next call of the program reports the fault
             sidecar.state()
 
 
@@ -206,7 +206,7 @@ def _address(cluster: api.NamespaceClient, name: str, deadline_s: float) -> str:
     """Return the IP address of the pod when its sidecar responds.
 
     Raises:
-        ConfigurationError: the pod cannot run, or does not respond in time; the message has its events.
+        ConfigurationError: the pod cannot run, or does not respond in time; the message has the reason.
     """
     began, running_since = time.monotonic(), None
     while True:
@@ -265,7 +265,7 @@ def _remove(cluster: api.NamespaceClient, name: str) -> None:
     """Remove the Job with all that belongs to it, and wait until it is gone.
 
     Raises:
-        ConfigurationError: the API server refuses this.
+        ConfigurationError: the API server refuses a request.
         SimulatorHung: the Job is still there after 60 s.
     """
     give_up = time.monotonic() + _REMOVED_S

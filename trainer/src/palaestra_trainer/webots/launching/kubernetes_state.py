@@ -1,4 +1,4 @@
-"""What the state of a simulator's pod and its events mean for the program that waits for the pod; pure."""
+"""Evaluate the state and the events of a simulator's pod, for the program that waits for the pod; pure."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ from collections.abc import Iterable, Sequence
 
 from palaestra_trainer.webots.launching.kubernetes_objects import Object
 
-# The kubelet repeats these starts, but the cause is a mistake in the pod's text or in the image's name.
+# The kubelet tries again after these failures. But a retry cannot help, because the cause is a mistake in the
+# pod's specification or in the image's name.
 _HOPELESS = frozenset(
     {
         "CreateContainerConfigError",

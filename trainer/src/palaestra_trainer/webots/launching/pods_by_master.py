@@ -1,4 +1,4 @@
-"""The pods of this program, of which some have the ROS master that others use."""
+"""The pods of this program; a pod may use the ROS master in another pod."""
 
 from __future__ import annotations
 
