@@ -1,4 +1,4 @@
-"""Run commands as an ordinary user in a bare Debian 13 that sees some folders of this machine.
+"""Run commands as an ordinary user in a bare Debian 13, in which some folders of this machine are mounted.
 
 The root file system is the base of the images, which `tests/cluster/base.sh` makes. It contains no Python, no
 compiler and no package of ROS. It is mounted in a mount namespace that ends with the command.

@@ -26,8 +26,8 @@ settings.register_profile("repeat", settings.get_profile("explore"), derandomize
 settings.load_profile("repeat")
 # Files that one worker runs one after another, by path prefix.
 TOGETHER = (
-    ("tests/integration/chart/",),  # one control plane, with Prometheus' and Kueue's kinds
-    (  # with and without Kueue's kinds, on the shared control plane
+    ("tests/integration/chart/",),  # these files share a control plane with Prometheus' and Kueue's kinds
+    (  # these files add Kueue's kinds to the shared control plane, and remove them again
         "tests/integration/operator/test_operator_queues.py",
         "tests/integration/operator/test_operator_refusals.py",
     ),
@@ -49,7 +49,7 @@ def pytest_collection() -> Generator[None]:
     """Let one worker compile tests and libraries on a new clone, and let the others read the result.
 
     Otherwise every worker compiles everything, which takes a minute. Garbage collection is off during the
-    imports, because imported objects stay.
+    imports, because imported modules stay in memory and the collector would find nothing to free.
     """
     with _compiled_by_one():
         gc.disable()
@@ -101,7 +101,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def pytest_collection_finish() -> None:
-    """Exclude the imported and collected objects from garbage collection, because they are many and stay."""
+    """Exclude modules and test items from garbage collection, because they are many and stay in memory."""
     gc.freeze()
 
 

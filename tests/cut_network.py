@@ -1,8 +1,8 @@
 """A robot and a computer with addresses of their own in a network namespace, whose network can be cut.
 
-Nodes of ROS name their own addresses to each other, so a proxy between two nodes cannot cut them off. In a
-namespace, both addresses can be removed: then no packet between them arrives, and no connection is closed.
-The addresses of loopback stay, and by these a client still sees the mock robot.
+ROS nodes send their own addresses to each other and then connect directly, so a proxy cannot cut them off. In
+a namespace, the test can remove both addresses: then no packet arrives, and no connection is closed. The
+loopback addresses stay, so a client can still read the pose of the mock robot.
 
 `python -m tests.cut_network` cuts the network of a robot with the ROS 1 driver while a program drives it, and
 prints the robot's seconds from its last command until it stands.
@@ -18,7 +18,7 @@ from tests.mock_robots import ended, started
 from tests.waiting import eventually
 
 ROBOT, COMPUTER = "198.18.42.1", "198.18.42.2"  # addresses for tests of networks
-LIMIT_S = 0.4  # up to 33 ms more than over REST, in the loop of the driver
+LIMIT_S = 0.4  # longer than the limit over REST, because the driver's loop delays a command by up to 33 ms
 DEADLINE_S = 100.0
 SEPARATE = ("unshare", "--user", "--map-root-user", "--net")
 
@@ -60,9 +60,9 @@ def main():
 
 
 def cut(client):
-    """Remove both addresses; no command may arrive from then on."""
+    """Remove both addresses while the robot drives; no command arrives after that."""
     before = client.get("/mock/truth")["commands"]
-    eventually(lambda: client.get("/mock/truth")["commands"] > before, pace_s=0.005)  # it was being driven
+    eventually(lambda: client.get("/mock/truth")["commands"] > before, pace_s=0.005)  # the program drives it
     for address in (ROBOT, COMPUTER):
         ip("address", "delete", f"{address}/32", "dev", "lo")
 

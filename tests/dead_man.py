@@ -15,15 +15,15 @@ from tests.mock_robots import Cable, ended, started
 
 DRIVING = Path(__file__).parent / "integration" / "real_robots" / "driving.py"
 LIMITS_S = {"kill": 0.35, "cut": 0.35, "hang": 0.6, "kill, over ros1": 0.4, "hang, over ros1": 0.6}
-STANDS_WITHIN_S = 20.0  # a deadline of this machine's clock, since the robot's clock may be late
+STANDS_WITHIN_S = 20.0  # measured by this machine's clock, because the robot's clock may be late
 
 
 def standing_s(client, begin_s=0.0, *, commands=True):
-    """Wait until the robot stands, and return its time since `begin_s`, or since its last command if later.
+    """Wait until the robot stands, and return the robot's seconds until then.
 
-    Without `commands`, a later command does not count: a program whose policy hangs commands zero.
-
-    The true velocity is below 0.01 m/s from then on for at least 0.3 s of the robot's time.
+    The seconds begin at the last command, but not before `begin_s`. If `commands` is False, they begin at
+    `begin_s`, because a program whose policy hangs still sends commands of zero. The robot stands when its
+    true velocity stays below 0.01 m/s for at least 0.3 s of the robot's time.
     """
     since, deadline = None, time.monotonic() + STANDS_WITHIN_S
     while time.monotonic() < deadline:
@@ -39,7 +39,7 @@ def standing_s(client, begin_s=0.0, *, commands=True):
 
 @contextlib.contextmanager
 def driver(url, speed=1.0, then="go"):
-    """Yield a program that drives the robot at `url`; `then`: what its policy does after some steps."""
+    """Yield a program that drives the robot at `url`; `then` is the action of its policy after some steps."""
     arguments = [sys.executable, DRIVING, url, str(speed), then]
     program = subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
     try:
@@ -52,9 +52,9 @@ def driver(url, speed=1.0, then="go"):
 
 
 def after(what):
-    """Return the robot's seconds from its last command, or from the last action, until it stands.
+    """Return the robot's seconds until it stands after the event `what`, a key of `LIMITS_S`.
 
-    `what` is one of `LIMITS_S`.
+    If the policy hangs, the seconds begin at its last action, otherwise at the robot's last command.
     """
     with (
         robot(over_ros="ros" in what) as (address, client, cut),

@@ -1,7 +1,8 @@
-"""A server on a Unix socket that answers the calls of the Docker API that the launcher makes.
+"""A server on a Unix socket that responds to the launcher's calls of the Docker API.
 
-A container is a process of this machine without isolation, with the environment of the request and the
-programs of this environment. Source of the API: https://docs.docker.com/reference/api/engine/
+A container is a process of this machine without isolation. It has the environment variables of the request,
+and runs the programs of this Python environment.
+Source of the API: https://docs.docker.com/reference/api/engine/
 """
 
 import contextlib
@@ -55,7 +56,7 @@ class Container:
         threading.Thread(target=self._end, args=(threads,), daemon=True).start()
 
     def _input(self):
-        """Close the input of the process when the only attached client has gone, as StdinOnce says."""
+        """Close the input of the process when its only client disconnects, as StdinOnce requires."""
         with contextlib.suppress(OSError):
             while self.attached.recv(4096):
                 pass
@@ -63,7 +64,7 @@ class Container:
 
     def _output(self, number, pipe):
         while text := pipe.read1(65536):
-            with contextlib.suppress(OSError):  # the client has gone
+            with contextlib.suppress(OSError):  # the client has disconnected
                 self.attached.sendall(struct.pack(">BxxxL", number, len(text)) + text)
 
     def _end(self, threads):

@@ -1,4 +1,4 @@
-"""Mock robots as processes, and a client of their REST interface that is not ours."""
+"""Mock robots as processes, and a REST client for them that uses no code of Palaestra."""
 
 import contextlib
 import http.client
@@ -16,8 +16,8 @@ from PIL import Image
 from tests.waiting import eventually
 
 PROGRAM = (sys.executable, "-m", "palaestra_sim.mock_robot.entry", "--listen=127.0.0.1:0")
-DEADLINE_S = 30.0  # moments on an idle machine
-SPEED = 5.0  # of the mock robots in tests of robots: faster ones depend on the scheduler of the machine
+DEADLINE_S = 30.0  # the waits take moments on an idle machine
+SPEED = 5.0  # the speed of a mock robot's clock; at higher speeds, the machine's scheduler affects the tests
 
 
 class Client:
@@ -52,7 +52,7 @@ class Client:
         return response.status, response.read()
 
     def send(self, path, body):
-        """Send a body with PUT or POST, as the path wants it."""
+        """Send a body with PUT or POST, whichever the path requires."""
         method = "PUT" if path.startswith("/data/") else "POST"
         assert self.ask(method, path, body) == (200, None)
 

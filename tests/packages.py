@@ -14,7 +14,7 @@ from palaestra_trainer.environments.make import make_environment
 from palaestra_trainer.job.configuration import Environment, dump, parse
 from palaestra_trainer.testing import fake_arena, fake_seeing
 
-NUMBERS, TARGET = 16, (13, 14)  # numbers of the observation of MoveToTargetEnv, and those of the target
+NUMBERS, TARGET = 16, (13, 14)  # the size of MoveToTargetEnv's observation, and the target's indices in it
 
 
 def linear_network(gain=1.0):
@@ -43,7 +43,8 @@ def linear_network(gain=1.0):
 def seeing_network(shape, speed=0.4, gain=20.0):
     """Return an ONNX file that drives forward, and turns toward the red part of an image.
 
-    The turn is the mean of `gain` times the redness of each pixel times its place, 1 at the left edge.
+    The turn is the mean over all pixels of `gain` * redness * place; the place is 1 at the left edge of the
+    image.
     """
     rows, columns, _ = shape
     red = np.array([1.0, -0.5, -0.5], np.float32) / 255.0

@@ -59,7 +59,7 @@ class PodRunner:
 
     def _loop(self):
         while not self._closed.wait(_LOOK_S):
-            with suppress(ApiError):  # an object changed meanwhile; the next look sees it
+            with suppress(ApiError):  # an object changed meanwhile; the next poll reads its new version
                 self._look()
 
     def _look(self):

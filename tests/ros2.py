@@ -35,7 +35,7 @@ def start(*words, **options):
 
 def surroundings():
     """Return the environment variables of a program of ROS 2."""
-    # The libraries of both environments have the same versions where both have them, such as NumPy.
+    # A library that is in both environments, such as NumPy, has the same version in both.
     paths = [ROOT / "trainer/src", ROOT / "sim_image/src", ROOT, sysconfig.get_path("purelib")]
     return os.environ | {
         "FASTDDS_BUILTIN_TRANSPORTS": "SHM",

@@ -1,9 +1,9 @@
 """`make bench`: measure the promised figures and print them as JSON.
 
-The load of machines varies, so a figure is a ratio within one run, or is printed next to the figure to which
-it is compared. Arguments select parts by name, e.g. `python -m tests.bench stepping parallel`. `--scale 0.1`
-runs a tenth of each part, which tests that the part works. `--record FILE` also writes the figures into a
-file of JSON.
+The load of machines varies, so the speeds of two runs are not comparable. A figure is therefore a ratio of
+two values of the same run, or the part also prints the value with which a reader must compare the figure.
+Arguments select parts by name, e.g. `python -m tests.bench stepping parallel`. `--scale 0.1` runs only a
+tenth of each part, as a test of its code. `--record FILE` also writes the figures into a file of JSON.
 """
 
 import argparse

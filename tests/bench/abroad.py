@@ -1,4 +1,4 @@
-"""Policies that run in another simulator than in training, and policies that observe camera images."""
+"""Policies in a simulator in which they were not trained, and policies that observe camera images."""
 
 import shutil
 import tempfile
@@ -13,8 +13,9 @@ CYLINDER_STEPS = 300_000
 
 
 def measure_transfer(scale=1.0):
-    """Return the success of move-to-target's policies in both simulators, on the same episodes.
+    """Return the success rates of two policies for move-to-target, on the same episodes.
 
+    One policy is trained in MuJoCo and the other in the stub. Each policy is measured in both simulators.
     Below full scale, the function measures only the policy that was trained in MuJoCo.
     """
     homes = list(HOMES.items())[: scaled(len(HOMES), scale)]
@@ -42,7 +43,7 @@ def measure_seeing(scale=1.0):
 
 
 def moved(run, home, place):
-    """Return a copy of a run directory in which the driver of the simulators is replaced."""
+    """Return a copy of a run directory whose simulators have the driver `place` instead of `home`."""
     copy = run.parent / f"in-{place}"
     shutil.copytree(run, copy)
     configuration = copy / "training.yaml"

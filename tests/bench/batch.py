@@ -1,7 +1,7 @@
-"""Steps a second of many copies in one MuJoCo and of one MuJoCo over ROS, in turns, with a free policy.
+"""The steps per second of many copies in one MuJoCo, compared with one MuJoCo over ROS.
 
-A step is one step of the environment of one copy. At full scale, the part also trains both examples until 95
-of 100 episodes, each of which is evaluated over ROS.
+The two are measured in turns, with random actions. A step is one step of the environment of one copy. At full
+scale, the part also trains both examples until 95 of 100 episodes succeed, evaluated over ROS.
 """
 
 import json
@@ -32,7 +32,10 @@ WANTED = {"stopAtSuccessRate": 0.95, "episodes": 50, "confirmEpisodes": 100}
 
 
 def measure(scale=1.0):
-    """Return the steps a second of both, the median of the rounds' ratios, and the seconds to 95 of 100."""
+    """Return the steps per second of copies and of ROS, their ratio, and the training times of both examples.
+
+    The ratio is the median over the rounds. A training ends when 95 of 100 episodes succeed.
+    """
     rows = scaled(ROWS, scale, 4)
     with ExitStack() as stack:
         batch, single = copies(stack, rows), over_ros(stack)
@@ -91,7 +94,7 @@ def begun(stack, env):
 
 
 def rate(env, steps):
-    """Return the steps of all rows a second, with random actions that are drawn before."""
+    """Return the steps per second of all rows together, with random actions; drawing them is not timed."""
     random = np.random.default_rng(0)
     actions = random.integers(0, env.action_space.n, (steps, env.num_envs))
     began = time.perf_counter()
@@ -101,7 +104,7 @@ def rate(env, steps):
 
 
 def seconds_to_learn(scale):
-    """Return the seconds in which each example's policy reaches 95 of 100, and the success rates."""
+    """Return for each example the seconds of its training, and the success rate of its policy."""
     found = {}
     for name in ("move-to-target-batch", "move-to-target-mujoco"):
         job = shortened(example(name), scale)

@@ -14,7 +14,7 @@ from tests.bench.stepping import RospyStepper
 
 ROUNDS = 10
 STEPS = 300
-SLOW_STEPS = 60  # of a client that opens a connection for each call
+SLOW_STEPS = 60  # for the client `rospy`, which is slow because it opens a connection for each call
 
 
 class Rospy:
@@ -56,7 +56,7 @@ def measure(scale=1.0):
 
 
 def compared(rounds, name):
-    """Return median and p99 of a client's steps in microseconds, and its steps in those of `robot`."""
+    """Return median and p99 of a client's step times in us, and their ratio to the step times of `robot`."""
     found = step_floor.figures([phases[name] for phases in rounds])
     ratios = [phases[name].median_s / phases["robot"].median_s for phases in rounds]
     return {

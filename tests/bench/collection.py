@@ -1,7 +1,7 @@
-"""Collecting from several simulators: synchronously, asynchronously, and with Stable-Baselines3's processes.
+"""Collecting from several simulators: synchronously, asynchronously, and with SubprocVecEnv's processes.
 
-The policy costs nothing. Each simulator is the stub, which sleeps in each step. `SubprocVecEnv` has the same
-facade of the same robot in each of its processes.
+The actions are fixed, so no time is spent on a policy. Each simulator is a stub that sleeps in each step. A
+process of Stable-Baselines3's `SubprocVecEnv` uses the same facade of the robot as our vector environments.
 """
 
 import itertools
@@ -30,7 +30,7 @@ FAST, FAST_MS, SLOW_MS = 3, 3, 30
 
 
 def measure(scale=1.0):
-    """Return the steps per second of each way, and the loss of three simulators beside a slow one."""
+    """Return the steps per second of each way, and the shares of `beside_a_slow_one`."""
     seconds = max(SECONDS * scale, LEAST_SECONDS)
     counts, sleeps = COUNTS[: scaled(len(COUNTS), scale)], SLEEPS_MS[: scaled(len(SLEEPS_MS), scale)]
     found = {
@@ -61,7 +61,10 @@ def measured(count, sleep_ms, seconds):
 
 
 def beside_a_slow_one(scale, seconds):
-    """Return the steps of three fast simulators beside a slow one, as a share of their steps alone."""
+    """Return the rate of three fast simulators that collect together with a slow one.
+
+    The rate is a share of the rate that the three have without the slow simulator, by the way of collecting.
+    """
     shares = {"synchronous": [], "asynchronous": []}
     with ExitStack() as stack:
         fast = [started(stack, f"fast_{number}", FAST_MS) for number in range(FAST)]
@@ -75,7 +78,7 @@ def beside_a_slow_one(scale, seconds):
 
 
 def rate(env, seconds, rows=None):
-    """Return the valid rows per second of the first `rows` members (None: all); the policy costs nothing."""
+    """Return the valid rows per second of the first `rows` members (None: all), with fixed actions."""
     env.reset()
     actions = itertools.cycle(np.full(env.num_envs, number) for number in range(len(MOVEMENTS)))
     count, began = 0, time.perf_counter()

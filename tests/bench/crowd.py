@@ -20,7 +20,7 @@ CLIENTS = 8
 DEADLINE_S = 1200
 SILENCE_S = 10
 LOOK_EVERY_S = 0.5
-TEMPLATE = "planned-once"  # stands for the name of each job
+TEMPLATE = "planned-once"  # `renamed` replaces this text by the name of a job
 
 
 def training_job(name, namespace):
@@ -102,7 +102,7 @@ def wait_for_silence(plane):
 
     def silent():
         before = sum(each.counts for each in asked(plane))
-        time.sleep(SILENCE_S)  # a period without requests
+        time.sleep(SILENCE_S)  # the period in which no request may arrive
         return sum(each.counts for each in asked(plane)) == before
 
     eventually(silent, DEADLINE_S)

@@ -2,7 +2,7 @@
 
 Each program has the configuration, the definitions and the webhooks of its Go module's manifests, with these
 differences. It listens only on the loopback interface, where the API server calls its webhooks. It serves
-them with the API server's certificate. Leader election and metrics are off. Its user is an administrator.
+them with the API server's certificate. Leader election and metrics are off. It connects as an administrator.
 """
 
 import base64
@@ -47,7 +47,7 @@ class ForeignOperator:
         definitions: the folder with the definitions of its kinds.
         webhooks: the file with its webhooks.
         configuration: the file with its configuration.
-        certificates: the field of the configuration for the certificates that it creates itself.
+        certificates: the field of the configuration that makes the program create its own certificates.
     """
 
     program: str
@@ -181,7 +181,7 @@ def _apply(plane, documents):
 
 
 def _configuration(operator, source, webhooks_port, health_port):
-    """Return a program's configuration: that of its manifests, with other addresses."""
+    """Return the configuration in a program's manifests, with the differences that the module names."""
     return yaml.safe_load((source / operator.configuration).read_text()) | {
         "webhook": {"host": LOOPBACK, "port": webhooks_port},
         "health": {"healthProbeBindAddress": f"{LOOPBACK}:{health_port}"},

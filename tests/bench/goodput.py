@@ -1,7 +1,7 @@
-"""The steps that remain of a training whose simulator is killed several times: ours, and other libraries.
+"""The progress of a training whose simulator is killed several times: with Palaestra and other libraries.
 
-40 s stand for an hour. So a restart takes the same time as in reality, but a 90 times larger share: the rate
-of 10 faults is one in 4 s. Steps that a training lost and repeats count once.
+The measurement of one hour is compressed into 40 s, so 10 faults per hour mean one fault in 4 s. A restart
+takes its real time, so it costs a 90 times larger share than in a real hour. Repeated steps count once.
 """
 
 import tempfile
@@ -11,10 +11,10 @@ from pathlib import Path
 from tests.bench.peer_runs import Palaestra, Program, kill, wait_for_steps
 from tests.bench.recoveries import NEVER
 
-HOUR_S = 40.0  # what stands for an hour
+HOUR_S = 40.0  # the compressed hour
 LEAST_S = 2.0
 FAULTS = (0, 1, 5, 10)
-SCALE_OF_ALL = 0.1  # below it, a test measures only the first two
+SCALE_OF_ALL = 0.1  # below this scale, only the first two rates of FAULTS are measured
 WARM_STEPS = 200
 LOOK_EVERY_S = 0.05
 WAYS = {
@@ -44,7 +44,7 @@ def shares(found):
 
 
 def steps_per_second(make, faults, hour_s):
-    """Return the steps per second in a training whose simulator is killed at equal distances."""
+    """Return the steps per second of a training whose simulator is killed at equal intervals."""
     with tempfile.TemporaryDirectory() as folder, make(Path(folder)) as training:
         wait_for_steps(training, WARM_STEPS)
         first, began = training.steps(), time.monotonic()
@@ -52,7 +52,7 @@ def steps_per_second(make, faults, hour_s):
         while (now := time.monotonic()) < began + hour_s:
             if moments and now >= moments[0]:
                 moments.pop(0)
-                kill(training)  # a simulator that does not run at this moment cannot break
+                kill(training)  # no effect while the simulator is still being restarted
             training.revive()
             time.sleep(LOOK_EVERY_S)
         return round(max(training.steps() - first, 0) / hour_s, 1)

@@ -1,4 +1,4 @@
-"""Jobs whose worlds are costly to check, and how long another tenant's job waits meanwhile.
+"""The time until a job is planned while other tenants have jobs whose worlds are costly to check.
 
 The operator is a separate process with the permissions of an installation. The control plane is real but has
 no nodes. The measured memory includes the processes in which the operator checks worlds.
@@ -21,10 +21,10 @@ from tests.integration.operator.installed import operator, wait_for
 
 ROOT = Path(__file__).parents[2]
 HOSTILE, OTHERS = 32, 5
-TENANTS = ("hostile-1", "hostile-2")  # as many as the operator's checks at a time
-MOST_BYTES = 899_900  # of all worlds of a job; the operator refuses more
-MOST_BYTES_OF_ONE = 200_000  # of one inline world
-LARGE_BYTES = 150_000  # a world of this size, too, is checked in a separate process
+TENANTS = ("hostile-1", "hostile-2")  # two, because the operator runs two checks at the same time
+MOST_BYTES = 899_900  # for all worlds of a job together; the operator refuses a job with more
+MOST_BYTES_OF_ONE = 200_000  # for one inline world
+LARGE_BYTES = 150_000  # large enough that the operator checks the world in a separate process
 PERIOD_S = 0.1
 DEADLINE_S = 600
 HEADER = b"#VRML_SIM R2023b utf8\n"

@@ -1,4 +1,4 @@
-"""The success rates of the examples' policies by training seed, on episodes that chose no policy."""
+"""The success rates of the examples' policies by training seed, on episodes not used to choose a policy."""
 
 import json
 import resource
@@ -30,7 +30,7 @@ EVAL = Path(sys.executable).with_name("palaestra-eval")
 
 
 def measure(scale=1.0):
-    """Return success and seconds of move-to-target and paper-dqn by seed, and the share of the seconds.
+    """Return success and training time of move-to-target and paper-dqn by seed, and the ratio of their times.
 
     The two examples train in turns, so that both have the same load of the machine. Each result also goes to
     standard error, because all seeds take more than half an hour.
@@ -104,12 +104,12 @@ def _processor_seconds():
 
 
 def _share(pairs, name):
-    """Return the seconds of all trainings of move-to-target, as a share of those of paper-dqn."""
+    """Return the total time of the trainings of move-to-target, divided by that of paper-dqn."""
     return round(sum(pair[NEW][name] for pair in pairs) / sum(pair[OLD][name] for pair in pairs), 3)
 
 
 def shortened(job, scale):
-    """Return a job with a share of its steps; below full scale, the job evaluates only at its end."""
+    """Return the job; below full scale, it has fewer steps and evaluates only at its end."""
     if scale < 1:
         trainer = job["spec"]["trainer"]
         trainer["steps"] = scaled(trainer["steps"], scale, LEAST_STEPS)

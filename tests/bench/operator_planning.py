@@ -13,7 +13,7 @@ from tests.bench.sizes import scaled
 from tests.jobs import make_job
 
 REPLICAS = 30
-SIMULATORS = 17  # in one replica: 16 that collect, and one that evaluates
+SIMULATORS = 17  # one replica has 16 simulators that collect, and one that evaluates
 WORLD_BYTES = 45_000
 UID = "0d1f3e5a-7c2b-4d68-9a40-c3b2a1908f7e"
 POST = """DEF POST_{0} Solid {{

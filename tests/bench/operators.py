@@ -1,7 +1,7 @@
 """The operator next to Jobs alone, JobSet and Kubeflow Trainer, each in its own control plane without nodes.
 
-The objects of every kind lead to pods of one size. A client creates the objects; the figures come from the
-audit log, from /proc and from the API server's metrics.
+The pods have the same size, whichever kind of object creates them. A client creates the objects; the figures
+come from the audit log, from /proc and from the API server's metrics.
 """
 
 import os
@@ -31,7 +31,7 @@ JOBS = 1000
 NAMESPACE = "crowd"
 SILENCE_S, DEADLINE_S = 10, 1200
 WEBHOOK_CALLS = r"^apiserver_admission_webhook_request_total\{.*\} (\S+)$"
-# The beginnings of the names of each program's users.
+# Prefixes of the names of the users as which each program sends its requests.
 USERS = {
     "palaestra": (USER,),
     JOB_SET.program: (JOB_SET.user,),
@@ -99,7 +99,7 @@ def _figures(create, started, count):
 
 
 def _seconds(log):
-    """Return the seconds from the client's first request to the last object of each kind."""
+    """Return the seconds from the client's first request to the last Job, and to the last pod."""
     began = min(each["requestReceivedTimestamp"] for each in log if _creates(each))
     created = {
         resource: [each["stageTimestamp"] for each in log if _creates(each, resource)]
@@ -112,7 +112,7 @@ def _seconds(log):
 
 
 def _creates(entry, resource=None):
-    """Return whether a request of the log created an object of the crowd, of any resource or of this one."""
+    """Return whether a logged request created an object of the crowd; `resource` limits the kind."""
     what = entry.get("objectRef") or {}
     return (
         entry["stage"] == "ResponseComplete"
@@ -156,7 +156,7 @@ def _wait_for_silence(plane):
 
     def silent():
         before = counted()
-        time.sleep(SILENCE_S)  # a period without requests
+        time.sleep(SILENCE_S)  # the period in which no request may arrive
         return counted() == before
 
     eventually(silent, DEADLINE_S)

@@ -21,7 +21,7 @@ from tests.bench.stepping import rate
 ROUNDS = 15
 STEPS = 200
 SLEEP_MS = 3
-# Every wheel changes direction at every step, because an equal command would not be sent.
+# Every wheel changes direction at every step, because the facade does not send an unchanged command again.
 MOVEMENTS = ("TURN_LEFT", "TURN_RIGHT")
 ARENA = Path(__file__).parents[2] / "sim_image/src/palaestra_sim/worlds/arena.wbt"
 

@@ -1,7 +1,7 @@
 """Endless trainings of the same task with one stub: by Palaestra, and by programs of other libraries.
 
-Each class of training starts in a `with` block. A training that ends is started again by `revive`, at once;
-a Job of Kubernetes waits 10 s before the second start, and longer before each later one.
+A `with` block starts a training. `revive` restarts a training that has ended, without a delay. A Job of
+Kubernetes would wait 10 s before the second start, and longer before each later one.
 """
 
 import json
@@ -115,14 +115,14 @@ class Program:
         self._process = subprocess.Popen(
             self._command,
             cwd=ROOT,
-            env=os.environ | {"PYTHONPATH": str(ROOT)},  # for processes that the program starts
+            env=os.environ | {"PYTHONPATH": str(ROOT)},  # the program's child processes import from ROOT
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
             start_new_session=True,
         )
 
     def _end(self, number):
-        """End what is left of the program: itself, and its worker processes."""
+        """End the program and its worker processes, if some of them still run."""
         try:
             os.killpg(self._process.pid, number)
         except ProcessLookupError:
@@ -170,7 +170,7 @@ def stubs(ancestor):
 
 
 def started_at_s(pid):
-    """Return the time at which a process started, as `time.time` counts."""
+    """Return the time at which a process started, in seconds since the Unix epoch."""
     ticks = int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[19])
     age_s = time.clock_gettime(time.CLOCK_BOOTTIME) - ticks / os.sysconf("SC_CLK_TCK")
     return time.time() - age_s

@@ -2,7 +2,7 @@
 
 Plain training runs the same task in one process without a simulator: `fake_arena` simulates the task, and SB3
 evaluates the policy. `subproc` is a program with Stable-Baselines3's `SubprocVecEnv`, which steps the same
-simulators as the example. Steps, hyperparameters, evaluations and confirmation episodes are equal in all.
+simulators as the example. All three trainings have the same steps, hyperparameters and evaluations.
 """
 
 import json
@@ -27,7 +27,7 @@ from tests.jobs import example
 from tests.local_run import PALAESTRA
 
 JOB = "move-to-target"
-CONFIRMING = 100  # evaluation.confirmEpisodes, which the example does not set
+CONFIRMING = 100  # the default of evaluation.confirmEpisodes, because the example does not set this field
 LEAST_STEPS = 300
 
 

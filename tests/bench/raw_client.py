@@ -1,7 +1,7 @@
-"""A step of move-to-target by a client that only moves bytes: the floor below any client in Python.
+"""A step of move-to-target by a client that only moves bytes. No client in Python can be faster.
 
 The client connects as any ROS client does. In each step it sends the same requests as Palaestra's client, in
-the same order, from bytes that were packed before. It reads whole frames and decodes nothing.
+the same order. It packs their bytes before the measurement, reads whole frames, and decodes nothing.
 """
 
 import contextlib
@@ -21,7 +21,7 @@ from palaestra_trainer.ros.master import Master
 NAME = "raw_client"
 PERIOD_MS = 192
 DEADLINE_S = 5.0
-LOOKS = 30  # as in Palaestra's client: polls before a wait in the kernel
+LOOKS = 30  # the number of polls before the client waits in the kernel, as in Palaestra's client
 RADIUS_M, DISTANCE_M = 0.063, 0.1826
 RANGES = tuple(f"ir{number}" for number in range(1, 10))
 TURNS_RAD_S = (1.0, -1.0)

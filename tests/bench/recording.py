@@ -1,7 +1,7 @@
 """Recording the figures of a part in a file of JSON, with the machine, its load and the versions.
 
-`tools.peers` makes docs/explain/peers.md from this file. The file has no date, so a second measurement
-changes only what is different.
+`tools.peers` makes docs/explain/peers.md from this file. The file has no date, so another measurement
+changes only the lines whose values differ.
 """
 
 import json

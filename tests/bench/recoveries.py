@@ -1,8 +1,8 @@
-"""The seconds from the SIGKILL of the only simulator until training steps again: ours, and other libraries.
+"""The seconds from the SIGKILL of a simulator to the next step, with Palaestra and with Stable-Baselines3.
 
-`palaestra` restarts the simulator in the run. `standby` has a second simulator. `without_restarts` ends with
-exit code 80, and a loop starts it again. `subproc` is Stable-Baselines3 with `SubprocVecEnv`: its program
-ends with an EOFError, and a loop starts it again from its newest checkpoint.
+`palaestra` restarts the simulator during the run. `standby` does the same with a spare simulator. The run of
+`without_restarts` ends with exit code 80, and a loop starts the run again. `subproc` is Stable-Baselines3
+with `SubprocVecEnv`: its program ends with an EOFError, and a loop restarts it from its newest checkpoint.
 """
 
 import statistics

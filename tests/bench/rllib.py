@@ -1,4 +1,4 @@
-"""RLlib's DQN over a simulator of ours: a whole run, a start, and the seconds to step again after a SIGKILL.
+"""RLlib's DQN with our simulator: the times of a whole run, of a start, and of a recovery after a SIGKILL.
 
 RLlib is not installed with this project. `--rllib PYTHON` names an interpreter that imports Ray and
 `palaestra_trainer`; without it, the part is skipped.

@@ -1,8 +1,8 @@
 """A training program as users of RLlib write it: DQN in one env runner, over a simulator of ours.
 
 `PYTHON -m tests.bench.rllib_program SPEC FOLDER` trains the job whose spec is in the file SPEC. PYTHON is an
-interpreter that imports Ray and `palaestra_trainer`. The program has no checkpoints, because RLlib restarts
-what breaks.
+interpreter that imports Ray and `palaestra_trainer`. The program saves no checkpoints, because RLlib restarts
+a broken environment and the program continues.
 """
 
 import json
@@ -18,9 +18,9 @@ from ray.tune.registry import register_env
 from palaestra_trainer.webots.launching.master import ensure_master
 from tests.bench.step_counter import StepCounter
 
-MODULE = "palaestra_trainer.environments"  # a process of Ray imports it, which registers the environments
-CPUS = 4  # of Ray's own count: one for the learner, one for each env runner
-CONFIRMATIONS = 2  # evaluations at the end, as many episodes as plain.CONFIRMING
+MODULE = "palaestra_trainer.environments"  # each process of Ray imports it to register the environments
+CPUS = 4  # the number that Ray may assign: one for the learner, and one for each env runner
+CONFIRMATIONS = 2  # evaluations at the end, which together have as many episodes as plain.CONFIRMING
 ROLLOUT = 4
 PER_ITERATION = 1000
 
@@ -63,13 +63,13 @@ def environment(spec, wanted):
 
 
 def schedule(rate, steps):
-    """Return a learning rate of a job as RLlib's; `lin_X` falls from X to 0."""
+    """Return RLlib's form of a job's learning rate; the rate `lin_X` falls from X to 0."""
     falls = isinstance(rate, str)
     return [[0, float(rate.removeprefix("lin_"))], [steps, 0.0]] if falls else rate
 
 
 def configured(spec, folder):
-    """Return the configuration with the job's hyperparameters; both ways to restart are on."""
+    """Return the configuration with the job's hyperparameters, and with both restarts of RLlib enabled."""
     trainer = spec["trainer"]
     given, evaluation = trainer["algorithm"]["hyperparameters"], trainer["evaluation"]
     every = evaluation["everySteps"]

@@ -2,7 +2,7 @@
 
 `python -m tests.bench.sb3_program SPEC FOLDER` trains the job whose spec is in the file SPEC. Each
 environment is `gymnasium.make` of the job's id in a process of `SubprocVecEnv`, where it starts its own stub.
-The program saves model and replay buffer at the job's interval, and resumes from the newest in FOLDER.
+The program saves model and replay buffer in FOLDER at the job's interval, and resumes from the newest files.
 """
 
 import json

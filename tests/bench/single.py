@@ -22,7 +22,7 @@ def requests_of_one_job(plane, api):
     to_the_pod = counted(asked(plane)[before:])
     with training() as address:
         place.run(pod, address)
-        time.sleep(TRAINS_S)  # the process trains
+        time.sleep(TRAINS_S)  # the duration of the job's training
         place.end(pod, word=Termination(step=100, reason="Completed: the training is complete"))
         place.until("Succeeded")
     crowd.wait_for_silence(plane)

@@ -18,7 +18,7 @@ TIMES = 20
 
 
 def measure(scale=1.0):
-    """Return the medians of the phases, and of the whole start with each program, which start in turns."""
+    """Return the median times of the whole start of each program, and of the phases of `palaestra run`."""
     times = scaled(TIMES, scale)
     ours, theirs = [], []
     for _ in range(times):

@@ -5,7 +5,7 @@ import struct
 from pathlib import Path
 
 NUMBER = struct.Struct("<q")
-NAME = "steps"  # of the file, in the folder of a training
+NAME = "steps"  # the name of the file in the folder of a training
 
 
 class StepCounter:

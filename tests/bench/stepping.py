@@ -64,7 +64,8 @@ def rate(step_once, count):
 def step(robot, way):
     """Take one step with Palaestra's client.
 
-    `way` changes every wheel's direction, because the client does not send an equal command.
+    `way` is 1 or -1, the direction of every wheel. The caller alternates it, because the client does not send
+    an unchanged command again.
     """
     robot.drive(way * 0.3, way * 0.1, way * 0.5)
     robot.advance()
@@ -124,7 +125,10 @@ class RospyStepper:
         self._publisher("close")()
 
     def _connected(self):
-        """Return the topics on which the simulator sends to this node; rospy counts connections too early."""
+        """Return the topics whose publisher has connected to this node, as the simulator reports them.
+
+        rospy's own number of connections is not used, because rospy counts a connection too early.
+        """
         links = self._publisher.getBusInfo(rospy.get_name())[2]
         return {topic for _, subscriber, _, _, topic, _ in links if subscriber == rospy.get_name()}
 

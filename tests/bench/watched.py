@@ -21,14 +21,14 @@ from tests.bench.arena import running
 from tests.bench.sizes import scaled
 from tests.jobs import example
 
-ROUNDS = 60  # many short rounds, because the load of the machine varies
+ROUNDS = 60  # many short rounds, so that changes of the machine's load average out
 STEPS = 400
 TRAINING_ROUNDS = 20
 TRAINING_S = 4.0
-WARM_STEPS = 1500  # the policy learns from each further batch of steps
+WARM_STEPS = 1500  # after these steps the policy learns, so the measured steps include learning
 MOST_STEPS = 1_000_000
 PATIENCE_S = 180
-PERIOD_S = 1.0 / 20.0  # of the page
+PERIOD_S = 1.0 / 20.0  # the page requests the scene 20 times per second
 PROGRAMS = ("palaestra-train", "palaestra-sidecar", "palaestra-stub")
 TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 
@@ -66,7 +66,7 @@ def measure_training(scale=1.0):
 
 
 def _extra(alone, seen):
-    """Return the processor seconds per second of a watched round that its steps do not explain."""
+    """Return the processor seconds per second that a viewer adds to the cost of the steps in its round."""
     (speed, busy), (seen_speed, seen_busy) = alone, seen
     return seen_busy - busy / speed * seen_speed
 
@@ -104,7 +104,7 @@ def viewing(what):
     with subprocess.Popen(
         command, cwd=local_run.ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE
     ) as viewer:
-        viewer.stdout.readline()  # the viewer has started
+        viewer.stdout.readline()  # wait until the viewer has started
         yield viewer
         viewer.stdin.close()
         if viewer.wait(30.0):

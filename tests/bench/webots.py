@@ -1,7 +1,7 @@
 """Environment steps with the controller for Webots, and with the stub, in turns.
 
-The Webots of the tests simulates with the stub, in another process. So the difference is the cost of the
-controller, of libController's calls, and of the tests' Webots, which answers each call in Python.
+The tests' own Webots also simulates with the stub, but in another process. So the difference is the cost of
+the controller, of libController's calls, and of the tests' Webots, which computes each result in Python.
 """
 
 import itertools

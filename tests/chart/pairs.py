@@ -85,10 +85,10 @@ BESIDE: dict[str, dict[str, Any]] = {
 
 
 def rows() -> list[tuple[str, ...]]:
-    """Return sets of paths. For any two paths, a set has both, a set has neither, and two sets have one each.
+    """Return sets of paths. For any two paths, there are sets with both, with neither, and with only one.
 
-    The first of the n + 1 sets is empty. Each path is in n/2 of the other sets, rounded up. Two such halves
-    overlap, and neither contains the other (Katona 1973).
+    The first of the n + 1 sets is empty. Each path is in n/2 of the other sets, rounded up. For two paths,
+    the groups of sets that contain them overlap, and neither group contains the other (Katona 1973).
     """
     n = next(odd for odd in range(1, 99, 2) if comb(odd, odd // 2 + 1) >= len(OTHERS))
     halves = list(zip(OTHERS, combinations(range(1, n + 1), n // 2 + 1), strict=False))

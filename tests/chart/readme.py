@@ -31,7 +31,7 @@ def values(source: str) -> Iterator[Value]:
 
 
 def text() -> str:
-    """Return the README with the present introduction and a new table."""
+    """Return the README with its introduction unchanged and a new table."""
     introduction, _, _ = PATH.read_text().partition(MARK)
     rows = [
         f"| `{value.path}` | `{json.dumps(value.default)}` | {value.sentence} |"

@@ -160,7 +160,7 @@ def indent(line: str) -> int:
 
 
 def of_comments(text: str) -> Iterator[Paragraph]:
-    """Yield comments. Consecutive lines of comments are one paragraph; a comment after code is its own."""
+    """Yield paragraphs of comments: consecutive comment lines, or a single comment after code."""
     found = [(number, without_code(comment)) for number, comment in comments(text)]
     sources = text.split("\n")
     full = {number: comment for number, comment in found if sources[number - 1].lstrip().startswith("#")}
@@ -193,7 +193,7 @@ def piece(node: ast.expr) -> str:
 
 def without_code(text: str) -> str:
     """Return a text in which code is one word, quotes are one word, and links are their text."""
-    text = re.sub(r"`[^`]*`", "X", text)  # a capital, since it may begin a sentence
+    text = re.sub(r"`[^`]*`", "X", text)  # a capital letter, because code may begin a sentence
     text = re.sub(r"[\"“][^\"”]*[\"”]", "x", text)
     return re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", text)
 

@@ -22,7 +22,7 @@ REASON = re.compile(r"# (noqa: [A-Z0-9, ]+ - |type: ignore\[[a-z-]+\](  # noqa: 
 BROAD = re.compile(r" *except(:| [^#]*\b(Base)?Exception\b)")
 MOST_LINES = 400
 PATH = re.compile(
-    r"`((?:[\w.-]+/)+[\w.-]+\.\w+)`"  # in backticks, with a file suffix
+    r"`((?:[\w.-]+/)+[\w.-]+\.\w+)`"  # a path in backticks that ends with a file suffix
     r"|(?<![\w/.~-])((?:operator|trainer|sim_image|tests|docs|manifests|charts|tools)/[\w./-]*[\w/])"
 )
 NEW = {"sim_image/src/palaestra_sim/scene/devices/gps.py", "tests/integration/webots/test_gps.py"}

@@ -24,7 +24,7 @@ def test_no_sentence_needs_a_second_reading(place):
 
 @pytest.mark.parametrize("reason", ROWS)
 def test_no_reason_needs_a_second_reading(reason, tmp_path):
-    """Each reason is a cell of a table in docs/reference/reasons.md, and the rules for pages skip tables."""
+    """docs/reference/reasons.md shows the reasons in a table, and the test of the pages skips tables."""
     page = tmp_path / "row.md"
     row = ROWS[reason]
     page.write_text(f"{row.meaning}\n\n{row.remedy}\n")
@@ -63,7 +63,7 @@ def test_a_planted_sentence_is_found(planted, name, text, tmp_path):
 
 
 def test_tables_and_code_in_a_docstring_are_no_sentences(tmp_path):
-    """In Markdown, an indented block after an empty line is code. But a list of arguments is prose."""
+    """An indented block after an empty line is code or a table. A list of arguments is indented prose."""
     path = tmp_path / "blocks.py"
     path.write_text(
         '"""Return a table.\n\n    What is    a cell\n\n    Who leads  another\n\n'

@@ -57,6 +57,6 @@ def test_no_type_is_defined_twice():
 
 @pytest.mark.parametrize("name", ["my_msgs/Own", "std_msgs", "std_srvs/Empty"])
 def test_an_unknown_message_is_a_key_error(name):
-    """A message has one of the known types; `std_srvs/Empty` is the type of a service."""
+    """A misspelled name, a package's name or the type of a service must not be taken for a message type."""
     with pytest.raises((KeyError, ValueError)):
         message_type(name)

@@ -27,7 +27,7 @@ def test_every_type_of_webots_ros_has_its_md5(name):
 
 @for_each("name", MESSAGES)
 def test_an_empty_message_survives_the_wire(name):
-    """For a field that is not set, ROS sends zero, an empty value or False."""
+    """In ROS, a field that is not set is sent as zero, as an empty value or as False, and not left out."""
     codec = message_type(name).codec
 
     assert codec.encode({}) == codec.encode({})

@@ -27,7 +27,7 @@ a-v0:
 
 
 def test_classes_have_the_short_names_that_the_trainer_knows():
-    """The trainer rejects an unknown name, and would use a wrong class for a wrong name."""
+    """The trainer rejects an unknown name, and the short name of another class would change the training."""
     known = {name for names in CLASSES.values() for name in names}
 
     assert set().union(*SHORT.values()) == known
@@ -44,7 +44,7 @@ def test_the_trainer_accepts_the_hyperparameters_of_a_converted_entry(algorithm)
 
 
 def test_no_word_that_lives_elsewhere_becomes_a_hyperparameter():
-    """These words belong to other fields of a job, and the trainer rejects them as hyperparameters."""
+    """Words such as `n_timesteps` are other fields of a job; the trainer rejects them as hyperparameters."""
     words = "".join(f"  {word}: null\n" for word in ELSEWHERE if word not in {"n_timesteps", "policy"})
 
     written = load(convert(f"a-v0:\n  n_timesteps: 5\n  policy: MlpPolicy\n{words}", "sac.yml").text)

@@ -20,7 +20,7 @@ def main() -> int:
     """Run the control plane until SIGINT or SIGTERM."""
     os.environ[REQUIRED] = "1"
     with tempfile.TemporaryDirectory(prefix="control-plane-") as folder, running(Path(folder)) as plane:
-        signal.pthread_sigmask(signal.SIG_BLOCK, ENDS)  # not earlier: child programs inherit a blocked signal
+        signal.pthread_sigmask(signal.SIG_BLOCK, ENDS)  # after the start of child programs, which inherit it
         sys.stdout.write(f"export KUBECONFIG={plane.kubeconfig}\n")
         sys.stdout.flush()
         signal.sigwait(ENDS)

@@ -40,7 +40,8 @@ CONTROLLERS = (
 )
 START_DEADLINE_S = 60
 STOP_DEADLINE_S = 10
-# The programs run only for minutes, and Go's garbage collection would take a tenth of their processor time.
+# Go's garbage collection runs rarely, because it would take a tenth of the processor time of these programs.
+# They run only for minutes, so their memory stays small enough.
 RARELY = {"GOGC": "400"}
 AUDIT = {
     "apiVersion": "audit.k8s.io/v1",
@@ -216,7 +217,7 @@ def _api_server(plane: ControlPlane, etcd_port: int) -> list[str]:
         f"--service-cluster-ip-range={SERVICES}",
         "--endpoint-reconciler-type=none",
         "--authorization-mode=RBAC",
-        "--enable-admission-plugins=OwnerReferencesPermissionEnforcement",  # as on OpenShift
+        "--enable-admission-plugins=OwnerReferencesPermissionEnforcement",  # OpenShift enables it too
         f"--audit-policy-file={policy}",
         f"--audit-log-path={plane.audit_log}",
     ]

@@ -1,4 +1,4 @@
-"""Pods from which a test sends requests to other pods, in a namespace and with labels of its choice."""
+"""Pods from which a test sends requests to other pods; the test chooses their namespace and labels."""
 
 from importlib.metadata import version
 

@@ -21,8 +21,8 @@ from tests.e2e.namespace import Namespace, unique
 
 T = TypeVar("T")
 
-BESIDE = "beside"  # the mark
-AT_ONCE = 12  # small pods that start next to two trainings, on two processors
+BESIDE = "beside"  # the name of the mark
+AT_ONCE = 12  # so many small pods can start at the same time, next to two trainings on two processors
 END_S = 1200.0
 
 

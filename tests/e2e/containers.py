@@ -1,7 +1,7 @@
 """Simulators in containers of a real Docker Engine: python -m tests.e2e.containers.
 
-The program starts simulators in both kinds of networks, kills programs that own a simulator, and prints what
-it sees as JSON. It runs in the network of the engine (tests/cluster/beside_containers.sh).
+The program starts simulators in both kinds of networks, kills programs that own a simulator, and prints its
+observations as JSON. It runs in the network of the engine (tests/cluster/beside_containers.sh).
 """
 
 import json
@@ -32,7 +32,10 @@ sys.stdin.read()
 
 
 def main() -> None:
-    """Print the times of both simulators, the names of two beside each other, and the containers left."""
+    """Print the simulated time in each network, the names of two simulators of one world, and more.
+
+    The other values are the error for a container with a GPU, and the containers that still exist at the end.
+    """
     engine = docker.from_env()
 
     def left() -> list[str]:
@@ -55,7 +58,10 @@ def main() -> None:
 
 
 def _of_a_killed_program(network: str, left) -> float:
-    """Return the time of a simulator whose program is then killed; wait until its container is gone."""
+    """Return the simulated time after a step of a program.
+
+    The program is then killed, and its container must end.
+    """
     environment = {name: value for name, value in os.environ.items() if not name.startswith("ROS_")}
     owner = subprocess.Popen(
         [sys.executable, "-c", OWNER, network],

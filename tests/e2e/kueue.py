@@ -25,7 +25,7 @@ NAMESPACE = "robots"
 TYPED_S = 300
 MADE_S = 120
 
-_BESIDE_A_TRAINING = "controllerManager.manager.resources.requests.cpu=50m"  # fits on two cores
+_BESIDE_A_TRAINING = "controllerManager.manager.resources.requests.cpu=50m"  # a small request, for two cores
 _FROM_THE_MODULE = """
 helm() {
   [[ $2 != palaestra ]] || return 0 # tests/e2e/allowances.py has allowed the class already
@@ -78,7 +78,7 @@ class Kueue:
 
 
 def scheduling(priority: str | None = None) -> Object:
-    """Return the `scheduling` field of the page's job that has this priority class, or none."""
+    """Return the `scheduling` field of the page's job with this priority class; None: the job without one."""
     specs: list[Object] = [yaml.safe_load(block).get("spec", {}) for block in blocks(DOING, "yaml")]
     found: list[Object] = [spec["scheduling"] for spec in specs if "scheduling" in spec]
     return next(each for each in found if each.get("priorityClassName") == priority)

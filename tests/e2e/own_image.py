@@ -16,7 +16,7 @@ from tools.images import cache
 from tools.images.engines import Buildah, Docker, Order
 
 ROOT = Path(__file__).parents[2]
-ARCHIVES = "PALAESTRA_E2E_IMAGES"  # a file with a line NAME=ARCHIVE for each, which tests/cluster/e2e.sh sets
+ARCHIVES = "PALAESTRA_E2E_IMAGES"  # names a file with a line NAME=ARCHIVE per image; e2e.sh sets the variable
 LOCK_DEADLINE_S, BUILD_S, LOAD_S = 300, 600, 300
 
 

@@ -59,7 +59,7 @@ _RUN_S = 240
 
 
 def page_of(cluster: Cluster, namespace: str, deployment: str, port: int) -> str:
-    """Return the first page of a server that listens only inside its pod, as `kubectl port-forward` does."""
+    """Return the first page of a server, requested inside its pod because it listens only there."""
     fetch = (
         f"from urllib.request import urlopen; print(urlopen('http://127.0.0.1:{port}', timeout=30).read())"
     )
@@ -110,11 +110,11 @@ def assert_the_first_notebook_drives_a_robot(cluster: Cluster) -> None:
 def assert_a_notebook_starts_simulators_in_pods(cluster: Cluster) -> None:
     """Assert that a notebook drives simulators in pods, and that they end with it.
 
-    The network of the tests' own cluster enforces no NetworkPolicy; tests/integration/webots looks at the
-    policy.
+    The network of the tests' own cluster enforces no NetworkPolicies, so a test in tests/integration/webots
+    checks the policy.
     """
     run = ("exec", "-n", SYSTEM, f"deploy/{NOTEBOOKS}", "--", "python3", "-c", SIMULATORS)
-    said = cluster.kubectl(*run, within_s=_RUN_S)  # it ends with code 137, since the program kills itself
+    said = cluster.kubectl(*run, within_s=_RUN_S)  # the exit code is 137, because the program kills itself
     assert '{"names"' in said, said
     seen = json.loads(next(line for line in said.splitlines() if line.startswith('{"names"')))
 

@@ -14,7 +14,7 @@ from tests.e2e.tour import tour
 
 pytestmark = [pytest.mark.changes_the_operator, pytest.mark.timeout(1200)]
 
-WITHIN_S = 600  # for `helm test`, which pulls no image here
+WITHIN_S = 600  # the timeout of `helm test`; the images are on the node already
 RELEASE = "palaestra"
 
 

@@ -1,4 +1,4 @@
-"""A simulator in a container of a real Docker Engine, the one that carries the cluster."""
+"""A simulator in a container of a real Docker Engine, which is the engine that runs the cluster's nodes."""
 
 import json
 import subprocess
@@ -14,7 +14,7 @@ pytestmark = [pytest.mark.beside, pytest.mark.comes_late]
 
 
 def test_simulators_start_in_containers_and_end_with_their_programs(namespace):
-    """test_launchers.py tests the same with a server without containers, so it cannot test their network."""
+    """Other tests use a Docker API without containers, so only this test covers the network of containers."""
     del namespace  # only the engine of the cluster is needed
     skip_without_archives()
     beside = ROOT / "tests/cluster/beside_containers.sh"

@@ -125,7 +125,7 @@ def nothing_is_left_to_see(planned):
 
 
 def unnamed(made):
-    """Return the spec of the pods with the names that depend on the job replaced."""
+    """Return the spec of the pods, in which `NAME` replaces the names that depend on the job."""
     text = yaml.safe_dump(made.template["spec"])
     for name in (
         made.owner["metadata"]["uid"],
@@ -288,7 +288,7 @@ def test_metadata_reaches_no_object_of_the_operator(planned, plain, shared):
 
 
 def test_a_job_of_somebody_else_is_left_alone(train, shared):
-    """By the name of a TrainingJob, its author must not get control of another user's Job."""
+    """An author could give a TrainingJob such a name that its Job has the name of another user's Job."""
     theirs = shared.create("jobs", somebody_s("theirs-0"))
 
     train(authors("theirs", ("spec.suspend", False)))

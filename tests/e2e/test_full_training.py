@@ -25,9 +25,9 @@ def ros_names(content):
 
 
 def test_every_robot_of_all_pods_has_a_ros_name_of_its_own(long_run):
-    """With the same ROS names in each simulator, only one simulator of a world could run.
+    """With the same ROS names in each simulator, only one simulator of a world could run at a time.
 
-    The paper names this as a limitation.
+    The paper reports this limitation of its own architecture.
     """
     known = {named(pod): set() for pod in long_run.pods()}
     space = long_run.namespace
@@ -59,9 +59,9 @@ def test_metrics_are_scraped_from_every_trainer_and_sidecar(long_run, monitor):
 
 
 def test_the_status_tells_where_each_replica_stands(long_run):
-    """A new operator must get the progress from the trainers again.
+    """The long run's operator is killed repeatedly.
 
-    The test kills the operator repeatedly.
+    Each new operator must get the progress from the trainers again.
     """
     long_run.pods()
     space = long_run.namespace

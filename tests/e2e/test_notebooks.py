@@ -13,7 +13,7 @@ pytestmark = [pytest.mark.beside, pytest.mark.comes_late]
 
 @pytest.mark.timeout(900)
 def test_a_notebook_trains_as_the_program_of_a_job(namespace):
-    """The image of the notebook server has the notebook, and the pod's root file system is read-only."""
+    """The notebook must run in a pod with the image of the notebook server and a read-only file system."""
     namespace.apply(yaml.safe_load((NOTEBOOKS / "6-train.yaml").read_text()))
 
     assert namespace.wait_for_end("notebook", LONG_S) == "Succeeded"

@@ -29,16 +29,16 @@ from tests.e2e.test_operators import KINDS, fingerprint
 from tests.pages import blocks, chapters
 from tests.terminal import Terminal
 
-TYPED_S = 600  # `helm test` trains, and a namespace is deleted with its pods
+TYPED_S = 600  # `helm test` trains a job, and the deletion of a namespace waits for its pods
 READY_S = 180
-SESSION_S = 800  # a small training, with a pause
+SESSION_S = 800  # long enough for a small training that is paused once
 RUNS = "from urllib.request import urlopen; print(urlopen('http://127.0.0.1:6006/data/runs').read())"
 INSTALL = (ROOT / "docs/howto/install.md").read_text()
 FIRST = (ROOT / "docs/start/cluster.md").read_text()
 PYTHON = (ROOT / "docs/howto/python.md").read_text()
 SWEEPS = (ROOT / "docs/howto/sweeps.md").read_text()
 LAB = "lab"  # the namespace of the runs that TensorBoard shows
-NAMESPACES = (LAB, "robots", "drones")  # of the page, in addition to the operator's namespace
+NAMESPACES = (LAB, "robots", "drones")  # the page creates these, besides the operator's namespace
 TENSORBOARD = "palaestra-tensorboard"
 # The Deployments that exist after the commands of each chapter of install.md, with their replicas.
 PROMISED = {

@@ -1,4 +1,4 @@
-"""The operator uses every permission that the installation grants, by the audit log of the whole run.
+"""The operator uses every permission that the installation grants; the audit log of the run must show this.
 
 This module runs last. Its tour uses all permissions of the cluster's operator, so the result does not depend
 on other tests. tests/e2e/test_chart.py covers the operator of one namespace and the pods of `helm test`.
@@ -20,7 +20,7 @@ from tests.e2e.tour import tour
 pytestmark = [pytest.mark.looks_back, pytest.mark.timeout(1200)]
 
 TRIAL = "palaestra-trial"
-NOTEBOOKS = "palaestra-jupyter"  # of a release that lets notebooks start simulators (test_pages.py)
+NOTEBOOKS = "palaestra-jupyter"  # test_pages.py installs a release whose notebooks start simulators
 WITH_NOTEBOOKS = {"jupyter": {"enabled": True, "simulators": True, "tokenSecret": {"name": "notebooks"}}}
 UNSEEN = {
     # An admission plugin checks this permission without an audit entry. The plugin

@@ -69,9 +69,9 @@ def test_an_image_that_cannot_be_pulled_is_named_and_waited_for(namespace, job):
 
 
 def test_a_job_starts_when_its_world_appears(namespace, job):
-    """A user may apply the job first.
+    """A user may apply the job before the ConfigMap that contains its world.
 
-    The job then waits until its ConfigMap exists and has the label for jobs.
+    The job must wait until the ConfigMap exists and has the label for jobs.
     """
     source = {"world": {"configMap": {"name": "arena", "key": "arena.wbt"}}}
     namespace.apply(job("waits", simulator=source, script="exit 0"))

@@ -25,7 +25,7 @@ def tour(place: Namespace, operators: str) -> None:
     replace_pod(place)
     suspend(place, flag=True)
     replace_operator(place, operators)
-    suspend(place, flag=False)  # the second operator finds the events of the first
+    suspend(place, flag=False)  # the new operator must read and count the events of the old operator
     suspend(place, flag=True)
     place.create("resourcequotas", SPENT)
     place.apply(tiny_job("refused", script="exit 0"))
@@ -33,7 +33,7 @@ def tour(place: Namespace, operators: str) -> None:
 
 
 def refer(place: Namespace) -> None:
-    """Use an existing claim and an existing world, and a job whose Job's name is taken."""
+    """Create jobs that use an existing claim and an existing world, and a job whose Job name is taken."""
     place.create("persistentvolumeclaims", make_claim("shared", labels=FOR_JOBS))
     world = {"arena.wbt": builtin("arena").decode()}
     place.create("configmaps", {"metadata": {"name": "worlds", "labels": FOR_JOBS}, "data": world})

@@ -72,7 +72,7 @@ PART_OF = {
     for service, parts in services.items()
     for verb, part in parts.items()
 }
-# The functions that call a service of another name with a value.
+# The service that a function calls, and the value that it sends to the service.
 ORDERS = {
     ("connector", "lock"): ("lock", True),
     ("connector", "unlock"): ("lock", False),
@@ -82,7 +82,7 @@ ORDERS = {
     ("lidar", "disable_point_cloud"): ("enable_point_cloud", False),
 }
 RENAMED = {("led", "set"): "set_led", ("led", "get"): "get_led"}
-# The index of the topic whose value a function returns; topic 0 otherwise.
+# The index of the topic whose value a function returns; functions that are not listed return topic 0.
 TOPICS = {("gps", "get_speed"): 1, ("gps", "get_speed_vector"): 2, ("radar", "get_number_of_targets"): 1}
 VALUES = {
     *("get_value", "get_values", "get_quaternion", "get_presence", "get_torque_feedback"),
@@ -181,7 +181,7 @@ class Answers:
         self.animation = None
 
     def call(self, name, arguments):
-        """Return the result of a function; after a refusal the value that libController returns."""
+        """Return the result of a function, or libController's value for an error if a service refuses."""
         try:
             return self._answer(name, arguments)
         except (ServiceFailed, SimError) as error:

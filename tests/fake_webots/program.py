@@ -25,10 +25,10 @@ from palaestra_sim.stub.physics import StubPhysics
 from tests.fake_webots.answers import Answers
 from tests.fake_webots.wire import read_request, write_result
 
-GRACE_S = 1.0  # Webots waits so long for a controller to end, before it sends SIGTERM
+GRACE_S = 1.0  # as in Webots, the time that a controller has to end before it gets SIGTERM
 MODES = {"pause": Mode.PAUSE, "realtime": Mode.REAL_TIME, "fast": Mode.FAST}
 QUIT = -1
-_POLL_S = 0.02  # interval of the looks at the controllers' processes
+_POLL_S = 0.02  # interval between two checks whether the controllers' processes still run
 
 
 def main():
@@ -59,7 +59,7 @@ class Webots:
         self.loop.watch(self.listener, self.accept)
         self.controllers = {}
         self.code = 0
-        self.then = None  # what follows the end of all controllers, once it has begun
+        self.then = None  # while all controllers are being ended, the function that is called afterwards
         self.mode = MODES[options.mode]
 
     def run(self):
@@ -99,14 +99,14 @@ class Webots:
         Link(self, connection)
 
     def end_program(self):
-        """End all controllers and then the program, also instead of a load that has begun."""
+        """End all controllers and then the program, even if a load of a world has begun."""
         if self.then is not None:
             self.then = self.loop.stop
             return
         self.end(self.loop.stop)
 
     def end(self, then):
-        """End all controllers, and then go on; do nothing if they are ending already."""
+        """End all controllers, and then call `then`; do nothing if they are being ended already."""
         if self.then is not None:
             return
         self.then = then
@@ -114,17 +114,20 @@ class Webots:
         self.end_controllers(list(self.controllers.values()), self.go_on)
 
     def go_on(self):
-        """Do what follows the end of all controllers, which a quit may have changed by now."""
+        """Call the current `then`, which `end_program` may have replaced in the meantime."""
         self.then()
 
     def end_controllers(self, controllers, then):
-        """End controllers: -1 to their next step, SIGTERM after a second, and then go on."""
+        """End controllers, and then call `then`.
+
+        The next step of a controller returns -1. A controller that still runs after a second gets SIGTERM.
+        """
         for controller in controllers:
             controller.leaving = True
         self.await_ends(controllers, then, 0.0)
 
     def await_ends(self, controllers, then, waited_s):
-        """Go on as soon as all these controllers have ended."""
+        """Call `then` as soon as all these controllers have ended."""
         running = [it for it in controllers if it.runs]
         if not running:
             then()
@@ -134,7 +137,7 @@ class Webots:
                 controller.process.terminate()
         self.loop.later(_POLL_S, lambda: self.await_ends(controllers, then, waited_s + _POLL_S))
 
-    # The host of the services.
+    # The services of the stub call the following methods.
 
     def arguments(self, robot):
         """Return arguments that affect only our own simulators."""
@@ -166,7 +169,7 @@ class Webots:
         self.end_controllers([self.controllers[robot.name]], lambda: self.start_again(robot))
 
     def start_again(self, robot):
-        """Start the controller of a robot that has ended, unless all are ending by now."""
+        """Start the controller of a robot again, unless all controllers are being ended."""
         if self.then is not None:
             return
         self.stepping.leave(robot)
@@ -233,7 +236,7 @@ class Controller:
         }
 
     def watch(self):
-        """Let the world go on without a controller whose process has ended."""
+        """Wait for the end of the process; afterwards, the world steps without this controller."""
         if self.runs:
             self.webots.loop.later(_POLL_S, self.watch)
             return

@@ -1,8 +1,8 @@
 """Compare the end states of two runs of one workload, without values that differ in every run.
 
 Pure. An end state becomes leaves, each with a path. Times, uids, versions and numbers in sentences are
-replaced by placeholders. Every other difference between two undisturbed runs is masked: later runs may differ
-there too.
+replaced by placeholders. If two undisturbed runs still differ at a path, this path is masked: it is not
+compared in later runs.
 """
 
 import re

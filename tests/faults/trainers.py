@@ -1,7 +1,7 @@
 """Trainers that serve their status on loopback addresses, correctly or with a fault.
 
-From the response that the plan names, all responses of the trainer have the fault: slow, cut, false, or
-endless.
+The plan names the number of a response. This response and all later ones have the fault: they are slow, cut,
+false or endless.
 """
 
 import threading
@@ -20,7 +20,7 @@ LIES = (
     replace(STATUS, step=10**18, target=10**18, attempt=10**9, steps_lost=10**18, phase="\x00" * 63),
     replace(STATUS, step=0, attempt=None, last_progress="9999-12-31T23:59:59Z", success_rate=1.0),
 )
-DRIBBLE_S = 0.2  # between two bytes, so that a response takes a minute
+DRIBBLE_S = 0.2  # the pause between two bytes, so that a response takes a minute
 ENDLESS = b" " * 65_536
 MOST_PIECES = 4096  # 256 MiB in total, unless the operator closes the connection first
 

@@ -51,7 +51,7 @@ class Stage(Place):
     def __exit__(self, *_: object) -> None:
         for each in self._trainers:
             each.close()
-        with suppress(ApiError):  # a namespace that stays costs later runs only some memory
+        with suppress(ApiError):  # a namespace that is not deleted costs later runs only some memory
             self.api.delete(NAMESPACES, None, self.name)
 
 

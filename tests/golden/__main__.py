@@ -63,7 +63,7 @@ def recorded() -> Iterator[tuple[Path, str]]:
 def main() -> int:
     """Write every file, and remove the recorded plans of examples and cases that no longer exist."""
     current = set()
-    for path, text in recorded():  # in this order, because the installation is rendered from earlier files
+    for path, text in recorded():  # one by one, because the installation is rendered from the files before it
         path.write_text(text)
         current.add(path)
     for stale in plans.on_disk() - current:

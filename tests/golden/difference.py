@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 CONTEXT = 1  # lines before and after a change
 
-Change = tuple[str, int, int, int, int]  # as in difflib: a tag, and the lines before and now
+Change = tuple[str, int, int, int, int]  # difflib's format: a tag, and the range of lines before and after
 
 
 class Line(NamedTuple):

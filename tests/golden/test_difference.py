@@ -53,7 +53,7 @@ def test_equal_objects_of_a_kind_are_different_places():
 
 
 def test_equal_plans_have_no_difference():
-    """The recorded difference of such a plan is an empty file, not a missing one."""
+    """For a plan that equals the smallest job's plan, the recorded file exists and is empty."""
     assert list(difference(TWO, TWO)) == []
 
 
@@ -78,7 +78,7 @@ EDITS = {
     st.randoms(use_true_random=False),
 )
 def test_a_change_of_any_line_of_an_example_s_plan_changes_what_is_recorded(name, layout, edit, chance):
-    """A test of the recorded difference therefore detects every change that the whole plan would show."""
+    """The tests compare only recorded differences, so each change of a plan must change its difference."""
     before, now = pairs(name)[layout]
     lines = now.splitlines()
     number = chance.choice([number for number, line in enumerate(lines) if line != "---"])

@@ -9,7 +9,7 @@ from tests.golden import plans
 from tests.tables import for_each
 
 ROOT = plans.HERE.parents[1]
-MOST_LINES = 40  # of a message; after `make golden`, git shows all lines
+MOST_LINES = 40  # a message shows no more lines, because after `make golden` git shows all of them
 
 
 @cache
@@ -26,7 +26,7 @@ def change_of(path):
 
 @for_each("path", recorded)
 def test_a_generated_file_is_current(path):
-    """A reviewer sees in the recorded plans which objects a cluster will get."""
+    """A reviewer reads the recorded plans to see which objects a cluster gets, so they must be up to date."""
     change = change_of(path)
     shown = "\n".join(islice(change, MOST_LINES))
 
@@ -40,7 +40,7 @@ def test_every_recorded_plan_has_its_example_or_case():
 
 @for_each("job", plans.cases)
 def test_a_case_says_what_it_shows_and_shows_it(job):
-    """The caption tells a reader what the case shows, so a case without a difference would be useless."""
+    """A reader learns the purpose of a case from its caption. A case without a difference shows nothing."""
     caption, _, fields = job.read_text().partition("\n")
 
     assert caption.startswith("# ")

@@ -1,4 +1,4 @@
-"""Draw dashboards for the documentation: `python -m tests.monitoring [NAME…]`. Both take ten minutes.
+"""Draw dashboards for the documentation: `python -m tests.monitoring [NAME…]`. All take ten minutes together.
 
     docs/images/training.png      Training, of manifests/examples/move-to-target.yaml to its end
     docs/images/simulators.png    Simulators, of three minutes in which simulators crash, hang and are slow

@@ -27,9 +27,9 @@ PICTURE = ROOT / "docs/images/demo.gif"
 WIDTH, HEIGHT = 1000, 560
 SHOWN = (760, 426)  # pixels in the README
 COLORS = 128
-SAMPLES = 8  # the frames whose colors the film has
+SAMPLES = 8  # the number of frames from which the common palette is computed
 FRAME_MS, LAST_MS = 200, 1500
-TRAINING, AFTER_THE_KILL, PLAYING = 12, 25, 40  # frames
+TRAINING, AFTER_THE_KILL, PLAYING = 12, 25, 40  # the number of frames of each part of the film
 MOST_BYTES = 2_000_000
 START_S, TRAIN_S = 120.0, 1200.0
 CLICK = "[...document.querySelectorAll('button')].find(it => it.innerText === {!r}).click()"
@@ -99,7 +99,7 @@ def _frames(page: Page, count: int) -> list[Image.Image]:
 
 
 def _write(frames: list[Image.Image]) -> None:
-    """Write the film; all frames have the same colors, so that the parts that stand still do not flicker."""
+    """Write the film; all frames share one palette, so that parts without motion do not flicker."""
     few = frames[:: len(frames) // SAMPLES]
     sheet = Image.new("RGB", (SHOWN[0], SHOWN[1] * len(few)))
     for row, frame in enumerate(few):

@@ -20,10 +20,10 @@ from matplotlib.ticker import EngFormatter, Formatter, FuncFormatter, PercentFor
 from tests.monitoring.questions import panels
 
 COLUMNS = 24
-COLUMN_IN, UNIT_IN = 0.62, 0.34  # width of a column and height of a unit of the grid, in inches
+COLUMN_IN, UNIT_IN = 0.62, 0.34  # the width of a grid column and the height of a grid row, in inches
 MARGINS_IN = {"left": 0.62, "right": 0.15, "top": 0.42, "bottom": 0.62}
-MOST_NAMES = 8  # in a legend, because more names would cover the curves
-LETTER_IN, MARK_IN = 0.05, 0.35  # in a legend: width of a letter, and of the rest of its entry
+MOST_NAMES = 8  # more names in a legend would cover the curves
+LETTER_IN, MARK_IN = 0.05, 0.35  # the width of a letter in a legend, and of the rest of an entry
 DPI = 90
 STYLE: dict[Any, Any] = {
     "font.size": 8,

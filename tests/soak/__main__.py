@@ -1,8 +1,8 @@
 """`make soak`: prove that a training survives faults without supervision. It prints JSON.
 
 Every part runs complete trainings and causes faults in them. It reports figures, and claims that are true or
-false. Arguments select parts by name, e.g. `python -m tests.soak recovery kills`. `--scale 0.1` runs a tenth
-of a part, which tests that the part works. `faults --seed N` repeats the plan number N of that part.
+false. Arguments select parts by name, e.g. `python -m tests.soak recovery kills`. `--scale 0.1` runs only a
+tenth of a part, as a test of its code. `faults --seed N` repeats the plan number N of the part `faults`.
 """
 
 import argparse

@@ -24,7 +24,7 @@ from tests.waiting import eventually
 KINDS = ROOT / "manifests" / "crd.yaml"
 AT_ONCE = 2 * (os.cpu_count() or 1) + 1  # runs mostly wait, so more than one per processor can run
 FEWEST = 200
-SEED = 1  # for the random sample below full scale
+SEED = 1  # below full scale, it selects the random sample of plans
 
 
 def measure(scale):

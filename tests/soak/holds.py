@@ -2,8 +2,8 @@
 
 `safety.decide` returns a cause with each command of zero. A cause with `stops` latches: the robot stands
 until a person begins a new episode. Any other cause is a hold, which ends by itself. A hold of at most one
-control period is the effect of one late reading; the policy acts again in the next period. A longer hold is a
-stop as a person sees it, so it counts as one.
+control period is the effect of one late reading; the policy acts again in the next period. A longer hold
+looks like a stop to a person, so it counts as a stop.
 """
 
 from collections.abc import Callable

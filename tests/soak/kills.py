@@ -13,7 +13,7 @@ SEED = 5
 CHECKPOINT_STEPS = 200
 # The time since the start of an attempt; simulators need a second or two to start.
 MOMENT_S = (0.0, 8.0)
-SAVING_S = (0.0, 0.005)  # after a draft of a checkpoint appears
+SAVING_S = (0.0, 0.005)  # the time since the folder of an incomplete checkpoint appeared
 GRACE_S = 60.0
 IN_TIME_S = GRACE_S / 2  # the half of the grace period in which the checkpoint is saved
 RESUMED = re.compile(r"resumed at step (\d+)")

@@ -16,7 +16,7 @@ EXIT_CODES = {"Succeeded": 0, "SimulatorBudgetSpent": 80}
 # restarts.
 STEPS = 96
 EPISODE = {"id": "MoveToTargetEnv-v0", "options": {"max_steps": 3}}
-A_FEW = {"limit": 2, "withinSeconds": 600}  # for a simulator that fails after every restart
+A_FEW = {"limit": 2, "withinSeconds": 600}  # so that a simulator that always fails ends the run soon
 LONGEST_S = 600.0
 
 
@@ -56,7 +56,7 @@ def play(fault, algorithm, ending):
 
 
 def is_as_told(found, ending, reported):
-    """Return whether a run ended as its row of the table says, with faults of that kind only.
+    """Return whether a run ended as its row of the table says, and all its faults are of the row's kind.
 
     Slow steps are allowed in every run, because any step may be slow on a busy machine.
     """

@@ -1,4 +1,4 @@
-"""A policy on a mock robot: how fast it stands, whether it stops without a cause, and whether it arrives.
+"""A policy on a mock robot: how soon the robot stops, the stops without a cause, and how often it arrives.
 
 The policies are trained first, as a user trains them. The mock robot runs at 20 times real time, except in
 the measurements of a stop and of the hour, which run in real time. Run this part alone, because a busy
@@ -34,7 +34,7 @@ from tests.soak.holds import Holds
 
 TIMES, EPISODES, HOUR_S = 50, 100, 3600.0
 SPEED = 20.0
-SLOW_SPEED = 10.0  # a delay of 50 ms is 5 ms then
+SLOW_SPEED = 10.0  # slower than SPEED, because the robot's 50 ms of delay are only 5 ms of this machine
 PERIOD_S = 0.192
 CUT = "cut, over ros1"
 HOUR_SPEED = 1.0  # a faster robot would count the pauses of this machine's scheduler as late readings
@@ -148,7 +148,7 @@ def link_over_rest(client):
 
 
 def holds_of_an_hour(seconds):
-    """Turn to and fro with a delay of 50 ms, away from obstacles; return the holds and stops."""
+    """Turn the robot to and fro, far from obstacles, with a delay of 50 ms; return the holds and stops."""
     robot, client = started(f"--speed={HOUR_SPEED:g}", "--delay-ms=50", "--drift=0")
     clock = RobotClock(HOUR_SPEED)
     rules = SafetyRules(speed_m_s=SPEED_M_S)
@@ -167,7 +167,7 @@ def holds_of_an_hour(seconds):
 
 
 def open_loop():
-    """Drive commands for 10 s; return the distance in meters from the integrated commands to the robot."""
+    """Drive for 10 s; return the distance in meters between the true pose and the integrated commands."""
     robot, client = started("--speed=4", "--drift=0")
     clock = RobotClock(4.0)
     try:

@@ -45,7 +45,7 @@ _TOWARD_ELL: Points = (
 SHEET = """IndexedFaceSet { coord Coordinate { point [ 0 -1 -1, 0 1 -1, 0 1 1, 0 -1 1 ] }
   coordIndex [ 0 1 2 3 -1 ] }"""
 _SHEET = [[(0, -1, -1), (0, 1, -1), (0, 1, 1)], [(0, -1, -1), (0, 1, 1), (0, -1, 1)]]  # the sheet faces +x
-_HEIGHTS = np.array([[0.0, 0.0, 0.0], [0.0, 0.5, 0.0], [0.2, 0.5, 0.2]])  # by y, then x; 1 m apart
+_HEIGHTS = np.array([[0.0, 0.0, 0.0], [0.0, 0.5, 0.0], [0.2, 0.5, 0.2]])  # indexed [y, x]; points 1 m apart
 _CELLS = [
     [[x + dx, y + dy, _HEIGHTS[y + dy, x + dx]] for dx, dy in corners]
     for x in (0, 1)

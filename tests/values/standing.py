@@ -15,9 +15,9 @@ import numpy as np
 from tests.values.frames import frame, quaternion
 from tests.values.worlds import Setting
 
-GRAVITY = 3.7  # m/s2, of this world
+GRAVITY = 3.7  # m/s2, in these worlds; it differs from the default
 REFERENCE = np.array([100.0, -20.0, 7.0])  # WorldInfo.gpsReference, in the axes of the file
-MOUNT = frame((0.1, -0.25, 0.3), (0.6, 0.0, 0.8), 0.9)  # from each sensor to the robot's frame
+MOUNT = frame((0.1, -0.25, 0.3), (0.6, 0.0, 0.8), 0.9)  # the frame of each sensor, in the robot's frame
 POSES = (  # poses of the robot, in the axes of the ground
     frame((1.2, -0.7, 0.4), (0.3, -0.5, 0.8), 1.1),
     frame((-2.0, 3.0, 1.5), (1.0, 0.0, 0.0), 2.2),

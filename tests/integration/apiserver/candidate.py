@@ -1,8 +1,8 @@
 """A candidate for a lease in a separate process: `candidate.py KUBECONFIG NAMESPACE IDENTITY`.
 
-For each change, it writes a line with `leads` or `follows`, and with the value of `leads()`. For each line on
-standard input, it writes `now` and the value of `leads()`. At the end of its input, it releases the lease and
-ends.
+When it gains or loses the leadership, it writes a line with `leads` or `follows`, and with the value of
+`leads()`. For each line on standard input, it writes `now` and the value of `leads()`. When standard input
+ends, it releases the lease and ends.
 """
 
 import sys

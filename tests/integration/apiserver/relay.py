@@ -41,7 +41,7 @@ class _Relay(StreamRequestHandler):
         """Wrap the connection in TLS if the proxy has a certificate."""
         if self.tls is not None:
             self.request = self.tls.wrap_socket(self.request, server_side=True)
-        self.rbufsize = 0  # bytes after the request are for the server
+        self.rbufsize = 0  # a buffer could take bytes after the request, which are for the server
         super().setup()
 
     def handle(self):

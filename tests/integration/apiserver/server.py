@@ -27,7 +27,7 @@ class Asked:
     query: dict[str, str]
     headers: dict[str, str]
     body: Any
-    lines: tuple[tuple[str, str], ...] = ()  # with repetitions, which `headers` loses
+    lines: tuple[tuple[str, str], ...] = ()  # all header lines; `headers` has only one line for each name
 
     @property
     def watches(self):

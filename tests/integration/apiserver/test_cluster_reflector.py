@@ -160,7 +160,7 @@ def test_a_forgotten_version_means_a_new_list_and_no_missed_deletion(follow, for
 
 
 def test_a_version_that_is_forgotten_again_and_again_does_not_become_a_storm(follow, rude):
-    """After repeated 410 errors, some clients give up, and others send 3,000 requests per second."""
+    """After repeated 410 errors, some other clients send 3,000 requests per second, and some stop forever."""
     followed = follow()
     rude.script.watches = [refusal(410, "Expired")]
     followed.wait_reported("a", "b")
@@ -243,7 +243,7 @@ def test_a_change_that_leaves_what_is_kept_as_it_was_is_not_reported(follow):
 
 
 def test_metadata_are_kept_under_the_name_of_their_kind(follow):
-    """The API server sends the kind PartialObjectMetadata, which no other code expects."""
+    """The API server names their kind PartialObjectMetadata, which no other code of the operator expects."""
     followed = follow(stream(added("c", "11"), ends="silent"), resource=CONFIG_MAPS.only_metadata())
 
     followed.wait_reported("a", "c")

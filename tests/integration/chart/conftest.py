@@ -11,7 +11,7 @@ from tests.chart.helm import NAMESPACE
 from tests.control_plane.plane import ControlPlane, running
 from tests.control_plane.programs import programs
 
-DEFINITION = "trainingjobs.palaestra.dev"  # deleted at the start of a test, which removes all TrainingJobs
+DEFINITION = "trainingjobs.palaestra.dev"  # a test deletes the definition first, and so all TrainingJobs
 NAMESPACES = (NAMESPACE, "robots", "drones")
 # Only these kinds are installed, because the projects have dozens, which an API server needs seconds to read.
 KINDS = (

@@ -52,7 +52,7 @@ def test_no_command_for_everybody_names_a_registry_that_is_a_placeholder():
 
 
 def test_the_commands_for_a_registry_can_be_typed_after_the_installation(typed, kubectl):
-    """The other tests of the page leave out these commands."""
+    """The other tests of the page leave out these commands, so only this test executes them."""
     for block in (BLOCKS[0], *REGISTRY):
         typed(block)
 

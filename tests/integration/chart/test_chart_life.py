@@ -97,7 +97,7 @@ def test_a_second_release_for_the_same_jobs_is_refused(release, values):
 def test_a_namespaced_operator_looks_after_its_namespaces_and_asks_for_no_other(
     release, cluster, api, tmp_path
 ):
-    """The operator has only the permissions of such a release, which apply in two namespaces."""
+    """The operator runs here with the release's own permissions, which cover only these two namespaces."""
     release("install", "palaestra", values={**MODES["namespaced"], "crds": {"install": True}})
     eventually(lambda: served(api))
     account = f"system:serviceaccount:{NAMESPACE}:palaestra-operator"

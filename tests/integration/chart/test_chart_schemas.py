@@ -50,9 +50,9 @@ def test_an_example_says_what_each_object_is_for(path):
 
 
 def test_authors_train_and_readers_look_on(cluster, places, kubectl):  # noqa: ARG001 - as above
-    """The cluster roles `edit` and `view` of Kubernetes give these permissions.
+    """The example roles.yaml adds TrainingJobs to the cluster roles `edit` and `view` of Kubernetes.
 
-    The role in our example permits a user to create TrainingJobs, but not pods.
+    A user with only the role `palaestra-author` of this file may create TrainingJobs, but no pods.
     """
     (roles,) = (path for path in PLATFORM if path.stem == "roles")
     kubectl("apply", "-f", str(roles), "-f", str(ROOT / "manifests" / "crd.yaml"))

@@ -257,7 +257,7 @@ def test_programs_can_catch_that_a_cluster_does_not_know_trainingjobs(server):
 
 
 def test_a_job_that_is_made_anew_under_the_name_is_not_waited_for(server):
-    """A GitOps controller may create the job again at once, but the first job is deleted."""
+    """`delete` must return even if a GitOps controller creates a job of the same name at once."""
     script, kubeconfig = server
     anew = {"metadata": NAMED | {"uid": "another", "resourceVersion": "2"}}
     script.calls = [

@@ -174,7 +174,7 @@ def test_the_finding_about_an_operator_at_0_replicas_has_the_command_that_scales
 
 
 def test_the_finding_about_a_missing_namespace_shows_how_to_make_or_choose_one(place):
-    """RBAC allows requests in such a namespace, and a dry run reports only `not found`."""
+    """RBAC allows requests in a missing namespace, so without this finding a user sees only `not found`."""
     site = Site(api=place.api, namespace="nosuch", operator_namespace=place.name)
 
     findings = {each.what: each for each in examine(site)}

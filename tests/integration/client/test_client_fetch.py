@@ -84,7 +84,7 @@ class Scene:
 
     def fetch(self, deadline_s=30.0):
         """Fetch the run of the job."""
-        return self.client.fetch("job", into=str(self.into), deadline_s=deadline_s)  # as users type it
+        return self.client.fetch("job", into=str(self.into), deadline_s=deadline_s)  # users often pass a str
 
     def left(self):
         """Return the files in the target folder."""

@@ -75,7 +75,7 @@ def test_the_first_sweep_of_the_page_trains_and_compares(sweep, tmp_path, capsys
 def test_the_other_sweeps_of_the_page_are_right(sweep, fence, count):
     """A reader copies these sweeps too.
 
-    All jobs of a matrix are checked, and of a search the jobs at the bounds of its ranges.
+    For a matrix, the test checks all jobs. For a search, it checks the jobs at the bounds of the ranges.
     """
     assert len(trials(load(sweep(fence)))) == count
 

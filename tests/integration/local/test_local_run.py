@@ -34,7 +34,7 @@ print("trains to", config["steps"], "from", config["initialPolicy"])
 WAIT = """\
 import os, pathlib, signal, sys
 run = pathlib.Path(os.environ["PALAESTRA_RUN"])
-signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGTERM])  # one that comes before the wait is not missed
+signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGTERM])  # keeps a SIGTERM that comes before the wait
 (run / "begun").touch()
 print("waiting", file=sys.stderr)
 while True:
@@ -345,7 +345,7 @@ def _read_to_the_end(terminal: int) -> bytes:
 
 
 def test_a_differential_robot_drives_by_its_own_program(desk):
-    """Another project's world has other wheel names and URLs of PROTOs, but no ROS name or --synchronize."""
+    """Another project's world has other names of wheels, and neither a ROS name nor `--synchronize`."""
     desk.write(
         DRIVE,
         simulators=[rover()],

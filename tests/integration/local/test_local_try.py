@@ -43,7 +43,7 @@ def test_a_task_that_ships_is_tried_without_a_problem(tmp_path):
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGKILL, -signal.SIGKILL)])
 def test_a_try_that_is_ended_leaves_no_process_and_no_file(tmp_path, number, code):
-    """People end a try as soon as they have seen enough, and after SIGKILL a program cannot clean up."""
+    """People often end a try early. After SIGKILL, the program itself cannot clean up."""
     process = started(tmp_path, "--episodes", "9999")
     with process:
         for line in process.stdout:

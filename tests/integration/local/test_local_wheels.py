@@ -70,7 +70,7 @@ def test_the_wheels_install_into_each_python(version, programs):
 
 
 def test_a_job_is_trained_with_the_newest_python(programs, tmp_path):
-    """Only a run shows that this Python lacks a module, and a warning announces the next removal."""
+    """Only a run shows that the newest Python has removed a module. A warning announces later removals."""
     folder = programs(next(filter(wheels.python, reversed(VERSIONS))))
     (tmp_path / "job.yaml").write_text(yaml.safe_dump(JOB))
 

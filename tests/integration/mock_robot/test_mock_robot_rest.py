@@ -70,7 +70,7 @@ def test_carrying_the_robot_does_not_change_its_odometry(robot):
 
 
 def test_a_wall_presses_the_bumper(robot):
-    """The bumper is the last sensor that can stop a program, and it stays pressed at the wall."""
+    """If the distance sensors do not stop a program before a wall, only the bumper still can."""
     robot.send("/mock/place", [1.7, 0.0, 0.0])
     contacts = robot.get("/mock/truth")["contacts"]
     assert robot.get("/data/bumper") == {"value": False}
@@ -95,7 +95,7 @@ def test_a_wall_presses_the_bumper(robot):
     ids=["two numbers", "no JSON", "obstacle", "method", "path", "length"],
 )
 def test_a_wrong_request_is_refused(robot, method, path, body, status):
-    """A refusal has a reason, and the next request of the program is answered."""
+    """A refusal must contain its reason, and the robot must still respond to the program's next request."""
     found, content = robot.ask(method, path, body)
 
     assert found == status
@@ -112,7 +112,7 @@ def test_a_body_without_a_length_is_refused(robot):
 
 
 def test_a_connection_may_break_in_a_request(robot):
-    """A program that was killed leaves half a request behind; no command must come from it."""
+    """A killed program may leave half a request behind, and the robot must not execute it."""
     commands = robot.get("/mock/truth")["commands"]
     with socket.create_connection(robot.address.split(":"), DEADLINE_S) as raw:
         raw.sendall(b"PUT /data/omnidrive HTTP/1.1\r\nContent-Length: 90\r\n\r\n[1, 0, 0]")

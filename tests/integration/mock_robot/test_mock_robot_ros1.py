@@ -51,7 +51,7 @@ def test_clients_read_the_limits_as_parameters():
 
 
 def test_a_command_is_forwarded_once_and_the_robot_stops_itself(mock, commands):
-    """The driver has no watchdog and repeats no command, so the dead man's switch of the robot stops it."""
+    """The driver has no watchdog and repeats no command, so only the robot's dead man's switch stops it."""
     before = mock.get("/mock/truth")["commands"]
     commands.publish(**FORWARD)
     eventually(lambda: mock.get("/mock/truth")["commands"] > before, pace_s=0.005)
@@ -86,7 +86,7 @@ def test_the_topics_have_the_frames_of_the_driver():
 
 
 def test_without_a_master_the_program_is_refused(monkeypatch):
-    """A person starts the master first, or sets the variable."""
+    """The error must name both remedies: to start a master, or to set the variable ROS_MASTER_URI."""
     monkeypatch.setenv("ROS_MASTER_URI", "http://127.0.0.1:9")
     done = subprocess.run(
         [*PROGRAM, "--ros1"], capture_output=True, text=True, timeout=DEADLINE_S, check=False

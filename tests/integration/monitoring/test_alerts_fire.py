@@ -101,7 +101,7 @@ def test_the_alerts_about_a_sick_run_fire_and_clear(tmp_path, folder, rules):
 
 
 def test_alerts_fire_without_a_leader_and_without_an_operator(folder, rules, place, start):
-    """The first operator ends as in a power failure, and the second one waits until its Lease expires."""
+    """Prometheus scrapes only the second operator. It leads when the Lease of the killed operator expires."""
     first = start(elect=True)
     address(first)
     second = start(elect=True)

@@ -31,7 +31,7 @@ def test_every_query_of_every_panel_and_all_that_an_alert_looks_at_is_answered(t
 
     with LocalRun(tmp_path, tiny_job(**FAULTY)) as run:
         scraped = [*targets.of_run(run, place.name), targets.of_operator(address(operator))]
-        with scraping(scraped, folder) as prometheus, suppress(NotAnswered):  # reported below, by its name
+        with scraping(scraped, folder) as prometheus, suppress(NotAnswered):  # the assertion names the query
             prometheus.until(lambda: prometheus.query("palaestra_operator_leader == 1"), ANSWERED_S)
             diverge(place)
             place.train("waiting")

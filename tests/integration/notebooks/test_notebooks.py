@@ -69,7 +69,7 @@ def surroundings(monkeypatch):
 @pytest.mark.parametrize("time", ["first", "second"])
 @pytest.mark.parametrize("name", ORDER)
 def test_every_notebook_runs_from_top_to_bottom_also_a_second_time(folder, name, time):
-    """A kernel has a running event loop. The second time, files and runs of the first time exist."""
+    """The cells must work in a kernel's running event loop, and while the files of an earlier time exist."""
     del time
     notebook = nbformat.read(folder / name, as_version=4)
     assert not any(cell.get("outputs") for cell in notebook.cells)
@@ -84,7 +84,7 @@ def test_every_notebook_runs_from_top_to_bottom_also_a_second_time(folder, name,
 
 @pytest.mark.parametrize("end", ["interrupt", "kill"])
 def test_an_interrupted_cell_and_a_killed_kernel_leave_no_process(tmp_path, end, monkeypatch):
-    """A simulator, a training and a page run beside the kernel, and end with it."""
+    """The kernel's simulator, training and page are separate processes, which must end with the kernel."""
     mark = uuid.uuid4().hex
     monkeypatch.setenv("PALAESTRA_TEST_MARK", mark)
     kernel, client = start_new_kernel(cwd=str(tmp_path))

@@ -52,7 +52,7 @@ def test_the_last_lines_and_faults_stay_when_the_pod_is_gone(place, start, contr
 
 
 def test_suspensions_are_counted_however_fast_they_follow(place, start):
-    """Times in the control plane are whole seconds, and these suspensions are shorter."""
+    """Kubernetes stores times in whole seconds, so two suspensions within a second have the same time."""
     start()
     place.train()
     for _ in range(PAUSES):

@@ -53,7 +53,7 @@ def all_have_failed(place):
 
 
 def test_large_jobs_that_are_refused_leave_the_operator_small(place, start):
-    """The operator starts after the jobs exist, so it reads all of them at once."""
+    """The operator starts after the jobs exist. It reads all of them at once, which needs the most memory."""
     worlds = with_worlds(*(["x" * 180_000] * 5))
     for number in range(LARGE):
         place.create(TRAINING_JOBS, make_job(f"job-{number}", **worlds))

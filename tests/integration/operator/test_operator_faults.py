@@ -12,7 +12,7 @@ from palaestra_protocol.pod.status import Termination
 from tests.waiting import eventually
 
 DONE = Termination(step=20, reason="Completed", success_rate=0.9)
-WRITES = 7  # for one replica that succeeds: accepted, policy, worlds, claim, Job, running, succeeded
+WRITES = 7  # a replica that succeeds needs: accepted, policy, worlds, claim, Job, running, succeeded
 END_S = 2.0
 LEASE_S = 15.0
 

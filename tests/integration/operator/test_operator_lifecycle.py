@@ -116,7 +116,7 @@ def test_a_claim_that_was_never_bound_goes_although_its_job_is_made_again(place,
 
 
 def claim_or_other(name):
-    """Return `claim` if the name is that of a claim, or the name itself."""
+    """Return `claim` for the name of a claim, and any other name unchanged."""
     return "claim" if name.startswith("PersistentVolumeClaim/") else name
 
 

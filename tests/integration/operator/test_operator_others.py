@@ -60,9 +60,10 @@ def test_a_job_that_somebody_else_suspends_is_not_fought_over(place, start, cont
 
 
 def test_what_the_operator_set_stands_on_the_job_and_its_author_is_heeded(place, start, control_plane):
-    """The annotation shows that the suspension comes from another program, so the author's value counts.
+    """The operator records its last value of `spec.suspend` in an annotation of the Job.
 
-    The operator creates the annotation with the Job, and patches it together with `spec.suspend`.
+    If the Job has another value, another program suspended the Job. The operator patches the Job only if the
+    author of the TrainingJob changes the wanted value.
     """
     start()
     place.train()
@@ -81,7 +82,7 @@ def test_what_the_operator_set_stands_on_the_job_and_its_author_is_heeded(place,
 
 
 def test_a_job_without_its_annotation_is_made_as_its_spec_asks_once(place, start, control_plane):
-    """The operator sets the annotation with its first patch, and does not undo a later suspension."""
+    """The operator sets the missing annotation in its first patch, so it does not undo a later suspension."""
     first = start()
     place.train()
     place.pods()

@@ -144,7 +144,7 @@ def test_a_job_that_is_admitted_is_asked_about_no_more(place, start, control_pla
     place.until("Running")
     before = len(lists(control_plane, place))
 
-    place.train("later", suspend=True)  # suspended without a queue
+    place.train("later", suspend=True)  # its author suspends it, and it is in no queue
     place.until("Suspended", "later")
 
     assert len(lists(control_plane, place)) == before

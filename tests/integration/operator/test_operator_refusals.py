@@ -273,7 +273,7 @@ def test_a_refused_claim_is_reported_and_made_when_there_is_room(place, start):
 
 
 def test_no_secret_is_looked_at_where_nobody_allowed_it(place, start, installed):
-    """RBAC cannot select by label, so an administrator must bind the role in each namespace."""
+    """RBAC cannot select Secrets by label, so the operator reads them only where a RoleBinding allows it."""
     start()
     place.create(SECRETS, SECRET)
     place.train(trainer={"env": [TOKEN]})

@@ -24,7 +24,7 @@ def used(control_plane):
 
 
 def test_every_right_is_used_and_none_is_missing(place, start, control_plane):
-    """The test makes the operator do all its work, so a permission that stays unused is only a risk."""
+    """The test makes the operator do all its work, so a permission that stays unused is not needed."""
     operator = start(elect=True)
     place.create(JOBS, stranger("taken-0"))
     place.create(CONFIG_MAPS, world_map())

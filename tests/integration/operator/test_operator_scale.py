@@ -90,7 +90,7 @@ def count(api: Api, resource) -> int:
 def quiet(plane, seconds):
     """Wait, and return whether the operator sent only watches and requests for the Lease."""
     before = len([each for each in asked(plane) if each.counts])
-    time.sleep(seconds)  # a period without requests
+    time.sleep(seconds)  # the period in which no request may arrive
     return len([each for each in asked(plane) if each.counts]) == before
 
 
@@ -130,7 +130,7 @@ def test_nothing_is_asked_in_a_minute_in_which_nothing_changes(crowd, settled):
     """
     plane, _ = crowd
     told, recorded = settled.requests(), [each for each in asked(plane) if each.counts]
-    time.sleep(QUIET_S)  # a period without requests
+    time.sleep(QUIET_S)  # the period in which no request may arrive
 
     assert settled.requests() - told == Counter()
     assert [each for each in asked(plane) if each.counts][len(recorded) :] == []

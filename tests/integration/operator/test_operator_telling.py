@@ -81,9 +81,9 @@ def test_the_metrics_are_those_of_the_page(place, start):
 
 
 def test_a_job_that_runs_and_ends_is_counted(place, start):
-    """Users query the time to the start and the reason of the end.
+    """Users query the time until a job starts and the reason why it ended.
 
-    The operator counts each once, when the status first shows it.
+    The operator counts each start and each end once, when the status first shows it.
     """
     operator = start()
     place.train()

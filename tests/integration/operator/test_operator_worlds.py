@@ -52,9 +52,9 @@ def test_a_process_returns_the_verdicts_on_several_worlds() -> None:
     ],
 )
 def test_a_world_over_its_budget_is_refused(budget: dict[str, int], size: int, words: str) -> None:
-    """The message must tell the author the field, the limit and the remedy.
+    """The message must contain the field, the limit and the remedy for the author.
 
-    The worlds that were checked before keep their verdicts.
+    A world that was checked earlier in the same process keeps its verdict.
     """
     large = given(size)
 

@@ -1,4 +1,4 @@
-"""A program that drives a robot forward until something happens to it."""
+"""A program that drives a robot to and fro until the test kills it, cuts its network or makes it fail."""
 
 import signal
 import sys
@@ -14,7 +14,11 @@ from palaestra_trainer.run.signals import Interruption
 
 
 def main():
-    """Drive: `address`, `speed` of the robot's clock, and what the policy does after a second."""
+    """Drive the robot.
+
+    The arguments are the robot's address, the speed of its clock, and the policy's action after four periods:
+    `go` continues, `hang` waits forever, and `raise` raises an error.
+    """
     address, speed, then = sys.argv[1], float(sys.argv[2]), sys.argv[3]
     clock = RobotClock(speed)
     with Interruption() as interruption:
@@ -35,5 +39,5 @@ def main():
 
 
 if __name__ == "__main__":
-    signal.alarm(120)  # no child of a test outlives it for long
+    signal.alarm(120)  # ends this program soon even if the test that started it was killed
     main()

@@ -1,9 +1,9 @@
 """A small ROS 2 driver of a mock robot, with the topics and the QoS of rto_node.
 
-Arguments: the address of the mock robot, its speed, and options. `--clock` publishes /clock; `--best-effort`
-publishes odometry and the scan so; `--latched` keeps the bumper's last state for later subscribers;
-`--camera` publishes pictures, as sensors in ROS 2 do it. A line `FRAME X Y` on standard input publishes a
-goal. The driver writes `ready` first.
+Arguments: the address of the mock robot, the speed of its clock, and options. `--clock` publishes /clock.
+`--best-effort` publishes odometry and the scan with best-effort QoS. `--latched` keeps the bumper's last
+state for later subscribers. `--camera` publishes pictures with the QoS of ROS 2 for sensors. A line `FRAME X
+Y` on standard input publishes a goal. The driver writes `ready` when it has started.
 """
 
 import math
@@ -55,7 +55,7 @@ class Driver:
         self.robot.send("/data/omnidrive", [message.linear.x, message.linear.y, message.angular.z])
 
     def read(self):
-        """Publish all readings; the bumper only when it changes, as rto_node does."""
+        """Publish all readings, but the bumper's state only when it changes, as rto_node does."""
         x, y, heading, *velocity, _ = self.robot.get("/data/odometry")
         odometry = Odometry()
         odometry.header.frame_id, odometry.child_frame_id = "odom", "base_link"

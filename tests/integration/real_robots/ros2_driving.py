@@ -1,6 +1,6 @@
-"""A program that drives a robot over ROS 2, and writes what it found as JSON.
+"""A program that drives a robot over ROS 2, and writes its last readings as JSON.
 
-Arguments: the address, the speed of the robot's clock, and the meters per second to drive for 6 periods.
+Arguments: the address, the speed of the robot's clock, and the robot's speed in m/s for 6 periods.
 """
 
 import json

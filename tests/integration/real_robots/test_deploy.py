@@ -57,7 +57,7 @@ def decisions(log):
 
 
 def test_the_robot_drives_from_target_to_target(deploy, mock, tmp_path):
-    """Each further episode begins where the one before ended; odometry and truth agree.
+    """Each further episode must begin where the last one ended, and odometry must agree with the true pose.
 
     The package is a zip, as a person sends it to the robot's computer.
     """
@@ -75,7 +75,7 @@ def test_the_robot_drives_from_target_to_target(deploy, mock, tmp_path):
 
 
 def test_the_record_has_poses_commands_and_readings(deploy, tmp_path):
-    """A person who was not there must see what happened, with tools for ROS 2."""
+    """With tools for ROS 2, a person who did not see the drive must be able to reconstruct it."""
     assert deploy("--target=0.6,0", *HANDS_OFF).returncode == 0
     topics = read_bag(tmp_path / "log.mcap").topics
 
@@ -121,7 +121,7 @@ def redness(image):
 
 
 def test_a_dry_run_moves_nothing(deploy, mock):
-    """The first thing that a careful person does must be safe."""
+    """A careful person begins with a dry run, so a dry run must be safe."""
     before = mock.get("/mock/truth")["commands"]
     done = deploy("--target=1,0", "--dry-run", "--no-hold")
 
@@ -130,7 +130,7 @@ def test_a_dry_run_moves_nothing(deploy, mock):
 
 
 def test_without_a_yes_nothing_moves(deploy, mock):
-    """Any other answer is a no."""
+    """The program must take any answer other than yes as a no."""
     before = mock.get("/mock/truth")["commands"]
     done = deploy("--target=1,0", "--no-hold", input="no\n")
 

@@ -36,7 +36,7 @@ def deploy(master, tmp_path):
 
 
 def test_a_dry_run_over_ros_reads_and_sends_no_command(deploy, mock):
-    """A person changes only the address of the robot."""
+    """To use ROS instead of REST, a person changes only the robot's address; a dry run must stay safe."""
     done = deploy("--dry-run")
 
     assert done.returncode == 0, done.stderr

@@ -23,7 +23,7 @@ from tests.waiting import eventually
 
 SPEED = 4.0
 TOPIC = "/usb_cam/image_raw"
-SIZE = (80, 60)  # RosPublisher is for short messages
+SIZE = (80, 60)  # a small picture, because RosPublisher is for short messages
 START = (-0.9, 0.1, 0.1)
 
 

@@ -43,7 +43,7 @@ def test_the_real_robot_keeps_the_rules_of_every_robot(robot):
 
 
 def test_odometry_is_shifted_to_where_the_person_placed_the_robot(robot, mock):
-    """Odometry begins anywhere, and REST has no request that resets it."""
+    """A robot's odometry may begin at any pose, and REST has no request to reset it."""
     real = robot()
     real.stand_at(Pose(1.0, 2.0, math.pi / 2.0))
     drive(real, (0.5, 0.0, 0.0), 5)
@@ -57,7 +57,7 @@ def test_odometry_is_shifted_to_where_the_person_placed_the_robot(robot, mock):
 
 
 def test_the_speed_limit_holds_for_the_robot_itself(robot, mock):
-    """Until a person raises it, the limit is 0.2 m/s, and the policy wants 0.5."""
+    """The policy commands 0.5 m/s, but the robot must not drive faster than the limit of 0.2 m/s."""
     real = robot(speed_m_s=0.2)
     drive(real, (0.5, 0.0, 0.0), 6)
 
@@ -90,7 +90,7 @@ def test_the_robot_does_not_leave_its_fence(robot, mock):
 
 
 def test_a_robot_drives_only_while_the_person_permits_it(robot, mock):
-    """While the key is released, the robot stands and extra periods pass. Then the policy continues."""
+    """While the key is released, the robot must stand, and its policy waits for some periods."""
     permitted = iter([*[True] * 20, *[False] * 20, *[True] * 1000])
     real = robot(hooks=Hooks(permitted=lambda: next(permitted)))
     extra = []
@@ -206,7 +206,7 @@ def test_the_last_command_of_a_dry_run_is_not_sent(mock):
 
 
 def test_a_new_episode_begins_where_odometry_says(robot, mock):
-    """The robot may have rolled on after the last step, or was pushed."""
+    """After the last step, the robot may have rolled on, or a person may have pushed it."""
     real = robot()
     drive(real, (0.5, 0.0, 0.0), 3)
     real.begin()
@@ -226,7 +226,7 @@ def test_an_address_that_is_more_than_a_host_is_refused(address):
 
 @pytest.mark.parametrize("host", ["999.1.1.1", "a..b", "no-such-host.invalid"])
 def test_a_name_without_an_address_is_refused(host):
-    """The name is looked up once, before the robot moves."""
+    """The program resolves the name only once, before the robot moves, so the error must come then."""
     with pytest.raises(RobotUnfit, match="has no address"):
         RealRobotino(RestLink(f"http://{host}")).connect()
 
@@ -239,7 +239,7 @@ def test_an_address_without_a_robot_is_refused():
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_a_signal_commands_the_robot_to_stand_before_the_program_ends(mock, number):
-    """Ctrl-C is the fastest way in which a person ends a program."""
+    """In an emergency, a person types Ctrl-C, so a signal must stop the robot before the program ends."""
     with driver(f"http://{mock.address}", SPEED) as program:
         program.send_signal(number)
 
@@ -248,7 +248,7 @@ def test_a_signal_commands_the_robot_to_stand_before_the_program_ends(mock, numb
 
 
 def test_an_error_of_the_policy_commands_the_robot_to_stand(mock):
-    """The exception passes the robot's context, which sends zero before the program ends."""
+    """The exception ends the robot's `with` block, which commands zero before the program ends."""
     with driver(f"http://{mock.address}", SPEED, "raise") as program:
         assert program.wait(DEADLINE_S) == 1
         assert mock.get("/mock/truth")["vx"] == 0.0

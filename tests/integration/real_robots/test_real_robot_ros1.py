@@ -23,7 +23,7 @@ from tests.waiting import eventually
 
 SPEED = 10.0
 OPTIONS = ("--ros1", "--drift=0", f"--speed={SPEED:g}")
-PACE_S = 0.005  # 1 ms is 10 ms of the robot
+PACE_S = 0.005  # short, because 1 ms of this machine is 10 ms of the robot's time
 
 
 @contextlib.contextmanager
@@ -143,7 +143,7 @@ def test_the_robot_drives_forward_and_stands_after_the_end(robot, mock):
     after = mock.get("/mock/truth")
 
     assert pose.x_m - 1.0 > 0.3
-    assert pose.x_m - 1.0 > before["x"]  # it drives back when the context ends
+    assert pose.x_m - 1.0 > before["x"]  # the robot drives backward before the context ends
     assert (after["vx"], after["vy"], after["omega"]) == (0.0, 0.0, 0.0)
     assert Master("/test").publishers("/cmd_vel") == set()
 
@@ -161,7 +161,7 @@ def test_a_wall_presses_the_bumper_over_ros(link, mock):
     assert before is False
     assert store.newest.bumped is True
     _, late = link()
-    assert eventually(lambda: late.newest.bumped, pace_s=PACE_S) is True  # from the latched message
+    assert eventually(lambda: late.newest.bumped, pace_s=PACE_S) is True  # a latched message reports the bump
 
 
 def test_the_driver_clips_what_is_faster_than_its_limit(link, slow):
@@ -188,7 +188,7 @@ def test_a_driver_with_a_lower_limit_is_refused(master, slow):
 
 
 def test_a_driver_with_its_limit_at_the_speed_of_the_rules_is_used(robot, slow):
-    """The default speed limit of the safety rules equals the driver's default limit."""
+    """By default, the safety rules and the driver have the same limit, so this common case must work."""
     real_robot = robot("/lab/slow", speed_m_s=0.2)
 
     def speed():
@@ -199,7 +199,7 @@ def test_a_driver_with_its_limit_at_the_speed_of_the_rules_is_used(robot, slow):
 
 
 def test_a_limit_that_nobody_has_set_is_the_drivers_default(master, slow):
-    """The driver reads its parameter, but does not write it."""
+    """The driver does not write its default into the parameter, so the parameter may be missing."""
     del slow
     with xmlrpc.client.ServerProxy(master) as server:
         server.deleteParam("/test", "/lab/slow/robotino_node/max_linear_vel")
@@ -260,7 +260,7 @@ def test_another_publisher_of_commands_is_refused_before_the_robot_moves(master,
 
 
 def test_a_recorder_of_commands_is_not_the_driver(master, link, other_node):
-    """`rosbag record -a` subscribes to all topics; without the driver, nothing confirms a command."""
+    """`rosbag record -a` subscribes to the topic of commands too, but must not be taken for the driver."""
     topic = "/lab/recorded/cmd_vel"
     with mock_in("lab/recorded"):
         connected, _ = link("/lab/recorded")
@@ -282,14 +282,14 @@ def test_a_recorder_of_commands_is_not_the_driver(master, link, other_node):
 @pytest.mark.skipif(cut_network.lack() is not None, reason="this machine has no network namespaces")
 @pytest.mark.parametrize("time", range(3))
 def test_the_robot_stands_soon_after_its_network_was_cut(time):
-    """The driver has no watchdog and does not notice the cut. Only the base's dead man's switch is left."""
+    """The driver has no watchdog and does not notice the cut, so only the base's dead man's switch acts."""
     del time
 
     assert cut_network.after_cut_s() < cut_network.LIMIT_S
 
 
 def test_a_driver_that_starts_again_is_found(link):
-    """A driver may crash during a drive; the readings are old for some time, and the drive continues."""
+    """A driver may crash and restart during a drive; when new readings arrive, the drive must continue."""
     with mock_in("lab/again"):
         connected, store = link("/lab/again")
         eventually(lambda: store.newest.oldest_s > 0.0, pace_s=PACE_S)

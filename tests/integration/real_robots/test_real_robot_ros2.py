@@ -28,7 +28,7 @@ RADIUS_M = 0.2286
 
 @contextmanager
 def driver(client, namespace, *options, speed=SPEED):
-    """Yield a driver of a mock robot that is ready; its standard input takes goals."""
+    """Start a driver of a mock robot, and yield it when it is ready; its standard input takes goals."""
     words = [HERE / "ros2_driver.py", client.address, speed, *options]
     words += ["--ros-args", "-r", f"__ns:={namespace}"]
     program = ros2.start(*words, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
@@ -58,7 +58,7 @@ def node(package, kind, *arguments):
 
 
 def leave(program):
-    """Wait for the end of a program; one that is killed would leave its shared memory."""
+    """Wait for the end of a program, because a killed program would leave its shared memory."""
     try:
         program.communicate(timeout=DEADLINE_S)
     finally:
@@ -81,7 +81,7 @@ def send(program, frame, goal):
 
 
 def of_odometry(client, x_m, y_m):
-    """Return a point of the room in the frame of odometry, which begins anywhere."""
+    """Return a point of the room in the frame of odometry, whose origin may be at any pose."""
     at_x, at_y, heading, *_ = client.get("/data/odometry")
     truth = client.get("/mock/truth")
     turned = cmath.rect(1.0, heading - truth["heading"])
@@ -124,7 +124,7 @@ def package(tmp_path_factory):
 
 @pytest.mark.parametrize("options", [(), ("--best-effort",)], ids=["reliable", "best-effort"])
 def test_the_robot_drives_over_topics(mock, options):
-    """One driver publishes its sensors with reliable QoS, and another driver with best effort."""
+    """Some drivers publish their sensors with reliable QoS, and others with best effort; both must work."""
     with driver(mock, "/one", *options):
         found = found_by(driving("ros2:/one"))
         truth = mock.get("/mock/truth")
@@ -137,7 +137,7 @@ def test_the_robot_drives_over_topics(mock, options):
 
 
 def test_a_latched_bump_from_before_the_connection_is_noticed(mock):
-    """A driver publishes the bumper only when it changes, and the robot may touch a wall already."""
+    """A driver publishes the bumper only at a change. But the robot may touch a wall before we connect."""
     mock.send("/mock/place", [1.6, 0, 0])
     mock.send("/data/omnidrive", [0.5, 0, 0])
     eventually(lambda: (mock.send("/data/omnidrive", [0.5, 0, 0]), mock.get("/data/bumper")["value"])[1])
@@ -170,7 +170,7 @@ def test_the_policy_node_drives_to_goals_in_the_time_of_clock(mock, package, tmp
         truth = mock.get("/mock/truth")
         assert (truth["x"], truth["y"]) == pytest.approx((0.6, 0.4), abs=0.2)
         rate_hz = (truth["commands"] - begun["commands"]) / (truth["time_s"] - begun["time_s"])
-        assert 10.0 < rate_hz < 22.0  # of the robot's time, which is four times faster than real time
+        assert 10.0 < rate_hz < 22.0  # by the robot's clock, which is four times as fast as real time
 
         program.send_signal(signal.SIGINT)
         assert program.wait(DEADLINE_S) == 0
@@ -183,7 +183,7 @@ def test_the_policy_node_drives_to_goals_in_the_time_of_clock(mock, package, tmp
 
 
 def test_a_policy_that_sees_acts_on_published_images(mock, tmp_path):
-    """The pictures have another size, order of colors and topic than the policy expects."""
+    """The camera's pictures have another size and order of colors than the policy's, and another topic."""
     package, bag = write_seeing_package(tmp_path / "package"), tmp_path / "node.mcap"
     mock.send("/mock/place", [-1.3, 0.3, 0.2])
     front = ("--ros-args", "-r", "image_raw:=/front/image", "--")

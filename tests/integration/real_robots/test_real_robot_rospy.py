@@ -40,7 +40,7 @@ from std_msgs.msg import Bool
 from sensor_msgs.msg import PointCloud
 rospy.init_node("viewer", disable_signals=True)
 def show(kind, value):
-    os.write(1, f"{kind} {value}\\n".encode())  # at once, because each topic has a thread
+    os.write(1, f"{kind} {value}\\n".encode())  # one write per line, because each topic has a thread
 rospy.Subscriber("bumper", Bool, lambda it: show("bumper", it.data))
 rospy.Subscriber("distance_sensors", PointCloud, lambda it: show(it.header.frame_id, len(it.points)))
 sys.stdin.read()

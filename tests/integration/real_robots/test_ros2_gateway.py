@@ -1,4 +1,4 @@
-"""A robot of a simulator in training as topics of ROS 2: the programs, a stub, and a subscriber."""
+"""The gateway publishes a robot that is being trained as topics of ROS 2, with a real stub and subscriber."""
 
 import json
 import os
@@ -29,7 +29,7 @@ PAGE = (HERE.parents[2] / "docs/howto/ros2.md").read_text()
 MODULE = ("-m", "palaestra_trainer.cli.ros2_gateway")
 DEADLINE_S = 30.0
 PACE_S = 0.01
-A_SECOND = 10.0  # states that a gateway requests in a second
+A_SECOND = 10.0  # the number of states that a gateway requests per second
 
 
 class Listener:
@@ -260,7 +260,7 @@ def test_only_the_scene_is_requested_and_only_topics_that_are_read_are_shown(mas
 
 
 def test_a_run_that_does_not_run_is_refused(tmp_path):
-    """The folder of a run stays after its end."""
+    """The folder of a run stays after its end, so the folder alone does not show that the run is running."""
     folder = run_directory(tmp_path, "http://127.0.0.1:1")
 
     assert f"{folder}: does not run" in refused(folder)

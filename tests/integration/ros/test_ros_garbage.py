@@ -95,7 +95,7 @@ def test_a_publisher_that_answers_garbage_is_a_fault_of_its_simulator(master, se
 
 
 def test_a_program_that_is_no_master_is_reported_as_a_lost_master(server, monkeypatch):
-    """Outside of a pod, a program that finds no master starts one, so it must recognize a wrong program."""
+    """A program starts a master if none responds, but here another program uses the master's address."""
     monkeypatch.setenv("ROS_MASTER_URI", server(GARBAGE["another document"]))
 
     with pytest.raises(MasterLost, match="another program may use this address"):

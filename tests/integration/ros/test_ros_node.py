@@ -111,7 +111,7 @@ def test_a_client_hangs_up_before_the_node_does(peer, dial, monkeypatch):
     connection.sendall(frame(ASK))
     read_exactly(connection, 1)
     read_frame(connection)
-    peer.do(lambda: None)  # the node has finished all work after the response
+    peer.do(lambda: None)  # wait until the node has finished all work after the response
 
     connection.setblocking(False)
     with pytest.raises(BlockingIOError):
@@ -232,7 +232,7 @@ def test_a_node_keeps_nothing_of_connections_that_it_has_refused(peer, dial):
         _, answer = dial(**service_header(peer, "double", "webots_ros/get_float"))
         assert "error" in answer
 
-    eventually(lambda: len(links_there()) < before + count)  # the loop holds the last connection
+    eventually(lambda: len(links_there()) < before + count)  # the node's loop still refers to the last one
 
 
 def links_there():

@@ -55,7 +55,7 @@ def send(peer, *values):
 
 
 def test_all_messages_arrive_in_their_order(peer, listener):
-    """The handler of commands decides itself which of them it uses."""
+    """The node must not drop commands, because the handler of commands decides which of them it uses."""
     values = [0.125 * number for number in range(20)]
     for value in values:  # a publisher of queue size 1 drops messages that the kernel does not take at once
         send(peer, value)
@@ -64,7 +64,7 @@ def test_all_messages_arrive_in_their_order(peer, listener):
 
 
 def test_a_publisher_that_comes_later_is_found(master):
-    """A robot's driver runs before the programs that command the robot."""
+    """A robot's driver starts first, and the programs that command the robot start later."""
     listener = Listener(master, "/later/ir1/value")
     peer = Peer("later", master)
     eventually(listener.connected, pace_s=0.002)
@@ -95,7 +95,7 @@ def test_a_publisher_that_was_killed_and_started_again_is_found(master):
 
 
 def test_a_lost_connection_is_opened_again(peer, listener):
-    """The publisher is still registered, so no update of the master comes."""
+    """The publisher is still registered, so the master sends no update. The node itself must reconnect."""
     peer.do(peer.publisher.topic.links[0].close)
     eventually(lambda: not listener.connected(), pace_s=0.002)
 
@@ -113,7 +113,7 @@ def test_a_publisher_that_ends_is_disconnected(peer, listener):
 
 
 def test_tools_see_the_subscription_and_its_connection(master, listener):
-    """`rosnode info` asks the node itself."""
+    """`rosnode info` requests its connections from the node, so the node must report the subscription."""
     with xmlrpc.client.ServerProxy(master) as registry:
         uri = registry.lookupNode("/test", "/listener")[2]
     with xmlrpc.client.ServerProxy(uri) as node:
@@ -125,7 +125,7 @@ def test_tools_see_the_subscription_and_its_connection(master, listener):
 
 
 def test_a_closed_node_is_not_registered(master, peer):
-    """A later publisher would try to reach it."""
+    """A later publisher of the topic would otherwise try to connect to the closed node."""
     listener = Listener(master, f"/{peer.name}/ir1/value", "short")
     eventually(listener.connected, pace_s=0.002)
     before = Master("/test").node_names()
@@ -181,7 +181,7 @@ def test_a_message_longer_than_the_limit_ends_the_connection(master):
 
 
 def test_a_publisher_of_another_type_is_refused(master):
-    """Two programs may use one name for different things."""
+    """Two programs may use one topic name for different types, whose bytes must not be mixed up."""
     listener = Listener(master, "/forged", "typed")
     with Forger("/forged", "std_msgs/Bool") as connection:
         ended = rest_of(connection)
@@ -191,7 +191,7 @@ def test_a_publisher_of_another_type_is_refused(master):
 
 
 def test_a_message_that_cannot_be_decoded_is_left_out(master):
-    """The next message may be right."""
+    """The connection must stay open, because the next message may be right."""
     listener = Listener(master, "/forged", "patient")
     with Forger("/forged") as connection:
         connection.sendall(LENGTH.pack(3) + b"abc" + message_type(TYPE).codec.frame({"range": 0.5}))

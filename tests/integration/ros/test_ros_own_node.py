@@ -159,7 +159,7 @@ with {} as interruption:
     ids=["a training", "a script"],
 )
 def test_rosnode_kill_ends_our_process_as_sigterm_does(listening, code, printed):
-    """The caller gets its response before the end, and a second request does not prevent the checkpoint."""
+    """The caller must get its response first, and a second request must not prevent the checkpoint."""
     with subprocess.Popen(
         [sys.executable, "-c", WITHOUT_ROSPY + UNTIL_KILLED.format(listening)],
         stdin=subprocess.PIPE,
@@ -171,7 +171,7 @@ def test_rosnode_kill_ends_our_process_as_sigterm_does(listening, code, printed)
             responses = [node.shutdown("/rosnode", "user request")[::2] for _ in range(2)]
         ended, _ = program.communicate(timeout=60)
 
-    assert other[0] == 0  # this node has the port of a node that was killed
+    assert other[0] == 0  # a master may send this request if a killed node had the same port
     assert responses == [[1, 0], [1, 0]]
     assert program.returncode == code
     assert ended.splitlines()[1:] == printed  # the first line is from the log

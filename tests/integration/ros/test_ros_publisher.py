@@ -84,7 +84,7 @@ def header_of(raw):
 
 
 def test_a_message_reaches_each_subscriber_at_once(publisher, subscriber):
-    """A command that waits for the next one would arrive too late for the robot's dead man's switch."""
+    """A command that is delayed until the next command would be too late for the dead man's switch."""
     assert publisher.publish(**FORWARD) == 1
     assert subscriber.next().linear.x == 0.25
 
@@ -96,7 +96,7 @@ def test_without_a_subscriber_the_caller_learns_that_nobody_listens(publisher):
 
 
 def test_a_subscriber_that_leaves_is_not_counted(publisher, subscriber):
-    """The kernel reports the end of a killed program at once."""
+    """If the publisher counted a program that has ended, its caller would believe that a robot obeys."""
     subscriber.close()
 
     eventually(lambda: publisher.publish(**FORWARD) == 0, pace_s=0.002)
@@ -123,7 +123,7 @@ def test_a_subscriber_that_does_not_read_is_dropped_and_delays_nobody(node, publ
 
 
 def test_a_subscriber_of_another_type_is_refused(node, publisher):
-    """The bytes would be read as wrong numbers."""
+    """The subscriber would read the bytes of another type as wrong numbers."""
     with connection(node, "std_msgs/Bool") as raw:
         error = header_of(raw)["error"]
 
@@ -166,7 +166,7 @@ def test_without_a_master_there_is_no_publisher():
 
 
 def test_an_unknown_type_is_refused(node):
-    """The mistake is the program's."""
+    """The mistake is in the user's program, so the error must not look like a lost master."""
     with pytest.raises(ConfigurationError, match="my_msgs/Twist: is not a known type"):
         RosPublisher(node, TOPIC, "my_msgs/Twist")
 
@@ -176,7 +176,7 @@ def test_an_unknown_type_is_refused(node):
     [({}, "127.0.0.1"), ({"ROS_IP": "10.0.0.7"}, "10.0.0.7"), ({"ROS_HOSTNAME": "pc"}, "pc")],
 )
 def test_the_node_has_an_address_that_the_master_reaches(environment, host):
-    """A robot cannot resolve the name of a laptop, which rospy would use."""
+    """rospy would use the host name of a laptop, which a robot often cannot resolve."""
     assert host_toward("http://127.0.0.1:11311/", environment) == host
 
 

@@ -220,7 +220,7 @@ def test_after_a_failure_the_connection_is_made_anew(peer, master, service):
 
 
 def test_another_type_is_refused(service):
-    """Before the first call, the node compares the md5 sums of the definitions."""
+    """The node compares the md5 sums before the first call, so it never decodes bytes of another type."""
     with pytest.raises(WrongData, match="md5sum"):
         service("get_time", "webots_ros/set_int")(value=1)
 

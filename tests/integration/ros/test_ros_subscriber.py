@@ -81,7 +81,7 @@ def test_a_killed_publisher_is_dead(peer, ranges):
 
 
 def test_a_topic_without_a_publisher_raises_an_error_at_once(peer):
-    """No node publishes the topic of a sensor that was never enabled."""
+    """If a sensor was never enabled, no node publishes its topic, so the program must not wait for it."""
     with pytest.raises(SimulatorDead, match="no node publishes"):
         RosSubscriber(f"/{peer.name}/ir2/value", "sensor_msgs/Range").connect()
 

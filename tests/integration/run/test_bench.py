@@ -38,7 +38,7 @@ OF_A_CLUSTER = ("hostile", "operators")
 OF_WHOLE_RUNS = ("learning", "navigating", "plain", "seeing", "sparse", "transfer")
 ELSEWHERE = ("memory", "operator", "recovery", "shutdown")
 SKIPPED = "rllib"  # RLlib is not installed with this project
-OF_PAGE = {chapter.part for chapter in CHAPTERS}  # of docs/explain/peers.md
+OF_PAGE = {chapter.part for chapter in CHAPTERS}  # the parts whose figures docs/explain/peers.md shows
 DEADLINE_S = 800  # the work takes a minute or two on an idle machine
 
 

@@ -95,7 +95,7 @@ def actions_of(env, steps, seed=0):
 
 
 def told(info):
-    """Return an info without the durations of episodes and the words of Palaestra."""
+    """Return an info as text, without the durations of episodes and without Palaestra's own entry."""
     kept = {name: value for name, value in info.items() if name != OURS}
     if "episode" in kept:
         kept["episode"] = {name: value for name, value in kept["episode"].items() if name != "t"}
@@ -163,7 +163,7 @@ def test_a_resume_continues_every_row_bit_for_bit(cartpole) -> None:
 
 
 def test_a_killed_simulator_ends_the_episodes_of_all_rows_and_comes_back() -> None:
-    """One process simulates all rows, so its end is a single fault. No loss may use the rows of that step."""
+    """One process simulates all rows, so its end is a single fault, and no row of that step is valid."""
     with batch_env() as (env, launcher):
         env.reset()
         [action] = actions_of(env, 1)
@@ -178,7 +178,7 @@ def test_a_killed_simulator_ends_the_episodes_of_all_rows_and_comes_back() -> No
 
 
 def test_a_row_that_fails_is_truncated_alone(cartpole, monkeypatch, tmp_path) -> None:
-    """The other rows continue. No loss uses the failed row, and a normal episode follows in it."""
+    """The other rows must continue. Only the failed row is invalid, and its next episode is normal."""
     unlimited = cartpole["world"].read_text().replace(' ctrlrange="-1 1" ctrllimited="true"', "")
     cartpole["world"].write_text(unlimited)
     (tmp_path / "wild_robots.py").write_text(WILD_ROBOT)

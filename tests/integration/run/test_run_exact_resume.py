@@ -79,7 +79,7 @@ VARIANTS = {
     "the page's scattered cylinders": learning(
         yaml.safe_load(PAGE["yaml"])["spec"]["trainer"]["environment"], 360, "stub"
     ),
-    # On resume, an episode is replayed with the training progress at its beginning.
+    # On resume, an episode is replayed with the training progress that was current when the episode began.
     "the example's curriculum in MuJoCo": learning(
         {"id": "curriculum:Curriculum-v0", "options": {"max_steps": 40}}, 240, "mujoco"
     ),

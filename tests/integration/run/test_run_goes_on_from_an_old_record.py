@@ -10,7 +10,7 @@ from palaestra.local.outcome import RunOutcome
 from tests.local_run import LocalRun
 
 OLD = Path(__file__).parents[2] / "fixtures" / "0.1.0" / "interrupted"
-PATIENCE_S = 240.0  # 20 s on an idle machine
+PATIENCE_S = 240.0  # the run takes 20 s on an idle machine
 
 
 def test_a_run_of_two_collectors_goes_on_from_a_checkpoint_of_0_1_0(tmp_path):

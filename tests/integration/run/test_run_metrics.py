@@ -71,7 +71,7 @@ def test_a_run_tells_numbers_that_fit_together(texts):
     taken = values["palaestra_simulator_step_duration_seconds_count", "collect-0"]
     simulated_s = values["palaestra_simulator_simulated_seconds_total", "collect-0"]
 
-    assert steps <= taken < 2 * steps  # read one after the other, while the simulator steps
+    assert steps <= taken < 2 * steps  # `taken` is read later, and the simulator steps in the meantime
     assert simulated_s >= 0.192 * steps  # resets take steps too
     episodes = values["palaestra_trainer_episodes_total",]
     assert 0 <= values["palaestra_trainer_episode_return_bucket", "+Inf"] - episodes <= 3

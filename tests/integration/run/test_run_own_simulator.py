@@ -37,7 +37,7 @@ def folder(tmp_path):
 
 
 def test_the_job_of_the_example_learns_its_task_for_other_simulators_too(folder):
-    """A reader types this command first; the policy must have learned, so the simulator's data is right."""
+    """A reader types this command first. A policy that succeeds shows that the simulator's data is right."""
     [train], [elsewhere] = blocks(PAGE, "sh train"), blocks(PAGE, "sh elsewhere")
     terminal = Terminal(folder, path=PALAESTRA.parent)
 

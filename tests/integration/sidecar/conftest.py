@@ -21,7 +21,7 @@ PROGRAM = str(Path(sys.executable).with_name("palaestra-sidecar"))
 ADDRESSES = re.compile(r"^palaestra-sidecar: control=(\S+) health=(\S+)$")
 DEADLINE_S = 20.0  # the waits take milliseconds on an idle machine
 ENDS = {0, EXIT_HUNG}  # exit codes after a signal; on a busy machine, the alarm ends the sidecar
-PACE_S = 0.005  # between two polls of a state without events
+PACE_S = 0.005  # the pause between two polls of a state, because no event reports its changes
 
 
 def eventually(seen, deadline_s=DEADLINE_S):

@@ -12,7 +12,7 @@ from palaestra_sim.world import RunIdentity, ros_name
 from tests.integration.sidecar.conftest import DEADLINE_S
 
 PROGRAM = str(Path(sys.executable).with_name("palaestra-sidecar"))
-STANDARD = (1 << 31) - 1  # without the real-time signals
+STANDARD = (1 << 31) - 1  # the mask of all signals except real-time signals
 
 
 def run(*arguments):

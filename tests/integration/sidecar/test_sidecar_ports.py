@@ -119,7 +119,7 @@ def test_the_metrics_know_the_processor_time_of_the_whole_family(sidecar) -> Non
     _, text = it.ask("GET", "/metrics", address=it.health)
 
     (used,) = re.findall(r"^palaestra_simulator_cpu_seconds_total{slot=\"a\"} (\S+)$", text, re.MULTILINE)
-    assert 0.35 < float(used) < 1.0  # twice 0.2 s, in ticks of 0.01 s
+    assert 0.35 < float(used) < 1.0  # two processes used 0.2 s each, counted in ticks of 0.01 s
 
 
 @pytest.mark.parametrize(

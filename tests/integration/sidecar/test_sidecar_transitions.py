@@ -19,9 +19,9 @@ def test_a_sidecar_begins_idle_and_starts_nothing_by_itself(sidecar, waits) -> N
 
 
 def test_a_life_that_goes_well(sidecar, waits) -> None:
-    """The requests are start, ready and stop, and then the simulator ends.
+    """A life consists of the requests start, ready and stop, and of the simulator's end.
 
-    Each response has the new state.
+    Each response must contain the new state.
     """
     it = sidecar(waits)
 

@@ -88,7 +88,7 @@ def test_a_loop_of_another_library_survives_crashes(stubs, script, monkeypatch, 
 
 
 def test_stable_baselines3_survives_crashes(stubs):
-    """Stable-Baselines3's own wrapper checks every number for NaN."""
+    """The wrapper `VecCheckNan` raises an error for any NaN, so the rows of a fault must contain numbers."""
     stubs("crash:probability=0.02")
     env = palaestra_trainer.make_sb3_vec_env(TASK, 2, max_steps=30)
     try:

@@ -119,7 +119,7 @@ def outcome(directory):
     found = checkpoint.newest(directory.checkpoints)
     state = json.loads((found.path / "state.json").read_text())
     for episode in state["episodes"]:
-        del episode["t"]  # seconds
+        del episode["t"]  # the wall time of the episode, which differs in every run
     with np.load(found.path / "state.npz") as arrays:
         state |= {name: array.tolist() for name, array in arrays.items()}
     experience = {name: digest for name, digest in found.manifest.files.items() if "experience" in name}

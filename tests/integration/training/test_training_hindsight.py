@@ -67,7 +67,7 @@ def digests(directory):
 
 @pytest.mark.parametrize(("name", "more"), [("DQN", {}), ("SAC", {}), ("DQN", {"normalize": {}})])
 def test_a_run_with_hindsight_survives_faults_and_ends(job, attempt, name, more):
-    """One of two simulators dies twice, and the model can be loaded afterwards."""
+    """One of two simulators dies twice; the run must still complete, and its policy must be loadable."""
     algorithm = {"name": name, "hyperparameters": HINDSIGHT} | more
     code, directory = attempt(job(name, algorithm=algorithm), "run")
 
@@ -86,7 +86,7 @@ def test_a_run_with_hindsight_survives_faults_and_ends(job, attempt, name, more)
 def test_an_interrupted_run_ends_as_one_that_was_not(job, attempt, at):
     """The signal arrives before the end of the first episode, during episodes, or after the buffer is full.
 
-    The results must be equal, bit by bit.
+    In each case, the results must equal those of an uninterrupted run, bit by bit.
     """
     written = job(steps=600, evaluation={"everySteps": 300, "episodes": 2, "confirmEpisodes": 0})
 

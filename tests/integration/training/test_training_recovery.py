@@ -111,7 +111,7 @@ def train(master):
 
 
 def test_a_killed_simulator_is_played_in_again(train):
-    """A simulator also ends in this way by a bus error, or if the kernel kills it for its memory."""
+    """A bus error, or a kill by the kernel for too much memory, ends a simulator in the same way."""
     trained = train()
 
     fault = trained.break_by(signal.SIGKILL)
@@ -143,7 +143,7 @@ def test_faults_leave_no_thread_no_descriptor_and_no_process(train):
         trained.go_on()
 
     assert trained.restarts.count == 11
-    eventually(lambda: left() == before, PATIENCE_S)  # a master may still call our node
+    eventually(lambda: left() == before, PATIENCE_S)  # a master's call to our node may still be open
 
 
 def left():

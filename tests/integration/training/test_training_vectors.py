@@ -39,7 +39,7 @@ def assert_apart(envs):
     distances = []
     for _ in range(4):
         observations, *_ = envs.step(np.array([1, 0]))
-        distances.append(np.asarray(observations)[:, 10:13])  # the velocity
+        distances.append(np.asarray(observations)[:, 10:13])  # the robot's velocity in the observation
     moving, standing = np.abs(np.asarray(distances)).sum(axis=(0, 2))
     assert moving > 1.0
     assert standing < 0.1

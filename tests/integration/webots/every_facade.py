@@ -159,14 +159,17 @@ class Everything:
         return found() if callable(found) else found
 
     def begin(self, group, path):
-        """Use a path that fails; for `use`, a sensor was enabled when the robot connected."""
+        """Use a path that fails.
+
+        This method really enables a sensor. `use` does not, because the robot enabled its sensors before.
+        """
         kind, _, name = facade(group, path).partition(".")
         if name == "enable":
             return self._facade(kind, group).enable(STEP_MS)
         return self.use(group, path)
 
     def uses(self, path):
-        """Return whether a path was used since the last `clear`, or for a topic or `enable`, ever."""
+        """Return whether a path was used since the last `clear`, or at any time for a topic or `enable`."""
         name = f"/{ROBOT}/{path}"
         return name in self.recorder.asked | self.recorder.heard
 
@@ -201,9 +204,9 @@ def rows(simulator):
 
 
 def failing(simulator):
-    """Return owner and path of each service that fails in a simulator and whose facade reports that.
+    """Return owner and path of each service that fails in a simulator and whose facade raises an error.
 
-    A program looks whether a headset is used before it reads the headset's pose.
+    The headset's services are excluded: without a headset, their facade returns None.
     """
     found = groups(dict.fromkeys(FAILING[simulator], ""))
     return [(group, path) for group, paths in found.items() for path in paths if "headset" not in path]
@@ -295,7 +298,7 @@ CALLS = {
     "WorldNode.pose_in": lambda it: it.box.pose_in(it.own),
     "WorldNode.track_pose": lambda it: (it.box.track_pose(it.own, STEP_MS), it.box.track_pose(it.own, 0)),
     "WorldNode.track_contacts": lambda it: (it.box.track_contacts(STEP_MS), it.box.track_contacts(0)),
-    "Supervisor.reset": lambda it: (it.supervisor.reset(), it.robot.advance()),  # in the next step
+    "Supervisor.reset": lambda it: (it.supervisor.reset(), it.robot.advance()),  # takes effect in a step
     "Supervisor.velocity": supervisor("velocity", "BOX"),
     "Supervisor.set_velocity": supervisor("set_velocity", "BOX", (0.0, 0.0, 0.0)),
     "Supervisor.add_force": both(
@@ -403,7 +406,7 @@ CALLS = {
     "Joystick.move": device("Joystick", "move", (1, 2), (1,)),
     "Joystick.push": device("Joystick", "push", 1),
     "Joystick.resist": device("Joystick", "resist", 1.0, 1.0),
-    # These were used when the robot connected.
+    # The robot enabled these sensors when it connected, so no further call is needed.
     **{
         f"{kind}.enable": lambda _it: None
         for kind in (*SENSORS, *RENDERED, "BatterySensor", "Keyboard", "Joystick", "EffortFeedback")

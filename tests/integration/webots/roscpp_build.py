@@ -17,7 +17,7 @@ TEMPLATES = "/usr/share/gencpp"
 MESSAGES = Path("/usr/share")  # Debian's message definitions, in one folder per package
 NESTED = ("std_msgs", "geometry_msgs", "sensor_msgs")
 LIBRARIES = ("roscpp", "roscpp_serialization", "rosconsole", "rostime", "boost_thread")
-DEADLINE_S = 240.0  # for the compiler on a slow and busy machine
+DEADLINE_S = 240.0  # the compiler may need minutes on a slow and busy machine
 
 
 def build(folder, services, topics):

@@ -67,7 +67,7 @@ def test_a_simulator_that_renders_nothing_does_not_fit(seer, sensor):
 
 
 def test_there_is_no_image_before_the_first_step():
-    """An empty image would look to a policy like a real one."""
+    """A policy could not distinguish an empty image from a real one."""
     for read in (lambda: Camera("robotino", "camera").rgb, lambda: RangeFinder("robotino", "depth").depths):
         with pytest.raises(NoReading, match="step the simulation first"):
             read()

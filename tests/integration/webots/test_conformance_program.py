@@ -38,7 +38,7 @@ def running(world, *program):
             eventually(lambda: is_served(f"/{world.stem}/robot/get_device_list"), DEADLINE_S)
             yield process
         finally:
-            process.terminate()  # it unregisters its services
+            process.terminate()  # after SIGTERM, the simulator unregisters its services
             process.wait(DEADLINE_S)
 
 
@@ -47,7 +47,7 @@ def test_a_stub_keeps_every_claim_of_its_column_and_not_those_of_webots(master, 
     written = conformance(tmp_path, "--world")
     with running(tmp_path / "everything.wbt"):
         for_webots = conformance(tmp_path, "--master", master, "--report", "webots.md")
-    with running(tmp_path / "everything.wbt") as process:  # the calls have changed the world
+    with running(tmp_path / "everything.wbt") as process:  # again, because the calls changed the world
         own = conformance(tmp_path, "--master", master, "--claims", "stub", "--all", "--report", "stub.md")
         process.wait(DEADLINE_S)
 

@@ -87,7 +87,7 @@ def test_a_radar_reads_each_target_by_the_radar_equation(detecting):
 
 
 def test_a_radar_that_sees_no_target_has_an_empty_value(detecting):
-    """None would mean that it has measured nothing yet."""
+    """The value None would mean that the radar has not measured yet."""
     webots, it = detecting
     for number in range(len(TARGETS)):
         webots.supervisor.set_field(f"TARGET_{number}", "translation", (-5.0, 0.0, 0.0))
@@ -102,7 +102,7 @@ def test_a_radar_that_sees_no_target_has_an_empty_value(detecting):
 
 
 def test_an_interrupted_reading_of_a_radar_does_not_shift_the_next(detecting, monkeypatch):
-    """Ctrl-C may come after the number of targets was read, and before the targets."""
+    """Ctrl-C may come after the facade has read the number of targets, but before it has read the targets."""
     webots, it = detecting
     read = RosSubscriber.next
 
@@ -176,7 +176,7 @@ def test_a_keyboard_has_the_keys_that_are_pressed_in_each_step(detecting):
 
 
 def test_a_key_that_is_not_pressed_cannot_be_released(detecting):
-    """The program must learn that the key is not in the state that the program assumes."""
+    """The program assumes a wrong state of the key, so it must get an error."""
     _, it = detecting
 
     with pytest.raises(WrongData, match="keyboard: 65 is not pressed"):
@@ -260,13 +260,13 @@ def test_forces_and_objects_are_read_in_mujoco(master, tmp_path):
     x, y = 40.0 - focal_px * 0.2, 30.0 - focal_px * 0.1
     assert ball.position_on_image == pytest.approx((x, y), abs=2.0)
     assert ball.size_on_image == pytest.approx((0.2 * focal_px, 0.2 * focal_px), abs=3.0)
-    assert segments[round(y), round(x)].tolist() == [128, 0, 255, 255]  # its color as BGRA
+    assert segments[round(y), round(x)].tolist() == [128, 0, 255, 255]  # the ball's color as BGRA
     of_ball = (segments[..., :3] > 0).any(axis=-1)
     assert of_ball.sum() == pytest.approx(math.pi * (0.1 * focal_px) ** 2, rel=0.1)
 
 
 def test_the_stub_refuses_a_camera_that_recognizes(master, tmp_path):
-    """It renders no image, so it cannot say which objects are visible."""
+    """The stub renders no image, so it cannot detect which objects are visible."""
     del master
 
     class Seeing(OwnRobot):

@@ -8,7 +8,7 @@ WHEEL_RAD_S = 5.0
 
 
 def test_a_position_sensor_tells_how_far_its_joint_has_turned(arena):
-    """A user needs the angle in radians over all turns, and from step to step."""
+    """A user needs the total angle over all turns, in radians, and the change of the angle in each step."""
     wheel, sensor = Motor("robotino", "wheel0_joint"), PositionSensor("robotino", "wheel0_joint_sensor")
     arena.robot.simulation.add([sensor], [wheel])
     arena.robot.connect()

@@ -101,7 +101,7 @@ def everything(request, master, tmp_path_factory):
 
 
 def test_every_path_is_used_by_the_member_that_the_page_names(everything):
-    """The page would otherwise send its reader to a method that does something else."""
+    """A wrong row of the page would send its reader to a method that does something else."""
     wrong = []
     for group, path in rows(everything.simulator):
         everything.recorder.clear()
@@ -130,7 +130,7 @@ def test_a_path_that_fails_in_a_simulator_is_an_error_of_its_facade(everything):
 
 
 def test_a_fact_is_the_value_of_the_world_or_the_default_of_webots(everything):
-    """The values come from the manual, not from the simulators."""
+    """The expected values come from the manual, so the test also finds an error that all simulators share."""
     found = {
         kind: {name: getattr(everything.robot.of[kind], name) for name in facts}
         for kind, facts in FACTS.items()
@@ -184,7 +184,7 @@ def test_texts_of_the_window_arrive_in_their_order(everything):
 
 
 def test_a_node_is_found_by_definition_number_device_and_parent(everything):
-    """Each way leads to the same node, so a program may use the one for which it has the data."""
+    """Each of these four ways finds the same node, so a program may use the data that it has."""
     box = everything.observer.find("BOX")
     gps = everything.observer.find_device("gps")
 
@@ -202,7 +202,7 @@ def test_a_node_is_found_by_definition_number_device_and_parent(everything):
 
 
 def test_the_fields_of_a_node_have_the_names_and_types_of_the_manual(everything):
-    """A world builder's tool can list what it may change."""
+    """With these names and types, a world builder's tool can list the fields that it may change."""
     fields = everything.observer.find("BOX").fields()
 
     assert {
@@ -269,7 +269,7 @@ def test_an_angle_is_written_in_degrees_minutes_and_seconds(everything):
 
 
 def test_a_copied_rectangle_is_at_its_new_place(everything):
-    """The rest of the display keeps its pixels."""
+    """Only the pixels of the copied rectangle may change; the rest of the display stays as it is."""
     display, file = everything.robot.of["Display"], everything.file("copied.png")
     display.set_color(0x000000)
     display.draw_rectangle((0, 0), (64, 64), fill=True)
@@ -279,7 +279,7 @@ def test_a_copied_rectangle_is_at_its_new_place(everything):
     everything.robot.advance()
     display.save(file)
     pixels = np.array(Image.open(file).convert("RGB"))
-    green = np.argwhere(pixels[..., 1] > 0)  # row and column of each
+    green = np.argwhere(pixels[..., 1] > 0)  # row and column of each green pixel
 
     assert {tuple(it) for it in green} == {
         (row + down, column + right)
@@ -290,7 +290,7 @@ def test_a_copied_rectangle_is_at_its_new_place(everything):
 
 
 def test_a_field_of_view_that_the_zoom_does_not_allow_is_an_error(everything):
-    """The simulators and Webots confirm the command all the same."""
+    """The simulators and Webots confirm this command without an effect, so the facade must report it."""
     camera = everything.robot.of["Camera"]
     camera.set_field_of_view(1.2)
     changed = camera.info.field_of_view_rad
@@ -302,7 +302,7 @@ def test_a_field_of_view_that_the_zoom_does_not_allow_is_an_error(everything):
 
 
 def test_an_effort_that_a_motor_may_use_and_its_gains_are_kept(everything):
-    """The motor then uses at most this effort."""
+    """A program limits the effort of a motor in this way, and must be able to read the limit."""
     motor = everything.robot.motors["RotationalMotor", "position"]
     motor.set_acceleration(3.0)
     motor.set_available_effort(0.0)
@@ -344,7 +344,7 @@ def test_a_connector_and_a_gripper_that_are_alone_detect_nothing(everything):
     ],
 )
 def test_a_value_that_webots_would_ignore_is_refused(everything, kind, command, argument):
-    """Webots confirms the command, and keeps the old value."""
+    """Webots would confirm the command but keep the old value, and the program would not notice."""
     motors = everything.robot.motors
     device = motors["RotationalMotor", "position"] if kind == "motor" else everything.robot.of[kind]
 
@@ -353,7 +353,7 @@ def test_a_value_that_webots_would_ignore_is_refused(everything, kind, command, 
 
 
 def test_a_tracking_with_a_negative_period_is_refused(everything):
-    """Only 0 ends the tracking."""
+    """Only a period of 0 ends the tracking, so a negative period is a mistake."""
     with pytest.raises(ConfigurationError, match="a period of -5 ms"):
         everything.supervisor.track_field("BOX", "translation", -5)
     with pytest.raises(ConfigurationError, match="BOX is a Solid"):
@@ -391,19 +391,19 @@ def test_the_end_of_a_segmentation_leaves_the_camera_on(everything):
 
 
 def test_no_headset_and_no_selection_is_none(everything):
-    """Only Webots has a window and headsets."""
+    """The stub and MuJoCo have no headset and no window with a selection, so the facade must return None."""
     assert everything.observer.headset_pose() is None
     assert everything.observer.selected() is None
 
 
 def test_a_fact_cannot_be_set(everything):
-    """An assignment without effect would be silent."""
+    """Without the error, a program would not notice that its assignment has no effect."""
     with pytest.raises(AttributeError, match="channel of emitter is read-only"):
         everything.robot.of["Emitter"].channel = 3
 
 
 def test_a_restarted_controller_serves_its_robot_again(everything):
-    """Its connections are lost, and a new one finds the same services."""
+    """The restart closes the controller's connections, and new connections must find the same services."""
     everything.supervisor.restart_controller("MOUTH")
     everything.robot.connect()
     everything.robot.mouth.send("here again")

@@ -59,7 +59,7 @@ def test_the_blocks_of_the_page_about_a_training_loop_are_one_script():
 
 
 def test_the_listings_of_the_paper_run_in_their_order():
-    """The simulator of this test crashes after every 80 steps. In the paper, a person restarted it."""
+    """The simulator crashes after every 80 steps, and the script must continue without a person's help."""
     result = carried_out(EXAMPLES / "paper.py", PALAESTRA_STUB_FAULTS="crash:step=80")
 
     assert result.stdout.count("simulator fault") >= 2

@@ -36,7 +36,7 @@ def lever(request, master, tmp_path):
 
 
 def test_a_motor_has_the_limits_of_the_world_and_takes_others(lever):
-    """A controller scales its commands with them."""
+    """A controller scales its commands with these limits, and may set a lower limit of the effort."""
     assert lever.arm.limits == MotorLimits(
         min_position=-1.0, max_position=2.0, max_velocity=3.0, max_effort=40.0
     )

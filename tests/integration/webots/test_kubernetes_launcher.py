@@ -1,7 +1,7 @@
 """A notebook in a pod starts simulators in pods of their own.
 
-The API server is real. A kubelet of the tests runs the pods (tests/pod_runner.py), and the notebook is a
-process of this machine, for which a pod object stands.
+The API server is real. A kubelet of the tests runs the pods (tests/pod_runner.py). The notebook is a process
+of this machine, which a pod object represents in the API server.
 """
 
 import os
@@ -147,7 +147,7 @@ def test_a_notebook_without_a_label_is_refused(place):
 
 
 def test_a_killed_notebook_leaves_no_simulator(place):
-    """The sidecar hears nothing any more and ends, so the Job ends and the cluster removes it."""
+    """The sidecar ends when it gets no more requests. So the Job ends too, and the cluster deletes it."""
     running = place.notebook(settings="silence_s=10")
     assert running.stdout.readline() == "robotino 0.192\n"
 

@@ -1,4 +1,4 @@
-"""Each place in which a simulator starts keeps the same promises."""
+"""A simulator behaves in the same way in each place in which a facade can start it."""
 
 import os
 import signal
@@ -101,7 +101,7 @@ def test_places_may_be_mixed(make, name):
 
 
 def test_a_wrong_world_is_refused_with_the_line_of_the_sidecar(place, tmp_path, engine):
-    """The mistake is the user's, so it is an error at once, and nothing is left."""
+    """The mistake is the user's, so an error must come at once, and no process or container may stay."""
     wrong = tmp_path / "wrong.wbt"
     wrong.write_text("#VRML_SIM R2023b utf8\nRobot {")
 
@@ -145,7 +145,7 @@ def test_the_container_has_what_the_settings_say(make, engine, world):
 
 
 def test_the_block_of_the_page_runs(engine, capsys, monkeypatch):
-    """A reader copies it, with an image of her own."""
+    """A reader copies the block, and replaces only the name of the image."""
     page = (Path(__file__).parents[3] / "docs/howto/where-simulators-run.md").read_text()
     monkeypatch.setattr(engine, "images", {STUB.replace("stub", "mujoco"), "lab/simulators:2"})
     (block,) = blocks(page, "python with-docker")

@@ -95,7 +95,7 @@ def test_the_angles_of_an_inertial_unit_are_those_of_its_quaternion(measured):
 
 
 def test_before_the_first_step_an_inertial_unit_has_no_angles():
-    """The sensor has read nothing, and angles of 0 would be a wrong reading."""
+    """The sensor has not measured yet, and angles of 0 would be a wrong reading."""
     assert InertialUnit("r", "inertial unit").roll_pitch_yaw is None
 
 
@@ -135,7 +135,7 @@ class Sliding(OwnRobot):
 
 @pytest.mark.parametrize("driver", PHYSICS)
 def test_a_gps_measures_the_velocity_in_the_axes_of_the_world(master, tmp_path, driver):
-    """The y axis of the robot is turned by 0.5 rad."""
+    """The robot is turned by 0.5 rad, so a velocity in its own axes would have other values."""
     del master
     text = Setting(driver).text(robot(SLIDE, TURNED.fields), "gravity 0")
     with running(text, tmp_path, driver, Sliding) as (_, sliding):

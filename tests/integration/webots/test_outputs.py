@@ -63,7 +63,7 @@ def test_a_connector_and_a_gripper_have_the_state_of_the_last_command(devices, k
 
 
 def test_an_emitter_has_the_channel_and_the_range_that_were_set(devices):
-    """The first values are those of the world file."""
+    """Before the first command the world file determines the values, and afterwards the command does."""
     emitter = devices[Emitter]
     before = emitter.channel, emitter.range_m, emitter.buffer_bytes
 
@@ -76,7 +76,7 @@ def test_an_emitter_has_the_channel_and_the_range_that_were_set(devices):
 
 
 def test_a_range_that_the_simulator_ignores_is_an_error(devices):
-    """Webots confirms the command all the same, and texts would reach fewer receivers than expected."""
+    """Webots would confirm the command but keep the old range, so texts would reach too few receivers."""
     with pytest.raises(WrongData, match="emitter ignores the range 6 and keeps"):
         devices[Emitter].set_range(6.0)
 
@@ -95,14 +95,14 @@ def test_a_sound_that_loops_plays_until_it_is_stopped(devices):
 
 
 def test_a_pen_and_a_brake_take_their_commands(devices):
-    """The simulator confirms them; nothing can be read back."""
+    """Each simulator must confirm the commands; no service returns their effect."""
     devices[Pen].write(on=True)
     devices[Pen].set_ink(0xFF0000, density=0.5)
     devices[Brake].set_damping(2.0)
 
 
 def test_a_negative_damping_is_refused(devices):
-    """Webots ignores it without an error, so the joint would keep its old brake."""
+    """Webots ignores a negative damping without an error, so the joint would keep its old damping."""
     with pytest.raises(ConfigurationError, match="the damping -1 is negative; use 0 or more"):
         devices[Brake].set_damping(-1.0)
 
@@ -193,13 +193,13 @@ def test_an_array_that_is_no_image_is_refused(devices, image):
 
 
 def test_a_file_that_is_no_image_is_refused(devices, tmp_path):
-    """Webots reports this only on its console."""
+    """Webots reports this mistake only on its console, which the program does not read."""
     with pytest.raises(WrongData, match=r"display refuses image_load for .*missing.png; use a PNG or JPEG"):
         devices[Display].draw_file(tmp_path / "missing.png")
 
 
 def test_a_camera_that_the_robot_lacks_is_not_attached(devices):
-    """The display would show no background, without a word."""
+    """Without the error, the display would show no background, and the program would not know why."""
     devices[Display].detach_camera()
 
     with pytest.raises(WrongData, match="display refuses attach_camera with value 'eye'"):

@@ -68,7 +68,7 @@ def test_what_has_rested_goes_on(rested):
 
 @pytest.mark.parametrize(("number", "kind"), [(signal.SIGKILL, "dead"), (signal.SIGSTOP, "hung")])
 def test_what_broke_while_it_rested_is_mended(rested, number, kind):
-    """The fault must be that of the simulator, although the paused mode could not be ended."""
+    """The request to resume a broken simulator fails, but the reported fault must be the simulator's own."""
     os.kill(rested.launcher.state().pid, number)
 
     rested.env.unpause()

@@ -19,7 +19,7 @@ from tests.tables import for_each
 from tools.interface.everything import FAILING, offered, world
 from tools.interface.plan import ANSWERS, FIELDS, QUIT_STATUS
 
-DEADLINE_S = 120.0  # seconds on an idle machine
+DEADLINE_S = 120.0  # the client needs only seconds on an idle machine
 ROOT = Path(__file__).parents[3]
 RUN = "import sys; from palaestra_sim.{}.cli import main; sys.exit(main())"
 PAGE = (ROOT / "docs/reference/ros-interface.md").read_text()
@@ -55,7 +55,7 @@ def of_roscpp(simulator, environment, folder):
 def program(folder):
     """Return the path of the client with roscpp, built once for all simulators."""
     folder.mkdir()
-    survey = offered("mujoco")  # the stub's types are among its types
+    survey = offered("mujoco")  # MuJoCo has all types that the stub has
     return build(folder, set(survey.services.values()), set(survey.topics.values()))
 
 

@@ -14,7 +14,7 @@ from tests.pages import blocks
 
 ROOT = Path(__file__).parents[3]
 PAGE = (ROOT / "docs/howto/ros-tools.md").read_text()
-DEADLINE_S = 60.0  # moments on an idle machine
+DEADLINE_S = 60.0  # the commands take moments on an idle machine
 PRINT_MD5 = """
 import webots_ros.msg, webots_ros.srv
 for type_ in (*vars(webots_ros.msg).values(), *vars(webots_ros.srv).values()):

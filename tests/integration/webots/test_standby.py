@@ -306,4 +306,4 @@ def test_changing_places_again_and_again_leaves_no_file_open(pair):
         it.wait_for_spare()
         opened.append(descriptors())
 
-    eventually(lambda: descriptors() <= opened[1])  # a master may still call our node
+    eventually(lambda: descriptors() <= opened[1])  # a master's call to our node may still be open

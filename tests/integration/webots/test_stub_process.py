@@ -11,11 +11,11 @@ import pytest
 
 from palaestra_trainer.ros import Master, RosService
 
-DEADLINE_S = 60.0  # moments on an idle machine
+DEADLINE_S = 60.0  # the waits take moments on an idle machine
 STUB = Path(sys.executable).with_name("palaestra-stub")
 WITHOUT_ROS = """
 import sys
-sys.modules.update(dict.fromkeys(["genmsg", "genpy", "rosgraph", "rosmaster", "rospy"]))  # not to be found
+sys.modules.update(dict.fromkeys(["genmsg", "genpy", "rosgraph", "rosmaster", "rospy"]))  # imports then fail
 from palaestra_sim.stub.cli import main
 sys.exit(main())
 """
@@ -140,7 +140,7 @@ def test_a_node_that_rosnode_kill_ends_is_reported_as_shut_down(master, stub):
     with xmlrpc.client.ServerProxy(master) as ask_master:
         _, _, address = ask_master.lookupNode("/test", "/process_test")
     with xmlrpc.client.ServerProxy(address) as node:
-        node.shutdown("/master", "[/gone] Reason: new node registered with same name")  # has no effect
+        node.shutdown("/master", "[/gone] Reason: new node registered with same name")  # for another node
         node.shutdown("/rosnode", "user request")
 
     line = process.stderr.readline()

@@ -243,7 +243,7 @@ def test_a_node_is_exported_as_text_that_can_be_inserted(world):
 
 
 def test_the_center_of_mass_of_a_box_is_its_middle(world, simulator):
-    """The stub has no masses."""
+    """The stub and MuJoCo return the node's origin, which is the center of mass of a uniform box."""
     webots, _ = world
 
     center = webots.observer.center_of_mass("BOX")

@@ -24,7 +24,7 @@ def test_a_started_simulator_is_available_until_it_is_stopped(own_arena):
 
 
 def test_a_stop_is_no_fault(own_arena):
-    """The sidecar knows about the stop before the simulator ends."""
+    """The sidecar must count the end of a simulator as a fault only if no client requested a stop."""
     own_arena.webots.stop()
 
     state = own_arena.launcher.state()
@@ -130,7 +130,7 @@ def test_a_reload_brings_the_world_back_with_new_handles(own_arena):
 
 
 def test_a_start_waits_for_the_controllers_of_all_robots(own_arena, make, name):
-    """In Webots, the controller of a robot may start after that of the supervisor, which responds already."""
+    """In Webots, the supervisor's controller may respond before the controller of a robot has started."""
     webots = own_arena.webots
     webots.at_start("late", lambda: None, [name])
 
@@ -147,7 +147,7 @@ def test_a_start_waits_for_the_controllers_of_all_robots(own_arena, make, name):
 
 
 def test_a_robot_without_a_controller_is_named(own_arena, monkeypatch):
-    """A wrong name is a mistake, so the wait ends long before the deadline of a start."""
+    """A wrong name in the world is a mistake, so the error must come long before the deadline of a start."""
     monkeypatch.setattr(facade, "_CONTROLLERS_S", 0.5)
     own_arena.webots.at_start("absent", lambda: None, ["absent"])
 

@@ -77,7 +77,10 @@ def client():
 
 
 def _end(process):
-    """End Webots; one that does not end fails this test alone, since the next one uses the same ROS names."""
+    """End Webots. If it does not end in time, this test fails and kills it.
+
+    Otherwise the next test would fail too, because its robots have the same ROS names.
+    """
     process.terminate()
     try:
         process.communicate(timeout=DEADLINE_S)

@@ -21,7 +21,7 @@ ROBOT = """DEF R{index} Robot {{
 
 
 def world(prefix, *supervisors):
-    """Return a world with a robot for each item, which says whether the robot is a supervisor."""
+    """Return a world with one robot for each of `supervisors`: True for a robot that is a supervisor."""
     robots = (
         ROBOT.format(index=index, prefix=prefix, supervisor=str(supervisor).upper())
         for index, supervisor in enumerate(supervisors)
@@ -46,7 +46,7 @@ def step(ask):
 
 
 def test_two_robots_step_together(webots, prefix, ask, step):
-    """The world waits for both, so that neither misses an observation."""
+    """Simulated time passes only when both robots have requested a step, so neither misses an observation."""
     webots(world(prefix, True, False), f"{prefix}_0", f"{prefix}_1")
 
     with ThreadPoolExecutor() as pool:
@@ -60,7 +60,7 @@ def test_two_robots_step_together(webots, prefix, ask, step):
 
 
 def test_a_step_that_is_no_multiple_of_the_basic_step_is_refused(webots, prefix, ask, step):
-    """The stub and Webots' own controller refuse it, too."""
+    """The stub and Webots' own controller refuse such a step, so our controller must refuse it too."""
     webots(world(prefix, True), f"{prefix}_0")
 
     assert [step(0, step_ms) for step_ms in (STEP_MS + 1, -STEP_MS)] == [{"success": False}] * 2
@@ -118,7 +118,7 @@ def test_quitting_ends_with_the_status_and_leaves_no_name(webots, prefix, ask):
 
 
 def test_sigterm_unregisters_the_names_also_during_a_step(webots, prefix, step):
-    """In a pause, Webots terminates a controller that waits in a step."""
+    """During a pause, a controller waits in its step when it gets SIGTERM; its ROS names must not stay."""
     process = webots(world(prefix, True), f"{prefix}_0", mode="pause")
     [pid] = children(process.pid)
     with ThreadPoolExecutor() as pool:
@@ -141,7 +141,7 @@ def test_a_refused_argument_is_one_line_in_the_console(webots, prefix):
 
 
 def test_an_injected_crash_ends_only_the_controller(webots, prefix, step):
-    """A user tests the training code; Webots goes on, as after a real crash of a controller."""
+    """A user tests training code by such a crash, so Webots must continue as after a real crash."""
     process = webots(
         world(prefix, True, True), f"{prefix}_0", f"{prefix}_1", PALAESTRA_STUB_FAULTS="crash:step=2"
     )
@@ -166,7 +166,7 @@ def test_an_injected_value_reaches_the_client(webots, prefix, ask):
 
 @pytest.mark.parametrize("slot", ["", "a"])
 def test_a_wrong_fault_ends_the_webots_of_a_sidecar_with_2(webots, prefix, slot):
-    """A job must not wait for a robot without a controller; a person's own Webots stays open."""
+    """A job must not wait for a robot without a controller. But a person's own Webots must stay open."""
     sidecar = {"PALAESTRA_SIMULATOR_SLOT": slot} if slot else {}
     process = webots(world(prefix, True), PALAESTRA_STUB_FAULTS="lost:topic=gsp/values", **sidecar)
 

@@ -34,7 +34,7 @@ def newest_webots(homes, monkeypatch):
 @pytest.mark.usefixtures("newest_webots")
 @pytest.mark.parametrize("driver", ["stub", "mujoco", "webots"])
 def test_one_of_three_robots_of_a_stranger_is_trained(tmp_path, driver):
-    """The same file runs in all simulators: all robots of the world step as one, and one of them learns."""
+    """One world file must work in all simulators. All its robots step together, and one of them learns."""
     world = tmp_path / "football" / "worlds" / "football.wbt"
     world.parent.mkdir(parents=True)
     world.write_text(FOOTBALL)
