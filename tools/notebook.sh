@@ -12,7 +12,7 @@ for file in examples/notebooks/*; do
   [[ -e notebooks/${file##*/} ]] || cp "$file" notebooks/
 done
 cd notebooks
-export PATH="$OLDPWD/.venv/bin:$PATH" # cells run palaestra's programs
+export PATH="$OLDPWD/.venv/bin:$PATH" # cells of the notebooks run palaestra's programs
 as_root=()
-((EUID)) || as_root=(--allow-root) # Jupyter refuses root unless this is said; the server listens on this machine only
+((EUID)) || as_root=(--allow-root) # without this option, Jupyter does not start as root; the server listens only on this machine
 exec jupyter lab "${as_root[@]}" --ServerApp.root_dir="$PWD" --LabApp.extension_manager=readonly "$@"

@@ -14,7 +14,7 @@ packages+=(ros-nav-msgs ros-std-srvs)
 packages+=(g++ libroscpp-dev libsensor-msgs-dev python3-gencpp)
 # MuJoCo's cameras draw with OpenGL on the processor.
 packages+=(libegl1 libgl1-mesa-dri libopengl0)
-# A test looks at the report of a run in a browser.
+# A test opens the report of a run in a browser.
 packages+=(chromium)
 
 all_installed() {

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Load an archive of an image into the Docker Engine that carries the cluster, and run a command where this engine's host network
-# is the command's own network.
+# Load the archive of an image into the Docker Engine that runs the cluster, and run a command in the network namespace of this
+# engine's host.
 #   beside_containers.sh ARCHIVE COMMAND…
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR source=settings.sh

@@ -1,7 +1,8 @@
-# The cluster's entry in the person's own kubeconfig, as kind makes it, so that plain kubectl works. Sourced, after settings.sh.
+# Functions that add the cluster to the person's own kubeconfig, as kind does, and that remove it again. So plain kubectl works.
+# Source this file after settings.sh.
 # shellcheck shell=bash
 
-PUBLISHED=$STATE/published # where the entry is: the environment of down.sh may be another one
+PUBLISHED=$STATE/published # has the path of the changed kubeconfig, because down.sh may run with another KUBECONFIG
 
 publish_context() {
   local personal=${KUBECONFIG:-$HOME/.kube/config}
@@ -26,5 +27,5 @@ retract_context() {
     "${config[@]}" delete-context "kind-$CLUSTER"
     "${config[@]}" delete-cluster "kind-$CLUSTER"
     "${config[@]}" delete-user "kind-$CLUSTER"
-  } >/dev/null 2>&1 || true # what isn't there any more need not be removed
+  } >/dev/null 2>&1 || true # an entry that somebody has already removed is not an error
 }

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Remove the cluster for the tests with all that it started, also one that a killed run left behind. Safe to repeat.
-# An existing cluster (PALAESTRA_CLUSTER=existing) is left as it is.
+# Remove the cluster for the tests and everything that it started, even if a killed run has left it behind. You can repeat this
+# script safely. It does not change an existing cluster (PALAESTRA_CLUSTER=existing).
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR source=settings.sh
 . "$(dirname "${BASH_SOURCE[0]}")/settings.sh"
@@ -31,7 +31,7 @@ down() {
   rm -rf "$STATE"
 }
 
-if [[ ${1:-} == --locked ]]; then # by up.sh, which holds the lock
+if [[ ${1:-} == --locked ]]; then # up.sh has called this script, and holds the lock
   down
 elif [[ ${PALAESTRA_CLUSTER:-} != existing ]]; then
   take_lock

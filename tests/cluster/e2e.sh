@@ -1,15 +1,15 @@
 #!/usr/bin/env bash
-# Bring a cluster up, install Palaestra in it, run the end-to-end tests, and remove all that was started: after success, after
-# failure and after Ctrl-C. A cluster that stood before is used and left, unless a killed run of this script left it behind.
+# Start a cluster, install Palaestra in it, run the end-to-end tests, and remove everything that was started, even after a
+# failure or Ctrl-C. A cluster that runs already is used and stays, unless a killed run of this script has left it behind.
 #   e2e.sh [PYTEST ARGUMENT…]     such as -k suspend
-# KEEP=1 leaves the cluster standing. PALAESTRA_CLUSTER chooses the way to it, see up.sh.
+# KEEP=1 keeps the cluster. PALAESTRA_CLUSTER chooses how the cluster is started, see up.sh.
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR source=settings.sh
 . "$(dirname "${BASH_SOURCE[0]}")/settings.sh"
 cd "$HERE/../.."
 
 INSTALLATION=manifests/install.yaml
-MARK=$STATE/by-e2e # this cluster was brought up here, and is to go with us
+MARK=$STATE/by-e2e # exists if this script has started the cluster, and so must remove it
 tests=
 images=
 installed=
@@ -31,7 +31,8 @@ finish() {
   exit "$status"
 }
 
-# Let the tests clean up after themselves, and end. Ctrl-C has reached them already: a second signal would cut that short.
+# Send the signal to the tests, wait until they have cleaned up, and end. A Ctrl-C has already reached the tests, and a second
+# signal would interrupt their cleanup. So the signal for a Ctrl-C is 0, which `kill` does not send.
 stop() {
   [[ -z $tests ]] || { kill -s "$1" "$tests" && wait "$tests"; } || true
   exit 130
@@ -41,12 +42,13 @@ bring_up() {
   [[ ! -f $MARK ]] || { say "removing what a killed run left behind" && "$HERE/down.sh"; }
   local stood=
   [[ ! -f $STATE/way ]] || stood=yes
-  KUBECONFIG=$(setpriv --pdeathsig TERM "$HERE/up.sh") # ends with us, so that it leaves no cluster without the mark
+  KUBECONFIG=$(setpriv --pdeathsig TERM "$HERE/up.sh") # up.sh ends with this script; otherwise a cluster without the mark could stay
   export KUBECONFIG
   [[ $stood || ${PALAESTRA_CLUSTER:-} == existing ]] || touch "$MARK"
 }
 
-# Name the archives in a file, as this goes on beside the cluster's coming up. What builds ends with this shell.
+# Build the images, and write the names of their archives to a file, because this function runs in the background while the
+# cluster starts. The builds end with this shell.
 build_images() {
   { setpriv --pdeathsig TERM tools/images.sh --archives &&
     setpriv --pdeathsig TERM tools/images.sh --archives --tag next operator; } >"$CACHE/e2e-images"
@@ -56,14 +58,15 @@ install_palaestra() {
   local first rest
   wait "$images" || die "the images could not be built: the message is above."
   images=
-  # The notebook has the layers of the trainer, and the next operator those of this one: behind them they take seconds.
+  # The notebook's image has the layers of the trainer's image, and the operator `next` has those of this operator. So these two
+  # images load in seconds after the others.
   mapfile -t first < <(sed -n '1,/^operator=/{/^notebook=/!s/.*=//p}' "$CACHE/e2e-images")
   mapfile -t rest < <(cut -d= -f2 "$CACHE/e2e-images" | grep -vxF "$(printf '%s\n' "${first[@]}")")
   "$HERE/load.sh" "${first[@]}"
   "$HERE/load.sh" "${rest[@]}"
   kubectl get namespace palaestra-system >/dev/null 2>&1 || installed=yes
   kubectl apply -f "$INSTALLATION" >/dev/null
-  # An image that was loaded again has the name of the one that runs.
+  # A new image has the same name as the image that runs, so only a restart uses the new image.
   [[ $installed ]] || kubectl -n palaestra-system rollout restart deployment/palaestra-operator >/dev/null
   kubectl -n palaestra-system rollout status deployment/palaestra-operator --timeout 120s >/dev/null ||
     die "the operator does not become ready: kubectl -n palaestra-system describe pods"
@@ -81,10 +84,11 @@ bring_up
 say "installing Palaestra"
 install_palaestra
 say "running the end-to-end tests"
-# In the background, so that a signal is acted on at once; a shell makes such a process deaf to Ctrl-C, env mends that.
+# The tests run in the background, so that this shell handles a signal at once. The shell makes background processes ignore
+# Ctrl-C, and `env` restores the default.
 export PALAESTRA_E2E=1 PALAESTRA_REQUIRE_CLUSTER=1 PALAESTRA_E2E_IMAGES=$CACHE/e2e-images
 env --default-signal=INT .venv/bin/pytest tests/e2e --durations=15 "$@" &
 tests=$!
 ended=0
-wait "$tests" || ended=$? # a Ctrl-C that comes just before is acted on behind it, if this does not end the script
+wait "$tests" || ended=$? # `||` keeps a failure of `wait` from ending the script before the trap of a Ctrl-C runs
 exit "$ended"

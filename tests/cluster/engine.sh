@@ -1,15 +1,17 @@
-# A Docker Engine of our own, in network, mount and process namespaces of its own. Sourced, after settings, debian and processes.
+# Functions for a separate Docker Engine, in its own network, mount and process namespaces. Source this file after settings.sh,
+# debian.sh and processes.sh.
 # shellcheck shell=bash
 #
-# Its network namespace has no way out: the one link leads to this machine and carries answers only. That fence stands before
-# the first program, and all that is inside (bridges, mounts, rules, routes, containers) goes when its first process goes.
-# Until engine_keep is called it lives no longer than the script that started it, however that ends.
+# The engine's network namespace has no route to the outside. Its only link leads to this machine, and the engine can open no
+# connection over this link. This fence exists before the first program starts. When the first process of the namespaces ends,
+# everything inside them ends too: bridges, mounts, rules, routes and containers.
+# Until engine_keep is called, the engine ends with the script that started it, even if this script is killed.
 
 ENGINE_PID_FILE=$STATE/engine.pid
 LINK=palaestra0
 HOST_ADDRESS=198.18.255.1
 ENGINE_ADDRESS=198.18.255.2
-FENCE=(unreachable "$CLUSTER_BLOCK" metric 4177) # the metric tells it from somebody else's route
+FENCE=(unreachable "$CLUSTER_BLOCK" metric 4177) # the metric distinguishes this route from the routes of other programs
 
 engine_fetch() {
   [[ ! -x $DOCKER/usr/sbin/dockerd ]] || return 0
@@ -27,7 +29,7 @@ engine_up() {
   ! ip link show "$LINK" >/dev/null 2>&1 || die "a cluster of another cache stands on this machine (link $LINK): remove it first."
   mkdir -p "$STATE"
   mkfifo "$STATE/owner"
-  exec 8<>"$STATE/owner" # closed when this script ends, in any way
+  exec 8<>"$STATE/owner" # the kernel closes it when this script ends, even if this script is killed
   ip route replace "${FENCE[@]}"
   give_weight
   become_engine &
@@ -38,7 +40,8 @@ engine_up() {
   docker network create kind --subnet "$NODE_SUBNET" >/dev/null
 }
 
-# On cgroup v1, a group below the root weighs as one process of this machine: beside others, all pods would share that.
+# On cgroup v1, a group below the root has by default the CPU weight of a single process. All pods together would then get as
+# much CPU as one other process of this machine.
 give_weight() {
   local shares=/sys/fs/cgroup/cpu/$CONTROL_GROUP/cpu.shares
   [[ -w /sys/fs/cgroup/cpu/cpu.shares ]] || return 0
@@ -52,7 +55,7 @@ engine_down() {
   local outer inner
   if outer=$(recorded_process "$ENGINE_PID_FILE"); then
     inner=$(engine_first_process)
-    kill -KILL "$outer" # the first process of the namespace dies with it, and with that one all others
+    kill -KILL "$outer" # then the first process of the namespaces is killed too, and with it all others
     wait_until 20 is_gone "$inner" || die "process $inner does not end, so the engine of an earlier run can't be removed."
   fi
   ip link del "$LINK" 2>/dev/null || true
@@ -61,14 +64,15 @@ engine_down() {
   rm -rf "$STATE"
 }
 
-# Become the engine's outermost process. The record is written first and the process keeps its id, so no kill can part them.
+# Turn this subshell into the engine's outermost process. The record is written first, and `exec` keeps the process id. So even
+# after a kill, no engine exists without a record.
 become_engine() {
   record_process "$ENGINE_PID_FILE"
   exec setsid unshare --net --mount --pid --fork --kill-child --mount-proc -- \
     "$HERE/engine/init.sh" "$STATE" "$DOCKER" "$CONTROL_GROUP" >"$STATE/engine.log" 2>&1 </dev/null 8>&-
 }
 
-# Print the id of the first process inside as this machine numbers it.
+# Print the id of the first process of the engine's namespaces, as it is outside of these namespaces.
 engine_first_process() {
   local outer inner
   outer=$(recorded_process "$ENGINE_PID_FILE") && inner=$(cat "/proc/$outer/task/$outer/children") && echo "${inner%% *}"

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# Do what docs/start/laptop.md says as an ordinary user of a bare Debian: clone, then `make run`, without apt and without root.
+# Follow docs/start/laptop.md as an ordinary user of a minimal Debian: clone, then `make run`, without apt and without root.
 #   first_run.sh bookworm|trixie [ARGUMENT OF MAKE…]
-# The Debian has ca-certificates, git, make and python3-venv. It installs everything else from this machine's package index,
-# which takes minutes, and 9 GB of disk while it runs. Only this script needs root: to make the Debian and to mount it.
+# The Debian has ca-certificates, git, make and python3-venv. `make` installs everything else from this machine's package index.
+# This takes minutes, and 9 GB of disk until the script ends. Only this script needs root, to build and to mount the Debian.
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR source=settings.sh
 . "$(dirname "${BASH_SOURCE[0]}")/settings.sh"

@@ -1,11 +1,12 @@
 #!/usr/bin/env bash
-# Print what a removed cluster left on this machine: processes, mounts, links, routes, firewall rules, control groups, files.
-# Succeeds when there is nothing. Bridges, rules and routes of a Docker Engine that this machine runs anyway are none.
+# Print everything that a removed cluster has left on this machine: processes, mounts, links, routes, firewall rules, control
+# groups and files. The script succeeds if nothing is left. If this machine runs a Docker Engine of its own, the bridges, rules
+# and routes of that engine do not count.
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR source=settings.sh
 . "$(dirname "${BASH_SOURCE[0]}")/settings.sh"
 
-# Those that name our folder, and those inside the engine's control groups.
+# Print the processes whose command line contains our folder, and the processes in the engine's control groups.
 processes() {
   local folder
   for folder in /proc/[0-9]*; do
@@ -22,7 +23,8 @@ network() {
   ip netns list | grep -i palaestra | sed 's/^/network namespace /' || true
 }
 
-# What an engine of ours would make if it didn't keep to its own network namespace, and nodes in an engine that isn't ours.
+# Print the nodes in this machine's own Docker Engine. Without such an engine, print the links and rules that only an engine of
+# ours can have created outside of its network namespace, by an error.
 containers() {
   if docker_at_hand; then
     docker ps --all --filter "label=io.x-k8s.kind.cluster=$CLUSTER" --format 'container {{.Names}}'

@@ -5,7 +5,7 @@ set -euo pipefail
 # shellcheck source-path=SCRIPTDIR source=settings.sh
 . "$(dirname "${BASH_SOURCE[0]}")/settings.sh"
 
-# A line that changes when the archive does.
+# Print a line that changes when the archive changes.
 fingerprint() { stat -c '%n %s %Y' "$(realpath "$1")"; }
 
 load_archive() {
@@ -28,7 +28,7 @@ fi
 programs=$("$HERE/programs.sh" kind)
 PATH=$programs:$PATH
 [[ $(cat "$STATE/way") != built ]] || use_own_docker
-# All at once: one image takes nearly all of the time, and the others fit beside it.
+# All images are loaded at the same time, because one image takes nearly all of the time.
 loads=()
 for image in "$@"; do
   if [[ -f $image ]]; then load_archive "$image" & else load_named "$image" & fi

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Install the Debian packages that were named, if they are missing; when not root, print the one line that does it and stop.
+# Install the named Debian packages that are missing. If you are not root, the script prints the command for it, and fails.
 #   packages.sh PACKAGE…
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR source=settings.sh
@@ -20,7 +20,7 @@ install="apt-get install -y --no-install-recommends ${missing[*]}"
 install_missing() {
   say "installing ${missing[*]}"
   apt-get update -qq
-  # Services that come with a package (containerd) are not to run beside ours, hence the temporary policy.
+  # This temporary policy prevents that apt starts the services of the packages, such as containerd, next to our own processes.
   [[ -e /usr/sbin/policy-rc.d ]] || {
     trap 'rm -f /usr/sbin/policy-rc.d' EXIT
     printf '#!/bin/sh\nexit 101\n' >/usr/sbin/policy-rc.d
@@ -28,4 +28,4 @@ install_missing() {
   }
   DEBIAN_FRONTEND=noninteractive $install -qq >/dev/null
 }
-locked packages install_missing # images are built while the cluster comes up, and apt can't do two things at once
+locked packages install_missing # the build of the images and the start of the cluster run at the same time, but apt runs only once

@@ -6,14 +6,15 @@
 #
 #   programs.sh --built [PROGRAM…]     build nothing; exit 3 without output if a program is missing
 #
-# The cache key of a program is the content of its module. A program is put in place by renaming.
+# The cache key of a program is a digest of its module. A complete program is renamed to its final name, so no call uses an
+# incomplete program.
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR source=settings.sh
 . "$(dirname "${BASH_SOURCE[0]}")/settings.sh"
 # shellcheck source-path=SCRIPTDIR source=debian.sh
 . "$HERE/debian.sh"
 
-KEPT_DAYS=14 # what earlier versions left in the cache
+KEPT_DAYS=14 # days for which programs of earlier versions stay in the cache
 
 build() {
   local program=$1 module=$2 package=$3 target=$4 part="$4.part"

@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
-# Bring up the cluster for the tests and print the path of its kubeconfig. Safe to repeat: a cluster that stands is left alone,
-# and what an interrupted run left behind is removed first.
+# Start the cluster for the tests, and print the path of its kubeconfig. You can repeat this script safely: it does not change a
+# cluster that runs, and it first removes everything that an interrupted run has left behind.
 #
-# PALAESTRA_CLUSTER chooses the way:
+# PALAESTRA_CLUSTER chooses how the cluster is started:
 # - "stock": kind's node image in the local Docker Engine.
 # - "built": engine and node image built here from Debian packages and Go modules, as root.
 # - "existing": the cluster of $KUBECONFIG; nothing is started.
-# If it is not set, the way is "stock" where Docker and the image are available, otherwise "built".
+# If PALAESTRA_CLUSTER is not set: "stock" if Docker and the node image are available, otherwise "built".
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR source=settings.sh
 . "$(dirname "${BASH_SOURCE[0]}")/settings.sh"
@@ -37,8 +37,8 @@ up_existing() {
   echo "$KUBECONFIG"
 }
 
-# Start kind without letting it outlive this script; in the background, so that a signal is acted on at once. It looks for
-# the files that kind.yaml mounts where it is called.
+# Start kind, which is killed when this script ends. It runs in the background, so that this script handles a signal at once.
+# The working directory must be this folder, because kind.yaml has relative paths of the files that it mounts.
 create_cluster() {
   say "creating the cluster"
   setpriv --pdeathsig KILL env --chdir "$HERE" \
@@ -65,7 +65,7 @@ up_built() {
   cat "$HERE/kind.yaml" "$HERE/node/kind-patches.yaml" >"$STATE/kind.yaml"
   create_cluster "$node_image" "$STATE/kind.yaml"
   address=$(docker inspect -f '{{.NetworkSettings.Networks.kind.IPAddress}}' "$CLUSTER-control-plane")
-  # kind wrote an address of the engine's own network namespace
+  # kind wrote an address that is valid only in the engine's network namespace
   kubectl --kubeconfig "$STATE/kubeconfig.part" config set-cluster "kind-$CLUSTER" --server "https://$address:6443" >/dev/null
   engine_keep
 }

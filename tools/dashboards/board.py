@@ -25,7 +25,7 @@ from grafana_foundation_sdk.models.dashboard import (
 from tools.dashboards.panels import SOURCE, Panel
 
 TAG = "palaestra"
-EVERYTHING = ".+"  # what "All" stands for in a matcher: short, and right for namespaces that come later
+EVERYTHING = ".+"  # the value of "All" in a matcher; it also matches namespaces that are created later
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,7 +38,7 @@ class Variable:
     says: str
 
     def build(self) -> QueryVariable:
-        """Return the choice in Grafana's model: several values may be chosen, and at first all are."""
+        """Return the choice in Grafana's model: at first, all values are chosen."""
         return (
             QueryVariable(self.name)
             .label(self.name.capitalize())
@@ -69,7 +69,7 @@ class Board:
     Attributes:
         name: the name of its file, its title, and a part of its address in Grafana: /d/palaestra-<name>.
         says: the questions that it answers, and its readers.
-        since: the start of the time that it shows at first, in Grafana's format: now-1h.
+        since: the start of the time range that it shows when it is opened, in Grafana's format: now-1h.
     """
 
     name: str

@@ -6,7 +6,7 @@ from tools.dashboards.board import Board, Section, Variable
 from tools.dashboards.metrics import grown, of_jobs, of_namespace, quantile, rate, total
 from tools.dashboards.panels import Look, Panel, Query
 
-_LONG = "30m"  # over so long a time, evaluations and checkpoints even out
+_LONG = "30m"  # a shorter time range would show each evaluation and each checkpoint as a jump
 _OF_RUNS = 'training_job!=""'
 
 
@@ -183,7 +183,7 @@ def _useful() -> Panel:
 
 
 def _cores_by(labels: str, over: str) -> str:
-    """Return the cores that runs use; no process that we scrape is the parent of a simulator's processes."""
+    """Return the cores that runs use, as a sum: a sidecar's own CPU does not contain its simulator's CPU."""
     ours = total(labels, rate(of_namespace("process_cpu_seconds_total", _OF_RUNS), over))
     theirs = total(labels, rate(of_namespace("palaestra_simulator_cpu_seconds_total"), over))
     return f"{ours} + {theirs}"

@@ -65,7 +65,7 @@ class Panel:
     Attributes:
         question: its title.
         says: how to read the answer, and what to do.
-        unit: of all values, one of `grafana_foundation_sdk.models.units`.
+        unit: the unit of all values, from `grafana_foundation_sdk.models.units`.
         least, most: the ends of the axis; None: the least or largest value.
         alarm: the least value that is drawn red.
         width: number of columns; a row has 24.

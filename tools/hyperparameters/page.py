@@ -1,7 +1,7 @@
 """The defaults of each algorithm, in docs/reference/trainingjob.md.
 
-Another module, in the operator, makes the rest of that page. The two are separate because the operator does
-not import the trainer.
+Another module, in the operator, makes the rest of that page. These two modules are separate, because the
+operator does not import the trainer.
 """
 
 import json

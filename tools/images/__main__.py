@@ -51,7 +51,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _wanted(known: Mapping[str, Recipe], options: argparse.Namespace) -> Mapping[str, Recipe]:
-    """Return the recipes of the images to build: without names, all of them or only that of --webots."""
+    """Return the recipes of the named images, and of Webots with --webots; without both, all recipes."""
     if options.webots is None:
         return {name: known[name] for name in options.names or known}
     own = webots.of_archive(options.webots, options.webots_assets, options.webots_sha256, platform.machine())

@@ -111,7 +111,7 @@ class Docker:
 class Buildah:
     """buildah with its own store in the cache; its base image is a tree made by debootstrap.
 
-    Steps run in a chroot, because builds inside a container need that, and use this machine's network.
+    Steps run in a chroot, because builds inside a container need a chroot. Steps use this machine's network.
     """
 
     def __init__(self, folder: Path, tree: Path) -> None:

@@ -1,4 +1,4 @@
-"""Choose the packages that one image needs from `requirements.lock`. Pure: text in, text out.
+"""Choose the packages that one image needs from `requirements.lock`; this module only converts text.
 
 For every package, the lock names the packages that require it (`# via`). So the part for an image can be
 found without an index. Markers are evaluated for the image's Python version, which differs from the version

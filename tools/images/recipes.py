@@ -94,7 +94,8 @@ def recipes(torch: str) -> Mapping[str, Recipe]:
             name="operator",
             dockerfile="operator/Dockerfile",
             packages=("sim_image", "operator"),
-            # Only the client's asynchronous half needs these packages, and the image leaves that half out.
+            # Only the asynchronous half of the client for Kubernetes needs these packages, and the image
+            # leaves that half out.
             without=("aiohttp", "aiohttp-retry"),
         ),
     }

@@ -1,6 +1,6 @@
-"""The recipe of the image of Webots, whose archive the person who builds the image has downloaded.
+"""The recipe of the image of Webots; the person who builds the image downloads the archive of Webots first.
 
-Webots is large, and this project neither passes it on nor downloads it. So `make images` does not build this
+Webots is large, and this project neither distributes nor downloads it. So `make images` does not build this
 image, and the digests of the archives are arguments of the Dockerfile, which checks them.
 """
 

@@ -64,8 +64,8 @@ _EVERYWHERE = frozenset(
     )
 )
 NOT_IN_WEBOTS: Final = frozenset(("lidar/laser_scan/layer0",))
-# Claims that need a person at the window of Webots, a gamepad, or the bones of a mesh. Without bones, the
-# controller of Webots reads a null pointer.
+# Services and topics whose check needs a person at the window of Webots, a gamepad, or the bones of a mesh.
+# Without bones, the controller of Webots reads a null pointer.
 UNCHECKED_IN_WEBOTS: Final = frozenset(
     (
         "joystick/get_number_of_axes",

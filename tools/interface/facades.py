@@ -8,7 +8,7 @@ from typing import Final
 from palaestra_sim.scene.devices import DEVICES
 from tools.interface.everything import device_name
 
-# These are for ROS's own tools, or do the same as another path.
+# Paths without a member of a class: only ROS's own tools need them, or another path does the same.
 WITHOUT: Final = frozenset(
     (
         *("get_loggers", "set_logger_level", "/rosout", "/model_name", "/clock"),
@@ -18,7 +18,7 @@ WITHOUT: Final = frozenset(
         "lidar/laser_scan/layer0",  # the older name of laser_scan, which Webots no longer has
     )
 )
-_NAME: Final = "get_name"  # of a device; a facade is made with this name
+_NAME: Final = "get_name"  # returns a device's name, which a facade already has when it is created
 
 # The class of each type of device whose class has another name.
 _CLASSES: Final = {

@@ -164,7 +164,7 @@ ANSWERS: Mapping[str, Request] = {
 }
 
 
-LATE = ("camera/recognition_enable_segmentation",)  # at the end, because the service ends its topic
+LATE = ("camera/recognition_enable_segmentation",)  # called last, because the service ends its topic
 
 HANDLES = ("BOX", "VIEWPOINT", "LINEARMOTOR_JOINT", "SHADED", "PAINT", "ROUND", "FLAT")
 

@@ -1,7 +1,7 @@
 """The services and topics that a training needs, as calls in the world of an example.
 
-The world is that of examples/simulators/cart.yaml: a cart with two wheels and a distance sensor, which is its
-own supervisor. `TRAINING` lists the calls in the order of a training.
+The world is from examples/simulators/cart.yaml. Its only robot is a cart with two wheels and a distance
+sensor, and is its own supervisor. `TRAINING` lists the calls in the order of a training.
 """
 
 from __future__ import annotations

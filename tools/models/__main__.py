@@ -1,4 +1,4 @@
-"""`python -m tools.models DIR...`: count the models of MuJoCo below folders that start without changes.
+"""`python -m tools.models DIR...`: count the MuJoCo models in folders that start without changes.
 
 dm_control, gymnasium, gymnasium-robotics, metaworld and robosuite have 140 models with an actuator. You need
 only the wheels of these packages, without their dependencies:

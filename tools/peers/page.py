@@ -20,7 +20,7 @@ COMMAND = f"python -m tests.bench --record {RECORDED}"
 BEGIN = "<!-- generated: measured comparisons -->"
 OPTIONS = {"rllib": "--rllib PYTHON "}
 AGAIN = "**These figures were measured while other programs used the machine, and are to be measured again.**"
-BUSY = 0.5  # of the processors: the load average before a part above which its figures are marked
+BUSY = 0.5  # share of the processors; with a higher load average before a part, its figures are marked
 
 Recorded = Mapping[str, Mapping[str, Any]]
 

@@ -27,7 +27,7 @@ class Row:
         what: the compared figure, and the other program.
         ours: returns Palaestra's figure.
         theirs: returns the other program's figure.
-        unit: the unit of both.
+        unit: the unit of both figures.
         more_is_better: whether the larger figure is the better one.
     """
 
@@ -47,8 +47,8 @@ class Chapter:
         title: the heading.
         text: sentences before the table.
         rows: returns the rows of the table for the recorded figures.
-        limit: a sentence that says what the comparison does not show.
-        reason: the reason of the rows in which Palaestra loses, with a link to a profile.
+        limit: a sentence about the limits of the comparison.
+        reason: the reason for the rows in which Palaestra's figure is worse, with a link to a profile.
     """
 
     part: str

@@ -1,8 +1,8 @@
-"""`python -m tools.worlds DIR...`: count the worlds of Webots below folders that simulators start.
+"""`python -m tools.worlds DIR...`: count the Webots worlds in folders that each simulator starts.
 
 The folders are checkouts of projects. The program sets the controllers of each world's robots to `ros`, in a
-copy next to the world, because a world refers to the files around it. Equal worlds count once. If a world
-starts only with `--leave-out all`, the program prints it with the messages that refuse it.
+copy. The copy is next to the world, because worlds refer to files by relative paths. Equal worlds count once.
+If a world starts only with `--leave-out all`, the program prints it with the messages that refuse it.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ MARK: Final = ".counted.wbt"
 HEADER: Final = b"#VRML_SIM "  # files with another header are parts of worlds
 LINE: Final = 80
 MOTORS: Final = ("RotationalMotor", "LinearMotor")
-# These robots neither drive nor measure.
+# Types of devices that are neither motors nor sensors.
 OTHERS: Final = ("Brake", "Display", "Emitter", "LED", "Pen", "Skin", "Speaker")
 
 

@@ -62,17 +62,17 @@ readOnlyRootFilesystem: true
 {{- define "palaestra.jobRules" -}}
 - apiGroups: [palaestra.dev]
   resources: [trainingjobs]
-  verbs: [get, list, watch, delete] # delete: ttlSecondsAfterFinished
+  verbs: [get, list, watch, delete] # delete: for ttlSecondsAfterFinished
 - apiGroups: [palaestra.dev]
   resources: [trainingjobs/status]
   verbs: [patch]
-# Owner references that block deletion need it where OwnerReferencesPermissionEnforcement is on.
+# With the admission plugin OwnerReferencesPermissionEnforcement, owner references that block deletion need this right.
 - apiGroups: [palaestra.dev]
   resources: [trainingjobs/finalizers]
   verbs: [update]
 - apiGroups: [batch]
   resources: [jobs]
-  verbs: [get, list, watch, create, patch, delete] # delete: suspended ones of ended replicas
+  verbs: [get, list, watch, create, patch, delete] # delete: suspended Jobs of ended replicas
 - apiGroups: [""]
   resources: [pods]
   verbs: [list, watch]
@@ -85,13 +85,13 @@ readOnlyRootFilesystem: true
   verbs: [get, list, watch, create]
 - apiGroups: [""]
   resources: [persistentvolumeclaims]
-  verbs: [get, list, watch, create, delete] # delete: never bound, of TrainingJobs that are gone
+  verbs: [get, list, watch, create, delete] # delete: claims of deleted TrainingJobs that were never bound to a volume
 - apiGroups: [networking.k8s.io]
   resources: [networkpolicies]
   verbs: [list, watch, create, patch]
 - apiGroups: [""]
   resources: [events]
-  verbs: [get, list, create, patch] # list: why a Job's pods could not be made
+  verbs: [get, list, create, patch] # list: events explain why a Job's pods cannot be created
 # The status reports why Kueue does not admit a Job; authors of TrainingJobs often may not read Workloads.
 - apiGroups: [kueue.x-k8s.io]
   resources: [workloads]

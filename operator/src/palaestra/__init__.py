@@ -23,7 +23,7 @@ else:
     }
 
     def __getattr__(name: str) -> Any:
-        """Return a public name; import its module only on use, because plans and schemas need no client."""
+        """Return a public name. Import its module only now: a program that only plans imports no client."""
         if name not in _HOMES:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
         return getattr(import_module(_HOMES[name]), name)

@@ -31,7 +31,7 @@
     ├── CommandFailed                a command in a container failed (cluster.errors)
     ├── ClientError                  a command about a cluster's jobs failed (client.errors)
     │   ├── EndedOtherwise           the job ended in another phase than expected
-    │   ├── HasEnded                 the job has ended, so it is neither suspended nor resumed
+    │   ├── HasEnded                 the job has ended, so it is not suspended, resumed or restarted
     │   ├── NoPod                    a replica has no pod or container to read
     │   ├── NoSuchJob                no such TrainingJob
     │   ├── NoSuchNamespace          no such namespace

@@ -74,9 +74,10 @@ def _passing_storage(storage: Object) -> Object:
 
 
 def _take_away(api: Api, made: Object, report: Report, *, or_fail: bool) -> None:
-    """Delete the job; report an error of the deletion, or raise it with `or_fail` if a retry cannot help.
+    """Delete the job, and report an error of the deletion.
 
-    `or_fail` is for a successful job. After a failed job, the error of the job must be shown instead.
+    With `or_fail`, the error is raised if a retry cannot help. `or_fail` is for a successful job. After a
+    failed job, the error of the job must be shown instead.
     """
     namespace, name = made["namespace"], made["name"]
     try:

@@ -1,20 +1,21 @@
 #!/usr/bin/env bash
-# The first process of the engine's namespaces: fence, then containerd and dockerd. When one of them ends, everything ends.
+# The first process of the engine's namespaces. It sets up the fence, and then starts containerd and dockerd. When one of these
+# two ends, everything ends.
 #   init.sh STATE DOCKER CONTROL_GROUP
 set -euo pipefail
 state=$1 docker=$2 control_group=$3
 
-# Until the script that started this says "stay", end with it: the other end of the pipe closes.
+# Until the starting script writes "stay" into the pipe, this process ends with that script, because the pipe then closes.
 (read -r word <"$state/owner" && [[ $word == stay ]] && exec sleep infinity) &
 
-# The fence. There is no link yet; the one that comes leads to this machine, and nothing new may begin on it from here.
+# The fence. The link to this machine does not exist yet. When it exists, these rules drop every connection that begins here.
 ip link set lo up
 echo 1 >/proc/sys/net/ipv6/conf/default/disable_ipv6
 iptables -t mangle -A FORWARD -o host -m conntrack --ctstate NEW,INVALID -j DROP
 iptables -t mangle -A OUTPUT -o host -m conntrack --ctstate NEW,INVALID -j DROP
 ip route add unreachable default
 
-mount --make-rshared / # pods' volumes must be seen by the node; the other side of this mount namespace sees nothing
+mount --make-rshared / # the node must see the volumes of pods; outside of this mount namespace they are invisible
 mkdir -p "$state"/{containerd,docker}
 
 cat >"$state/containerd.toml" <<END

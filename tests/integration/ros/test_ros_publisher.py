@@ -176,7 +176,7 @@ def test_an_unknown_type_is_refused(node):
     [({}, "127.0.0.1"), ({"ROS_IP": "10.0.0.7"}, "10.0.0.7"), ({"ROS_HOSTNAME": "pc"}, "pc")],
 )
 def test_the_node_has_an_address_that_the_master_reaches(environment, host):
-    """rospy would use the host name of a laptop, which a robot often cannot resolve."""
+    """Rospy would use the host name of a laptop, which a robot often cannot resolve."""
     assert host_toward("http://127.0.0.1:11311/", environment) == host
 
 

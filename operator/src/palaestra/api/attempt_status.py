@@ -86,7 +86,8 @@ class Goodput(StatusModel):
     """Seconds in which the training thread waited for simulators to compute a step."""
 
     transport: Seconds = 0
-    """Seconds that steps took in addition, for requests, responses and the environment's code."""
+    """Seconds that the same steps took beyond `stepping`: for requests, responses and the environment's
+    code."""
 
     learning: Seconds = 0
     """Seconds spent in the algorithm."""
@@ -101,8 +102,8 @@ class Goodput(StatusModel):
     """Seconds before the first step of each attempt."""
 
     recovering: Seconds = 0
-    """Seconds in which training waited because no simulator could step, or for a step that ended with a
-    fault; and seconds in which a resumed run restored its simulators to the state at the checkpoint."""
+    """Seconds in which training waited because no simulator could step, seconds of steps that ended with a
+    fault, and seconds in which a resumed run restored its simulators to their state at the checkpoint."""
 
     recycling: Seconds = 0
     """Seconds in which training waited for the restart of a healthy simulator that had reached a limit of

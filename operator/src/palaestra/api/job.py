@@ -177,10 +177,10 @@ class Spec(ApiModel):
     no_progress_limit: Annotated[int, Field(ge=0, le=100)] | None = Field(
         default=None, json_schema_extra={MAY_CHANGE: True}
     )
-    """Number of pods without progress at which the replica fails: pods that were disrupted, or deleted with
-    time to save, since `furthestStep` in the status last rose. Absent: 6; 0: no limit. Counting starts after
-    the first reported step. Pods whose trainer never ran are not counted. `palaestra run` ignores this field;
-    its limit is 5."""
+    """Number of pods without progress at which the replica fails. A pod counts if it was disrupted, or
+    deleted with time to save, since `furthestStep` in the status last rose. Absent: 6; 0: no limit. Counting
+    starts after the first reported step. Pods whose trainer never ran are not counted. `palaestra run`
+    ignores this field; its limit is 5."""
 
     ttl_seconds_after_finished: Annotated[int, Field(ge=0, le=315_360_000)] | None = Field(
         default=None, json_schema_extra={MAY_CHANGE: True}

@@ -83,7 +83,7 @@ def _has_foreign_domain(key: str) -> bool:
 
 
 def _selects_security_profile(key: str) -> bool:
-    """Return whether an annotation selects a seccomp or AppArmor profile; kubelets still use AppArmor's."""
+    """Return whether an annotation selects a seccomp or AppArmor profile. Kubelets still obey AppArmor's."""
     return "security" in _domain(key) and _domain(key).endswith(".kubernetes.io")
 
 
@@ -103,7 +103,7 @@ class Scheduling(ApiModel):
 
     tolerations: Annotated[Listed[Toleration], Field(max_length=16)] = ()
     """Node taints that the pods tolerate. The cluster's installation must allow each key
-    (`jobs.allowedTolerations`), unless the job requests an extended resource of that name."""
+    (`jobs.allowedTolerations`), unless the key is the name of an extended resource that the job requests."""
 
     affinity: FreeObject = Field(default={})
     """Affinity of the pods, in the format of a pod's spec. An affinity to other pods may select only pods in

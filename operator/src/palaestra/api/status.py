@@ -110,8 +110,8 @@ class Restarts(StatusModel):
     operator: Count = 0
     """Pods that the operator replaced because the kubelet does not repair them (`TrainerNotStarted`,
     `RestartPolicyDropped`, `Stalled`); and pods whose trainer the kubelet ended because a probe failed
-    (`ProbeFailed`). Pods that a container of another program kept alive after the trainer's end count here
-    too. The count is at most `backoffLimit`."""
+    (`ProbeFailed`). Pods also count here if a container of another program kept them alive after the
+    trainer's end. The count is at most `backoffLimit`."""
 
 
 class PodReference(StatusModel):

@@ -81,7 +81,7 @@ def _name_bounds(schema: Schema) -> None:
 
 
 def _present(default: Any) -> Any:
-    """Return `default` without null values, because the API server checks the default by the rules too."""
+    """Return `default` without null values, since the API server checks it with the schema's rules."""
     if isinstance(default, list):
         return [_present(item) for item in default]
     if isinstance(default, dict):
@@ -90,7 +90,7 @@ def _present(default: Any) -> Any:
 
 
 def freeze(schema: Schema) -> None:
-    """Add rules to the object `schema` that refuse changes of all fields without the mark `MAY_CHANGE`."""
+    """Add rules to the object `schema` that refuse a change of any field without the mark `MAY_CHANGE`."""
     # An API server refuses a rule on a field with arbitrary content, so the field's parent gets the rule.
     whole = False
     for name, inner in schema["properties"].items():

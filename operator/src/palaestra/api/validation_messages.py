@@ -17,10 +17,10 @@ from palaestra_protocol.foreign_words import ELSEWHERE, FROM_ZOO, NO_ALGORITHM, 
 
 _LONGEST_QUOTE = 60
 _SIMILAR = 0.6
-# A message suggests a field for a name in Python's style if their similarity is at least this. For
+# A message suggests a field for a name in Python's style if their similarity is at least this value. For
 # every_steps the message suggests everySteps, but for n_steps it does not suggest steps.
 _MISSPELLED = 0.92
-# Sections in which people write hyperparameters of RL Zoo.
+# Sections into which people write hyperparameters of RL Zoo by mistake.
 _OF_TRAINING = (("spec",), ("trainer",), ("algorithm",))
 _VARIABLES = "env"  # a person who writes `env` more likely means environment variables than an environment
 

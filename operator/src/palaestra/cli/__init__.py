@@ -82,6 +82,6 @@ def _parser(first: Sequence[str]) -> argparse.ArgumentParser:
             commands.add_parser(name, help=each.summary)
     else:
         with without_collections():
-            import_without("rich", "structlog")  # structlog would format tracebacks with rich
+            import_without("rich", "structlog")  # with rich, structlog would format tracebacks
             _module(first[0], named.module).add(commands)
     return parser

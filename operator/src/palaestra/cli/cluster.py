@@ -43,7 +43,7 @@ def add_cluster(parser: argparse.ArgumentParser) -> None:
 
 
 def say(lines: Iterable[str]) -> None:
-    """Write lines to standard output as printable text, because pods wrote some of them; flush each line."""
+    """Write each line to standard output and flush it. Omit control characters, which a pod may have sent."""
     for line in lines:
         sys.stdout.write(f"{printable(line)}\n")
         sys.stdout.flush()

@@ -1,4 +1,4 @@
-"""`palaestra demo`: a robot learns in a browser, its simulator can be broken, and its policy is played."""
+"""`palaestra demo`: train a robot, show it in a browser, break its simulator on request, play its policy."""
 
 import argparse
 from collections.abc import Mapping

@@ -5,7 +5,7 @@
     ├── NoSuchNamespace     the namespace does not exist
     ├── NoSuchJob           the TrainingJob does not exist, or was deleted during the call
     ├── QueueDecides        only Kueue suspends and resumes a job in a queue
-    ├── HasEnded            the job has ended, so it is neither suspended nor resumed
+    ├── HasEnded            the job has ended, so it is not suspended, resumed or restarted
     ├── NothingLost         no replica of the job has lost its run, so no replica is restarted
     ├── EndedOtherwise      the job ended in another phase than expected
     ├── TookTooLong         a deadline passed; the same call may be repeated
@@ -78,11 +78,11 @@ class QueueDecides(ClientError):
 
 
 class HasEnded(ClientError):
-    """The job has ended, so it is neither suspended nor resumed; retrying cannot help."""
+    """The job has ended, so it is not suspended, resumed or restarted; retrying cannot help."""
 
     @classmethod
     def of(cls, name: str, phase: str, verb: str) -> Self:
-        """Return the error about a job that ended in `phase`; `verb` is the refused action: `resumed`."""
+        """Return the error about a job that ended in `phase`; `verb` is a participle, such as `resumed`."""
         return cls(
             f"job {name}: has ended ({phase}), so it cannot be {verb}; create a new job, and continue this "
             "run with spec.storage.resumeFrom"

@@ -14,8 +14,8 @@ _NUMBERS = re.compile(r"\d+")
 class News:
     """Reports each phase of a job, and each waiting reason of a replica, once.
 
-    The kubelet alternates between two messages and counts its retries. So a message that was reported before
-    is reported again only after the reason has changed; numbers in the message are not compared.
+    The kubelet alternates between two messages, and its messages contain the number of retries. So a message
+    is reported a second time only after the reason has changed, and numbers in messages are not compared.
     """
 
     def __init__(self, name: str) -> None:

@@ -15,7 +15,7 @@ are not used (docs/decisions/0004). These modules depend on Kubernetes, but not 
 - `watch`: one watch, until it ends
 - `reflector`: a cache that follows the API server
 - `store`: the objects in such a cache
-- `workqueue`: the keys to reconcile; only one worker at a time has a key
+- `workqueue`: the keys to reconcile; two workers never have the same key at the same time
 - `lease`: leader election; `lease_timing`: the arithmetic of its durations
 - `recorder`: events for people
 - `pod_logs`: the log of a running container

@@ -1,8 +1,8 @@
-"""Requests to an API server in plain JSON; each has a deadline, and each kind of refusal its own exception.
+"""Requests to an API server in plain JSON.
 
-This module retries only two kinds of requests, within the deadline of the call: a request that a busy server
-rejected (429), and a read whose connection broke. For all other failed requests, the caller decides on a
-retry.
+Each request has a deadline, and each kind of refusal raises an exception of its own. This module retries only
+two kinds of requests, within the deadline of the call: a request that a busy server rejected (429), and a
+read whose connection broke. For all other failed requests, the caller decides on a retry.
 """
 
 import time

@@ -11,7 +11,7 @@ from urllib3.util import make_headers
 
 from palaestra.cluster.proxies import Proxy
 
-POOL = 32  # connections that stay open; with default options, the operator needs fewer than these
+POOL = 32  # unused connections that stay open; with default options, the operator needs fewer connections
 # With these options the kernel detects dead peers, even behind proxies that do not report them.
 _TIMES = (("TCP_KEEPIDLE", 30), ("TCP_KEEPINTVL", 30), ("TCP_KEEPCNT", 9))
 KEPT_ALIVE = (

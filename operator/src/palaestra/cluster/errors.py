@@ -183,7 +183,7 @@ def from_status(code: int, status: Mapping[str, Any], retry_after: str | None = 
     if code == NOT_FOUND and not status:
         return NoSuchKind(code, "NoSuchKind", "the API server does not serve this kind of objects")
     reason = str(status.get("reason") or f"HTTP{code}")
-    # Palaestra's own servers, reached through the API server, use the field `error`.
+    # If the API server forwards a request to one of Palaestra's own servers, `error` has the message.
     message = str(status.get("message") or status.get("error") or "the API server gave no message")
     fallback = ServerError if code >= SERVER_ERROR else ApiError
     kind = _by_cause(status) or BY_REASON.get(reason, BY_CODE.get(code, fallback))

@@ -1,8 +1,8 @@
 """Read a kubeconfig by the rules of kubectl.
 
-The official client merges the files and supports auth-providers. The official client ignores `as` and the
-errors of plugins, so this module reads all other fields. The module is imported only if a kubeconfig is used,
-because the official client needs 10 MiB of memory.
+The official client merges the files and supports auth-providers. This module reads all other fields, because
+the official client ignores `as` and the errors of plugins. The module is imported only if a kubeconfig is
+used, because the official client needs 10 MiB of memory.
 """
 
 import base64
@@ -73,7 +73,7 @@ def access(files: str, context: str | None) -> Access:
         cluster = _entry(config["clusters"].get_with_name(chosen["cluster"])["cluster"], "cluster")
         user = _user(config, chosen)
         return _access(files, merger, name, cluster, user)
-    except Unreachable:  # an OSError, but the kubeconfig is right
+    except Unreachable:  # this error is an OSError too, but the kubeconfig is right
         raise
     except WRONG as error:
         raise NotConfigured(_fact(files, error)) from error
@@ -102,7 +102,7 @@ def namespace(files: str, context: str | None) -> str | None:
 def _merged(files: str) -> tuple[KubeConfigMerger, Any]:
     """Return the kubeconfig's files and their merged content.
 
-    The current context is that of the first file that names one.
+    The first file that names a current context determines the current context.
     """
     merger = KubeConfigMerger(files)
     config = merger.config
@@ -244,7 +244,7 @@ def _told_to_plugins(cluster: _Entry) -> dict[str, Any]:
 
 
 def _warn(files: str, host: str, proxy: Proxy | None) -> None:
-    """Log one warning that the certificate is not verified; suppress urllib3's warning at every request."""
+    """Log one warning that the certificate is not verified. Silence urllib3's: it comes at each request."""
     log.warning(
         "%s: %s is set, so the certificate of %s is not verified: others may read your credentials",
         files,

@@ -74,5 +74,5 @@ class Tenure:
     duration_s: float
 
     def holds(self, now: float) -> bool:
-        """Return whether the leader may still act; the result is False before another process may act."""
+        """Return whether the leader may still act. False comes before another process may take the Lease."""
         return now < self.sent + self.duration_s * SHARE

@@ -4,7 +4,7 @@ import ssl
 import tempfile
 from pathlib import Path
 
-# Source: OpenSSL's x509_vfy.h. Messages attribute every other error to the certificate's chain.
+# Source: OpenSSL's x509_vfy.h. `refused_certificate` attributes all other errors to the certificate's chain.
 DATES = {9: "is not valid yet", 10: "has expired"}
 NAMES = (62, 64)  # the certificate contains neither the host's name nor its IP address
 DATES_REMEDY = "compare this machine's clock with the certificate's dates, or have the certificate renewed"

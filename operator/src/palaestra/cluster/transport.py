@@ -193,7 +193,7 @@ class Transport:
         try:
             return self._answer(response, call, deadline)
         except BaseException:  # also KeyboardInterrupt
-            # In an open connection, the next request would read the rest of this response.
+            # If the connection stayed open, the next request would read the rest of this response.
             response.close()
             raise
         finally:

@@ -1,6 +1,6 @@
 """The controller's queue of names of objects.
 
-The queue has each name at most once, and only one worker at a time has a name from the queue.
+The queue has each name at most once, and two workers never have the same name at the same time.
 
 If a name is added while a worker has it, `get` returns the name again after that worker is done. So no change
 is missed, and two workers never work on one object. The queue contains names, not events: a worker reads the
@@ -58,8 +58,8 @@ class WorkQueue(Generic[Item]):
         self._changed = threading.Condition()
         # The ready keys of each lane. The first lane has the next turn.
         self._ready: dict[Hashable, deque[Item]] = {}
-        # For each key that waits for a worker, the time at which the wait began. A key that is added again
-        # while a worker has it waits too.
+        # For each key that waits for a worker, the time at which the wait began. If a key is added while a
+        # worker has it, the key waits too.
         self._since: dict[Item, float] = {}
         self._working: set[Item] = set()
         self._later: list[tuple[float, int, Item]] = []

@@ -1,8 +1,8 @@
 """Check that the installation allows those settings of a job that affect other users of the cluster.
 
 A job is checked until it is accepted, and never again. So an accepted job stays accepted if a newer release
-adds a check or an administrator removes an allowed value. The schema of affinities is open. These checks skip
-a value of an unexpected type, and the API server refuses it.
+adds a check or an administrator removes an allowed value. The schema of the CRD does not check affinities.
+These checks skip a value of an unexpected type, and the API server refuses this value in a pod.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -27,7 +27,7 @@ KINDS = ("podAffinity", ANTI_AFFINITY)
 
 
 def pod_metadata_is_allowed(job: TrainingJob, allowed: Allowed) -> Hold | None:
-    """Other controllers act on labels and annotations of pods."""
+    """Allow only listed keys, because other controllers act on labels and annotations of pods."""
     scheduling = job.spec.scheduling
     for field, value, keys, known in (
         ("podLabels", "allowedPodLabels", scheduling.pod_labels, allowed.pod_labels),
@@ -40,7 +40,7 @@ def pod_metadata_is_allowed(job: TrainingJob, allowed: Allowed) -> Hold | None:
 
 
 def priority_is_allowed(job: TrainingJob, allowed: Allowed) -> Hold | None:
-    """Pods of a higher priority preempt the pods of other users."""
+    """Allow only listed classes, because pods of a higher priority preempt the pods of other users."""
     name = job.spec.scheduling.priority_class_name
     if name is None or name in allowed.priority_classes:
         return None
@@ -48,7 +48,7 @@ def priority_is_allowed(job: TrainingJob, allowed: Allowed) -> Hold | None:
 
 
 def runtime_is_allowed(job: TrainingJob, allowed: Allowed) -> Hold | None:
-    """Another runtime may isolate a container less, or give it access to devices."""
+    """Allow only listed classes: another runtime may isolate a container less, or give it devices."""
     name = job.spec.scheduling.runtime_class_name
     if name is None or name in allowed.runtime_classes:
         return None
@@ -56,7 +56,7 @@ def runtime_is_allowed(job: TrainingJob, allowed: Allowed) -> Hold | None:
 
 
 def tolerations_are_allowed(job: TrainingJob, allowed: Allowed) -> Hold | None:
-    """A taint reserves nodes for other users, unless its key is a resource that the job requests."""
+    """Allow only listed taints and those of requested resources: others may reserve nodes for other users."""
     for place, toleration in enumerate(job.spec.scheduling.tolerations):
         if not (_allows(allowed.tolerations, toleration.key) or _requests(job, toleration.key)):
             field, fact = f"tolerations[{place}]", f"toleration of taint {toleration.key}"
@@ -65,7 +65,7 @@ def tolerations_are_allowed(job: TrainingJob, allowed: Allowed) -> Hold | None:
 
 
 def affinity_stays_in_its_namespace(job: TrainingJob, allowed: Allowed) -> Hold | None:
-    """An affinity to pods of other namespaces affects where those pods may run, and reveals their nodes."""
+    """Allow only listed namespaces: an affinity affects where its pods may run, and reveals their nodes."""
     known = (job.metadata.namespace, *allowed.affinity_namespaces)
     terms = (term for kind, strength in product(KINDS, STRENGTHS) for term in _terms(job, kind, strength))
     for where, term in terms:
@@ -79,7 +79,7 @@ def affinity_stays_in_its_namespace(job: TrainingJob, allowed: Allowed) -> Hold 
 
 
 def no_pods_of_others_are_kept_away(job: TrainingJob, allowed: Allowed) -> Hold | None:
-    """A required anti-affinity works in both directions: selected pods cannot use the job's nodes."""
+    """Refuse a required anti-affinity to other pods, because it also keeps these pods off the job's nodes."""
     for where, term in _terms(job, ANTI_AFFINITY, REQUIRED):
         selector = term.get("labelSelector")
         if selector is not None and not _selects_own(job, term) and not _selects_allowed(selector, allowed):

@@ -16,7 +16,7 @@ DESCRIBE_WORKLOAD = "; `kubectl describe workload` shows it"  # only the Workloa
 
 
 def held(situation: ReplicaContext) -> Finding | None:
-    """The replica may not start: for example, its run is lost, or an object of the spec is missing."""
+    """The replica must not start: for example, its run is lost, or a named object does not exist."""
     if situation.hold is None:
         return None
     job = situation.seen.job
@@ -42,7 +42,10 @@ def suspended(situation: ReplicaContext) -> Finding | None:
 
 
 def _with_words(situation: ReplicaContext, why: Explanation) -> str:
-    """Return the message of `why`; after a restart, keep the stored message until Kueue's is read again."""
+    """Return the message of `why`, with Kueue's message if it is known.
+
+    After a restart of the operator, return the stored message until Kueue's message is read again.
+    """
     if situation.seen.unasked:
         return why.message + UNASKED + (DESCRIBE_WORKLOAD if why.reason == Reason.QUEUED else DESCRIBE)
     before, plain = situation.old.message or "", why.message.removesuffix(AGAIN)

@@ -110,7 +110,7 @@ def _of_memory(old: ReplicaStatus | None, new: ReplicaStatus) -> Iterator[Emitte
 
 
 def _of_lost_run(old: ReplicaStatus | None, new: ReplicaStatus) -> Iterator[EmittedEvent]:
-    """Yield an event if a person has given up a lost run since the old status."""
+    """Yield an event if a person has restarted a lost run since the old status."""
     before = old.lost.restarted if old is not None and old.lost is not None else None
     if new.lost is not None and new.lost.restarted is not None and new.lost.restarted != before:
         yield emitted(Reason.RUN_RESTARTED, say(Reason.RUN_RESTARTED, step=new.lost.step), new.index)

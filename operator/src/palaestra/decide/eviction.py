@@ -1,8 +1,9 @@
 """Checks for pods that the kubelet cannot repair and does not end: the operator evicts and counts them.
 
 An eviction gives the pod the condition DisruptionTarget, so its Job counts no failure. Before the eviction,
-the operator counts the pod in an annotation of the Job, the mark. If the operator is killed between the two
-writes, it restarts, finds the mark of a running pod, and evicts that pod.
+the operator counts the pod in an annotation of the Job, which is called the mark. If the operator is killed
+after the mark is written and before the eviction, it restarts, finds the mark of a running pod, and evicts
+that pod.
 
 A trainer that ends because a probe failed exits with 75, and its Job does not count this exit code either.
 The operator counts that pod in the mark too. The pod has already ended, so no eviction is needed.

@@ -1,7 +1,7 @@
 """Checks that stop a replica for good: limits in the job's spec, and causes that a retry cannot remove.
 
-While a replica waits for its first step, `trouble` keeps the last cause of the delay for a minute. A kubelet
-that restarts does not report the cause for a moment.
+While a replica waits for its first step, `trouble` keeps the last cause of the delay for a minute, because a
+kubelet that restarts does not report the cause for a moment.
 """
 
 from dataclasses import replace
@@ -56,7 +56,7 @@ def no_progress(situation: ReplicaContext) -> Finding | None:
 
 
 def start_timeout(situation: ReplicaContext) -> Finding | None:
-    """The replica has done no step within `startTimeoutSeconds`; the reason is the cause of the delay."""
+    """The replica has done no step within `startTimeoutSeconds`; the cause of the delay is its reason."""
     if (
         situation.suspended
         or situation.hold is not None

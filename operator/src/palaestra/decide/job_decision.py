@@ -108,7 +108,10 @@ def _replica(job: TrainingJob, seen: ReplicaObserved, prepared: Prepared, times:
 
 
 def _with_lost_run(found: Decided, job: TrainingJob, prepared: Prepared, times: Times) -> Decided:
-    """Return a replica with its lost run; a new value of the annotation gives up a lost run in the status."""
+    """Return a replica with its lost run.
+
+    A new value of the annotation `palaestra.dev/restart-lost-runs` marks the run in the status as restarted.
+    """
     shown, lost = found.status.lost, prepared.lost.get(found.status.index)
     if found.status.phase in TERMINAL:
         return found
@@ -185,7 +188,7 @@ def _reconciliation(
 
 
 def _waits(observed: Observed, prepared: Prepared) -> bool:
-    """Return whether a hold keeps all replicas from being planned; then no active time passes."""
+    """Return whether a hold keeps all replicas from being planned; then the job counts as inactive."""
     return prepared.hold is not None and all(replica.job is None for replica in observed.replicas)
 
 

@@ -1,4 +1,4 @@
-"""The record of the newest ended attempt in the status, because a pod's logs are deleted with the pod.
+"""The record of the newest ended attempt, which the status keeps after Kubernetes has deleted the pod's log.
 
 The record is written as soon as the trainer has ended, and stays after the pod is deleted. If no reconcile
 observed the end of a pod, the record is written once the next pod exists.
@@ -22,8 +22,8 @@ from palaestra_protocol.pod.status import MOST_FAULTS, MOST_LINE, MOST_LINES, Fa
 def last_attempt(situation: ReplicaContext, end: ReplicaVerdict | None = None) -> LastAttempt | None:
     """Return the record of the newest ended attempt; None if no attempt has ended.
 
-    `end` is the phase and reason of an ended replica. They become the record of an attempt whose pod was
-    deleted.
+    `end` is the phase and reason of an ended replica. If the pod of the last attempt was deleted, the record
+    of this attempt gets the same reason.
     """
     known, newest = situation.old.last_attempt, situation.seen.pod
     attempt = (
@@ -47,7 +47,7 @@ def last_attempt(situation: ReplicaContext, end: ReplicaVerdict | None = None) -
 
 
 def late_word(situation: ReplicaContext) -> LastAttempt | None:
-    """Return the record of the last attempt of a replica whose end was observed before its pod's end.
+    """Return the record of an ended replica's last attempt, even if the pod's end is observed only now.
 
     If the pod is deleted without a termination message, the record has the reason of the replica's end. The
     caches of Jobs and pods are updated in any order, and the record must not depend on that order.
@@ -77,7 +77,7 @@ def _knows(known: LastAttempt | None, number: int) -> bool:
 
 
 def _replaced(situation: ReplicaContext) -> EndedAttempt | None:
-    """Return the attempt before the newest pod, if the newest pod was not observed before."""
+    """Return the attempt that the newest pod replaced, if the newest pod is observed for the first time."""
     named, newer = situation.old.pod, newer_pods(situation.old, situation.seen.pods)
     if not newer:
         return None
@@ -110,7 +110,7 @@ def _record(attempt: EndedAttempt, explanation: Explanation) -> LastAttempt:
 
 
 def _counted_restarts(attempt: EndedAttempt) -> int:
-    """Return the counted restarts of simulators in an attempt, if the trainer does not report any."""
+    """Return the counted restarts of simulators in an attempt whose termination message has no number."""
     now, before = attempt.situation.counted, attempt.situation.old
     for counts in (now, before):
         if counts.pod is not None and counts.pod.name == attempt.name:

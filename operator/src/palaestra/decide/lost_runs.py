@@ -2,8 +2,8 @@
 
 Such a replica would train from step 0 again. So the operator holds the replica and suspends its Job until a
 person restores the run or gives it up. To give the run up, the person sets an annotation of the TrainingJob
-to any new value, such as the time. The status stores the value that was applied last, so each value has one
-effect.
+to any new value, such as the time. The status stores the value that was applied last, so each value takes
+effect only once.
 """
 
 from collections.abc import Collection, Iterable
@@ -47,7 +47,7 @@ def new_word(job: TrainingJob) -> str | None:
 
 
 def restarted(replica: ReplicaStatus, lost: LostRun, now: datetime) -> ReplicaStatus:
-    """Return the status of a replica whose lost run was given up: the replica starts at step 0 again."""
+    """Return the status of a replica whose lost run was given up or restored, without values of that run."""
     forgotten = (
         "step",
         "furthest_step",

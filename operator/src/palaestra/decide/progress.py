@@ -1,7 +1,7 @@
 """The trainer's last report as fields of the status, and the wait for the trainer's next progress.
 
 If the trainer no longer reports a value, the last value stays, because an unknown value is not zero. Only the
-speed is then removed.
+speed is removed, because an old speed is not the current speed.
 """
 
 from datetime import datetime

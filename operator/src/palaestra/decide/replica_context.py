@@ -28,8 +28,8 @@ class ReplicaContext:
         seen: the observation of the replica.
         counted: the attempts and restarts of the replica, including this observation.
         times: the clocks; the wall clock is in UTC and whole seconds.
-        active_left_s: remaining seconds of the job's active time; None: the job has no active deadline, or
-            its active time does not run now.
+        active_left_s: remaining seconds of the job's active time; None: the job has no active deadline, or is
+            not active now.
         hold: the cause that keeps the replica's objects from being created, or None.
         shown: the reason in the status if the replica continues; set only for the checks of `STOPS`.
         causes: the causes to replace the pod, including causes that will hold later; set only for the checks

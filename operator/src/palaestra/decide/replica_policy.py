@@ -1,8 +1,8 @@
 """The decision on a replica: three ordered lists of checks, and the status and actions that follow from them.
 
 `make golden` writes the lists into docs/explain/judging.md. In each list, the first check that holds now
-decides. Each reconcile runs all checks, also those after that one: a check that does not hold yet may return
-the seconds until it will, and the operator reconciles again then.
+decides. Each reconcile nevertheless runs all checks of a list. A check that does not hold yet may return the
+seconds until it holds, and the operator reconciles again after this time.
 
 - `ENDS`: the replica has ended for this reason; the other lists are ignored.
 - `STOPS`: the operator stops the replica for good, by a mark on its Job. These checks use the results of
@@ -169,7 +169,7 @@ def judge(situation: ReplicaContext) -> tuple[ReplicaVerdict, ReplicaActions]:
     if (end := _first(ends)) is not None:
         return _verdict(situation, end), ReplicaActions(waits=waits)
     stop = _first(stops)
-    # The replica has no Job, and the operator will not create it.
+    # The replica has no Job that could be stopped, and the operator will not create one.
     if stop is not None and situation.seen.job is None:
         return ReplicaVerdict(phase=Phase.FAILED, explanation=stop.explanation), ReplicaActions()
     replaced = kind is CheckKind.COUNTED and stop is None

@@ -88,7 +88,7 @@ def newer_pods(old: ReplicaStatus, pods: Sequence[PodView]) -> tuple[PodView, ..
 def of_this_run(old: ReplicaStatus, pods: Sequence[PodView]) -> frozenset[str]:
     """Return the uids of the pods whose reports count.
 
-    After a lost run was given up, only the reports of newer pods count.
+    After a lost run was restarted, only the reports of pods that were created later count.
     """
     if old.lost is not None and old.lost.restarted is not None and old.lost.pod is not None:
         pods = newer_pods(old.model_copy(update={"pod": old.lost.pod}), pods)

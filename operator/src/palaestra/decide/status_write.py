@@ -8,7 +8,7 @@ etcd refuses an object of more than 1.5 MiB, and the operator would retry the wr
 status has its own limit. But the status of a hundred replicas with 32 simulators each exceeds 1.5 MiB, and
 the spec needs space too. So the least important details are removed until the object fits. These details are
 only for people. Decisions and events must not depend on removed details, because each reconcile would then
-emit the event again.
+emit the same event again.
 """
 
 import json

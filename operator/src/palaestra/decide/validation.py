@@ -38,7 +38,7 @@ class JobRefused(TrainingJobError, ValueError):
 
 
 def managed_here(raw: Mapping[str, Any]) -> bool:
-    """Return whether this operator runs the job: no other controller manages it and nobody deletes it."""
+    """Return whether this operator runs the job: it has no other controller, and is not being deleted."""
     manager = part(raw, "spec").get("managedBy")
     ours = manager is None or manager == MANAGER
     return ours and "deletionTimestamp" not in part(raw, "metadata")

@@ -144,7 +144,7 @@ def sidecar_crash_loops(situation: ReplicaContext) -> Finding | None:
 
 
 def simulator_not_up(situation: ReplicaContext) -> Finding | None:
-    """A simulator is slow to start; the trainer gives up when the simulator's restart budget is spent."""
+    """A simulator is slow to start; the trainer fails when the simulator's restart budget is spent."""
     polled = situation.seen.polled
     if situation.pod is None or polled is None or situation.trains or not situation.fresh:
         return None

@@ -59,7 +59,7 @@ def judged_images(container: Object) -> CheckResult:
         _chosen(container, TRAINER_IMAGE, release.trainer),
         _chosen(container, STUB_IMAGE, release.stub),
         _chosen(container, MUJOCO_IMAGE, release.mujoco),
-        *filter(None, [_chosen(container, WEBOTS_IMAGE, "")]),  # without this option, there is no such image
+        *filter(None, [_chosen(container, WEBOTS_IMAGE, "")]),  # absent: no default image of Webots
     )
     tags = [image for image in named if DIGEST not in image]
     if not tags:

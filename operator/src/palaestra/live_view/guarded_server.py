@@ -2,8 +2,8 @@
 
 By default, viser listens on all addresses, accepts connections from pages of any origin, and executes 15
 kinds of messages from clients. One kind publishes the view through a tunnel to the internet; other kinds
-upload files, or set any property of a control. A page of another site could send all these messages. In this
-module
+upload files, or set any property of a control. A page of another site could send all these messages. This
+module adds three restrictions:
 - the server listens on 127.0.0.1;
 - a request must name this host, which prevents DNS rebinding, and a websocket must come from the page of this
   server;

@@ -120,7 +120,7 @@ class ViewPage:
     def _show(self) -> None:
         source = self._sources[self._shown]
         state = source.state()
-        if self._away_since is not None and self._looked:  # a restart, not the first start
+        if self._away_since is not None and self._looked:  # the simulator was shown before its restart
             self._note = f"stepped again after {time.monotonic() - self._away_since:.1f} s"
         self._away_since = None
         if state.revision != self._stage.revision:
@@ -151,7 +151,7 @@ class ViewPage:
         self._picture.label, self._picture.image = _cell(picture.name), pixels
 
     def _wait(self, reason: str) -> None:
-        """Show the reason for which the scene stands still, and read the simulators' addresses again."""
+        """Show the reason instead of the simulator's values, and read the simulators' addresses again."""
         self._stage.revision = None
         self._text.content = _paragraphs(summarized(self._sources[self._shown].progress()), reason)
         self._away_since = self._away_since or time.monotonic()

@@ -2,8 +2,7 @@
 
 The first part has the start of a run, and the last part has its end. Without a limit, a program that prints
 forever would fill the disk, and a full disk would end the run. The middle is cut out of the file itself,
-because a second file might not fit on the disk. So the descriptor of a writer must be able to read and
-append.
+because a second file might not fit on the disk. So the descriptor must be open for reading and for appending.
 """
 
 import os

@@ -65,7 +65,7 @@ def main() -> int:
     """Run the request on standard input, and return the exit code of `palaestra run`."""
     request = ChildRequest.from_json(sys.stdin.buffer.read())
     sys.stdout = TextIOWrapper(BufferedWriter(LimitedFile(sys.stdout.fileno())), errors="replace")
-    # The program that started this process has already ended, so another process is the parent.
+    # If the program that started this process has already ended, this process has another parent.
     if os.getppid() != request.process:
         return int(ExitCode.INTERRUPTED)
     Thread(target=_end_with, args=(request.control, request.process), daemon=True).start()

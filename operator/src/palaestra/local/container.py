@@ -43,7 +43,7 @@ class Running:
         self.spec = spec
         self.log = log
         self.ends = 0
-        self.started = False  # the container has passed its startup probe once, or has no startup probe
+        self.started = False  # True once the startup probe has passed; without a probe, from the start
         self._news = asyncio.Event()  # set when the container has started or ended
         self._pod = pod
         self._env = marked(spec.env, pod.uid, spec.name)

@@ -88,8 +88,8 @@ def summary(outcome: RunOutcome, run_directory: Path) -> tuple[str, ...]:
 def uses(run_directory: Path) -> tuple[str, ...]:
     """Return lines with commands for the results of a run.
 
-    palaestra-eval reads only models of the built-in loop; this loop also records its attempts. A custom
-    program may write a model in another format, so palaestra-eval is not shown for it.
+    palaestra-eval reads only models of the built-in loop, which also writes attempts.jsonl. A custom program
+    may write a model in another format, so without attempts.jsonl, palaestra-eval is not shown.
     """
     curves = run_directory / "tensorboard"
     measurable = all((run_directory / name).exists() for name in ("model.zip", "attempts.jsonl"))

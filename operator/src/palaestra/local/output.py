@@ -26,7 +26,7 @@ from palaestra.local.errors import StorageFailed
 Show = Callable[[str], None]
 KEPT_LINES = 20  # enough to show the reason for a program's end without the log file
 CHUNK = 65536
-RESTORED = b"\x1b[0m\x1b[?25h"  # resets the color and shows the cursor, because a killed program does not
+RESTORED = b"\x1b[0m\x1b[?25h"  # resets the color and shows the cursor, which a killed program cannot do
 _CONTROL = re.compile(r"\x1b(?:\[[0-?]*[ -/]*[@-~]|[@-_])")
 _NO_SIZE = struct.pack("HHHH", 24, 80, 0, 0)
 

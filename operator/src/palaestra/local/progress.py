@@ -42,7 +42,7 @@ class ProgressReader:
     """Reads the progress of a run that is about to start."""
 
     def __init__(self, directory: Path) -> None:
-        """Record the file of an earlier run, which is ignored: another program may use its addresses now."""
+        """Record the time of an earlier run's file, whose addresses may now belong to another program."""
         self._file = directory / FILE
         self._stale = self._written()
         self._last = RunProgress()

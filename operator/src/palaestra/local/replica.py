@@ -170,7 +170,7 @@ def _json(path: Path) -> dict[str, Any]:
 
 
 def mount(pod: Pod, volumes: list[Mapping[str, Any]], config_map: Mapping[str, Any]) -> None:
-    """Create each volume as a folder at its mount path; remove the content of an emptyDir.
+    """Create each volume as a folder at its mount path; empty each emptyDir except the run directory.
 
     Raises:
         StorageFailed: a volume cannot be written.

@@ -1,8 +1,8 @@
 """`palaestra run`: train the policy of a TrainingJob file on this machine.
 
-All checks pass before a process is started or a file is written. Replicas run one after another, because each
-needs a whole small machine. `--replica` selects one replica, so that two terminals can run two replicas at
-the same time.
+All checks pass before a process is started or a file is written. Replicas run one after another, because one
+replica may need all of a small machine. `--replica` selects one replica, so that two terminals can run two
+replicas at the same time.
 """
 
 import asyncio

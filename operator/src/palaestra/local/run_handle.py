@@ -119,7 +119,7 @@ class RunHandle:
         return self.wait(0.0)
 
     def fileno(self) -> int:
-        """Return a descriptor for `select`, readable as soon as the run has ended; valid until `wait`."""
+        """Return a descriptor that is readable once the run has ended; `wait` closes it after that end."""
         return self._end
 
     def wait(self, deadline_s: float) -> bool:
@@ -172,7 +172,7 @@ class RunHandle:
         code = self._process.returncode
         code = KILLED if code < 0 else code
         outcome = RunOutcome.of(self.directory)
-        # This run wrote no outcome; the file may be from an earlier run.
+        # If the exit codes differ, an earlier run wrote this outcome, and this run wrote none.
         if outcome is None or outcome.exit_code != code:
             last = self.log.read_text(errors="replace").splitlines()[-1:]
             outcome = RunOutcome(exit_code=code, reason="".join(last))

@@ -31,7 +31,7 @@ SMALL = 65_536  # bytes; a cached TrainingJob of at most this size does not get 
 
 
 def trimmed(raw: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a copy of an object, with the fields that the operator needs for anything but a plan.
+    """Return a copy of an object with the fields that the operator needs, except fields for a plan only.
 
     An object of an unknown kind keeps all fields except managedFields.
     """

@@ -62,13 +62,13 @@ class Objects:
             about trainers that the kubelet ended.
         unadmitted: Kueue's reason not to admit a Job, by the Job's uid; a Job is absent if the reason was not
             requested.
-        unasked: uids of incomplete Jobs and pods about which the operator sends no request, because there
-            are too many.
+        unasked: uids of incomplete Jobs and pods about which the operator sends no request, because too many
+            Jobs and pods are incomplete.
         polled: the last responses of trainers by pod UID; absent if the last request to the pod failed.
         denied: the API server's message of the last refused creation, by replica; the key None stands for
             objects of the whole job. A replica without a refusal is absent.
-        switchers: the field manager that set `spec.suspend` of a Job, by the Job's uid; absent if the value
-            is the operator's.
+        switchers: the field manager that set `spec.suspend` of a Job, by the Job's uid; absent if the
+            operator set the value.
     """
 
     jobs: Sequence[Raw] = ()
@@ -236,7 +236,7 @@ class Suspended:
     """The mark on a Job that the operator has suspended.
 
     Attributes:
-        pod: uid of the current attempt's pod at that time.
+        pod: uid of the pod that the current attempt had at the suspension.
         lived: whether the suspension ended the pod; False if the pod had ended or was being deleted before.
     """
 
@@ -325,8 +325,8 @@ class ReplicaObserved:
             None: the reason was not requested yet.
         unasked: whether the pod, its volumes or Kueue's admission are missing, and the operator sends no
             request about the cause.
-        switcher: the field manager that set the Job's `spec.suspend`; "": the value is the operator's, or the
-            manager is unknown.
+        switcher: the field manager that set the Job's `spec.suspend`; "": the operator set it, or the manager
+            is unknown.
     """
 
     index: int

@@ -104,7 +104,7 @@ class Controller:
         self._layout = layout
         self._times = times
         self._records = ReconcileRecords()
-        self._terminating: set[Key] = set()  # jobs whose "namespace terminates" is already logged
+        self._terminating: set[Key] = set()  # jobs for which "namespace terminates" was logged
 
     def begin_anew(self) -> None:
         """Drop all records, which restarts all waiting times: another operator may have led meanwhile."""
@@ -195,8 +195,8 @@ def _just_accepted(before: Object, stored: Object) -> bool:
     """Return whether the written status accepts its job, so that all its objects can be created at once.
 
     A job that was not accepted has never had a pod, so its creations need no confirming read. A job with an
-    `existingClaim` is different: a pod of an earlier job may still write to the claim. The reads of the next
-    reconcile must exclude that, so the result is False.
+    `existingClaim` is different: a pod of an earlier job may still write to the claim. For such a job the
+    result is False, and the next reconcile checks the pods before it creates the objects.
     """
     accepted = part(stored, "status").get("release") and not part(before, "status").get("release")
     return bool(accepted) and part(stored, "spec", "storage").get("existingClaim") is None

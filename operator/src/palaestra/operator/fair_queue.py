@@ -30,7 +30,7 @@ class FairQueue:
         self._closed = False
 
     def waits(self, key: Key) -> bool:
-        """Return whether a job is queued or under check; if False, its worlds must go to `hand_over`."""
+        """Return whether a job is queued or under check; if not, pass its worlds to `hand_over`."""
         with self._changed:
             turn = self._turns.get(key)
             return turn.worlds is not None if turn is not None else key in self._lines.get(key[0], ())

@@ -1,6 +1,6 @@
 """All writes to the cluster; while another operator leads, each write is refused.
 
-A write that was decided in an earlier term as leader is refused too. Its thread may have been delayed between
+A write that was decided in an earlier term as leader is refused too. The thread may have been delayed between
 decision and write, and another operator may have led in that time.
 """
 

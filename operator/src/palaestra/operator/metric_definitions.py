@@ -10,8 +10,8 @@ from palaestra.api.status import Phase, Restarts
 from palaestra_protocol.metrics import Family, Label, counter, gauge, histogram
 
 SECONDS = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0)
-# Buckets for the time from a job's creation until it first runs, in seconds. The time is shortest on a node
-# that has all images, and longest in a queue overnight.
+# Buckets in seconds for the time from a job's creation until it first runs. They range from a start on a node
+# that has all images to a night in a queue.
 WAITS = (1.0, 2.0, 5.0, 10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1800.0, 3600.0, 14_400.0)
 RESULTS = ("done", "conflict", "error")
 # The reasons with which a replica may end: success, and every reason that is a warning.

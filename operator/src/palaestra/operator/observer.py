@@ -173,7 +173,7 @@ class JobObserver:
     def _with_claims(self, job: TrainingJob, observed: Observed) -> tuple[Observed, float | None]:
         """Return the observation completed with the claims of trained replicas that are not in the caches.
 
-        A claim that a person restored may lack the operator's labels.
+        A claim that a person restored may lack the operator's labels, and is then not in the caches.
         """
         lacking, namespace = lacking_claims(job, observed), job.metadata.namespace
         claims = [ReferencedObject(kind=ReferenceKind.CLAIM, name=name) for name in lacking]

@@ -25,7 +25,7 @@ def confirm(api: Api, raw: Object, actions: Sequence[Action]) -> None:
     """Check that the TrainingJob is unchanged; before a Job is created or stopped, check its pods too.
 
     These checks prevent a second training of an ended replica, and a second pod for a replica. If a replica
-    has started since the decision, its pod is neither stopped nor replaced: the cause has passed.
+    has started since the decision, its pod is neither stopped nor replaced, because the cause is gone.
 
     Raises:
         Outdated: the TrainingJob or a pod has changed.

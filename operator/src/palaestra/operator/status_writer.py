@@ -1,7 +1,7 @@
 """Report the state of a job: write the status once if it changed, then write the events.
 
-An event about a change that is not in the status would be wrong, so events are written after the status. If
-only the progress changed, the status is written rarely. Changed conditions and phases are written at once.
+An event about a change that is not in the status would be wrong, so events are written after the status.
+Changed conditions and phases are written at once, but progress alone at most every 30 seconds.
 """
 
 import threading

@@ -1,4 +1,4 @@
-"""Threads that take keys from the queue and reconcile them; only one thread at a time has a key.
+"""Threads that take keys from the queue and reconcile them; two threads never have the same key.
 
 An object that causes errors does not delay other objects. After an error, a worker logs the error, and
 retries the key after a pause that grows with each failure. Meanwhile the workers reconcile the other keys.
@@ -17,7 +17,7 @@ from palaestra.operator.fenced_client import NotLeading
 from palaestra.operator.preconditions import Outdated
 
 IDLE_S = 1.0  # seconds between two checks of the stop condition
-REPEATS = 4  # consecutive conflicts of a key before the first log line; later lines come at powers of two
+REPEATS = 4  # consecutive conflicts of a key before the first log line; the next lines are at 8, 16, 32, ...
 IN_DOUBT_S = 1.0  # seconds until the next try of a key while it is uncertain whether this operator leads
 # Seconds after which a reconcile counts as stuck. Every call has a deadline, so a reconcile is normally
 # shorter.

@@ -33,7 +33,7 @@ def main() -> None:
     parent, seconds, mebibytes = map(int, sys.argv[1:])
     _end_with(parent)
     _limit(mebibytes)
-    # A world's tree of nodes has no cycles, and each garbage collection would visit the whole tree.
+    # A world's tree of nodes has no cycles, so garbage collections would visit the whole tree without effect.
     gc.disable()
     _write({})
     for field, source in _requests():

@@ -39,7 +39,7 @@ class WorldChecker:
         self._wake = wake
         self._turns = FairQueue()
         self._lock = threading.Lock()
-        # By digest; the result that was used last is at the end.
+        # The keys are the digests of worlds. The result that was used last is at the end.
         self._known: OrderedDict[str, WorldVerdict] = OrderedDict()
         self._stopped = threading.Event()
         self._threads = [

@@ -56,9 +56,9 @@ class ContainerPaths:
     """The absolute paths in the containers of one replica.
 
     The claim is mounted at `volume`, and `run` is the run directory on this claim. `home` is set if the
-    image's own home is read-only, and `shared_memory` if the default is too small for a simulator. `sidecar`
-    is set if `palaestra-sidecar` must be copied into a user's image. A claim with an initial policy is
-    mounted at `initial`.
+    image's own home is read-only. `shared_memory` is set if the shared memory of a container is by default
+    too small for a simulator. `sidecar` is set if `palaestra-sidecar` must be copied into a user's image. A
+    claim with an initial policy is mounted at `initial`.
     """
 
     config: str
@@ -76,7 +76,7 @@ class ContainerPaths:
 class Allowed:
     """The values that an installation allows in those settings of a job that affect other users.
 
-    Among keys, an entry that ends in `/` is a domain, and allows every key of this domain.
+    In the tuples of keys, an entry that ends in `/` is a domain, and allows every key of this domain.
 
     Attributes:
         pod_labels: keys of labels that jobs may give their pods.
@@ -165,7 +165,7 @@ class Layout(Protocol):
         ...
 
     def another_run(self, uid: str, replica: int) -> str:
-        """Return the directory of another run on the same volume: of a replica of the job with `uid`.
+        """Return the run directory of a replica of another job, which has this `uid`, on the same volume.
 
         Raises:
             PlanError: in this layout, jobs cannot share a volume.
@@ -178,7 +178,7 @@ class ClusterLayout:
     """The layout of a cluster: a pod has its own network and file system, so ports and paths are fixed.
 
     `has_webots_image` is False if the installation names no image of Webots. The operator then accepts no job
-    that needs it.
+    that needs this image.
     """
 
     images: Images

@@ -14,7 +14,8 @@ from palaestra_sim.world import RunIdentity
 JOB_LABEL = "palaestra.dev/job"
 REPLICA_LABEL = "palaestra.dev/replica"
 UID_LABEL = "palaestra.dev/job-uid"  # this label distinguishes successive jobs of the same name
-# Annotation of a TrainingJob. If its value changes, replicas whose runs are lost start again at step 0.
+# Annotation of a TrainingJob. If its value changes, each replica whose run is lost resumes from its run
+# directory, or starts at step 0 if the directory is empty.
 RESTART_LOST_RUNS = "palaestra.dev/restart-lost-runs"
 TRAINER = "trainer"
 ROS_MASTER = "ros-master"

@@ -80,7 +80,7 @@ class Optuna(ApiModel):
     """`true` stops a trial whose figure is below the median of earlier trials at the same step."""
 
     startup_trials: Annotated[int, Field(ge=0, le=MOST_TRIALS)] = 5
-    """Number of trials at random before the search and before pruning."""
+    """Number of trials that must be complete before Optuna searches and prunes; they have random values."""
 
     warmup_steps: Annotated[int, Field(ge=0)] = 0
     """Environment steps before a trial can be pruned."""
@@ -96,10 +96,10 @@ class SweepSpec(ApiModel):
     """Values by the path of their field; every combination is a trial."""
 
     random: dict[str, Distribution] = Field(default={})
-    """Distributions by the path of their field; each trial draws a value of each."""
+    """Distributions by the path of their field; each trial draws one value from each distribution."""
 
     trials: Annotated[int, Field(ge=1, le=MOST_TRIALS)] | None = None
-    """Number of trials, with `random` only. It may be raised later."""
+    """Number of trials, with `random` only. The number may be raised later."""
 
     seed: Annotated[int, Field(ge=0)] = 1
     """Seed of the random draws."""

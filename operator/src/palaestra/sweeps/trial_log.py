@@ -2,7 +2,7 @@
 
 <dir>/<sweep>/sweep.yaml        the Sweep, with its job
 <dir>/<sweep>/trials.jsonl      a line for each trial that has ended
-<dir>/<sweep>/optuna.journal    the search, if Optuna makes it
+<dir>/<sweep>/optuna.journal    the state of the search, if the Sweep has `optuna`
 <dir>/<sweep>/<sweep>-<n>/      on this machine: the runs of trial n, one folder a seed
 <dir>/<sweep>/table.txt, curves.png     the result
 """
