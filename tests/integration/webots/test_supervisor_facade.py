@@ -243,7 +243,7 @@ def test_a_node_is_exported_as_text_that_can_be_inserted(world):
 
 
 def test_the_center_of_mass_of_a_box_is_its_middle(world, simulator):
-    """The stub and MuJoCo return the node's origin, which is the center of mass of a uniform box."""
+    """A uniform box has its center of mass at its origin; test_values_mass.py compares other shapes."""
     webots, _ = world
 
     center = webots.observer.center_of_mass("BOX")

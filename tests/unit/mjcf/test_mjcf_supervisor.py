@@ -230,6 +230,21 @@ def test_a_body_on_joints_takes_no_velocity(load):
         simulation.motion.set_velocity(simulation.tree.of_def("pole"), (1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
+def test_a_center_of_mass_includes_the_bodies_inside(load):
+    """MuJoCo computes it from the masses of the model, which the nodes do not have."""
+    simulation = load()
+    for name in ("cart", "pole", "ball"):
+        node = simulation.tree.of_def(name)
+
+        found = simulation.motion.center_of_mass(node)
+
+        bodies = simulation.nodes.bodies
+        inside = [bodies[it] for it in (node, *node.descendants()) if it in bodies]
+        masses = simulation.model.model.body_mass[inside]
+        expected = masses @ simulation.model.data.xipos[inside] / masses.sum()
+        assert found == pytest.approx(tuple(expected))
+
+
 def test_contact_points_are_where_a_body_touches(load):
     """While the ball falls, it touches nothing.
 

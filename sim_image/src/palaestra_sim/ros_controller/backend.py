@@ -21,10 +21,14 @@ from palaestra_sim.scene.tree.scene_tree import SceneTree
 
 
 class MotionBackend(Protocol):
-    """The motion of nodes, in m/s, rad/s, N and N m, in the axes of the world file."""
+    """The motion of nodes, in m, m/s, rad/s, N and N m, in the axes of the world file."""
 
     def velocity(self, node: SceneNode) -> tuple[Vector, Vector]:
         """Return the linear and angular velocity of a node."""
+        ...
+
+    def center_of_mass(self, node: SceneNode) -> Vector:
+        """Return the center of mass of a node and of the nodes inside it, in meters."""
         ...
 
     def set_velocity(self, node: SceneNode, velocity: Vector, turning: Vector) -> None:

@@ -235,6 +235,23 @@ def volume_m3(mesh: Mesh) -> float:
     return abs(sum(dot(points[a], cross(points[b], points[c])) for a, b, c in mesh.triangles)) / 6.0
 
 
+def middle_of_volume(mesh: Mesh) -> Vector:
+    """Return the center of the volume that the triangles enclose; the origin if they enclose no volume."""
+    points = mesh.points
+    corners = [(points[a], points[b], points[c]) for a, b, c in mesh.triangles]
+    volumes = [dot(a, cross(b, c)) for a, b, c in corners]  # six times those of tetrahedra with the origin
+    if not sum(volumes):
+        return 0.0, 0.0, 0.0
+    x, y, z = (
+        sum(
+            volume * (a[axis] + b[axis] + c[axis]) for volume, (a, b, c) in zip(volumes, corners, strict=True)
+        )
+        / (4.0 * sum(volumes))
+        for axis in range(3)
+    )
+    return x, y, z
+
+
 def _flattened(corners: Sequence[Vector]) -> list[tuple[float, float]]:
     """Return an outline without the coordinate along which it is thinnest, counterclockwise."""
     normal = [

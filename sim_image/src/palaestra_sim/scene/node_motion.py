@@ -1,4 +1,4 @@
-"""The velocities of nodes, and the forces and torques on them, for a supervisor.
+"""The velocities and centers of mass of nodes, and the forces and torques on them, for a supervisor.
 
 Robots and dynamic solids move. All other nodes are at rest, and forces and velocities do not affect them.
 """
@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import Final
 
 from palaestra_sim.ros_interfaces import UnsimulatedError
+from palaestra_sim.scene.center_of_mass import center_of_mass
 from palaestra_sim.scene.dynamic_solids import DynamicSolid
 from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.geometry import Vector
@@ -47,6 +48,14 @@ class NodeMotion:
             vx, vy, omega = robot.body.velocity
             velocity, turning = (vx, vy, 0.0), (0.0, 0.0, omega)
         return place.from_ground(velocity), place.from_ground(turning)
+
+    def center_of_mass(self, node: SceneNode) -> Vector:
+        """Return the center of mass of a node and of the nodes inside it, in meters.
+
+        Raises:
+            UnsimulatedError: the node has no frame.
+        """
+        return center_of_mass(node, _place(node))
 
     def set_velocity(self, node: SceneNode, velocity: Vector, turning: Vector) -> None:
         """Give a node a velocity; a robot's motors return to their commanded speeds within a few steps."""

@@ -1,4 +1,4 @@
-"""Read and set the velocities of a model's bodies, and apply forces to them, for a supervisor."""
+"""Read and set the motion of a model's bodies, and apply forces to them, for a supervisor."""
 
 from __future__ import annotations
 
@@ -34,6 +34,17 @@ class BodyMotion:
         """
         (vx, vy, vz), (wx, wy, wz) = self._model.velocity(mujoco.mjtObj.mjOBJ_XBODY, self._body(node))
         return (vx, vy, vz), (wx, wy, wz)
+
+    def center_of_mass(self, node: SceneNode) -> Vector:
+        """Return the center of mass of a body and of the bodies inside it, in meters.
+
+        Raises:
+            UnsimulatedError: the node is not a body.
+        """
+        body = self._body(node)
+        self._model.settle()
+        x, y, z = self._model.data.subtree_com[body].tolist()
+        return x, y, z
 
     def set_velocity(self, node: SceneNode, velocity: Vector, turning: Vector) -> None:
         """Set the velocity and the angular velocity of a body that has a free joint.

@@ -137,8 +137,7 @@ class NodeServices:
         }
 
     def _get_center_of_mass(self, request: Any) -> Fields:
-        """Return the origin of the node; this service ignores masses."""
-        return {"centerOfMass": _point(_place(self._node(request)).world_position)}
+        return {"centerOfMass": _point(self._handles.simulation.motion.center_of_mass(self._node(request)))}
 
     def _get_static_balance(self, request: Any) -> Fields:
         self._node(request)
