@@ -10,7 +10,7 @@ import pytest
 from palaestra_trainer.environments.infos import OURS
 from palaestra_trainer.episodes.batch_vec_env import BatchVecEnv
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
-from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.errors import ConfigurationError, WrongData
 from palaestra_trainer.job.configuration import parse
 from palaestra_trainer.simulators.batch_simulator import BatchSimulator
 from palaestra_trainer.simulators.connect import simulator_at
@@ -195,6 +195,22 @@ def test_a_row_that_fails_is_truncated_alone(cartpole, monkeypatch, tmp_path) ->
         assert infos[1]["TimeLimit.truncated"]
         assert "row 1" in infos[1][OURS]["sim_fault"]["fact"]
         assert all(info[OURS]["valid"] for info in env.step(calm)[3])
+
+
+def test_a_reset_that_observes_no_number_is_not_a_failed_simulation(monkeypatch) -> None:
+    """The author must look for the fault in the environment, and not in the world."""
+    with batch_env() as (env, _):
+        reset = env._env.reset
+
+        def observing_nothing(**options):
+            observation, info = reset(**options)
+            observation[1] = np.nan
+            return observation, info
+
+        monkeypatch.setattr(env._env, "reset", observing_nothing)
+
+        with pytest.raises(WrongData, match="row 1 fails at each reset: the environment's observation is"):
+            env._begin(np.arange(ROWS))
 
 
 def test_a_policy_learns_in_the_copies_and_is_evaluated_over_ros(tmp_path) -> None:

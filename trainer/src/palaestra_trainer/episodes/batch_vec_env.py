@@ -210,8 +210,7 @@ class BatchVecEnv(CollectingVecEnv):
 
     def _failed(self, row: int, length: int, last: Any) -> dict[str, Any]:
         """Count the failure of one row; return the row's info."""
-        whole = self._member.failed[row]
-        fact = self._member.reason(row) if whole else "the environment's observation or reward is not finite"
+        fact = self._reason(row, "observation or reward")
         fault = WrongData(self._restarter.name, f"row {row}: {fact}")
         self._failures += 1
         if self._failures > MOST_FAILURES * self.num_envs:
@@ -236,9 +235,14 @@ class BatchVecEnv(CollectingVecEnv):
             rows = rows[self._member.failed[rows] | ~_finite(self._observation, self.num_envs)[rows]]
             if not len(rows):
                 return
-        raise WrongData(
-            self._restarter.name, f"row {rows[0]} fails at each reset: {self._member.reason(rows[0])}"
-        )
+        fact = self._reason(rows[0], "observation")
+        raise WrongData(self._restarter.name, f"row {rows[0]} fails at each reset: {fact}")
+
+    def _reason(self, row: int, checked: str) -> str:
+        """Return why a row failed: its simulation failed, or one of the `checked` values is not finite."""
+        if self._member.failed[row]:
+            return self._member.reason(row)
+        return f"the environment's {checked} is not finite"
 
     def _reset_rows(self, rows: Rows) -> None:
         mask = np.zeros(self.num_envs, dtype=bool)
