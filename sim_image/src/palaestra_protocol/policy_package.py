@@ -68,7 +68,9 @@ class PackageFile:
         fields = Fields(content, path)
         name, sha256 = fields.text("name", MOST_NAME), fields.text("sha256")
         if not FILE_NAME.fullmatch(name):
-            raise ProtocolError(f"{path}.name: {name[:40]!r} is not the name of a file in the package")
+            raise ProtocolError(
+                f"{path}.name: {name[:40]!r} is not the name of a file; use letters, digits, _, . and -"
+            )
         if not _DIGEST.fullmatch(sha256):
             raise ProtocolError(f"{path}.sha256: is not a SHA-256")
         return cls(name=name, size=fields.whole("size", 0, MOST_COUNT), sha256=sha256)

@@ -1,4 +1,4 @@
-"""Every path of docs/reference/ros-interface.md is used through its facade, in each simulator."""
+"""Each service and topic with a member in docs/reference/ros-interface.md is used by that member."""
 
 import math
 

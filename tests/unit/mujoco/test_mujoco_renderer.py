@@ -217,7 +217,7 @@ def test_every_geometry_is_drawn_where_it_is(load, geometry):
 
 
 def test_a_spherical_camera_sees_nothing(load):
-    """The renderer makes only flat images, so `enable` fails, as in a simulator without a renderer."""
+    """The renderer makes only flat images, so the camera sends none, as in a simulator without a renderer."""
     simulation = load(BOX, CAMERA.replace("fieldOfView", "spherical TRUE fieldOfView"))
     kind, camera = simulation.robots[0].parts.devices.rows["eye"]
 

@@ -86,7 +86,7 @@ def test_a_name_outside_of_the_folder_is_refused(tmp_path, name):
     content["files"][0]["name"] = name
     (tmp_path / MANIFEST).write_text(json.dumps(content))
 
-    with pytest.raises(PackageError, match="is not the name of a file in the package"):
+    with pytest.raises(PackageError, match="is not the name of a file; use letters"):
         read_package(tmp_path)
 
 

@@ -12,7 +12,7 @@ from palaestra.local.simulators import lack
 PROGRAM = "palaestra-report"
 REPORT = "report.html"
 DEADLINE_S = 60.0
-# Each attempt removes this file at its start, and writes it with its report.
+# A trainer removes this file when an attempt starts, and writes it at the end, just before the report.
 _WRITTEN_BY_THE_TRAINER = "end.json"
 
 

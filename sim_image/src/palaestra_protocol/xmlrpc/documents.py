@@ -103,7 +103,7 @@ def _read(data: bytes) -> xmlrpc.client.Unmarshaller:
 
 
 def _refuse_document_type(*_: object) -> None:
-    raise UnreadableDocument("XML-RPC: a document type is not allowed")
+    raise UnreadableDocument("XML-RPC: the document has a DOCTYPE, which is not allowed")
 
 
 def _values(reader: xmlrpc.client.Unmarshaller) -> tuple[Any, ...]:

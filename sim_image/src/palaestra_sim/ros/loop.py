@@ -22,8 +22,9 @@ _File = int | socket.socket
 
 # In a virtual machine a wake-up takes 30 us, longer than the response to a request. So if the last _STREAK
 # waits were all shorter than _QUICK_S, the loop polls up to _LOOKS times before it waits, and yields the
-# processor between two polls. If each step contains one longer wait, the loop never polls. That is intended:
-# in this case most polls would find nothing, and would take processor time from other simulators.
+# processor between two polls. A step of a trainer causes fewer than _STREAK waits. So if each step contains
+# one longer wait, the loop never polls: most polls would find nothing, and would take processor time from
+# other simulators.
 _QUICK_S = 200e-6
 _STREAK = 10  # more waits than a step of a trainer causes
 _LOOKS = 30

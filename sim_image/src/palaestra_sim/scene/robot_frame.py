@@ -21,7 +21,7 @@ class RobotFrame(Frame):
     """The frame of a robot with a body; the robot drives upright at a constant height.
 
     The robot is at the top of the world, not inside another node, so its frame has the pose of the body. The
-    body uses the axes of the ground.
+    pose of the body has the axes of the ground, and this frame has those of the world file.
     """
 
     moves = True

@@ -45,7 +45,7 @@ def test_stable_baselines3_has_nothing_to_object_to(options):
 
 @pytest.mark.parametrize("name", [NAME, f"palaestra_trainer.environments:{NAME}"])
 def test_the_environment_is_made_by_name(name):
-    """After an import of the package, or with the package in the name, the environment is registered."""
+    """An import of the package registers the environment; gymnasium imports the package in a name."""
     robot, scene = fake_arena()
 
     env = gymnasium.make(name, robot=robot, scene=scene, movements=["STOP", "LEFT"], max_steps=7)

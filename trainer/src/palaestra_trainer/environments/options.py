@@ -22,7 +22,7 @@ FRAMES = (1, 3)
 
 
 class Episodes(Protocol):
-    """The options of all tasks that end at a target; see `MoveToTargetOptions`."""
+    """The options that all tasks with a target share; `MoveToTargetOptions` explains them."""
 
     @property
     def reward(self) -> str:
@@ -46,7 +46,7 @@ class Episodes(Protocol):
 
 
 class Driving(Episodes, Protocol):
-    """The options of all tasks for a robot that drives in all directions; see `MoveToTargetOptions`."""
+    """The options that all tasks of a robot share if it drives in all directions."""
 
     @property
     def movements(self) -> Sequence[Movement]:

@@ -1,9 +1,10 @@
-"""A VecEnv that does not wait for slow simulators: a step returns as soon as one member has a new row.
+"""A VecEnv that does not wait for slow simulators: its step returns as soon as one member has a new row.
 
 The rows of the other members are invalid and pending: they repeat the member's last observation and have
-reward 0. Their simulators keep computing, also while the algorithm learns. A vector step returns the rows of
-the steps that have ended since the previous vector step. The algorithm's new action for a pending member is
-ignored, because the member's row belongs to the action with which its step began.
+reward 0. Their simulators keep computing, also while the algorithm learns. A step of the VecEnv returns a
+valid row for each member whose own step has ended since the VecEnv's previous step. The
+algorithm's new action for a pending member is ignored, because the member's row belongs to the action with
+which its step began.
 
 The order of the rows depends on the speed of the simulators, so a resumed run differs from an uninterrupted
 run. A resume does not repeat the steps that were pending at the checkpoint.

@@ -78,8 +78,8 @@ class PolicyModule(nn.Module):
         self.choices = choices_of(self.action_space) if loaded.takes_masks else []
         if self.choices and ACTION_MASKS in self.spaces:
             raise ExportError(
-                f"the observation has a key {ACTION_MASKS}, which is the input for masks; nothing was "
-                "written; rename the key in the environment"
+                f"the observation has a key {ACTION_MASKS}, but the exported policy needs this name for its "
+                "input of masks; nothing was written; rename the key in the environment"
             )
         lstm = getattr(policy, "lstm_actor", None)
         self.state_shape = None if lstm is None else (int(lstm.num_layers), int(lstm.hidden_size))

@@ -320,9 +320,9 @@ def batched_form(robot: type[SimulatedRobot]) -> type[BatchedRobot]:
                     " use; set its attribute batched to a subclass of BatchedRobot, or remove batch"
                 )
             return form
-    known = ", ".join(single.__name__ for single, _ in BATCHED_FORMS)
+    known = " or ".join(single.__name__ for single, _ in BATCHED_FORMS)
     raise ConfigurationError(
-        f"trainer.robot: {robot.__name__} has no batched form; derive it from {known}, set its attribute"
+        f"trainer.robot: {robot.__name__} has no batched form; derive it from {known}; or set its attribute"
         " batched to a subclass of BatchedRobot, or remove batch"
     )
 

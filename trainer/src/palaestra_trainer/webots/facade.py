@@ -87,7 +87,7 @@ class Webots:
         # The probe has its own connection with a shorter deadline, because it must detect a hang early.
         self._probe = RosService(f"/{supervisor_node_name}/robot/get_time", "webots_ros/get_float", _PROBE_S)
         self._start_deadline_s = start_deadline_s
-        # For each name: the function to call, and the robots that must respond before the call.
+        # For each `name` of `at_start`: the function, and the robots that must respond before its call.
         self._at_start: dict[str, tuple[Callable[[], None], tuple[str, ...]]] = {}
         self._entered = 0
         self._stopped = False

@@ -62,7 +62,7 @@ class _Input(Sensor):
     def _pressed(self) -> tuple[int, ...]:
         """Return the numbers that arrived, each once, in the order in which they arrived.
 
-        A joystick sends -1 if no button is pressed.
+        A joystick sends -1 if no button is pressed; this number is left out.
         """
         return tuple(dict.fromkeys(number for number in self._values.arrived() if number >= 0))
 

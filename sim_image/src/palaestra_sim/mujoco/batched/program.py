@@ -34,7 +34,7 @@ def serve(simulation: Backend, world: Path, rows: int, threads: int) -> int:
 
 
 def batch_of(simulation: Backend, name: str, rows: int, threads: int) -> BatchWorld:
-    """Return copies of a world, before `open`.
+    """Return copies of a world; `BatchWorld.open` comes before the first step.
 
     Raises:
         BatchRefusedError: the world has parts that the batch form does not simulate.

@@ -134,8 +134,8 @@ def _services(actuator: MujocoActuator) -> tuple[Row, ...]:
     )
 
 
-def _in_no_world(_part: DevicePart) -> Never:
-    raise TypeError("a world file of Webots cannot have such a node")
+def _in_no_world(part: DevicePart) -> Never:
+    raise TypeError(f"a world file of Webots cannot have a {part.node.type_name}")
 
 
 MUJOCO_SENSOR: Final = DeviceType(

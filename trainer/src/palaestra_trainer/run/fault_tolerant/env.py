@@ -1,4 +1,4 @@
-"""A gymnasium wrapper around the environment of one member that tolerates faults."""
+"""A gymnasium wrapper around the environment of one member; it tolerates faults of the simulator."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A Stable-Baselines3 VecEnv of members that tolerates faults."""
+"""A Stable-Baselines3 VecEnv that tolerates faults of its members' simulators."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A gymnasium VectorEnv of members that tolerates faults."""
+"""A gymnasium VectorEnv that tolerates faults of its members' simulators."""
 
 from __future__ import annotations
 
