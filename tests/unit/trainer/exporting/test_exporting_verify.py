@@ -163,7 +163,7 @@ def test_a_file_with_the_favorite_action_but_other_scores_is_refused():
         return lambda *inputs: right(*(part * 0 for part in inputs))
 
     with pytest.raises(
-        ExportError, match=f"{SAME}.* would show nothing; normalize observations, train it long"
+        ExportError, match=f"{SAME}.* would show nothing; normalize observations, train long"
     ):
         verify.compare(convert, PolicyModule(policy), policy)
 
