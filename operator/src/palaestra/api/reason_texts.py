@@ -152,8 +152,7 @@ ROWS: dict[Reason, ReasonText] = {
     ),
     Reason.QUEUED: ReasonText(
         "waits in queue {queue} for Kueue{taken}{why}{again}",
-        "Kueue has not admitted the replica yet, or has evicted it; the text after the colon is "
-        "Kueue's own message",
+        "Kueue has not admitted the replica yet, or has evicted it; Kueue's own message follows the colon",
         "wait, or change what the message names: see [queues](../howto/queues.md#train-in-a-queue)",
         warning=False,
     ),

@@ -162,9 +162,7 @@ def test_a_file_with_the_favorite_action_but_other_scores_is_refused():
         right = safetensors_file.runner(safetensors_file.content(module, {}), module)
         return lambda *inputs: right(*(part * 0 for part in inputs))
 
-    with pytest.raises(
-        ExportError, match=f"{SAME}.* would show nothing; normalize observations, train long"
-    ):
+    with pytest.raises(ExportError, match=f"{SAME}.* would show nothing; normalize observations, train long"):
         verify.compare(convert, PolicyModule(policy), policy)
 
 
