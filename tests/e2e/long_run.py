@@ -10,7 +10,7 @@ from tests.e2e.jobs import SMALL, tiny_job
 from tests.e2e.namespace import LONG_S, OPERATOR, SYSTEM, Namespace, named, trains
 from tests.jobs import example
 
-NAME, STEPS = "move-to-target", 30_000
+NAME, STEPS = "move-to-target", 25_000
 # Each step of the pair waits without using the processor, so the pair trains past the last kill on any
 # machine.
 PAIR, PAIR_STEPS = "pair", 3_000

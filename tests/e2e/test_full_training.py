@@ -118,7 +118,7 @@ def test_the_last_word_of_a_trainer_is_in_its_pod(long_run):
 
 
 @pytest.mark.after_the_long_run
-@pytest.mark.parametrize(("name", "replicas", "steps"), [(NAME, "1/1", "30000"), (PAIR, "2/2", "3000")])
+@pytest.mark.parametrize(("name", "replicas", "steps"), [(NAME, "1/1", "25000"), (PAIR, "2/2", "3000")])
 def test_kubectl_shows_a_job_in_one_line(long_run, name, replicas, steps):
     """A person looks first at status, reason, replicas, step and success, so one line must show them."""
     status = long_run.end(name)

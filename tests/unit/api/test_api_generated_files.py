@@ -80,7 +80,7 @@ def test_the_examples_show_what_their_names_say(repository) -> None:
     assert job("reinforce").trainer.algorithm.name == "REINFORCE"
     assert (job("move-to-target").trainer.algorithm.name, job("move-to-target").trainer.steps) == (
         "DQN",
-        30_000,
+        25_000,
     )
 
 
