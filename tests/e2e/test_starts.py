@@ -1,4 +1,4 @@
-"""Jobs that do not start: the status of each has a reason and names the container."""
+"""Jobs that do not start: the status of each has a reason, with the container if one is the cause."""
 
 import pytest
 

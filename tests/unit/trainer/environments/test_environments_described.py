@@ -24,6 +24,17 @@ class Documented(Hall):
     """
 
 
+class Shelf:
+    """A class with a table, which is not an environment.
+
+    # Observation
+
+    | index | meaning |
+    |---|---|
+    | 0 | position |
+    """
+
+
 def made_by_function(robot, scene) -> Documented:
     """Return the environment, without a table of its own."""
     return Documented(robot, scene)
@@ -67,7 +78,7 @@ def test_an_environment_that_cannot_be_imported_here_has_no_tables(register):
 def test_a_function_that_returns_no_environment_has_no_docstring(register):
     """A wrong annotation must not put the tables of another class into the sheet."""
 
-    def wrong(robot, scene) -> dict:
+    def wrong(robot, scene) -> Shelf:
         del robot, scene
 
     register(wrong)
