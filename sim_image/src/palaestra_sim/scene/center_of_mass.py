@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from palaestra_sim.scene.frames import Frame
-from palaestra_sim.scene.geometry import Vector
+from palaestra_sim.scene.geometry import Vector, weighted_mean
 from palaestra_sim.scene.mass import MassProperties, read_matter, volume_m3
 from palaestra_sim.scene.meshes import middle_of_volume
 from palaestra_sim.scene.nodes.scene_node import SceneNode
@@ -24,28 +24,22 @@ def center_of_mass(node: SceneNode, place: Frame) -> Vector:
         node: the node.
         place: the frame of the node.
     """
-    heavy = [matter for matter in _matter(node) if matter.mass_kg > 0.0]
-    total_kg = sum(matter.mass_kg for matter in heavy)
-    if total_kg == 0.0:
-        return place.world_position
-    centers = [matter.place.world_pose.carry(_center(matter)) for matter in heavy]
-    x, y, z = (
-        sum(matter.mass_kg * at[axis] for matter, at in zip(heavy, centers, strict=True)) / total_kg
-        for axis in range(3)
-    )
-    return x, y, z
+    matters = list(_matter(node))
+    centers = [matter.place.world_pose.carry(_center(matter)) for matter in matters]
+    return weighted_mean(centers, [matter.mass_kg for matter in matters]) or place.world_position
 
 
 def _matter(node: SceneNode) -> Iterator[MassProperties]:
-    """Yield the mass of each Solid at and inside a node."""
+    """Yield each mass of a Solid at and inside a node."""
     reading = NodeReader()  # the world was checked when it was loaded
     for solid in (node, *node.descendants()):
-        if solid.place is not None and not solid.left_out:
+        if solid.place is not None and not solid.left_out and (solid.stand_in or solid.nodes("physics")):
             shapes = list(bounding_shapes(reading, solid, solid.place))
             matter = read_matter(reading, solid, solid.place, shapes)
             if solid.stand_in:  # it has no Physics node, but the mass of its PROTO
                 matter = replace(matter, mass_kg=reading.number(solid, "mass", 0.0))
-            yield matter
+            if matter.mass_kg > 0.0:
+                yield matter
 
 
 def _center(matter: MassProperties) -> Vector:
@@ -54,15 +48,8 @@ def _center(matter: MassProperties) -> Vector:
     if matter.center is not None:
         x, y, z = matter.center
         return x * scale, y * scale, z * scale
-    volumes = [volume_m3(shape) for shape in matter.shapes]
-    if not sum(volumes):
-        return 0.0, 0.0, 0.0
     middles = [_middle(shape) for shape in matter.shapes]
-    x, y, z = (
-        sum(volume * at[axis] for volume, at in zip(volumes, middles, strict=True)) / sum(volumes)
-        for axis in range(3)
-    )
-    return x, y, z
+    return weighted_mean(middles, [volume_m3(shape) for shape in matter.shapes]) or (0.0, 0.0, 0.0)
 
 
 def _middle(shape: Shape) -> Vector:

@@ -65,6 +65,18 @@ class Pose(NamedTuple):
         return self.rotation[8] > _UPRIGHT
 
 
+def weighted_mean(points: Sequence[Vector], weights: Sequence[float]) -> Vector | None:
+    """Return the mean of points; None if the sum of their weights is 0."""
+    total = sum(weights)
+    if not total:
+        return None
+    x, y, z = (
+        sum(weight * at[axis] for weight, at in zip(weights, points, strict=True)) / total
+        for axis in range(3)
+    )
+    return x, y, z
+
+
 def turn(m: Matrix, v: Vector) -> Vector:
     """Return the vector `v`, rotated by `m`."""
     x, y, z = v

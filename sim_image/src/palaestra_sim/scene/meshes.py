@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Final, NamedTuple
 
-from palaestra_sim.scene.geometry import Vector, cross, dot, minus
+from palaestra_sim.scene.geometry import Vector, cross, dot, minus, weighted_mean
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 
 _SIDES: Final = 20  # number of sides of a cone
@@ -240,16 +240,11 @@ def middle_of_volume(mesh: Mesh) -> Vector:
     points = mesh.points
     corners = [(points[a], points[b], points[c]) for a, b, c in mesh.triangles]
     volumes = [dot(a, cross(b, c)) for a, b, c in corners]  # six times those of tetrahedra with the origin
-    if not sum(volumes):
-        return 0.0, 0.0, 0.0
-    x, y, z = (
-        sum(
-            volume * (a[axis] + b[axis] + c[axis]) for volume, (a, b, c) in zip(volumes, corners, strict=True)
-        )
-        / (4.0 * sum(volumes))
-        for axis in range(3)
-    )
-    return x, y, z
+    middles = [
+        ((a[0] + b[0] + c[0]) / 4.0, (a[1] + b[1] + c[1]) / 4.0, (a[2] + b[2] + c[2]) / 4.0)
+        for a, b, c in corners
+    ]
+    return weighted_mean(middles, volumes) or (0.0, 0.0, 0.0)
 
 
 def _flattened(corners: Sequence[Vector]) -> list[tuple[float, float]]:
