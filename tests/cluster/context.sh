@@ -27,5 +27,5 @@ retract_context() {
     "${config[@]}" delete-context "kind-$CLUSTER"
     "${config[@]}" delete-cluster "kind-$CLUSTER"
     "${config[@]}" delete-user "kind-$CLUSTER"
-  } >/dev/null 2>&1 || true # an entry that somebody has already removed is not an error
+  } >/dev/null 2>&1 || true # another program may have removed the entry
 }

@@ -96,7 +96,7 @@ def test_an_operator_without_leader_election_needs_no_lease():
 
 
 def test_metrics_without_a_running_operator_have_the_remedy_of_the_operator():
-    """Without a running pod there are no metrics, so the person must first repair the operator."""
+    """An operator without a running pod exports no metrics, so a person must repair it first."""
     [found] = results(metrics, deployment(), [POD | {"status": {"phase": "Pending"}}])
 
     assert found.verdict is CheckStatus.WRONG

@@ -21,7 +21,7 @@ def test_a_variable_chooses_the_controller_and_an_option_precedes_it(options, en
 
 
 def test_a_wrong_variable_ends_the_sidecar_with_one_sentence(capsys):
-    """Without the error, nobody would notice that a typing error chose another controller."""
+    """A typing error would choose another controller, and no message would report it."""
     with pytest.raises(SystemExit):
         parse(NEEDED, {"WEBOTS_ROS_CONTROLLER": "mine"})
 

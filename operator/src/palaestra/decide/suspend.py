@@ -6,7 +6,7 @@ from palaestra.decide.restart_counts import lives
 from palaestra.observe.models import JobView, PodView, ReplicaObserved, Suspended
 
 BY_SPEC = "spec.suspend; set it to false to continue"
-SOMEBODY = "somebody else"  # the name of the client if no field manager is known
+UNKNOWN_CLIENT = "somebody else"  # the name of the client if no field manager is known
 
 
 def set_last(seen: JobView) -> bool:
@@ -75,7 +75,7 @@ def suspended_by(job: TrainingJob, seen: ReplicaObserved) -> str:
     if seen.job is None or not overruled(job, seen.job):
         return BY_SPEC
     return (
-        f"{seen.switcher or SOMEBODY}, not by spec.suspend; "
+        f"{seen.switcher or UNKNOWN_CLIENT}, not by spec.suspend; "
         f"the replica continues when Job {seen.job.name} is resumed"
     )
 
@@ -87,5 +87,5 @@ def unheeded(job: TrainingJob, seen: ReplicaObserved) -> str:
     if seen.job.queue:
         return f"; spec.suspend has no effect, because queue {seen.job.queue} starts and stops it"
     if overruled(job, seen.job):
-        return f"; resumed by {seen.switcher or SOMEBODY} although spec.suspend is true"
+        return f"; resumed by {seen.switcher or UNKNOWN_CLIENT} although spec.suspend is true"
     return ""

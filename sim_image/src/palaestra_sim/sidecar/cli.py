@@ -245,7 +245,7 @@ def _view_socket(given: argparse.Namespace, driver: Driver, world: Path) -> Path
 
 
 def _batch_file(given: argparse.Namespace, driver: Driver, world: Path) -> Path | None:
-    """Return the file for the address of MuJoCo's copies of the world; None if there is no such file."""
+    """Return the file with the address of MuJoCo's copies of the world; None without copies."""
     if given.work is None or driver is not Driver.MUJOCO:
         return None
     return Path(given.work).absolute() / f"{world.stem}.batch"

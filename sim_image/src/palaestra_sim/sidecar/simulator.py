@@ -123,7 +123,7 @@ class SupervisedSimulator:
         return replace(state, rss_bytes=self.usage().rss_bytes) if ready else state
 
     def _address(self) -> str | None:
-        """Return the address at which the running process serves its copies; None if it has none yet."""
+        """Return the address of the process's copies; None before the process serves them."""
         if self._batch is None or self._process is None:
             return None
         try:

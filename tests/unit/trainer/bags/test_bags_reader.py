@@ -64,7 +64,7 @@ def test_a_damaged_bag_is_refused_or_its_messages_are_right(whole, at, to, tmp_p
 
 
 def test_a_chunk_that_looks_like_another_record_is_missed(whole, tmp_path):
-    """Readers skip records of an unknown kind, so nobody would notice that a second of a drive is missing."""
+    """Readers skip records of an unknown kind, so a second of a drive would be missing without a message."""
     summary = make_reader(io.BytesIO(whole)).get_summary()
     damaged = bytearray(whole)
     damaged[summary.chunk_indexes[-1].chunk_start_offset] = UNKNOWN_KIND

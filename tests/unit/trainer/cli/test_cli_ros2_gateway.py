@@ -15,7 +15,7 @@ from palaestra_trainer.cli.ros2_gateway import gateway
     ],
 )
 def test_a_run_or_a_robot_at_a_master_must_be_named(arguments, message, capsys):
-    """If the program guessed the robot, nobody would notice that the gateway shows the wrong one."""
+    """If the program guessed the robot, the gateway could show the wrong robot without a message."""
     with pytest.raises(SystemExit, match="2"):
         gateway(arguments)
 

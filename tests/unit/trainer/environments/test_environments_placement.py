@@ -94,7 +94,7 @@ def test_both_may_be_chosen_even_if_they_are_near():
 
 
 def test_the_options_that_every_reset_of_a_run_gets_change_nothing():
-    """A run passes these options for environments with a curriculum, and this task has none."""
+    """A run passes these options for environments with a curriculum; this task has no curriculum."""
     of_a_run = {"training_progress": 0.5, "episode": 7}
 
     tasks = [PLACES.chosen_task(np.random.default_rng(0), chosen) for chosen in ({}, of_a_run)]

@@ -175,7 +175,7 @@ def large_run(number):
 def test_no_text_of_a_run_becomes_an_element_or_a_reference(drawn):
     """A person opens a report from a mail, so a job's name or a fault's message must not run as code.
 
-    The page must not load anything either: a request would show a server that somebody opened the page.
+    The page must not load anything either: a request would report to a server that a person opened the page.
     """
     text = page(drawn)
 

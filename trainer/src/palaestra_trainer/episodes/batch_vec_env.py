@@ -239,7 +239,7 @@ class BatchVecEnv(CollectingVecEnv):
         raise WrongData(self._restarter.name, f"row {rows[0]} fails at each reset: {fact}")
 
     def _reason(self, row: int, checked: str) -> str:
-        """Return why a row failed: its simulation failed, or one of the `checked` values is not finite."""
+        """Return the reason of a row's failure: its simulation, or a `checked` value that is not finite."""
         if self._member.failed[row]:
             return self._member.reason(row)
         return f"the environment's {checked} is not finite"

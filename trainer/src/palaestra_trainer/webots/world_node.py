@@ -55,7 +55,7 @@ class WorldNode:
 
     @property
     def definition(self) -> str:
-        """The DEF name; "" if the node has none."""
+        """The DEF name; "" for a node without a DEF name."""
         return str(self._ask("get_def", "node_get_name").name)
 
     @property
@@ -129,7 +129,7 @@ class WorldNode:
         The rotation is a quaternion: x, y, z, w.
 
         Raises:
-            WrongData: also if the node has no position (a Group has none).
+            WrongData: also if the node has no position, as a Group.
         """
         at = self._ask("get_position", "node_get_position").position
         turn = self._ask("get_orientation", "node_get_orientation").orientation
