@@ -15,7 +15,12 @@ RESTRICTED_CONTAINER = {
 RESTRICTED_POD = {"runAsNonRoot": True, "runAsUser": 65532, "seccompProfile": {"type": "RuntimeDefault"}}
 CONNECT = """
 import socket, sys
-socket.create_connection((sys.argv[1], int(sys.argv[2])), timeout=float(sys.argv[3])).close()
+try:
+    socket.create_connection((sys.argv[1], int(sys.argv[2])), timeout=float(sys.argv[3])).close()
+except (ConnectionRefusedError, TimeoutError):
+    print("closed")
+else:
+    print("open")
 """
 LISTEN = """
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
@@ -50,9 +55,11 @@ def plain_pod(name: str, labels: dict[str, str] | None = None, **container: obje
 class Asker:
     """A pod with these `labels` from which a test sends requests; it runs until its namespace is deleted."""
 
-    def __init__(self, namespace: Namespace, name: str, labels: dict[str, str] | None = None) -> None:
+    def __init__(
+        self, namespace: Namespace, name: str, labels: dict[str, str] | None = None, **container: object
+    ) -> None:
         self.namespace, self.name, self.labels = namespace, name, labels or {}
-        namespace.create("pods", plain_pod(name, labels))
+        namespace.create("pods", plain_pod(name, labels, **container))
         namespace.wait(lambda: trains(namespace.get("pods", name) or {"status": {}}))
 
     def get(self, pod: Object, port: int, path: str) -> str:
@@ -61,11 +68,19 @@ class Asker:
         return self.namespace.execute(self.name, "python3", "-c", ASK, address, container="main")
 
     def reaches(self, pod: Object, port: int) -> bool:
-        """Return whether a connection to another pod's port succeeds."""
+        """Return whether a connection to another pod's port succeeds.
+
+        A busy cluster can refuse a command in a container. Such a failure says nothing about the port, so
+        the command is repeated.
+        """
         assert runs(pod)
         where = (pod["status"]["podIP"], str(port), str(CONNECT_S))
+        return self.namespace.wait(lambda: self._connect(*where)) == "open"
+
+    def _connect(self, *where: str) -> str:
+        """Return "open" or "closed", or an empty string if the command did not run."""
+        command = ("python3", "-c", CONNECT, *where)
         try:
-            self.namespace.execute(self.name, "python3", "-c", CONNECT, *where, container="main")
+            return self.namespace.execute(self.name, *command, container="main").strip()
         except CommandFailed:
-            return False
-        return True
+            return ""
