@@ -25,6 +25,10 @@ NAMES = ["cart velocity", "f", "t", "v", "m", "c", "u", "a", "pole_framexaxis"]
 GRIP = '<adhesion name="grip" body="cart" ctrlrange="0 1" gain="5"/>'
 MUSCLE = '<muscle name="arm" joint="hinge" ctrlrange="0 1" lengthrange="0 1"/>'
 GENERAL = '<general name="any" joint="hinge" dyntype="integrator"/>'
+DRIVE = """<dcmotor name="drive" joint="hinge" motorconst="1" resistance="1" input="pos vel"
+  controller="10 0 5"/>"""
+SPIN = '<dcmotor name="spin" joint="hinge" motorconst="1" resistance="1"/>'
+FACE = '<orientation name="face" site="skin" refsite="chip" input="quat" kp="1" dampratio="1"/>'
 
 
 def device(simulation, name):
@@ -152,6 +156,44 @@ def test_an_adhesion_keeps_its_control_within_its_range(load):
     assert simulation._model.data.ctrl.tolist() == [0.0, 1.0]
 
 
+def test_each_control_of_an_actuator_is_a_device_of_its_own(load, cartpole):
+    """MuJoCo counts controls, so the control of a later actuator has another number than the actuator."""
+    world = (DRIVE + FACE + FORCE,)
+    simulation = load(*world)
+    robot = simulation.robots[0]
+    model = mujoco.MjModel.from_xml_path(str(cartpole(*world)))
+    data = mujoco.MjData(model)
+
+    device(simulation, "mujoco/drive_vel").set_control(2.0)
+    device(simulation, "mujoco/face_qx").set_control(0.5)
+    robot.motors["push"].set_effort(5.0)
+    simulation.step(100)
+    data.ctrl[:] = [0.0, 2.0, 1.0, 0.5, 0.0, 0.0, 2.5]  # "push" has a gear of 2
+    mujoco.mj_step(model, data, nstep=50)
+
+    inner = simulation._model.data
+    assert inner.ctrl.tolist() == data.ctrl.tolist()
+    assert inner.qpos.tolist() == data.qpos.tolist()
+    assert robot.motors["push"].feedback_nm == pytest.approx(5.0)
+    assert {f"mujoco/face_q{part}" for part in "wxyz"} < set(robot.parts.devices.rows)
+
+
+def test_a_force_about_an_axis_of_a_ball_joint_is_a_motor(load):
+    """The gear of such an actuator is a vector, whose first number may be 0."""
+    turn = '<motor name="turn" joint="swivel" gear="0 2 0"/>'
+    ball = '<body pos="0 0 3"><joint name="swivel" type="ball"/><geom size="0.1" mass="1"/></body>'
+    motor = load(turn, "", ("</worldbody>", f"{ball}</worldbody>")).robots[0].motors["turn"]
+
+    motor.set_effort(5.0)
+
+    assert motor.control[1] == 0.5
+
+
+def test_the_body_of_an_orientation_servo_is_the_robot(load):
+    """The first actuator decides which body of the top level is the robot."""
+    assert load(FACE).robots[0].parts.place.translation == (1.0, 1.0, 0.5)
+
+
 def test_an_adhesion_pulls(load):
     """The ball is pulled to the floor, so its touch sensor measures more than its weight."""
     pull = '<adhesion name="pull" body="ball" ctrlrange="0 1" gain="100"/>'
@@ -172,8 +214,9 @@ def test_an_adhesion_pulls(load):
         ((FORCE + GRIP,), "adhesion", "mujoco/grip"),
         ((FORCE + MUSCLE,), "muscle", "mujoco/arm"),
         ((FORCE + GENERAL,), "general", "mujoco/any"),
+        ((FORCE + SPIN,), "dcmotor", "mujoco/spin"),
     ],
-    ids=["sensor", "adhesion", "muscle", "general"],
+    ids=["sensor", "adhesion", "muscle", "general", "dcmotor"],
 )
 def test_leave_out_leaves_out_a_type(load, texts, type_name, name):
     """The trainer logs the devices that are left out, and the job's status lists them."""

@@ -40,7 +40,10 @@ CARTPOLE = """<mujoco>
       </body>
     </body>
   </worldbody>
-  <actuator><motor name="push" joint="slider" gear="2" {limits}/></actuator>
+  <actuator>
+    <adhesion name="grip" body="cart" ctrlrange="0 1"/>
+    <motor name="push" joint="slider" gear="2" {limits}/>
+  </actuator>
   <sensor>
     <jointpos name="cart position" joint="slider"/>
     <jointvel name="cart speed" joint="slider"/>
@@ -298,6 +301,7 @@ def test_a_request_that_does_not_fit_the_world_is_refused(changes, fact) -> None
         ({"commanded": "velocity"}, "the motor 'push' is commanded by force, not by velocity"),
         ({"sensors": ["gyro"]}, "does not read 'gyro'"),
         ({"sensors": ["push"]}, "the model has no sensor 'push'"),
+        ({"sensors": ["mujoco/grip"]}, "the model has no sensor 'mujoco/grip'"),
         ({"motors": ["leg"]}, "the motor 'leg' does not exist"),
         ({"motors": ["hinge"]}, "the motor 'hinge' does not exist"),
         ({"period_ms": 30}, "30 ms is not a multiple of the basic step of 20 ms"),

@@ -130,7 +130,7 @@ class ModelBatch:
                 yield f"the motor {name!r} {fact}"
         for name in request.sensors:
             number = numbers.get(name)
-            if number is None or number >= model.nsensor or isinstance(self._device(name), ActuatorMotor):
+            if number is None or isinstance(self._device(name), (ActuatorMotor, MujocoActuator)):
                 yield f"the model has no sensor {name!r}"
             elif model.sensor_dim[number] != 1 or model.sensor_type[number] == _CLIPPED:
                 yield f"does not read {name!r}, which measures several numbers or a distance"

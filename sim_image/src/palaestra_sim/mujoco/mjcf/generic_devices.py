@@ -16,7 +16,12 @@ from palaestra_sim.scene.devices.device_type import DevicePart, DeviceTopic, Dev
 
 FOLDER: Final = "mujoco/"  # prefix of the names of these generic devices
 _BODY: Final = int(mujoco.mjtTrn.mjTRN_BODY)
-_MUSCLE: Final = int(mujoco.mjtGain.mjGAIN_MUSCLE)
+_TYPES: Final = {
+    int(mujoco.mjtGain.mjGAIN_MUSCLE): "muscle",
+    int(mujoco.mjtGain.mjGAIN_DCMOTOR): "dcmotor",
+    int(mujoco.mjtGain.mjGAIN_SO3): "orientation",
+    int(mujoco.mjtGain.mjGAIN_PID): "pid",
+}
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -44,12 +49,12 @@ class MujocoSensor:
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class MujocoActuator:
-    """An actuator that is not a motor, such as a muscle or an adhesion.
+    """A control of an actuator that is not a motor, such as a muscle, an adhesion or an orientation servo.
 
     Attributes:
         name: the name of the device.
         controls: the controls of all actuators in MuJoCo's data.
-        number: the index of this actuator's control.
+        number: the index of this control.
         low, high: the minimum and the maximum control; infinite if the model has no limits.
         model: the result of the service `get_model`.
     """
@@ -88,7 +93,7 @@ class MujocoActuator:
 
 
 def actuator_of(model: Any, data: Any, number: int, name: str) -> MujocoActuator:
-    """Return the device of an actuator that is not a motor."""
+    """Return the device for control `number`, of an actuator that is not a motor."""
     low, high = -math.inf, math.inf
     if model.actuator_ctrllimited[number]:
         low, high = model.actuator_ctrlrange[number].tolist()
@@ -102,10 +107,18 @@ def type_name_of(model: Any, number: int) -> str:
 
 
 def actuator_type_of(model: Any, number: int) -> str:
-    """Return the type of an actuator that is not a motor: adhesion, muscle or general."""
+    """Return the type of an actuator that is not a motor, as in the XML of the model, such as muscle."""
     if model.actuator_trntype[number] == _BODY:
         return "adhesion"
-    return "muscle" if model.actuator_gaintype[number] == _MUSCLE else "general"
+    return _TYPES.get(int(model.actuator_gaintype[number]), "general")
+
+
+def input_names_of(model: Any, number: int) -> list[str]:
+    """Return a name for each control of an actuator; one empty name if the actuator has a single control."""
+    count = int(model.actuator_ctrlnum[number])
+    if count == 1:
+        return [""]
+    return [mujoco.mj_actuatorInputName(model, number, place) or str(place) for place in range(count)]
 
 
 def _topics(sensor: MujocoSensor) -> tuple[DeviceTopic, ...]:

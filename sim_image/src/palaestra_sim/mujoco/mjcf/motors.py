@@ -19,14 +19,15 @@ from palaestra_sim.mujoco.mjcf.model import HINGE, SLIDE, Model
 from palaestra_sim.ros_interfaces import UnsimulatedError
 from palaestra_sim.scene.motors import Motor, MotorSpec
 
-_JOINTS: Final = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
+JOINTS: Final = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
 _FIXED: Final = int(mujoco.mjtGain.mjGAIN_FIXED)
 _LINEAR: Final = (int(mujoco.mjtBias.mjBIAS_NONE), int(mujoco.mjtBias.mjBIAS_AFFINE))
 _DIRECT: Final = tuple(
     int(it) for it in (mujoco.mjtDyn.mjDYN_NONE, mujoco.mjtDyn.mjDYN_FILTER, mujoco.mjtDyn.mjDYN_FILTEREXACT)
 )
 _INTEGRATED: Final = int(mujoco.mjtDyn.mjDYN_INTEGRATOR)
-_TURNED: Final = (*_JOINTS, int(mujoco.mjtTrn.mjTRN_TENDON), int(mujoco.mjtTrn.mjTRN_SLIDERCRANK))
+_SPHERICAL: Final = (int(mujoco.mjtJoint.mjJNT_BALL), int(mujoco.mjtJoint.mjJNT_FREE))
+_TURNED: Final = (*JOINTS, int(mujoco.mjtTrn.mjTRN_TENDON), int(mujoco.mjtTrn.mjTRN_SLIDERCRANK))
 
 
 class Control(Enum):
@@ -183,8 +184,10 @@ class ActuatorMotor(Motor):
 def control_of(model: Any, index: int) -> tuple[Control, float] | None:
     """Return the quantity that an actuator's control sets, and `ModelActuator.scale`.
 
-    Return None if the actuator is not a motor, such as a muscle.
+    Return None if the actuator is not a motor, such as a muscle, or has several controls.
     """
+    if model.actuator_ctrlnum[index] != 1:
+        return None
     gain, bias = model.actuator_gainprm[index], model.actuator_biasprm[index]
     dynamics = int(model.actuator_dyntype[index])
     known = (
@@ -206,6 +209,14 @@ def control_of(model: Any, index: int) -> tuple[Control, float] | None:
     return Control.FORCE, 1.0 / (float(gain[0]) * gear)
 
 
+def control_address(model: Any, index: int) -> int:
+    """Return the place of an actuator's first control in `ctrl`.
+
+    Actuators before it may have several controls each.
+    """
+    return int(model.actuator_ctrladr[index])
+
+
 def kind_of(model: Any, index: int) -> str:
     """Return a word for the quantity that an actuator's control sets, such as "velocity"."""
     control = control_of(model, index)
@@ -215,12 +226,14 @@ def kind_of(model: Any, index: int) -> str:
 def gear_of(model: Any, index: int) -> float:
     """Return the force at the joint for an actuator force of 1.
 
-    For an actuator on a site, this is the force in the direction of the actuator's gear.
+    For an actuator on a site, a ball or a free joint, this is the force in the direction of the gear.
     """
-    gear: list[float] = model.actuator_gear[index].tolist()
-    if model.actuator_trntype[index] in _TURNED:
-        return gear[0]
-    return math.hypot(*gear) if model.actuator_trntype[index] == mujoco.mjtTrn.mjTRN_SITE else 0.0
+    gear: list[float] = model.actuator_gear[model.actuator_outadr[index]].tolist()
+    transmission, target = int(model.actuator_trntype[index]), int(model.actuator_trnid[index][0])
+    spherical = transmission in JOINTS and model.jnt_type[target] in _SPHERICAL
+    if spherical or transmission == mujoco.mjtTrn.mjTRN_SITE:
+        return math.hypot(*gear)
+    return gear[0] if transmission in _TURNED else 0.0
 
 
 def length_of(model: Model, index: int) -> Callable[[], float] | None:
@@ -232,18 +245,20 @@ def length_of(model: Model, index: int) -> Callable[[], float] | None:
     if model.model.actuator_trntype[index] not in _TURNED:
         return None
     gear, lengths = gear_of(model.model, index), model.data.actuator_length
-    return lambda: float(lengths[index]) / gear
+    output = int(model.model.actuator_outadr[index])
+    return lambda: float(lengths[output]) / gear
 
 
 def force_of(model: Model, index: int) -> Callable[[], float]:
     """Return a function that reads the force of an actuator at its joint, in N or N m."""
     gear, forces = gear_of(model.model, index), model.data.actuator_force
-    return lambda: float(forces[index]) * gear
+    output = int(model.model.actuator_outadr[index])
+    return lambda: float(forces[output]) * gear
 
 
 def joint_of(model: Any, index: int) -> int | None:
     """Return the number of the hinge or slider that an actuator moves; None if it moves another object."""
-    if model.actuator_trntype[index] not in _JOINTS:
+    if model.actuator_trntype[index] not in JOINTS:
         return None
     joint = int(model.actuator_trnid[index][0])
     return joint if model.jnt_type[joint] in {HINGE, SLIDE} else None
@@ -253,8 +268,9 @@ def spec_of(model: Any, index: int, name: str, control: Control, scale: float) -
     """Return the specification of a motor, with the limits that the model sets for the actuator."""
     low, high = 0.0, 0.0
     limit = math.inf
-    if model.actuator_ctrllimited[index]:
-        ends = sorted(float(it) / scale for it in model.actuator_ctrlrange[index])
+    address = control_address(model, index)
+    if model.actuator_ctrllimited[address]:
+        ends = sorted(float(it) / scale for it in model.actuator_ctrlrange[address])
         if control is Control.POSITION:
             low, high = ends
         else:

@@ -33,7 +33,8 @@ class Equipment:
     Attributes:
         devices: all devices, by the name of the device.
         joints: for each device on a joint, the id of that joint, by the name of the device.
-        numbers: the number in the model of each actuator and sensor, by the name of the device.
+        numbers: the place in `ctrl` of each actuator's control, and the number in the model of each sensor,
+            by the name of the device.
         motors: the actuators that are motors.
         actuators: the actuators that are not motors.
         samples: functions that set the values of the sensors.
@@ -64,12 +65,14 @@ def body_of(model: Any) -> int | None:
     joint or site. If actuators move only tendons, the robot is the first body. Return None if the model has
     no body.
     """
-    for index in range(model.nu):
-        joint, site = motors.joint_of(model, index), int(model.actuator_trnid[index][0])
-        if joint is not None:
-            return int(model.body_rootid[model.jnt_bodyid[joint]])
-        if model.actuator_trntype[index] == mujoco.mjtTrn.mjTRN_SITE:
-            return int(model.body_rootid[model.site_bodyid[site]])
+    for index in range(model.nactuator):
+        target, other = model.actuator_trnid[index].tolist()
+        transmission = model.actuator_trntype[index]
+        spherical = transmission == mujoco.mjtTrn.mjTRN_SO3  # turns a ball joint, or a site against another
+        if transmission in motors.JOINTS or (spherical and other < 0):
+            return int(model.body_rootid[model.jnt_bodyid[target]])
+        if spherical or transmission == mujoco.mjtTrn.mjTRN_SITE:
+            return int(model.body_rootid[model.site_bodyid[target]])
     return 1 if model.nbody > 1 else None
 
 
@@ -89,7 +92,7 @@ class _Fitter:
         """Return the devices."""
         model = self._model.model
         self._model.settle()  # computes the lengths of tendons, because motors read these lengths
-        for index in range(model.nu):
+        for index in range(model.nactuator):
             self._add_actuator(index)
         for index in range(model.nsensor):
             self._add_sensor(index)
@@ -107,36 +110,42 @@ class _Fitter:
         joint = motors.joint_of(model, index)
         default = self._defaults[index]
         control = motors.control_of(model, index)
-        folder = "" if control is not None else generic_devices.FOLDER
-        name = self._name(_ACTUATOR, default, f"{default}_actuator", folder)
+        if control is None:
+            self._add_own_actuator(index)
+            return
+        name = self._name(_ACTUATOR, default, f"{default}_actuator")
         if name is None:
             return
-        if control is None:
-            self._add_own_actuator(index, name)
-            return
+        address = motors.control_address(model, index)
         actuator = ModelActuator(
             control=control[0],
             scale=control[1],
             length=motors.length_of(self._model, index),
-            read=self._reader(index),
-            write=self._writer(index),
+            read=self._reader(address),
+            write=self._writer(address),
             force=motors.force_of(self._model, index),
         )
         motor = ActuatorMotor(motors.spec_of(model, index, name, *control), actuator)
         turns = joint is not None and model.jnt_type[joint] == HINGE
         if self._add(_ACTUATOR, ROTATIONAL_MOTOR if turns else LINEAR_MOTOR, motor, joint):
             self._found.motors.append(motor)
-            self._found.numbers[name] = index
+            self._found.numbers[name] = address
 
-    def _add_own_actuator(self, index: int, name: str) -> None:
+    def _add_own_actuator(self, index: int) -> None:
+        """Add a device for each control of an actuator that is not a motor."""
         model = self._model.model
         type_name = generic_devices.actuator_type_of(model, index)
-        if self._is_left_out(_ACTUATOR, model.actuator(index).name, name, type_name):
-            return
-        actuator = generic_devices.actuator_of(model, self._model.data, index, name)
-        if self._add(_ACTUATOR, generic_devices.MUJOCO_ACTUATOR, actuator, None):
-            self._found.actuators.append(actuator)
-            self._found.numbers[name] = index
+        address = motors.control_address(model, index)
+        for place, input_name in enumerate(generic_devices.input_names_of(model, index)):
+            default = "_".join(filter(None, (self._defaults[index], input_name)))
+            name = self._name(_ACTUATOR, default, f"{default}_actuator", generic_devices.FOLDER)
+            if name is None or self._is_left_out(_ACTUATOR, model.actuator(index).name, name, type_name):
+                continue
+            number = address + place
+            actuator = generic_devices.actuator_of(model, self._model.data, number, name)
+            if self._add(_ACTUATOR, generic_devices.MUJOCO_ACTUATOR, actuator, None):
+                self._found.actuators.append(actuator)
+                self._found.numbers[name] = number
 
     def _add_sensor(self, index: int) -> None:
         model = self._model.model
@@ -221,15 +230,15 @@ class _Fitter:
         axis = (1.0, 0.0, 0.0)  # an arbitrary axis: only MuJoCo computes the motion of the joint
         return self._shafts.setdefault(joint, Shaft(joint=Joint(axis=axis, slides=bool(slides))))
 
-    def _reader(self, index: int) -> Callable[[], float]:
+    def _reader(self, address: int) -> Callable[[], float]:
         controls = self._model.data.ctrl
-        return lambda: float(controls[index])
+        return lambda: float(controls[address])
 
-    def _writer(self, index: int) -> Callable[[float], None]:
+    def _writer(self, address: int) -> Callable[[float], None]:
         controls = self._model.data.ctrl
 
         def write(value: float) -> None:
-            controls[index] = value
+            controls[address] = value
 
         return write
 
@@ -240,7 +249,7 @@ def _actuator_names(model: Any) -> list[str]:
     Several actuators of one joint may lack names; for example, a position servo and a velocity servo. Their
     names then end with their kinds, or with their numbers if the kinds are equal.
     """
-    joints = [motors.joint_of(model, index) for index in range(model.nu)]
+    joints = [motors.joint_of(model, index) for index in range(model.nactuator)]
     plain = [
         model.actuator(index).name or ("" if joint is None else model.jnt(joint).name) or f"actuator{index}"
         for index, joint in enumerate(joints)
