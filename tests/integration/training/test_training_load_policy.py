@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from palaestra_trainer import load_policy
-from palaestra_trainer.algorithms import make_model, policy_of, small_cnn
+from palaestra_trainer.algorithms import ModelPolicy, make_model, small_cnn
 from palaestra_trainer.algorithms.saved_hyperparameters import begun_with
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import ConfigurationError
@@ -41,7 +41,7 @@ def test_a_loaded_policy_acts_on_raw_observations_as_it_did_in_its_run(
     assert bool(by_run.scales) is (normalize is not None)
     for seed in range(20):
         observation, _ = made.reset(seed=seed)
-        expected, _ = policy_of(trained).predict(observation, deterministic=True)
+        expected, _ = ModelPolicy(trained).predict(observation, deterministic=True)
         assert np.array_equal(by_run.predict(observation)[0], expected)
         assert np.array_equal(by_zip.predict(observation)[0], expected)
 

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from sb3_contrib.common.maskable.buffers import MaskableRolloutBuffer
 
 from palaestra_trainer import exporting, load_policy
-from palaestra_trainer.algorithms import check, make_model, policy_of
+from palaestra_trainer.algorithms import ModelPolicy, check, make_model
 from palaestra_trainer.algorithms.maskable import ValidMaskableDictRolloutBuffer, ValidMaskableRolloutBuffer
 from palaestra_trainer.environments.masks import allows
 from palaestra_trainer.episodes.episode_state import EpisodeState
@@ -271,7 +271,7 @@ def test_an_evaluation_outside_a_run_asks_for_masks_too(learn, make_member):
     model, _, env = learn(task_of())
     member = with_task(make_member(), task_of(Asked))
 
-    evaluation = evaluate(policy_of(model), member, [1, 2, 3])
+    evaluation = evaluate(ModelPolicy(model), member, [1, 2, 3])
     env.close()
 
     assert member.env.asked == sum(episode.length for episode in evaluation.episodes)

@@ -11,7 +11,7 @@ import stable_baselines3 as sb3
 from gymnasium import spaces
 from stable_baselines3.common.vec_env import VecNormalize
 
-from palaestra_trainer.algorithms import make_model, policy_of
+from palaestra_trainer.algorithms import ModelPolicy, make_model
 from palaestra_trainer.algorithms.normalization import Moments, ValidNormalize
 from palaestra_trainer.episodes.evaluation import evaluate
 from palaestra_trainer.episodes.seeds import EVALUATE
@@ -164,7 +164,7 @@ def test_a_policy_is_shown_what_it_learned_from(make_env):
     observation = np.array([0.2, 0.1], np.float32)
     seen = model.get_vec_normalize_env().normalize_obs(observation)
 
-    chosen, _ = policy_of(model).predict(observation, deterministic=True)
+    chosen, _ = ModelPolicy(model).predict(observation, deterministic=True)
 
     assert chosen == model.predict(seen, deterministic=True)[0]
     assert chosen != model.predict(observation, deterministic=True)[0]
@@ -177,7 +177,7 @@ def test_an_evaluation_earns_what_it_earns_and_changes_no_statistic(make_normal,
     env = model.get_vec_normalize_env()
     before = of(env.obs_rms), of(env.ret_rms)
 
-    evaluation = evaluate(policy_of(model), make_member(), [10, 20])
+    evaluation = evaluate(ModelPolicy(model), make_member(), [10, 20])
 
     assert (of(env.obs_rms), of(env.ret_rms)) == before
     for episode in evaluation.episodes:
@@ -215,7 +215,7 @@ def test_a_policy_is_used_without_this_package_as_the_page_says(make_normal, tmp
     seen = page["eyes_of"](tmp_path / "model.zip")(observation)
 
     assert np.array_equal(seen, model.get_vec_normalize_env().normalize_obs(observation))
-    chosen = policy_of(model).predict(observation, deterministic=True)[0]
+    chosen = ModelPolicy(model).predict(observation, deterministic=True)[0]
     assert loaded.predict(seen, deterministic=True)[0] == chosen
 
 

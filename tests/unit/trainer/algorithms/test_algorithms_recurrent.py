@@ -11,7 +11,7 @@ from gymnasium import spaces
 from hypothesis import given
 from hypothesis import strategies as st
 
-from palaestra_trainer.algorithms import check, make_model, policy_of
+from palaestra_trainer.algorithms import ModelPolicy, check, make_model
 from palaestra_trainer.algorithms.recurrent import (
     ValidRecurrentDictRolloutBuffer,
     ValidRecurrentRolloutBuffer,
@@ -143,7 +143,7 @@ def test_the_memory_restarts_with_the_first_valid_row(model):
 
 def test_an_evaluation_keeps_the_memory_of_an_episode(model, make_member):
     """The LSTM state lasts from step to step, but not from one episode to the next."""
-    first, again = (evaluate(policy_of(model), make_member(), [seed]) for seed in (5, 5))
-    both = evaluate(policy_of(model), make_member(), [3, 5])
+    first, again = (evaluate(ModelPolicy(model), make_member(), [seed]) for seed in (5, 5))
+    both = evaluate(ModelPolicy(model), make_member(), [3, 5])
 
     assert first.episodes == again.episodes == both.episodes[1:]

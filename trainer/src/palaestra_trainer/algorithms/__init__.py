@@ -2,8 +2,9 @@
 
 from palaestra_trainer.algorithms.ineffective_settings import futile
 from palaestra_trainer.algorithms.make_model import check, make_model
-from palaestra_trainer.algorithms.masks import is_masked, predict_allowed, refuse_without_masks, takes_masks
-from palaestra_trainer.algorithms.normalization import normalizer_of, policy_of
+from palaestra_trainer.algorithms.masks import is_masked, refuse_without_masks, takes_masks
+from palaestra_trainer.algorithms.model_policy import ModelPolicy
+from palaestra_trainer.algorithms.normalization import normalizer_of
 from palaestra_trainer.algorithms.registry import ALGORITHMS, entry_of
 from palaestra_trainer.algorithms.reinforce import REINFORCE
 from palaestra_trainer.algorithms.saved_hyperparameters import begin_with, begun_with, keep
@@ -12,6 +13,7 @@ from palaestra_trainer.algorithms.space_compat import refuse_spaces
 __all__ = [
     "ALGORITHMS",
     "REINFORCE",
+    "ModelPolicy",
     "begin_with",
     "begun_with",
     "check",
@@ -21,8 +23,6 @@ __all__ = [
     "keep",
     "make_model",
     "normalizer_of",
-    "policy_of",
-    "predict_allowed",
     "refuse_spaces",
     "refuse_without_masks",
     "takes_masks",

@@ -185,37 +185,7 @@ class ValidNormalize(VecNormalize):
             self.ret_rms.update(self.returns[valid])
 
 
-class Normalized:
-    """A policy that takes raw observations and normalizes them as in its training.
-
-    Attributes:
-        model: the model; it needs normalized observations.
-    """
-
-    def __init__(self, model: BaseAlgorithm, normalizer: ValidNormalize) -> None:
-        self.model = model
-        self._normalizer = normalizer
-
-    def predict(
-        self,
-        observation: Any,
-        state: Any = None,
-        episode_start: Any = None,
-        deterministic: bool = False,  # noqa: FBT001, FBT002 - as in Stable-Baselines3
-        **masks: Any,
-    ) -> tuple[Any, Any]:
-        """Return an action for a raw observation, and the policy's next state; MaskablePPO takes `masks`."""
-        seen = self._normalizer.normalize_obs(observation)
-        return self.model.predict(seen, state, episode_start, deterministic, **masks)
-
-
 def normalizer_of(model: BaseAlgorithm) -> ValidNormalize | None:
     """Return the normalizer of a model; None if the model uses raw observations and rewards."""
     found = model.get_vec_normalize_env()
     return found if isinstance(found, ValidNormalize) else None
-
-
-def policy_of(model: BaseAlgorithm) -> BaseAlgorithm | Normalized:
-    """Return the policy of a model for raw observations; its use does not change the statistics."""
-    normalizer = normalizer_of(model)
-    return Normalized(model, normalizer) if normalizer else model

@@ -19,8 +19,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from palaestra_protocol.pod.status import SuccessInterval
-from palaestra_trainer.algorithms import predict_allowed, takes_masks
 from palaestra_trainer.environments.episode_end import EpisodeEnd
+from palaestra_trainer.environments.masks import ACTION_MASKS
 from palaestra_trainer.episodes.film import MOST_FILMS, Film, Filming
 from palaestra_trainer.episodes.reset_options import EVALUATING, reset_options
 from palaestra_trainer.episodes.wilson import wilson
@@ -32,7 +32,11 @@ from palaestra_trainer.waiting.check import Check, go_on
 
 
 class ActingPolicy(Protocol):
-    """An object that chooses an action for an observation, such as every Stable-Baselines3 model."""
+    """An object that chooses an action for an observation, such as every Stable-Baselines3 model.
+
+    A policy whose attribute `takes_masks` is true also gets the masks of allowed actions, as the argument
+    `action_masks`.
+    """
 
     def predict(
         self,
@@ -279,15 +283,13 @@ def play(
     look()
     info: dict[str, Any] = {}
     memory: Any = None  # the state of a recurrent policy
-    over, end, masked = False, EpisodeEnd("an evaluation"), takes_masks(policy)
+    over, end, masked = False, EpisodeEnd("an evaluation"), getattr(policy, "takes_masks", False)
     while not over:
         check()
         end.not_after(len(rewards))
-        seen = (observation, memory, np.array([not rewards]))
-        if masked:
-            action, memory = predict_allowed(policy, restarter.action_mask(), *seen)
-        else:
-            action, memory = policy.predict(*seen, deterministic=True)
+        masks: dict[str, Any] = {ACTION_MASKS: restarter.action_mask()} if masked else {}
+        start = np.array([not rewards])
+        action, memory = policy.predict(observation, memory, start, deterministic=True, **masks)
         observation, reward, terminated, truncated, info = restarter.step(np.asarray(action)[()])
         restarter.watcher.stepped(1)
         rewards.append(float(reward))

@@ -159,14 +159,14 @@ class Selection:
         run = self._run
         seeds = episode_seeds(run.configuration.seed, stream, episodes, first)
         with self._playing():
-            policy = algorithms.policy_of(self._model)
+            policy = algorithms.ModelPolicy(self._model)
             evaluation = evaluate_on_all(policy, run.fleet.evaluating, seeds, run.interruption.check)
         run.progress.evaluated(evaluation)
         return evaluation
 
     def _record_again(self, game: tuple[int, Episode]) -> SceneFilm:
         with self._playing():
-            policy, run = algorithms.policy_of(self._model), self._run
+            policy, run = algorithms.ModelPolicy(self._model), self._run
             return record_again(policy, run.fleet.evaluating, game, run.interruption.check)
 
     @contextmanager

@@ -74,7 +74,7 @@ def playing(
         env = SimulatorsVecEnv(fleet.evaluating[:1], configuration.seed)
         trained = algorithms.make_model(begun, env, configuration.seed, configuration.device)
         checkpoint.load_tensors(model, trained)
-        yield Playing(policy=algorithms.policy_of(trained), restarters=fleet.evaluating)
+        yield Playing(policy=algorithms.ModelPolicy(trained), restarters=fleet.evaluating)
 
 
 def measure(

@@ -13,9 +13,9 @@ import gymnasium
 import numpy as np
 from stable_baselines3.common.base_class import BaseAlgorithm
 
-from palaestra_trainer.algorithms import entry_of, predict_allowed, takes_masks
+from palaestra_trainer.algorithms import entry_of, takes_masks
 from palaestra_trainer.environments.make import keywords, make_environment
-from palaestra_trainer.environments.masks import masks_in
+from palaestra_trainer.environments.masks import ACTION_MASKS, masks_in
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.job.configuration import DEFAULT_ROBOT, Configuration, Environment, load
 from palaestra_trainer.job.run_directory import RunDirectory
@@ -98,24 +98,27 @@ class TrainedPolicy:
             ValueError: masks are missing or wrong for a policy that needs masks, or were given to another
                 policy.
         """
-        seen = (self._seen(observation), state, episode_start)
-        if self.takes_masks:
-            if action_masks is None:
-                raise ValueError(
-                    "action_masks: the policy chooses only among allowed actions; pass "
-                    'env.get_wrapper_attr("action_masks")(), or numpy.ones to allow all'
-                )
-            try:
-                masks = masks_in(action_masks, self.model.action_space)
-            except ValueError as error:
-                raise ValueError(f"action_masks: {error}; pass the masks of the environment") from error
-            return predict_allowed(self.model, masks, *seen, deterministic=deterministic)
-        if action_masks is not None:
+        masks = self._masks(action_masks)
+        return self.model.predict(self._seen(observation), state, episode_start, deterministic, **masks)
+
+    def _masks(self, given: Any) -> dict[str, Any]:
+        """Return the masks as a keyword argument of the model's `predict`; empty if the model takes none."""
+        if not self.takes_masks:
+            if given is None:
+                return {}
             raise ValueError(
                 f"action_masks: {type(self.model).__name__} chooses among all actions; leave them out, or "
                 "train with MaskablePPO"
             )
-        return self.model.predict(*seen, deterministic)
+        if given is None:
+            raise ValueError(
+                "action_masks: the policy chooses only among allowed actions; pass "
+                'env.get_wrapper_attr("action_masks")(), or numpy.ones to allow all'
+            )
+        try:
+            return {ACTION_MASKS: masks_in(given, self.model.action_space)}
+        except ValueError as error:
+            raise ValueError(f"action_masks: {error}; pass the masks of the environment") from error
 
     def _seen(self, observation: Any) -> Any:
         if isinstance(observation, Mapping):
