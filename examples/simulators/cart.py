@@ -72,7 +72,11 @@ class ApproachEnv(gymnasium.Env[np.ndarray, int]):
         return self.seen(), -off_m, False, over, {"is_success": over and off_m < TOLERANCE_M}
 
     def seen(self) -> np.ndarray:
-        """Return the distance from the place to stop, in half meters, and the heading in radians."""
+        """Return the observation.
+
+        The first number is the distance to the place where the robot must stop, in half meters. It is
+        negative if the robot is too near the wall. The second number is the robot's heading in radians.
+        """
         off = (float(self.robot.distances()[0]) - NEAR_M) / 0.5
         return np.clip([off, self.robot.pose().heading_rad], -1.0, 1.0).astype(np.float32)
 

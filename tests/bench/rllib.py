@@ -23,7 +23,10 @@ VERSION = "import ray; print(ray.__version__)"
 
 
 def measure(scale=1.0, python=None):
-    """Return the seconds of a start, of recoveries, and of the example with RLlib's DQN."""
+    """Return the times of RLlib's DQN in seconds: a start, recoveries, and a whole run of move-to-target.
+
+    `program_ended` counts the recoveries in which the program ended and was started again.
+    """
     began = time.monotonic()
     with tempfile.TemporaryDirectory() as folder, Program(Path(folder), MODULE, python) as training:
         wait_for_steps(training, 1)
@@ -51,7 +54,7 @@ def recovered(training):
 
 
 def whole_run(scale, python):
-    """Return the seconds of the example, with evaluations and confirmation."""
+    """Return the seconds of a run of move-to-target, with evaluations and confirmation."""
     with tempfile.TemporaryDirectory() as folder:
         spec = Path(folder) / "spec.json"
         spec.write_text(json.dumps(plain.job(scale)["spec"]))

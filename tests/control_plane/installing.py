@@ -1,4 +1,7 @@
-"""Install Palaestra on a control plane without nodes: all objects of install.yaml except the Deployment."""
+"""Install Palaestra on a control plane without nodes.
+
+All objects of install.yaml are created, except the Deployment and the CustomResourceDefinition.
+"""
 
 from palaestra.cluster import Api, Resource, connect
 from tests.chart.installation import installed
@@ -12,7 +15,7 @@ ELSEWHERE = {"Deployment", "CustomResourceDefinition"}  # tests define the kinds
 
 
 def install(plane: ControlPlane) -> Api:
-    """Create all objects of the installation, and return an administrator's client."""
+    """Create the objects, and return an administrator's client when the API server serves TrainingJobs."""
     api = connect(str(plane.kubeconfig))
     for obj in installed():
         kind = obj["kind"]

@@ -106,7 +106,7 @@ def test_rossrv_and_rosservice_read_the_types_of_a_simulator(place, terminal, tm
 
 @pytest.mark.usefixtures("simulator")
 def test_rostopic_echo_prints_a_message_of_a_simulator(terminal):
-    """The test steps repeatedly, because no output shows when rostopic has subscribed."""
+    """The simulator is stepped until rostopic ends, because no output shows when rostopic has subscribed."""
     answer(terminal("ros-package-path", "the-tools"))
     listening = terminal("ros-package-path", "the-topic")
 
