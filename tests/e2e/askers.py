@@ -17,7 +17,7 @@ CONNECT = """
 import socket, sys
 try:
     socket.create_connection((sys.argv[1], int(sys.argv[2])), timeout=float(sys.argv[3])).close()
-except (ConnectionRefusedError, TimeoutError):
+except OSError:
     print("closed")
 else:
     print("open")

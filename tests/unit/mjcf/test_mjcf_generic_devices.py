@@ -182,11 +182,15 @@ def test_a_force_about_an_axis_of_a_ball_joint_is_a_motor(load):
     """The gear of such an actuator is a vector, whose first number may be 0."""
     turn = '<motor name="turn" joint="swivel" gear="0 2 0"/>'
     ball = '<body pos="0 0 3"><joint name="swivel" type="ball"/><geom size="0.1" mass="1"/></body>'
-    motor = load(turn, "", ("</worldbody>", f"{ball}</worldbody>")).robots[0].motors["turn"]
+    simulation = load(turn, "", ("</worldbody>", f"{ball}</worldbody>"))
+    motor = simulation.robots[0].motors["turn"]
 
     motor.set_effort(5.0)
+    simulation.step(10)
 
     assert motor.control[1] == 0.5
+    assert motor.feedback_nm == pytest.approx(5.0)
+    assert simulation._model.data.ctrl.tolist() == [2.5]
 
 
 def test_the_body_of_an_orientation_servo_is_the_robot(load):

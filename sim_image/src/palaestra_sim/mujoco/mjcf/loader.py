@@ -53,7 +53,7 @@ def load(
     model = Model(compiled, _keyframe(compiled, description))
     basic_step_ms = _basic_step_ms(compiled, description)
     body = body_of(compiled)
-    if compiled.nactuator == 0 or body is None:
+    if compiled.nu == 0 or body is None:
         fact = f"the model has no {'body' if body is None else 'actuator'}, so a trainer cannot move anything"
         raise description.error("", "", fact, "add a body with a joint, and an actuator for it")
     equipment = equip(model, description, leave_out)
