@@ -193,6 +193,12 @@ def test_a_force_about_an_axis_of_a_ball_joint_is_a_motor(load):
     assert simulation._model.data.ctrl.tolist() == [2.5]
 
 
+def test_a_model_whose_only_actuator_has_no_control_is_refused(load):
+    """A trainer could not move anything in such a world."""
+    with pytest.raises(WorldError, match="the model has no actuator"):
+        load(SPIN.replace("/>", ' input="none"/>'))
+
+
 def test_the_body_of_an_orientation_servo_is_the_robot(load):
     """The first actuator decides which body of the top level is the robot."""
     assert load(FACE).robots[0].parts.place.translation == (1.0, 1.0, 0.5)
