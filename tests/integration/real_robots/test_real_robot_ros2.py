@@ -15,7 +15,7 @@ import pytest
 
 from palaestra_trainer.bags.reader import read_bag
 from tests import ros2
-from tests.mock_robots import ARRIVED_M, DEADLINE_S, ended, started
+from tests.mock_robots import ARRIVED_M, DEADLINE_S, ended, settled, started
 from tests.packages import write_package, write_seeing_package
 from tests.pages import blocks
 from tests.waiting import TooLate, eventually
@@ -108,6 +108,14 @@ def running():
     ended(process, client)
 
 
+@pytest.fixture(scope="module")
+def in_real_time():
+    """Yield a client of a mock robot whose clock is that of this machine."""
+    process, client = started("--drift=0")
+    yield client
+    ended(process, client)
+
+
 @pytest.fixture(scope="module", autouse=True)
 def lonely():
     """Yield a program that drives where no driver is; it waits for one while the other tests run."""
@@ -182,14 +190,18 @@ def test_the_policy_node_drives_to_goals_in_the_time_of_clock(mock, package, tmp
     assert topics["/palaestra/cmd_vel"][-1].content["linear"]["x"] == 0.0
 
 
-def test_a_policy_that_sees_acts_on_published_images(mock, tmp_path):
-    """The camera's pictures have another size and order of colors than the policy's, and another topic."""
+def test_a_policy_that_sees_acts_on_published_images(in_real_time, tmp_path):
+    """The camera's pictures have another size and order of colors than the policy's, and another topic.
+
+    The robot moves in real time, because the age of a picture counts as many times as its clock is faster.
+    """
+    mock = settled(in_real_time)
     package, bag = write_seeing_package(tmp_path / "package"), tmp_path / "node.mcap"
     mock.send("/mock/place", [-1.3, 0.3, 0.2])
     front = ("--ros-args", "-r", "image_raw:=/front/image", "--")
     own = ("--", "--record", bag, "--topic", "image_raw=/front/image")
     with (
-        driver(mock, "/robot1", "--clock", "--camera", *front) as robot,
+        driver(mock, "/robot1", "--clock", "--camera", *front, speed=1.0) as robot,
         node(package, "in-a-simulation", *own) as (program, log),
     ):
         send(robot, "odom", of_odometry(mock, 0.0, 0.0))
@@ -210,21 +222,19 @@ def redness(image):
     return (pixels[:, 0] - pixels[:, 1]).mean()
 
 
-def test_the_policy_node_is_quiet_without_a_goal_and_opens_no_network(package):
+def test_the_policy_node_is_quiet_without_a_goal_and_opens_no_network(in_real_time, package):
     """Without a goal, other nodes may drive the robot. Packets of tests must not leave this machine."""
-    process, client = started("--drift=0")
-    try:
-        with driver(client, "/", speed=1.0) as robot, node(package, "policy-node") as (program, log):
-            assert client.get("/mock/truth")["commands"] == 0
-            send(robot, "odom", of_odometry(client, 0.3, 0.0))
-            wait_for(log, "reached after")
-            assert 0.05 < client.get("/mock/truth")["x"] < 0.3
-            assert network_sockets(program.pid) == []
-            program.send_signal(signal.SIGTERM)
-            assert program.wait(DEADLINE_S) == 0
-            assert client.get("/mock/truth")["vx"] == 0.0
-    finally:
-        ended(process, client)
+    mock = settled(in_real_time)
+    commands = mock.get("/mock/truth")["commands"]
+    with driver(mock, "/", speed=1.0) as robot, node(package, "policy-node") as (program, log):
+        assert mock.get("/mock/truth")["commands"] == commands
+        send(robot, "odom", of_odometry(mock, 0.3, 0.0))
+        wait_for(log, "reached after")
+        assert 0.05 < mock.get("/mock/truth")["x"] < 0.3
+        assert network_sockets(program.pid) == []
+        program.send_signal(signal.SIGTERM)
+        assert program.wait(DEADLINE_S) == 0
+        assert mock.get("/mock/truth")["vx"] == 0.0
 
 
 def network_sockets(pid):
