@@ -90,7 +90,7 @@ format: setup ## rewrite the sources in the common format
 bench: setup test-packages ## measure speed and memory against the project's limits; prints JSON
 	@$(BIN)/python -m tests.bench
 
-PEERS := clients collection plain startup recoveries goodput
+PEERS := clients collection plain startup recoveries goodput operators
 RLLIB :=
 peers: setup test-packages ## measure the figures of docs/explain/peers.md again; RLLIB=PYTHON: those of RLlib too
 	@$(BIN)/python -m tests.bench --record docs/explain/peers.json $(PEERS) $(if $(RLLIB),--rllib $(RLLIB) rllib)

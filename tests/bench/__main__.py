@@ -17,6 +17,7 @@ from tests.bench import (
     batch,
     clients,
     collection,
+    foreign_operators,
     goodput,
     hostile,
     learning,
@@ -53,6 +54,7 @@ PARTS = {
     "memory": runs.measure_memory,
     "operator": operator.measure,
     "operators": operators.measure,
+    "operators_many": operators.measure_many,
     "planning": operator_planning.measure,
     "hostile": hostile.measure,
     "newcomer": newcomer.measure,
@@ -93,8 +95,16 @@ def main():
         sys.stdout.write(json.dumps(line) + "\n")
         sys.stdout.flush()
         if asked.record:
-            others = rllib.versions(asked.rllib) if name == "rllib" else {}
-            recording.record(asked.record, line, (before, recording.load()), others)
+            recording.record(
+                asked.record, line, (before, recording.load()), other_versions(name, asked.rllib)
+            )
+
+
+def other_versions(part, rllib_python):
+    """Return the versions of the programs of other projects in a part, by name."""
+    if part == "rllib":
+        return rllib.versions(rllib_python)
+    return foreign_operators.versions() if part == "operators" else {}
 
 
 if __name__ == "__main__":

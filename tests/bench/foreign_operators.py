@@ -99,6 +99,11 @@ def programs(*, build):
     return Path(done.stdout.strip().splitlines()[-1])
 
 
+def versions():
+    """Return the version of each operator by the name of its program."""
+    return {each.program: _of_module(each, "Version") for each in (JOB_SET, TRAINER)}
+
+
 @contextmanager
 def running_foreign(plane, operators):
     """Define the kinds of operators and run their programs until the block ends; yield their process IDs.
@@ -160,11 +165,14 @@ def _object(resource, namespace, name, spec):
 
 def _source(operator):
     """Return the folder of a module's files; the build of the program downloaded it."""
+    return Path(_of_module(operator, "Dir"))
+
+
+def _of_module(operator, field):
+    """Return what Go knows about an operator's module."""
     folder = SCRIPTS / "programs" / operator.program
-    command = ["go", "list", "-mod=readonly", "-m", "-f", "{{.Dir}}", operator.module]
-    return Path(
-        subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True).stdout.strip()
-    )
+    command = ["go", "list", "-mod=readonly", "-m", "-f", f"{{{{.{field}}}}}", operator.module]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True).stdout.strip()
 
 
 def _define(plane, folder):

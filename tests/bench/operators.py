@@ -28,6 +28,7 @@ from tests.integration.operator.installed import READS, USER, operator
 from tests.waiting import eventually
 
 JOBS = 1000
+MANY = 10_000
 NAMESPACE = "crowd"
 SILENCE_S, DEADLINE_S = 10, 1200
 WEBHOOK_CALLS = r"^apiserver_admission_webhook_request_total\{.*\} (\S+)$"
@@ -54,6 +55,12 @@ def measure(scale=1.0):
             ("train_jobs", create_train_jobs, lambda plane: running_foreign(plane, (JOB_SET, TRAINER))),
         )
     }
+
+
+def measure_many(scale=1.0):
+    """Return the figures of ten times as many TrainingJobs."""
+    count = scaled(MANY, scale)
+    return {"jobs": count} | _figures(crowd.create_training_jobs, _our_operator, count)
 
 
 @contextmanager

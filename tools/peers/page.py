@@ -11,11 +11,13 @@ from pathlib import Path
 from typing import Any
 
 from palaestra.api.generated_sections import between_marks
+from tools.peers.operators import CHAPTER as OPERATORS
 from tools.peers.rllib import chapter as rllib_chapter
 from tools.peers.rows import CHAPTERS, Chapter, Row
 
 PAGE = "docs/explain/peers.md"
 RECORDED = "docs/explain/peers.json"
+MEASURED = (*CHAPTERS, OPERATORS)  # all chapters except the one that also needs figures of other parts
 COMMAND = f"python -m tests.bench --record {RECORDED}"
 BEGIN = "<!-- generated: measured comparisons -->"
 OPTIONS = {"rllib": "--rllib PYTHON "}
@@ -36,7 +38,7 @@ def page(text: str, root: Path) -> str:
 
 def chapters(recorded: Recorded) -> str:
     """Return a chapter for each part; a part that is not recorded has a chapter without figures."""
-    wanted = [*CHAPTERS, rllib_chapter(recorded)]
+    wanted = [*MEASURED, rllib_chapter(recorded)]
     return "\n".join(_chapter(each, recorded.get(each.part)) for each in wanted)
 
 

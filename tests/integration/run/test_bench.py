@@ -16,8 +16,8 @@ from tests.bench.__main__ import PARTS
 from tests.control_plane.programs import NoPrograms
 from tests.local_run import ROOT
 from tests.soak import chaos
-from tools.peers.page import chapters
-from tools.peers.rows import CHAPTERS
+from tools.peers.operators import CHAPTER as OPERATORS
+from tools.peers.page import MEASURED, chapters
 
 SMALL = (
     "batch",
@@ -33,12 +33,12 @@ SMALL = (
     "webots",
 )
 OF_PEERS = ("goodput", "recoveries", "startup")
-OF_A_CLUSTER = ("hostile", "operators")
+OF_A_CLUSTER = ("hostile", "operators", "operators_many")
 # These parts run the examples in MEASURED of test_run_from_file_to_policy.py.
 OF_WHOLE_RUNS = ("learning", "navigating", "plain", "seeing", "sparse", "transfer")
 ELSEWHERE = ("memory", "operator", "recovery", "shutdown")
 SKIPPED = "rllib"  # RLlib is not installed with this project
-OF_PAGE = {chapter.part for chapter in CHAPTERS}  # the parts whose figures docs/explain/peers.md shows
+OF_PAGE = {chapter.part for chapter in MEASURED}  # the parts whose figures docs/explain/peers.md shows
 DEADLINE_S = 800  # the work takes a minute or two on an idle machine
 
 
@@ -124,8 +124,11 @@ def test_one_job_of_each_operator_is_measured():
         pytest.skip(str(missing))
 
     found = operators.measure(0.0)
+    many = operators.measure_many(0.0)
 
-    assert found["jobs"] == 1
+    assert found["jobs"] == many["jobs"] == 1
+    assert many.keys() - {"jobs"} == found["training_jobs"].keys()
+    assert all(figure(found) >= 0 for row in OPERATORS.rows(found) for figure in (row.ours, row.theirs))
     assert found["train_jobs"]["programs"]["kubeflow-trainer"]["writes_a_job"] > 0
     assert all(isinstance(number, int | float) for number in numbers(found))
 
