@@ -37,6 +37,18 @@ def robot(mock):
         each.close()
 
 
+def speeds(robot, mock, twist, periods):
+    """Drive for some periods; return the robot's true speeds at their ends.
+
+    A loaded machine delays readings, and without new readings the robot is held back for a moment.
+    """
+    found = []
+    for _ in range(periods):
+        drive(robot, twist, 1)
+        found.append(mock.get("/mock/truth")["vx"])
+    return found
+
+
 def test_the_real_robot_keeps_the_rules_of_every_robot(robot):
     """An environment uses a simulated and a real robot in the same way."""
     check_robot(robot())
@@ -58,10 +70,7 @@ def test_odometry_is_shifted_to_where_the_person_placed_the_robot(robot, mock):
 
 def test_the_speed_limit_holds_for_the_robot_itself(robot, mock):
     """The policy commands 0.5 m/s, but the robot must not drive faster than the limit of 0.2 m/s."""
-    real = robot(speed_m_s=0.2)
-    drive(real, (0.5, 0.0, 0.0), 6)
-
-    assert mock.get("/mock/truth")["vx"] == pytest.approx(0.2)
+    assert max(speeds(robot(speed_m_s=0.2), mock, (0.5, 0.0, 0.0), 6)) == pytest.approx(0.2)
 
 
 def test_the_robot_stands_after_a_bump_and_says_so(robot, mock):
@@ -99,7 +108,7 @@ def test_a_robot_drives_only_while_the_person_permits_it(robot, mock):
         extra.append(real.advance())
 
     assert sum(extra) >= 4
-    assert mock.get("/mock/truth")["vx"] > 0.0
+    assert max(speeds(real, mock, (0.2, 0.0, 0.0), 6)) > 0.0
 
 
 def test_a_robot_at_its_charger_is_refused(robot, mock):
@@ -150,9 +159,9 @@ def test_a_short_bump_ends_the_episode_too(robot, mock):
 
 def test_the_numbers_of_a_policy_may_be_those_of_numpy(robot, mock):
     """A user's environment may pass numbers of NumPy from an action without a conversion."""
-    drive(robot(), np.array([0.2, 0.0, 0.0], np.float32), 3)
+    found = speeds(robot(), mock, np.array([0.2, 0.0, 0.0], np.float32), 6)
 
-    assert mock.get("/mock/truth")["vx"] == pytest.approx(0.2)
+    assert max(found) == pytest.approx(0.2)
 
 
 def test_an_error_in_the_thread_of_the_commands_reaches_the_program(robot, mock):
