@@ -204,6 +204,17 @@ def test_a_killed_node_is_dead(peer, service):
         get_time(ask=True)
 
 
+def test_a_client_can_wait_until_a_node_ends(peer, service):
+    """After a reload of a world, the old controllers respond for a moment, and then end."""
+    get_time = service("get_time")
+    get_time(ask=True)
+    before = get_time.await_end(0.0)
+    peer.end(peer.node.abandon)
+
+    assert before is False
+    assert get_time.await_end(DEADLINE_S) is True
+
+
 def test_after_a_failure_the_connection_is_made_anew(peer, master, service):
     """A restarted simulator has the same name but another port."""
     get_time = service("get_time")

@@ -121,8 +121,7 @@ def test_a_reload_brings_the_world_back_with_new_handles(own_arena):
     moved = own_arena.robot.pose()
 
     own_arena.robot.close()
-    own_arena.webots.supervisor.reload()
-    own_arena.webots.wait_available()
+    own_arena.webots.reload()
     own_arena.robot.connect()
 
     assert moved.x_m > 0.1

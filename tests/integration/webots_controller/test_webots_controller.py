@@ -1,5 +1,6 @@
 """The controller for Webots: its robots step, pause, reload and end as those of Webots' own controller."""
 
+import contextlib
 import os
 import signal
 from concurrent.futures import ThreadPoolExecutor
@@ -7,7 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from palaestra_trainer.ros import is_served
+from palaestra_trainer.ros import Master, is_served
+from palaestra_trainer.webots.attached import Attached
+from palaestra_trainer.webots.facade import Webots
 from tests.waiting import eventually
 
 DEADLINE_S = 60.0
@@ -94,6 +97,22 @@ def test_a_reload_ends_both_controllers_and_starts_them_again(webots, prefix, as
     for index in range(2):
         eventually(lambda index=index: is_served(f"/{prefix}_{index}/robot/get_device_list"), DEADLINE_S)
     assert ask(1, "robot/get_time", "get_float") == {"value": 0.0}
+
+
+def test_a_facade_that_reloads_connects_only_to_the_new_controllers(webots, prefix):
+    """The old controllers respond until Webots ends them, and one of them may end later than the others.
+
+    A client that connects to an old controller would lose its connection, which counts as a simulator fault.
+    """
+    robots = [f"{prefix}_0", f"{prefix}_1"]
+    webots(world(prefix, True, False), *robots)
+    with contextlib.closing(Webots(robots[0], "world.wbt", launcher=Attached())) as facade:
+        facade.at_start("robots", lambda: None, robots)
+        for _ in range(2):
+            before = [Master("/test").node_uri(f"/{robot}") for robot in robots]
+            facade.reload()
+            after = [Master("/test").node_uri(f"/{robot}") for robot in robots]
+            assert not {*before} & {*after}
 
 
 def test_the_world_goes_on_without_a_controller_that_was_killed(webots, prefix, step):

@@ -99,6 +99,13 @@ class RosService:
         """
         return self._asked().fileno()
 
+    def await_end(self, deadline_s: float) -> bool:
+        """Wait until the node closes the connection, and return whether it did within the deadline.
+
+        No response may be pending. Without a connection, the result is True at once.
+        """
+        return self._wire is None or self._wire.await_end(deadline_s)
+
     def close(self) -> None:
         """Close the connection; the next call opens a new one."""
         if self._wire is not None:

@@ -7,6 +7,7 @@ own timeout would need two system calls.
 from __future__ import annotations
 
 import os
+import select
 import socket
 import struct
 import time
@@ -87,6 +88,15 @@ class TcprosClient:
             self._socket.sendall(data)
         except OSError as error:
             raise self._fault("does not accept requests", error) from error
+
+    def await_end(self, deadline_s: float) -> bool:
+        """Wait until the peer closes the connection, and return whether it did within the deadline.
+
+        No response may be pending.
+        """
+        readable = select.poll()
+        readable.register(self._socket, select.POLLIN)
+        return bool(readable.poll(max(deadline_s, 0.0) * 1000.0))
 
     def receive(self, ahead: int = 0) -> bytes | memoryview:
         """Return the next frame, including `ahead` bytes before its length; valid until the next call.

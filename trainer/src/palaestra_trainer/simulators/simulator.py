@@ -129,8 +129,7 @@ class Simulator:
         Raises:
             SimulatorDead, SimulatorHung, WrongData: the world is not loaded in time.
         """
-        self.webots.supervisor.reload()
-        self.webots.wait_available()
+        self.webots.reload()
         self.unpause()
         self.robot.connect()
 

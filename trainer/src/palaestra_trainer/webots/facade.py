@@ -21,6 +21,7 @@ from palaestra_trainer.errors import (
     TrainerError,
 )
 from palaestra_trainer.ros import RosService
+from palaestra_trainer.webots.attached import Attached
 from palaestra_trainer.webots.facade_registry import FacadeRegistry
 from palaestra_trainer.webots.launcher_names import LauncherName, launcher_named
 from palaestra_trainer.webots.launching.launcher import Launcher, Place
@@ -35,6 +36,7 @@ Result = TypeVar("Result")
 _PROBE_S = 1.0
 _POLL_S = 0.02
 _STOP_DEADLINE_S = 5.0  # the longest time that a simulator may take to quit
+_ENDS_S = 5.0  # the longest time that controllers may take to end; Webots terminates them after one second
 _CONTROLLERS_S = 20.0  # the longest time from the supervisor's first response until all robots respond
 
 
@@ -85,7 +87,7 @@ class Webots:
         self.supervisor = Supervisor(supervisor_node_name, self.observer)
         self._launcher = chosen
         # The probe has its own connection with a shorter deadline, because it must detect a hang early.
-        self._probe = RosService(f"/{supervisor_node_name}/robot/get_time", "webots_ros/get_float", _PROBE_S)
+        self._probe = RosService(*_time_of(supervisor_node_name), _PROBE_S)
         self._start_deadline_s = start_deadline_s
         # For each `name` of `at_start`: the function, and the robots that must respond before its call.
         self._at_start: dict[str, tuple[Callable[[], None], tuple[str, ...]]] = {}
@@ -131,6 +133,35 @@ class Webots:
         for connect, _ in self._at_start.values():
             connect()
 
+    def reload(self) -> None:
+        """Load the world again, and wait until its new controllers respond.
+
+        All connections of devices must be opened again.
+        In Webots, the old controllers still respond for a moment. So this method waits until they have closed
+        their connections, before it connects to the new ones.
+
+        Raises:
+            SimulatorDead, SimulatorHung: as `wait_available`.
+            WrongData: a controller failed.
+        """
+        with contextlib.ExitStack() as connections:
+            old = [RosService(*_time_of(robot)) for robot in self._controlled()]
+            for clock in old:
+                connections.callback(clock.close)
+                clock(ask=True)
+            self.supervisor.reload()
+            give_up = time.monotonic() + _ENDS_S
+            for clock in old:
+                clock.await_end(give_up - time.monotonic())
+        self._disconnect()
+        give_up = time.monotonic() + self._start_deadline_s
+        while not self.available() and time.monotonic() < give_up:
+            # Nobody watches the process of an attached simulator, so its names may only be gone for a moment.
+            if not isinstance(self._launcher, Attached):
+                self._check_process()
+            time.sleep(_POLL_S)
+        self.wait_available()
+
     def wait_available(self) -> None:
         """Wait until the simulator and the controllers of its robots respond, after a start or a reload.
 
@@ -148,8 +179,7 @@ class Webots:
                 )
             time.sleep(_POLL_S)  # the master has no call that waits for a node
         give_up = time.monotonic() + _CONTROLLERS_S
-        robots = (robot for _, group in self._at_start.values() for robot in group)
-        for robot in dict.fromkeys((self.supervisor_node_name, *robots)):
+        for robot in self._controlled():
             self._await_controller(robot, give_up)
 
     def stop(self) -> None:
@@ -233,6 +263,11 @@ class Webots:
         if self._own is not None:
             self._own.close()
 
+    def _controlled(self) -> tuple[str, ...]:
+        """Return the ROS names of the supervisor and of the robots that are connected at a start."""
+        robots = (robot for _, group in self._at_start.values() for robot in group)
+        return tuple(dict.fromkeys((self.supervisor_node_name, *robots)))
+
     def _await_controller(self, robot: str, give_up: float) -> None:
         """Wait until a robot returns its devices, whose service a controller registers last.
 
@@ -243,7 +278,8 @@ class Webots:
             try:
                 observer.devices()
             except SimulatorDead:
-                self._check_process()
+                if not self.available():
+                    self._check_process()
                 if time.monotonic() > give_up:
                     raise
             else:
@@ -271,6 +307,11 @@ class Webots:
         self._probe.close()
         self.observer.close()
         self.supervisor.close()
+
+
+def _time_of(robot: str) -> tuple[str, str]:
+    """Return name and type of the service with the simulated time, which every controller has."""
+    return f"/{robot}/robot/get_time", "webots_ros/get_float"
 
 
 open_facades: FacadeRegistry[Webots] = FacadeRegistry()

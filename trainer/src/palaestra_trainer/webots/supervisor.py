@@ -56,7 +56,10 @@ class Supervisor(SupervisedView):
         self._services.ask("supervisor/simulation_reset_physics", "get_bool")
 
     def reload(self) -> None:
-        """Reload the world; controllers restart, so all connections must be opened again."""
+        """Reload the world; controllers restart, so all connections must be opened again.
+
+        The old controllers may respond for a moment; `Webots.reload` waits until the new ones respond.
+        """
         # The response may be lost, because the controller that sends it restarts too.
         with contextlib.suppress(SimulatorDead):
             self._services.ask("supervisor/world_reload", "get_bool")
