@@ -20,7 +20,9 @@ DEADLINE_S = 30.0  # the waits take moments on an idle machine
 # From a pole's axis, in m: an episode ends at 0.45 m by odometry, which drifts. How far the robot then rolls
 # towards the pole depends on the load, because the mock's clock is faster than real time.
 ARRIVED_M = 0.6
-SPEED = 5.0  # the speed of a mock robot's clock; at higher speeds, the machine's scheduler affects the tests
+SPEED = (
+    2.0  # the speed of a mock robot's clock; at higher speeds, a delay of this machine is a lost connection
+)
 
 
 class Client:

@@ -19,7 +19,7 @@ sys.stdout.write(robot.stdout.readline().decode())
 @pytest.fixture(scope="module")
 def running():
     """Yield a client of a robot with a perfect odometry, which all tests of this file share."""
-    process, client = started("--speed=5", "--drift=0")
+    process, client = started("--speed=2", "--drift=0")
     yield client
     ended(process, client)
 

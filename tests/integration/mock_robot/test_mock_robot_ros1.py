@@ -17,7 +17,7 @@ FORWARD = {"linear": {"x": 0.2}}
 def mock(master):
     """Yield the client of a robot whose driver has its default limits."""
     del master
-    process, client = started("--ros1", "--speed=5", "--drift=0", "--start=0,0,0")
+    process, client = started("--ros1", "--speed=2", "--drift=0", "--start=0,0,0")
     yield client
     process.terminate()
     assert process.wait(DEADLINE_S) == 0

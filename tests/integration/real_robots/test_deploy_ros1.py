@@ -9,7 +9,7 @@ from tests.mock_robots import DEADLINE_S, ended, started
 from tests.packages import write_package
 
 PROGRAM = (sys.executable, "-m", "palaestra_trainer.cli.deploy")
-SPEED = 10.0
+SPEED = 2.0
 
 
 @pytest.fixture

@@ -21,9 +21,9 @@ from tests import cut_network
 from tests.mock_robots import DEADLINE_S, drive, ended, started
 from tests.waiting import eventually
 
-SPEED = 10.0
+SPEED = 2.0
 OPTIONS = ("--ros1", "--drift=0", f"--speed={SPEED:g}")
-PACE_S = 0.005  # short, because 1 ms of this machine is 10 ms of the robot's time
+PACE_S = 0.005  # short, because the robot's time passes faster than that of this machine
 
 
 @contextlib.contextmanager
@@ -58,11 +58,18 @@ def mock(running):
 
 
 @pytest.fixture(scope="module")
-def slow(master):
+def running_slowly(master):
     """Yield the client of a robot whose driver has the default limits, in the namespace /lab/slow."""
     del master
     with mock_in("lab/slow") as client:
         yield client
+
+
+@pytest.fixture
+def slow(running_slowly):
+    """Return the client of the robot in /lab/slow, which stands."""
+    eventually(lambda: stands(running_slowly), pace_s=PACE_S)
+    return running_slowly
 
 
 @pytest.fixture

@@ -22,7 +22,7 @@ from tests.waiting import TooLate, eventually
 
 HERE = Path(__file__).parent
 PAGE = (HERE.parents[2] / "docs/howto/ros2.md").read_text()
-SPEED = 4.0
+SPEED = 2.0
 RADIUS_M = 0.2286
 
 

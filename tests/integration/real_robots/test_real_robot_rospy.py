@@ -82,7 +82,7 @@ def test_programs_of_rospy_drive_the_mock_and_see_its_sensors(program):
     """A person tries a program of a laboratory with the mock."""
     program(TELEOPERATION, "ours")
     viewer = program(SENSORS, "ours")
-    process, mock = started("--ros1", "--speed=5", "--start=1.5,0,0")
+    process, mock = started("--ros1", "--speed=2", "--start=1.5,0,0")
     try:
         speed = eventually(lambda: mock.get("/mock/truth")["vx"], pace_s=0.01)
         lines = {viewer.stdout.readline()}
