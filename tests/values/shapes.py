@@ -30,6 +30,11 @@ _TRIANGLES = [
 _POINTS = ", ".join("{:g} {:g} {:g}".format(*corner) for corner in _CORNERS)
 _INDICES = ", ".join(f"{' '.join(map(str, face))} -1" for face in _FACES)
 ELL = f"IndexedFaceSet {{ coord Coordinate {{ point [ {_POINTS} ] }} coordIndex [ {_INDICES} ] }}"
+_OBJ = [
+    *("v {:g} {:g} {:g}".format(*corner) for corner in _CORNERS),
+    *(f"f {' '.join(str(at + 1) for at in face)}" for face in _FACES),
+]
+FILES = {"ell.obj": "\n".join(_OBJ).encode()}  # the mesh files that nodes name, by their addresses
 # Where the spine points along z, Webots rotates the cross-section by half a turn. Clockwise sections face
 # out.
 _SECTION = ", ".join(f"{-x:g} {-y:g}" for x, y in [*reversed(_OUTLINE), _OUTLINE[-1]])
@@ -170,6 +175,13 @@ SHAPES = (
         _TOWARD_ELL,
         volume_m3=2.0 * 0.5 + 1.5 * 0.5,
         name="Extrusion",
+    ),
+    Shape(
+        "Mesh",
+        'Mesh { url "ell.obj" }',
+        partial(rays.triangles, corners=_TRIANGLES),
+        _TOWARD_ELL,
+        volume_m3=2.0 * 0.5 + 1.5 * 0.5,
     ),
     Shape(
         "IndexedFaceSet",

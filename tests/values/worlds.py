@@ -7,9 +7,11 @@ from dataclasses import dataclass
 
 from palaestra_sim.mujoco.physics import MujocoPhysics
 from palaestra_sim.scene.mode import Mode
+from palaestra_sim.scene.nodes.instantiate import Descriptions
 from palaestra_sim.scene.simulation import Simulation
 from palaestra_sim.scene.tree.field_types import FieldType
 from palaestra_sim.stub.physics import StubPhysics
+from palaestra_sim.world import parse
 from tests.values.frames import AXES, Frame, axis_angle
 
 PHYSICS = {"stub": StubPhysics, "mujoco": MujocoPhysics}
@@ -58,10 +60,12 @@ WorldInfo {{ basicTimeStep {STEP_MS} coordinateSystem "{self.system}" {info} }}
 {nodes}
 """
 
-    def load(self, nodes, info=""):
-        """Return the simulation of a world with these nodes."""
-        world = self.text(nodes, info).encode()
-        return Simulation.load(world, PHYSICS[self.physics](), "values", Mode.FAST)
+    def load(self, nodes, info="", files=None):
+        """Return the simulation of a world with these nodes; `files` are the mesh files, by address."""
+        world = parse(self.text(nodes, info).encode(), "values")
+        read = None if files is None else lambda _, address: files[address]
+        descriptions = Descriptions(read=read)
+        return Simulation.of(world, PHYSICS[self.physics](), "values", Mode.FAST, descriptions)
 
 
 SETTINGS = [Setting(physics, system) for physics in PHYSICS for system in AXES]

@@ -10,7 +10,7 @@ from palaestra_sim.scene.devices import DEVICES
 from palaestra_sim.scene.devices.distance_sensor import DistanceSensorType
 from palaestra_sim.scene.tree.field_types import field_kinds
 from palaestra_sim.scene.visuals import drawn
-from tests.values.shapes import SHAPES
+from tests.values.shapes import FILES, SHAPES
 from tests.values.worlds import PHYSICS, Setting
 
 # Nodes that have no reading and move nothing, so that no formula gives a value for them.
@@ -64,7 +64,7 @@ def nodes(geometry):
 def accepted(physics, geometry):
     """Return whether a simulator accepts a geometry in a boundingObject."""
     try:
-        Setting(physics).load(f"Solid {{ boundingObject {nodes(geometry)} }}")
+        Setting(physics).load(f"Solid {{ boundingObject {nodes(geometry)} }}", files=FILES)
     except WorldError:
         return False
     return True
@@ -109,7 +109,8 @@ def test_a_shape_that_a_bounding_object_may_have_has_rows(physics):
 def test_a_shape_that_is_visible_has_rows():
     """Infra-red rays, lidars and cameras see every visible shape, so each shape needs its own values."""
     shapes = " ".join(f"Shape {{ geometry {nodes(geometry)} }}" for geometry in GEOMETRIES)
-    simulation = Setting("stub").load(f"Solid {{ children [ {shapes} ] }}")
-    seen = {thing.node.nodes("geometry")[0].type_name for thing in drawn(simulation.tree.root)}
+    simulation = Setting("stub").load(f"Solid {{ children [ {shapes} ] }}", files=FILES)
+    things = drawn(simulation.tree.root, simulation.tree.mesh_files)
+    seen = {thing.node.nodes("geometry")[0].type_name for thing in things}
 
     assert seen == {shape.type for shape in SHAPES}

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.values.frames import Frame, frame, quaternion, turn
-from tests.values.shapes import SHAPES
+from tests.values.shapes import FILES, SHAPES
 from tests.values.standing import MOUNT, POSES
 from tests.values.worlds import SETTINGS, STEP_MS, Setting, cached, device, move, robot
 
@@ -149,7 +149,7 @@ def test_a_shape_has_the_mass_of_its_volume(shape):
     Its convex hull would be heavier.
     """
     base = "translation 0 0 1 boundingObject Box { size 0.1 0.1 0.1 }"
-    simulation = Setting("mujoco").load(robot(SLEDGE.format(shape.node), base))
+    simulation = Setting("mujoco").load(robot(SLEDGE.format(shape.node), base), files=FILES)
     device(simulation, "push").set_effort(100.0)
     simulation.step(50 * STEP_MS)
 

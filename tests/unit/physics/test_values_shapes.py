@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.values.frames import frame, looking
-from tests.values.shapes import SHAPES
+from tests.values.shapes import FILES, SHAPES
 from tests.values.standing import MOUNT
 from tests.values.worlds import SETTINGS, STEP_MS, cached, device, enable, move, robot
 
@@ -39,7 +39,7 @@ def simulation_of(setting, shape, outlined):
         f'Solid {{ {setting.put(place).fields} name "{index}" {look} {outline} }}'
         for index, place in enumerate(places_of(shape, setting))
     )
-    simulation = setting.load(solids + robot(SENSORS.replace("MOUNTED", MOUNT.fields)))
+    simulation = setting.load(solids + robot(SENSORS.replace("MOUNTED", MOUNT.fields)), files=FILES)
     enable(simulation)
     return simulation
 

@@ -297,13 +297,13 @@ def test_the_scale_of_a_stand_in_is_a_field_of_its_own():
     assert obstacles(load_world("Bush { scale 3 }", stand_ins=own)) == [("box", 0.0, 0.0, (3.0, 1.0, 1.0))]
 
 
-def test_a_mesh_as_a_bounding_object_is_refused_by_name_and_can_be_left_out():
-    """The stub rejects the node by its type, without reading the mesh file."""
-    world = 'Solid { boundingObject Mesh { url "gone.dae" } } Solid { boundingObject Box { } }'
-    with pytest.raises(WorldError, match="the stub simulates no Mesh as a boundingObject"):
+def test_terrain_as_a_bounding_object_is_refused_by_name_and_can_be_left_out():
+    """Robots of the stub stand on one level, so terrain would lie under or above them without an effect."""
+    world = "Solid { boundingObject ElevationGrid { } } Solid { boundingObject Box { } }"
+    with pytest.raises(WorldError, match="the stub simulates no ElevationGrid as a boundingObject"):
         load_world(world)
 
-    assert len(load_world(world, leave_out=LeaveOut(types=frozenset({"Mesh"}))).scene.solids) == 1
+    assert len(load_world(world, leave_out=LeaveOut(types=frozenset({"ElevationGrid"}))).scene.solids) == 1
 
 
 def test_a_world_in_a_project_finds_its_protos(ros, tmp_path):

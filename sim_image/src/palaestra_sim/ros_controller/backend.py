@@ -6,7 +6,7 @@ this Protocol. Another simulator that implements this Protocol can serve the sam
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
 from palaestra_protocol.scene import SceneState, VisibleScene
@@ -110,6 +110,11 @@ class Backend(Protocol):
     @property
     def forces(self) -> bool:
         """Whether the masses and frictions of the world's nodes affect the motion."""
+        ...
+
+    @property
+    def unread_meshes(self) -> Mapping[str, int]:
+        """The number of visible shapes by type that no sensor sees, because their files are not read."""
         ...
 
     @property

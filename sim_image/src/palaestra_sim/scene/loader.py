@@ -49,7 +49,6 @@ class Loader:
             protos={**builtin_protos(), **found.local},
             stand_ins={**solids, **self.stand_ins},
             unusable=found.refused,
+            read=ProjectFiles(world_path, source).read,
         )
-        simulation = Simulation.of(world, self.physics(), world_path.name, mode, descriptions, self.leave_out)
-        simulation.read_textures(ProjectFiles(world_path, source).read)
-        return simulation
+        return Simulation.of(world, self.physics(), world_path.name, mode, descriptions, self.leave_out)

@@ -132,8 +132,9 @@ def _shapes(reading: NodeReader, node: SceneNode, place: Frame, grown: _Grown) -
                 reading.lacks(node, "a Plane that is neither a floor nor a ceiling")
             elif normal > 0.0 and not any(around.type_name == "Robot" for around in node.ancestors()):
                 reading.floors.append((place, local))
-        case "IndexedFaceSet":
-            yield from _mesh(reading, node, place, grown)
+        case "IndexedFaceSet" | "Mesh":
+            triangles = _faces if node.type_name == "IndexedFaceSet" else _of_file
+            yield from triangles(reading, node, place, grown)
         case _:
             yield from _solid(reading, node, place, grown)
 
@@ -166,8 +167,8 @@ def _solid(reading: NodeReader, node: SceneNode, place: Frame, grown: _Grown) ->
     yield Shape(kind=kind, size=size, local=local, place=place, node=node)
 
 
-def _mesh(reading: NodeReader, node: SceneNode, place: Frame, grown: _Grown) -> Iterator[Shape]:
-    """Yield the triangles of a mesh; without faces, the box around its points."""
+def _faces(reading: NodeReader, node: SceneNode, place: Frame, grown: _Grown) -> Iterator[Shape]:
+    """Yield the triangles of an IndexedFaceSet; without faces, the box around its points."""
     points = [number for coordinate in node.nodes("coord") for number in coordinate.numbers("point") or ()]
     if not points or len(points) % 3:
         reading.refuse(node, "an IndexedFaceSet without points", "give it a Coordinate with points")
@@ -179,7 +180,25 @@ def _mesh(reading: NodeReader, node: SceneNode, place: Frame, grown: _Grown) -> 
         x, y, z = (max(it * factor, _LEAST_M) for it, factor in zip(size, grown.scale, strict=True))
         yield Shape(kind="box", size=(x, y, z), local=grown.at(middle), place=place, node=node)
         return
+    yield _centered(mesh, node, place, grown)
+
+
+def _of_file(reading: NodeReader, node: SceneNode, place: Frame, grown: _Grown) -> Iterator[Shape]:
+    """Yield the triangles of a Mesh."""
+    try:
+        mesh = placed(reading.mesh_files.mesh_of(node), grown.scale)
+    except ValueError as error:
+        reading.lacks(node, f"the Mesh of a boundingObject: {error}")
+        return
+    if mesh is None:
+        reading.lacks(node, "the Mesh of a boundingObject: all its triangles have the area 0")
+        return
+    yield _centered(mesh, node, place, grown)
+
+
+def _centered(mesh: Mesh, node: SceneNode, place: Frame, grown: _Grown) -> Shape:
+    """Return the shape of a scaled mesh."""
     middle, size = box_of(mesh.points)
     centered = Mesh(tuple(minus(point, middle) for point in mesh.points), mesh.triangles)
     local = grown.frame.after(Pose(middle))
-    yield Shape(kind="mesh", size=size, local=local, place=place, node=node, mesh=centered)
+    return Shape(kind="mesh", size=size, local=local, place=place, node=node, mesh=centered)

@@ -13,7 +13,7 @@ The same world, commands and seed give the same values, bit for bit. Only steps 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from palaestra_sim.errors import SimError, WorldError
 from palaestra_sim.scene.appearance import Appearance
@@ -32,7 +32,7 @@ from palaestra_sim.scene.reader import SceneContents, read_added, read_scene
 from palaestra_sim.scene.robot import Robot
 from palaestra_sim.scene.saved_states import States, require_joint
 from palaestra_sim.scene.shapes import bounding_shapes
-from palaestra_sim.scene.textures import ReadFile, Textures
+from palaestra_sim.scene.textures import Textures
 from palaestra_sim.scene.tree.fields import NodeField
 from palaestra_sim.scene.tree.scene_tree import SceneTree
 from palaestra_sim.scene.tree.write_rules import require_removable, require_room
@@ -59,7 +59,7 @@ class Simulation:
     def __init__(self, tree: SceneTree, scene: SceneContents, mode: Mode) -> None:
         self.tree = tree
         self.scene = scene
-        self._view = View(tree.root)
+        self._view = View(tree.root, Textures(tree.read), tree.mesh_files)
         self.appearance = Appearance(self._view, lambda: self.robots)
         self.movies = Movies(
             lambda size: view(tree.root, scene.physics, size), scene.physics.film, scene.basic_step_ms
@@ -109,7 +109,8 @@ class Simulation:
             physics: the physics that moves the robots.
             name: the name of the world file, in errors.
             mode: the simulation mode at the start.
-            descriptions: the descriptions of the types that are not base types.
+            descriptions: the descriptions of the types that are not base types, and the files that nodes
+                name.
             leave_out: the nodes that may be left out, if they cannot be simulated.
 
         Raises:
@@ -118,14 +119,15 @@ class Simulation:
         tree = SceneTree(world, name, descriptions)
         return cls(tree, read_scene(tree, physics, leave_out), mode)
 
-    def read_textures(self, read: ReadFile) -> None:
-        """Let infra-red sensors see textures; `read` returns the bytes of a texture's file."""
-        self._view.textures = Textures(read)
-
     @property
     def unread_textures(self) -> int:
         """The number of visible shapes with a texture that infra-red sensors do not see."""
         return self._view.unread_textures()
+
+    @property
+    def unread_meshes(self) -> Mapping[str, int]:
+        """The number of visible shapes by type that no sensor sees, because their files are not read."""
+        return self._view.unread_meshes()
 
     @property
     def left_out(self) -> tuple[WorldError, ...]:

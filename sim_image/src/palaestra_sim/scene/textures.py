@@ -16,9 +16,9 @@ from palaestra_sim.ros_interfaces import UnsimulatedError
 from palaestra_sim.scene import picture_files
 from palaestra_sim.scene.geometry import Vector
 from palaestra_sim.scene.nodes.scene_node import SceneNode
+from palaestra_sim.world.project_files import ReadFile
 from palaestra_sim.world.source import Source
 
-ReadFile = Callable[[Source, str], bytes]
 Coordinates = tuple[float, float]
 # A function that maps a point of a shape to its coordinates in a texture. The box around the shape reaches
 # from -1 to 1 on each axis.

@@ -16,6 +16,7 @@ from typing import Final
 from palaestra_sim.errors import WorldError, refusal
 from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.geometry import AxisAngle, Pose, Vector, from_axis_angle
+from palaestra_sim.scene.mesh_files import MeshFiles
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.old_axes import of_instance, of_old_axes
 
@@ -50,10 +51,12 @@ class NodeReader:
         refused: mistakes that are already known.
         leave_out: the nodes that the user leaves out.
         simulator: the name of the simulator.
+        mesh_files: the mesh files that nodes name.
 
     Attributes:
         leave_out: the nodes that the user leaves out.
         simulator: the name of the simulator, for messages.
+        mesh_files: the mesh files that nodes name.
         left_out: the nodes that were left out, each with its position and the reason.
         world_info: the WorldInfo of the world; None if it is missing.
         system: one letter for the direction of each axis, such as "ENU" for east, north and up.
@@ -67,10 +70,12 @@ class NodeReader:
         refused: Iterable[WorldError] = (),
         leave_out: LeaveOut | None = None,
         simulator: str = "the simulator",
+        mesh_files: MeshFiles | None = None,
     ) -> None:
         self._refused: list[WorldError] = list(refused)
         self.leave_out = leave_out or LeaveOut()
         self.simulator = simulator
+        self.mesh_files = mesh_files or MeshFiles()
         self.left_out: list[WorldError] = []
         self.world_info: SceneNode | None = None
         self.system = "ENU"

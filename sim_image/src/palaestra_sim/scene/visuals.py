@@ -1,6 +1,6 @@
 """Convert the nodes of a world to visible shapes, each with a color and the frame that carries it.
 
-This module reads no textures and no mesh files, so a shape has one color. A stand-in, the placeholder of a
+This module reads no textures, so a shape has one color. A stand-in, the placeholder of a
 PROTO, has the shapes of its boundingObject in the color of its first appearance. The floor of a stand-in does
 not use `wallAppearance`, and the walls do not use `floorAppearance`. A scale stretches a shape along the
 shape's own axes, so right angles stay right angles.
@@ -9,13 +9,16 @@ shape's own axes, so right angles stay right angles.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Final, Literal, NamedTuple
 
 from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.geometry import Pose, Vector, from_axis_angle, triple
 from palaestra_sim.scene.lights import lights_in
+from palaestra_sim.scene.mesh_files import MeshFiles
 from palaestra_sim.scene.meshes import Mesh, cone, elevation_grid, face_set
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.old_axes import standing
@@ -49,6 +52,7 @@ _LOOKS: Final = frozenset(
         "ImageTexture",
         "IndexedFaceSet",
         "Material",
+        "Mesh",
         "PBRAppearance",
         "Plane",
         "Shape",
@@ -56,6 +60,7 @@ _LOOKS: Final = frozenset(
         "TextureTransform",
     )
 )
+_OF_FILES: Final = frozenset(("CadShape", "Mesh"))
 # For each PROTO with a floor, the field with the size of the floor's texture.
 _TILES: Final = {"Floor": "tileSize", "RectangleArena": "floorTileSize"}
 _TILE_M: Final = (0.5, 0.5)  # Source: Floor.proto of Webots
@@ -97,13 +102,21 @@ class Drawn:
     tiles: tuple[float, float] = (1.0, 1.0)
 
 
-def drawn(root: SceneNode) -> Iterator[Drawn]:
-    """Yield the visible shapes of a node and of all nodes inside it, with their current fields and frames."""
-    yield from _inside(root, _Frame())
+def drawn(root: SceneNode, files: MeshFiles | None = None) -> Iterator[Drawn]:
+    """Yield the visible shapes of a node and of all nodes inside it, with their current fields and frames.
+
+    `files` are the mesh files that nodes name; a Mesh whose file cannot be read has no shape.
+    """
+    yield from _inside(root, _Frame(files or MeshFiles()))
 
 
 class View:
     """The visible part of a world, with counts of its changes.
+
+    Args:
+        root: the root of the world.
+        textures: the images of the world's textures; by default no image can be read.
+        mesh_files: the mesh files that nodes name; by default no file can be read.
 
     Attributes:
         root: the root of the world.
@@ -113,9 +126,12 @@ class View:
             does not count.
     """
 
-    def __init__(self, root: SceneNode) -> None:
+    def __init__(
+        self, root: SceneNode, textures: Textures | None = None, mesh_files: MeshFiles | None = None
+    ) -> None:
         self.root = root
-        self.textures = Textures()
+        self.textures = textures or Textures()
+        self._mesh_files = mesh_files or MeshFiles()
         self.changes = 0
         self.moves = 0
         # The number of changes when the lights were collected.
@@ -130,7 +146,7 @@ class View:
 
     def things(self) -> tuple[Drawn, ...]:
         """Return the current visible shapes."""
-        return tuple(drawn(self.root))
+        return tuple(drawn(self.root, self._mesh_files))
 
     def lights(self) -> tuple[SceneNode, ...]:
         """Return the current lights."""
@@ -144,6 +160,20 @@ class View:
         textured = (thing for thing in self.things() if thing.textured)
         return sum(it.look is None or paint(it.look, it.geometry, 1.0) is None for it in textured)
 
+    def unread_meshes(self) -> Mapping[str, int]:
+        """Return the number of shapes, by type, that no sensor sees, because their files are not read."""
+        nodes = list(self.root.descendants())
+        hidden = {inside for node in nodes for inside in node.outlining()}
+        named = (node for node in nodes if node.type_name in _OF_FILES and node not in hidden)
+        return Counter(it.type_name for it in named if it.type_name != "Mesh" or not self._reads(it))
+
+    def _reads(self, node: SceneNode) -> bool:
+        try:
+            self._mesh_files.mesh_of(node)
+        except ValueError:
+            return False
+        return True
+
     def sky(self) -> Vector:
         """Return the color of the background, red, green and blue from 0 to 1."""
         for node in self.root.nodes():
@@ -155,8 +185,12 @@ class View:
 
 
 class _Frame(NamedTuple):
-    """A frame relative to `place`, and the factors by which the frame scales its contents along its axes."""
+    """A frame relative to `place`, and the factors by which the frame scales its contents along its axes.
 
+    `files` are the mesh files of the world.
+    """
+
+    files: MeshFiles
     place: Frame | None = None
     pose: Pose = Pose()
     scale: Vector = (1.0, 1.0, 1.0)
@@ -173,12 +207,12 @@ class _Frame(NamedTuple):
         if place is not None:
             # A scale with equal factors is already contained in `place.scale`.
             x, y, z = scale if len(set(scale)) > 1 else (1.0, 1.0, 1.0)
-            return _Frame(place, Pose(), (place.scale * x, place.scale * y, place.scale * z))
+            return _Frame(self.files, place, Pose(), (place.scale * x, place.scale * y, place.scale * z))
         turned = _numbers(node, "rotation", (0.0, 0.0, 1.0, 0.0))
         pose = self.at(triple(_numbers(node, "translation", (0.0, 0.0, 0.0))))
         x, y, z = (factor * inner for factor, inner in zip(self.scale, scale, strict=True))
         rotation = from_axis_angle((turned[0], turned[1], turned[2], turned[3]))
-        return _Frame(self.place, pose.after(Pose(rotation=rotation)), (x, y, z))
+        return _Frame(self.files, self.place, pose.after(Pose(rotation=rotation)), (x, y, z))
 
 
 def _inside(node: SceneNode, frame: _Frame) -> Iterator[Drawn]:
@@ -244,8 +278,8 @@ class _Look(NamedTuple):
 
 
 def _geometry(node: SceneNode, frame: _Frame, look: _Look, owner: SceneNode) -> Iterator[Drawn]:
-    """Yield the shape of a geometry, or nothing if its numbers are invalid or it is in another file."""
-    solid = _solid(node, frame.pose)
+    """Yield the shape of a geometry, or nothing if its numbers or its file are invalid."""
+    solid = _solid(node, frame)
     if solid is None or not look.color or look.color[3] <= 0.0:
         return
     x, y, z = (length * factor for length, factor in zip(solid.size, frame.scale, strict=True))
@@ -275,8 +309,9 @@ class _Solid(NamedTuple):
     mesh: Mesh | None = None
 
 
-def _solid(node: SceneNode, pose: Pose) -> _Solid | None:
+def _solid(node: SceneNode, frame: _Frame) -> _Solid | None:
     """Return the solid of a geometry in a frame; None if the geometry has no solid."""
+    pose = frame.pose
     diameter = 2.0 * _number(node, "radius", 1.0)
     match node.type_name:
         case "Box":
@@ -293,12 +328,12 @@ def _solid(node: SceneNode, pose: Pose) -> _Solid | None:
             x, y = _numbers(node, "size", (1.0, 1.0))
             below = standing(node, pose).after(Pose((0.0, 0.0, -_SHEET_M / 2.0)))
             return _Solid("box", (x, y, _SHEET_M), below)
-    found = _mesh(node, pose)
+    found = _mesh(node, frame)
     return None if found is None else _Solid("mesh", (1.0, 1.0, 1.0), *found)
 
 
-def _mesh(node: SceneNode, pose: Pose) -> tuple[Pose, Mesh] | None:
-    mesh: Mesh | None = None
+def _mesh(node: SceneNode, frame: _Frame) -> tuple[Pose, Mesh] | None:
+    pose, mesh = frame.pose, None
     match node.type_name:
         case "Cone":
             pose = standing(node, pose)
@@ -308,6 +343,9 @@ def _mesh(node: SceneNode, pose: Pose) -> tuple[Pose, Mesh] | None:
         case "ElevationGrid":
             pose = standing(node, pose)
             mesh = elevation_grid(node)
+        case "Mesh":
+            with suppress(ValueError):  # the report on the world counts meshes that are not read
+                mesh = frame.files.mesh_of(node)
     return None if mesh is None else (pose, mesh)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Final, Protocol
 
 from palaestra_sim.errors import WorldError, refusal
@@ -22,6 +22,8 @@ from palaestra_sim.world.mjcf import is_mjcf
 
 _ROLLS_AND_TURNS: Final = 2
 _MOST_NAMES: Final = 8  # maximum number of device names in one line
+_HULLS: Final = frozenset(("IndexedFaceSet", "Mesh"))
+_SIGHT: Final = frozenset(("Camera", "Lidar", "RangeFinder"))  # these devices see visible shapes
 _OF_BODIES: Final = frozenset(("Accelerometer", "Gyro"))
 
 
@@ -38,6 +40,11 @@ class Described(Protocol):
     @property
     def forces(self) -> bool:
         """Whether the masses and frictions of the world's nodes affect the motion."""
+        ...
+
+    @property
+    def unread_meshes(self) -> Mapping[str, int]:
+        """The number of visible shapes by type that no sensor sees, because their files are not read."""
         ...
 
     @property
@@ -108,19 +115,22 @@ def differences(simulation: Described) -> Iterator[str]:
     devices = [row for robot in robots for row in robot.devices.rows.values()]
     types = Counter(it.type for _, it in devices if isinstance(it, DistanceSensor))
     lidars = sum(kind.node == "Lidar" for kind, _ in devices)
-    outlines = [node for node in simulation.tree.nodes.values() if node.outline]
-    meshes = sum(node.type_name == "IndexedFaceSet" for node in outlines)
+    outlines = [inside for node in simulation.tree.nodes.values() for inside in node.outlining()]
+    meshes = Counter(node.type_name for node in outlines if node.type_name in _HULLS and not node.left_out)
     yield from _not_in_webots(devices)
     yield from _without_effect(simulation)
     if infrared := types[DistanceSensorType.INFRA_RED]:
         yield f"{infrared} infra-red DistanceSensor: rays pass through the robot itself"
         if unread := simulation.unread_textures:
             yield f"{unread} Shape with a texture that infra-red DistanceSensors do not see"
+    if infrared or any(kind.node in _SIGHT for kind, _ in devices):
+        for type_name, count in sorted(simulation.unread_meshes.items()):
+            yield f"{count} {type_name} that no sensor sees: only a Mesh of an STL or OBJ file is seen"
     if lidars:
         yield f"{lidars} Lidar: rays pass through the robot itself"
     yield from _without_physics(it for it in robots if not _of_a_model(it.node))
-    if meshes:
-        yield f"{meshes} IndexedFaceSet as boundingObject: robots touch its convex hull"
+    for type_name, count in sorted(meshes.items()):
+        yield f"{count} {type_name} as boundingObject: robots touch its convex hull"
     rays = (
         beam
         for _, it in devices

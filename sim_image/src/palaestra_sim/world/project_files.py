@@ -9,12 +9,16 @@ from __future__ import annotations
 
 import errno
 import posixpath
+from collections.abc import Callable
 from pathlib import Path
 
 from palaestra_sim.world.bounded_read import read_bounded
 from palaestra_sim.world.paths import is_relative
 from palaestra_sim.world.root import placed, root_of
 from palaestra_sim.world.source import Source
+
+ReadFile = Callable[[Source, str], bytes]
+"""Returns the bytes of the file at an address that a world or a PROTO file names; may raise OSError."""
 
 
 class ProjectFiles:

@@ -6,7 +6,7 @@ The same world and the same commands give the same values, bit for bit, also aft
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Final, Never
 
 from palaestra_sim.errors import WorldError
@@ -59,6 +59,7 @@ class MjcfSimulation:
         self.quit_status: int | None = None
         self.forces = False  # the scene's nodes contain no masses or friction; MuJoCo's model contains both
         self.unread_textures = 0  # textures affect only infra-red sensors, which MJCF does not have
+        self.unread_meshes: Mapping[str, int] = {}  # MuJoCo reads all files of a model
         self.left_out: tuple[WorldError, ...] = tuple(equipment.left_out)
         self.basic_step_ms = basic_step_ms
         self.motion = BodyMotion(model, tree.bodies)

@@ -20,6 +20,7 @@ from palaestra_sim.scene.nodes.scope import Scope, definitions
 from palaestra_sim.scene.nodes.types import is_base_type
 from palaestra_sim.world import Is, Item, Node, Proto, Value, World, builtin_protos
 from palaestra_sim.world.parts import ShapePart
+from palaestra_sim.world.project_files import ReadFile
 from palaestra_sim.world.source import Source
 from palaestra_sim.world.stand_ins import StandIn, expand
 
@@ -36,17 +37,19 @@ MAX_NODES: Final = 250_000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Descriptions:
-    """The definitions of node types that are not base types.
+    """The definitions of node types that are not base types, and the files that nodes name.
 
     Attributes:
         protos: PROTOs, by name.
         stand_ins: simple solids that replace PROTOs, by name; a stand-in overrides a PROTO of its name.
         unusable: the errors of local PROTOs that cannot be expanded, by name.
+        read: returns the bytes of a file that a node names; without it, no file can be read.
     """
 
     protos: Mapping[str, Proto] = field(default_factory=dict)
     stand_ins: Mapping[str, StandIn] = field(default_factory=dict)
     unusable: Mapping[str, WorldError] = field(default_factory=dict)
+    read: ReadFile | None = None
 
 
 class Instantiator:

@@ -115,6 +115,12 @@ class SceneNode:
             yield node
             yield from node.descendants()
 
+    def outlining(self) -> Iterator[SceneNode]:
+        """Yield all nodes in this node's boundingObject."""
+        for outline in self.nodes("boundingObject"):
+            yield outline
+            yield from outline.descendants()
+
     def ancestors(self) -> Iterator[SceneNode]:
         """Yield the nodes that contain this node, from the parent to the root."""
         node = self.parent

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from typing import Final
 
 from palaestra_sim.errors import WorldError, refusal
+from palaestra_sim.scene.mesh_files import MeshFiles
 from palaestra_sim.scene.nodes.instantiate import Descriptions, Instantiator
 from palaestra_sim.scene.nodes.scene_node import FieldContent, SceneNode
 from palaestra_sim.scene.nodes.scope import Scope
@@ -23,7 +24,7 @@ class SceneTree:
     Args:
         world: the parsed world.
         name: the name of the world file, in errors.
-        descriptions: the descriptions of the types that are not base types.
+        descriptions: the descriptions of the types that are not base types, and the files that nodes name.
 
     Attributes:
         source: the bytes of the world.
@@ -31,11 +32,16 @@ class SceneTree:
         root: a Group that has the nodes of the file as its children.
         refused: mistakes in the file because of which a node is missing, such as `USE` of an unknown name.
         ignored: fields that a PROTO does not have, each with its position in the file.
+        read: returns the bytes of a file that a node names; without it, no file can be read.
+        mesh_files: the mesh files that nodes name.
     """
 
     def __init__(self, world: World, name: str = "world", descriptions: Descriptions | None = None) -> None:
         self.source = world.source
-        self._grower = Instantiator(descriptions or Descriptions())
+        descriptions = descriptions or Descriptions()
+        self._grower = Instantiator(descriptions)
+        self.read = descriptions.read
+        self.mesh_files = MeshFiles(descriptions.read)
         self.root = self._grower.root(world, name)
         self.nodes: dict[int, SceneNode] = self._grower.nodes
         self.refused: list[WorldError] = self._grower.refused
