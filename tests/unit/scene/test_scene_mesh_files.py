@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from palaestra_sim.errors import WorldError
-from palaestra_sim.scene.mesh_files import MOST_TRIANGLES, decode
+from palaestra_sim.scene.mesh_files import MOST_BYTES, MOST_TRIANGLES, decode
 from palaestra_sim.scene.mode import Mode
 from palaestra_sim.scene.nodes.instantiate import Descriptions
 from palaestra_sim.scene.simulation import Simulation
@@ -180,6 +180,22 @@ def test_a_file_that_many_nodes_name_is_read_once_and_may_be_turned_inside_out()
     assert read == ["leg.stl"]
     first, second = (shape.mesh.triangles for shape in simulation.scene.solids)
     assert second == tuple((a, c, b) for a, b, c in first)
+
+
+def test_a_wrong_file_is_read_once_and_all_files_together_are_limited():
+    """A picture must not read a wrong file again, and a thousand large files must not take all memory."""
+    read = []
+    shapes = 'Shape { geometry Mesh { url "a.stl" } } ' * 3 + 'Shape { geometry Mesh { url "b.stl" } }'
+    files = {"a.stl": b"x" * 64, "b.stl": bytes(MOST_BYTES)}
+    world = parse(Setting("stub").text(f"Solid {{ children [ {shapes} ] }}").encode(), "my.wbt")
+    descriptions = Descriptions(read=lambda _, address: (read.append(address), files[address])[1])
+    simulation = Simulation.of(world, StubPhysics(), "my.wbt", Mode.FAST, descriptions)
+
+    assert [dict(simulation.unread_meshes) for _ in range(2)] == [{"Mesh": 4}] * 2
+    assert read == ["a.stl", "b.stl"]
+    meshes = [it for it in simulation.tree.root.descendants() if it.type_name == "Mesh"]
+    with pytest.raises(ValueError, match=r"b\.stl and the mesh files before it have more than 64 MiB"):
+        simulation.tree.mesh_files.mesh_of(meshes[-1])
 
 
 def test_the_report_counts_the_meshes_that_no_sensor_sees():

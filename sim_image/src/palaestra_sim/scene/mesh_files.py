@@ -16,8 +16,12 @@ from palaestra_sim.scene.geometry import Vector
 from palaestra_sim.scene.meshes import Corners, Mesh, Triangle, cut
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.world.project_files import ReadFile
+from palaestra_sim.world.source import Source
 
+MOST_BYTES: Final = 64 << 20
+"""Maximum size of all mesh files of a world together."""
 MOST_TRIANGLES: Final = 100_000
+"""Maximum number of triangles of one file."""
 _MOST_CORNERS: Final = 100  # of one face; the time to cut a face grows with the third power of its corners
 _LARGEST_M: Final = 1e5
 _CORNERS: Final = 3
@@ -26,7 +30,7 @@ _BINARY: Final = struct.Struct("<3f3f3f3fH")  # the normal and the three corners
 
 
 class MeshFiles:
-    """The mesh files that the nodes of a world name; each file is read once.
+    """The mesh files that the nodes of a world name; each file is read once, also if it is wrong.
 
     Args:
         read: returns the bytes of a file; without it, no file can be read.
@@ -34,7 +38,9 @@ class MeshFiles:
 
     def __init__(self, read: ReadFile | None = None) -> None:
         self._read = read
-        self._found: dict[tuple[str, str], Mesh] = {}
+        # For each file that was read: its mesh, or None and the reason why it has no mesh.
+        self._found: dict[tuple[str, str], tuple[Mesh | None, str]] = {}
+        self._read_bytes = 0
 
     def mesh_of(self, node: SceneNode) -> Mesh:
         """Return the triangles of a Mesh.
@@ -50,16 +56,27 @@ class MeshFiles:
             raise ValueError(f"{address} cannot be read here")
         key = (node.origin.source.name, address)
         if key not in self._found:
-            try:
-                self._found[key] = decode(self._read(node.origin.source, address), address)
-            except OSError as error:
-                raise ValueError(f"{address}: {error.strerror}") from error
-            except ValueError as error:
-                raise ValueError(f"{address} {error}") from error
-        found = self._found[key]
+            self._found[key] = self._decoded(self._read, node.origin.source, address)
+        found, reason = self._found[key]
+        if found is None:
+            raise ValueError(reason)
         if node.flag("ccw", True):
             return found
         return Mesh(found.points, tuple((a, c, b) for a, b, c in found.triangles))
+
+    def _decoded(self, read: ReadFile, namer: Source, address: str) -> tuple[Mesh | None, str]:
+        """Return the mesh of a file, or None and the reason why it cannot be read."""
+        try:
+            data = read(namer, address)
+        except OSError as error:
+            return None, f"{address}: {error.strerror}"
+        self._read_bytes += len(data)
+        if self._read_bytes > MOST_BYTES:
+            return None, f"{address} and the mesh files before it have more than {MOST_BYTES >> 20} MiB"
+        try:
+            return decode(data, address), ""
+        except ValueError as error:
+            return None, f"{address} {error}"
 
 
 def decode(data: bytes, name: str) -> Mesh:
