@@ -169,7 +169,7 @@ def _source(operator):
 
 
 def _of_module(operator, field):
-    """Return what Go knows about an operator's module."""
+    """Return a field of an operator's Go module, such as Version, as `go list -m` prints it."""
     folder = SCRIPTS / "programs" / operator.program
     command = ["go", "list", "-mod=readonly", "-m", "-f", f"{{{{.{field}}}}}", operator.module]
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True).stdout.strip()

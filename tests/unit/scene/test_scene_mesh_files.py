@@ -157,7 +157,7 @@ def absent(_, address):
     ],
 )
 def test_a_mesh_that_cannot_be_read_is_refused_at_its_line_and_can_be_left_out(physics, address, read, fact):
-    """Without its boundingObject, the Solid would be no obstacle, and nobody would notice."""
+    """Without its boundingObject, robots and rays would pass through the Solid without an error."""
     with pytest.raises(WorldError) as refused:
         loaded(physics, address, read)
 

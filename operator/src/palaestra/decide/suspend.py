@@ -6,7 +6,7 @@ from palaestra.decide.restart_counts import lives
 from palaestra.observe.models import JobView, PodView, ReplicaObserved, Suspended
 
 BY_SPEC = "spec.suspend; set it to false to continue"
-UNKNOWN_CLIENT = "somebody else"  # in a message if the Job has no field manager
+UNKNOWN_CLIENT = "somebody else"  # a message names this client if the Job has no field manager
 
 
 def set_last(seen: JobView) -> bool:

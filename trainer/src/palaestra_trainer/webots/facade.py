@@ -156,7 +156,7 @@ class Webots:
         self._disconnect()
         give_up = time.monotonic() + self._start_deadline_s
         while not self.available() and time.monotonic() < give_up:
-            # Nobody watches the process of an attached simulator, so its names may only be gone for a moment.
+            # `Attached` has no process to check, and its simulator has no ROS names during a reload.
             if not isinstance(self._launcher, Attached):
                 self._check_process()
             time.sleep(_POLL_S)
