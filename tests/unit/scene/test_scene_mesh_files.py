@@ -168,7 +168,10 @@ def test_a_mesh_that_cannot_be_read_is_refused_at_its_line_and_can_be_left_out(p
 
 
 def test_a_file_that_many_nodes_name_is_read_once_and_may_be_turned_inside_out():
-    """A hexapod has the same leg six times. `ccw FALSE` turns the triangles, and not the file."""
+    """A hexapod has the same leg six times. `ccw FALSE` turns the triangles, and not the file.
+
+    Both forms are kept, because each new one would build its bounding-box tree again.
+    """
     read = []
     solid = 'Solid {{ boundingObject Mesh {{ url "leg.stl" ccw {} }} }} '
     solids = solid.format("TRUE") + solid.format("FALSE")
@@ -180,6 +183,8 @@ def test_a_file_that_many_nodes_name_is_read_once_and_may_be_turned_inside_out()
     assert read == ["leg.stl"]
     first, second = (shape.mesh.triangles for shape in simulation.scene.solids)
     assert second == tuple((a, c, b) for a, b, c in first)
+    turned = next(node for node in simulation.tree.root.descendants() if not node.flag("ccw", True))
+    assert simulation.tree.mesh_files.mesh_of(turned) is simulation.tree.mesh_files.mesh_of(turned)
 
 
 def test_a_wrong_file_is_read_once_and_all_files_together_are_limited():

@@ -6,14 +6,13 @@ It does not read Collada files, which have frames, units and axes of their own.
 
 from __future__ import annotations
 
-import math
 import posixpath
 import struct
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Final
 
 from palaestra_sim.scene.geometry import Vector
-from palaestra_sim.scene.meshes import Corners, Mesh, Triangle, cut
+from palaestra_sim.scene.meshes import CORNERS, MOST_M, Corners, Mesh, Triangle, are_lengths, cut
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.world.project_files import ReadFile
 from palaestra_sim.world.source import Source
@@ -23,8 +22,6 @@ MOST_BYTES: Final = 64 << 20
 MOST_TRIANGLES: Final = 100_000
 """Maximum number of triangles of one file."""
 _MOST_CORNERS: Final = 100  # of one face; the time to cut a face grows with the third power of its corners
-_LARGEST_M: Final = 1e5
-_CORNERS: Final = 3
 _HEADER: Final = 80  # bytes of a binary STL file before the number of its triangles
 _BINARY: Final = struct.Struct("<3f3f3f3fH")  # the normal and the three corners of a triangle, and a number
 
@@ -60,9 +57,7 @@ class MeshFiles:
         found, reason = self._found[key]
         if found is None:
             raise ValueError(reason)
-        if node.flag("ccw", True):
-            return found
-        return Mesh(found.points, tuple((a, c, b) for a, b, c in found.triangles))
+        return found if node.flag("ccw", True) else found.turned
 
     def _decoded(self, read: ReadFile, namer: Source, address: str) -> tuple[Mesh | None, str]:
         """Return the mesh of a file, or None and the reason why it cannot be read."""
@@ -103,8 +98,8 @@ def _merged(triangles: Iterable[Corners]) -> Mesh:
         found.append((at.setdefault(a, len(at)), at.setdefault(b, len(at)), at.setdefault(c, len(at))))
     if not found:
         raise ValueError("has no triangle")
-    if not all(math.isfinite(number) and abs(number) <= _LARGEST_M for point in at for number in point):
-        raise ValueError(f"has a corner that is not finite, or farther than {_LARGEST_M:g} m away")
+    if not are_lengths(number for point in at for number in point):
+        raise ValueError(f"has a corner that is not finite, or farther than {MOST_M:g} m away")
     return Mesh(tuple(at), tuple(found))
 
 
@@ -125,7 +120,7 @@ def _of_stl(data: bytes) -> Iterator[Corners]:
     for number, words in _lines(data):
         if words[0] == "vertex":
             corners.append(_point(words[1:], number))
-            if len(corners) == _CORNERS:
+            if len(corners) == CORNERS:
                 yield corners[0], corners[1], corners[2]
                 corners = []
     if corners:
@@ -140,7 +135,7 @@ def _of_obj(data: bytes) -> Iterator[Corners]:
             points.append(_point(words[1:4], number))
         elif words[0] == "f":
             face = [_corner(word, len(points), number) for word in words[1:]]
-            if not _CORNERS <= len(face) <= _MOST_CORNERS:
+            if not CORNERS <= len(face) <= _MOST_CORNERS:
                 raise ValueError(f"line {number} has a face with {len(face)} corners; use triangles")
             for a, b, c in cut(points, face):
                 yield points[a], points[b], points[c]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Final, NamedTuple
@@ -11,10 +11,12 @@ from typing import Final, NamedTuple
 from palaestra_sim.scene.geometry import Vector, cross, dot, minus, weighted_mean
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 
+CORNERS: Final = 3
+"""Number of corners of a triangle."""
+MOST_M: Final = 1e5
+"""Largest absolute value of a coordinate."""
 _SIDES: Final = 20  # number of sides of a cone
-_CORNERS: Final = 3  # number of corners of a triangle
 _FEW: Final = 4  # a face with up to this many corners is treated as convex
-_LARGEST_M: Final = 1e5
 _PARALLEL: Final = 1e-12
 _THIN_M: Final = 1e-4  # a mesh that is thinner than this counts as flat
 _SHEET_M: Final = 1e-3
@@ -33,6 +35,14 @@ class Mesh:
     points: tuple[Vector, ...]
     triangles: tuple[Triangle, ...]
     _parts: list[_Part] = field(default_factory=list, init=False, repr=False, compare=False)
+    _turned: list[Mesh] = field(default_factory=list, init=False, repr=False, compare=False)
+
+    @property
+    def turned(self) -> Mesh:
+        """The same triangles, clockwise as seen from outside; this mesh is built at the first use."""
+        if not self._turned:
+            self._turned.append(Mesh(self.points, tuple((a, c, b) for a, b, c in self.triangles)))
+        return self._turned[0]
 
     @property
     def whole(self) -> _Part:
@@ -100,14 +110,14 @@ def cone(radius_m: float, height_m: float) -> Mesh:
 def face_set(node: SceneNode) -> Mesh | None:
     """Return the mesh of an IndexedFaceSet; None if it has no face. Faces with wrong indices are skipped."""
     flat = [number for coordinate in node.nodes("coord") for number in coordinate.numbers("point") or ()]
-    if len(flat) % _CORNERS or not _finite(flat):
+    if len(flat) % CORNERS or not are_lengths(flat):
         return None
     points = tuple(zip(flat[0::3], flat[1::3], flat[2::3], strict=True))
     faces = _faces(node.numbers("coordIndex") or (), len(points))
-    triangles = [triangle for face in faces for triangle in cut(points, face)]
-    if not node.flag("ccw", True):
-        triangles = [(a, c, b) for a, b, c in triangles]
-    return Mesh(points, tuple(triangles)) if triangles else None
+    mesh = Mesh(points, tuple(triangle for face in faces for triangle in cut(points, face)))
+    if not mesh.triangles:
+        return None
+    return mesh if node.flag("ccw", True) else mesh.turned
 
 
 def elevation_grid(node: SceneNode) -> Mesh | None:
@@ -116,7 +126,7 @@ def elevation_grid(node: SceneNode) -> Mesh | None:
     across, along = ((node.numbers(name) or (1.0,))[0] for name in ("xSpacing", "ySpacing"))
     heights = node.numbers("height") or ()
     complete = min(columns, rows) > 1 and len(heights) >= columns * rows
-    if not complete or not _finite((*heights, across, along)):
+    if not complete or not are_lengths((*heights, across, along)):
         return None
     points = tuple(
         (column * across, row * along, heights[row * columns + column])
@@ -128,13 +138,18 @@ def elevation_grid(node: SceneNode) -> Mesh | None:
     return Mesh(points, tuple(triangle for cell in cells for triangle in _fan(cell)))
 
 
+def are_lengths(numbers: Iterable[float]) -> bool:
+    """Return whether all numbers are finite and at most `MOST_M`, in both directions."""
+    return all(math.isfinite(number) and abs(number) <= MOST_M for number in numbers)
+
+
 def cut(points: Sequence[Vector], face: Sequence[int]) -> list[Triangle]:
     """Return the triangles of a flat face, whose outline may be concave."""
     if len(face) <= _FEW:
         return list(_fan(face))
     flat = _flattened([points[index] for index in face])
     left, found = list(range(len(face))), []
-    while len(left) > _CORNERS:
+    while len(left) > CORNERS:
         ear = next((at for at in range(len(left)) if _is_ear(flat, left, at)), None)
         if ear is None:  # the outline crosses itself
             break
@@ -284,7 +299,7 @@ def _faces(indices: Sequence[float], count: int) -> Iterator[list[int]]:
         if number != -1.0:
             face.append(int(number))
             continue
-        if len(face) >= _CORNERS and all(0 <= index < count for index in face):
+        if len(face) >= CORNERS and all(0 <= index < count for index in face):
             yield face
         face = []
 
@@ -293,7 +308,3 @@ def _fan(face: Sequence[int]) -> Iterator[Triangle]:
     """Yield the triangles of a convex face."""
     for second, third in pairwise(face[1:]):
         yield face[0], second, third
-
-
-def _finite(numbers: Sequence[float]) -> bool:
-    return all(math.isfinite(number) and abs(number) <= _LARGEST_M for number in numbers)

@@ -154,13 +154,9 @@ class Webots:
             for clock in old:
                 clock.await_end(give_up - time.monotonic())
         self._disconnect()
-        give_up = time.monotonic() + self._start_deadline_s
-        while not self.available() and time.monotonic() < give_up:
-            # `Attached` has no process to check, and its simulator has no ROS names during a reload.
-            if not isinstance(self._launcher, Attached):
-                self._check_process()
-            time.sleep(_POLL_S)
-        self.wait_available()
+        # `Attached` has no process to check, and its simulator has no ROS names during a reload.
+        self._await_supervisor(watched=not isinstance(self._launcher, Attached))
+        self._await_controllers()
 
     def wait_available(self) -> None:
         """Wait until the simulator and the controllers of its robots respond, after a start or a reload.
@@ -170,17 +166,8 @@ class Webots:
                 subclass, if the simulator refused its input.
             SimulatorHung: it did not respond in time.
         """
-        give_up = time.monotonic() + self._start_deadline_s
-        while not self.available():
-            self._check_process()
-            if time.monotonic() > give_up:
-                raise SimulatorHung(
-                    self.supervisor_node_name, f"did not start within {self._start_deadline_s:g} s"
-                )
-            time.sleep(_POLL_S)  # the master has no call that waits for a node
-        give_up = time.monotonic() + _CONTROLLERS_S
-        for robot in self._controlled():
-            self._await_controller(robot, give_up)
+        self._await_supervisor(watched=True)
+        self._await_controllers()
 
     def stop(self) -> None:
         """End the simulator through its supervisor; kill it only if it does not quit.
@@ -267,6 +254,24 @@ class Webots:
         """Return the ROS names of the supervisor and of the robots that are connected at a start."""
         robots = (robot for _, group in self._at_start.values() for robot in group)
         return tuple(dict.fromkeys((self.supervisor_node_name, *robots)))
+
+    def _await_supervisor(self, *, watched: bool) -> None:
+        """Wait until the simulator responds; if not `watched`, check its process only at the deadline."""
+        give_up = time.monotonic() + self._start_deadline_s
+        while not self.available():
+            late = time.monotonic() > give_up
+            if watched or late:
+                self._check_process()
+            if late:
+                raise SimulatorHung(
+                    self.supervisor_node_name, f"did not start within {self._start_deadline_s:g} s"
+                )
+            time.sleep(_POLL_S)  # the master has no call that waits for a node
+
+    def _await_controllers(self) -> None:
+        give_up = time.monotonic() + _CONTROLLERS_S
+        for robot in self._controlled():
+            self._await_controller(robot, give_up)
 
     def _await_controller(self, robot: str, give_up: float) -> None:
         """Wait until a robot returns its devices, whose service a controller registers last.
