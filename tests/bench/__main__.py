@@ -59,6 +59,7 @@ PARTS = {
     "hostile": hostile.measure,
     "newcomer": newcomer.measure,
     "plain": plain.measure,
+    "plain_old": plain.measure_old,
     "startup": startup.measure,
     "recoveries": recoveries.measure,
     "goodput": goodput.measure,

@@ -20,6 +20,7 @@ CLIENTS = 8
 DEADLINE_S = 1200
 SILENCE_S = 10
 LOOK_EVERY_S = 0.5
+PER_OBJECT_S = 0.0005  # a long list keeps the API server busy, so it is read less often
 TEMPLATE = "planned-once"  # `renamed` replaces this text by the name of a job
 
 
@@ -94,7 +95,8 @@ def wait_for_count(api, resource, namespace, count):
     Raises:
             TooLate: the objects do not exist after twenty minutes.
     """
-    eventually(lambda: len(api.list(resource.only_metadata(), namespace)) >= count, DEADLINE_S, LOOK_EVERY_S)
+    pace_s = max(LOOK_EVERY_S, PER_OBJECT_S * count)
+    eventually(lambda: len(api.list(resource.only_metadata(), namespace)) >= count, DEADLINE_S, pace_s)
 
 
 def wait_for_silence(plane):

@@ -28,7 +28,7 @@ from tests.integration.operator.installed import READS, USER, operator
 from tests.waiting import eventually
 
 JOBS = 1000
-MANY = 5000  # with 10,000, the API server alone needs more than 18 GiB of memory
+MANY = 10_000
 NAMESPACE = "crowd"
 SILENCE_S, DEADLINE_S = 10, 1200
 WEBHOOK_CALLS = r"^apiserver_admission_webhook_request_total\{.*\} (\S+)$"
@@ -58,7 +58,7 @@ def measure(scale=1.0):
 
 
 def measure_many(scale=1.0):
-    """Return the figures of five times as many TrainingJobs."""
+    """Return the figures of ten times as many TrainingJobs."""
     count = scaled(MANY, scale)
     return {"jobs": count} | _figures(crowd.create_training_jobs, _our_operator, count)
 

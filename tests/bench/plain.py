@@ -26,37 +26,52 @@ from tests.bench.sizes import scaled
 from tests.jobs import example
 from tests.local_run import PALAESTRA
 
-JOB = "move-to-target"
+NEW, OLD = "move-to-target", "paper-dqn"
 CONFIRMING = 100  # the default of evaluation.confirmEpisodes, because the example does not set this field
 LEAST_STEPS = 300
 
 
 def measure(scale=1.0):
     """Return the seconds of the trainings, which run one after the other, and their ratios."""
-    plain_s = seconds_of([sys.executable, "-m", "tests.bench.plain", str(scale)])
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "job.yaml"
-        file.write_text(json.dumps(job(scale)))
-        run_s = seconds_of([PALAESTRA, "run", file, "--dir", folder])
+    run_s, plain_s = _seconds_of_both(NEW, scale)
     with tempfile.TemporaryDirectory() as folder:
         spec = Path(folder) / "spec.json"
-        spec.write_text(json.dumps(job(scale)["spec"]))
+        spec.write_text(json.dumps(job(NEW, scale)["spec"]))
         subproc_s = seconds_of([sys.executable, "-m", "tests.bench.sb3_program", spec, folder])
-    return {
-        "seconds": round(run_s),
-        "plain_seconds": round(plain_s),
-        "times_plain": round(run_s / plain_s, 2),
+    return _figures(run_s, plain_s) | {
         "subproc_seconds": round(subproc_s),
         "times_subproc": round(run_s / subproc_s, 2),
     }
 
 
-def job(scale):
-    """Return the example, with a share of its steps and episodes."""
-    made = example(JOB)
+def measure_old(scale=1.0):
+    """Return the seconds of `make run` and of plain training with the settings of paper-dqn."""
+    return _figures(*_seconds_of_both(OLD, scale))
+
+
+def _seconds_of_both(name, scale):
+    """Return the seconds of `make run` with an example, and of plain training with its settings."""
+    plain_s = seconds_of([sys.executable, "-m", "tests.bench.plain", name, str(scale)])
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "job.yaml"
+        file.write_text(json.dumps(job(name, scale)))
+        return seconds_of([PALAESTRA, "run", file, "--dir", folder]), plain_s
+
+
+def _figures(run_s, plain_s):
+    return {
+        "seconds": round(run_s),
+        "plain_seconds": round(plain_s),
+        "times_plain": round(run_s / plain_s, 2),
+    }
+
+
+def job(name, scale):
+    """Return an example, with a share of its steps and episodes."""
+    made = example(name)
     trainer = made["spec"]["trainer"]
     evaluation = trainer["evaluation"]
-    del evaluation["stopAtSuccessRate"]  # both programs train all steps
+    evaluation.pop("stopAtSuccessRate", None)  # both programs train all steps
     trainer["steps"] = scaled(trainer["steps"], scale, LEAST_STEPS)
     evaluation["episodes"] = scaled(evaluation["episodes"], scale)
     evaluation["confirmEpisodes"] = scaled(CONFIRMING, scale)
@@ -86,4 +101,4 @@ def train(spec):
 
 
 if __name__ == "__main__":
-    train(job(float(sys.argv[1]))["spec"])
+    train(job(sys.argv[1], float(sys.argv[2]))["spec"])

@@ -57,7 +57,7 @@ def whole_run(scale, python):
     """Return the seconds of a run of move-to-target, with evaluations and confirmation."""
     with tempfile.TemporaryDirectory() as folder:
         spec = Path(folder) / "spec.json"
-        spec.write_text(json.dumps(plain.job(scale)["spec"]))
+        spec.write_text(json.dumps(plain.job(plain.NEW, scale)["spec"]))
         command = ["env", f"PYTHONPATH={ROOT}", python, "-m", MODULE, spec, folder]
         return plain.seconds_of(command)
 

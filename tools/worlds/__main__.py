@@ -26,6 +26,7 @@ DEADLINE_S: Final = 180.0
 # Matches a robot's controller, except `<none>` and `void`: robots with these two values have no controller.
 CONTROLLER: Final = re.compile(rb'(\bcontroller\s+)"(?!<none>|void")[^"\n]*"')
 VOID: Final = re.compile(rb'(\bcontroller\s+)"void"')
+UNCONTROLLED: Final = re.compile(r'controller "(?:<none>|void)"')
 MARK: Final = ".counted.wbt"
 HEADER: Final = b"#VRML_SIM "  # files with another header are parts of worlds
 LINE: Final = 80
@@ -109,8 +110,11 @@ def for_ros(world: Path, simulator: str) -> Iterator[Path]:
 
 
 def is_complete(line: str) -> bool:
-    """Return whether a line of `--check` describes a robot with controller `ros`, a motor and a sensor."""
-    if not line.startswith('robot "') or 'controller "ros"' not in line:
+    """Return whether a line of `--check` describes a robot that has a controller, a motor and a sensor.
+
+    `for_ros` does not replace a controller that a PROTO names, but users can, in their world.
+    """
+    if not line.startswith('robot "') or UNCONTROLLED.search(line):
         return False
     types = set(re.findall(r"\b\d+ ([A-Z]\w+)", line))
     return bool(types.intersection(MOTORS) and types.difference(MOTORS, OTHERS))

@@ -35,7 +35,7 @@ SMALL = (
 OF_PEERS = ("goodput", "recoveries", "startup")
 OF_A_CLUSTER = ("hostile", "operators", "operators_many")
 # These parts run the examples in MEASURED of test_run_from_file_to_policy.py.
-OF_WHOLE_RUNS = ("learning", "navigating", "plain", "seeing", "sparse", "transfer")
+OF_WHOLE_RUNS = ("learning", "navigating", "plain", "plain_old", "seeing", "sparse", "transfer")
 ELSEWHERE = ("memory", "operator", "recovery", "shutdown")
 SKIPPED = "rllib"  # RLlib is not installed with this project
 OF_PAGE = {chapter.part for chapter in MEASURED}  # the parts whose figures docs/explain/peers.md shows

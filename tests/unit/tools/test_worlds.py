@@ -67,3 +67,19 @@ def test_a_robot_without_a_controller_gets_one_only_if_it_is_the_only_robot(fold
         "palaestra-stub: 2 of 2 worlds start as they are, 2 with --leave-out all; "
         "2 of these keep a robot with a motor and a sensor"
     )
+
+
+def test_a_robot_whose_proto_names_its_controller_is_kept(folder, capsys):
+    """Users set such a robot's controller in their world, so the world counts as trainable."""
+    (folder / "protos").mkdir()
+    (folder / "protos" / "Arm.proto").write_text(
+        '#VRML_SIM R2023b utf8\nPROTO Arm [ field SFString controller "mine" ] '
+        f'{{ Robot {{ name "arm" controller IS controller children [ {ARM} ] }} }}'
+    )
+    (folder / "worlds" / "arm.wbt").write_text(
+        '#VRML_SIM R2023b utf8\nEXTERNPROTO "../protos/Arm.proto"\nWorldInfo { }\nArm { }'
+    )
+
+    _, lines = count(folder, capsys)
+
+    assert lines[-1].endswith("1 of these keep a robot with a motor and a sensor")

@@ -39,6 +39,11 @@ def problem(attempt: Callable[[], object]) -> WorldError | None:
         ("42", "2:1: found 42 where the type of a node should be"),
         ('Robot { } "a"', '2:11: found "a" where the type of a node should be'),
         ("Robot ]", '2:7: found ] where the "{" of Robot should be; a node is written Type { … }'),
+        (
+            'externproto "a"',
+            '2:13: found "a" where the "{" of externproto should be; write EXTERNPROTO in capital',
+        ),
+        ("def R Robot { }", '2:5: found R where the "{" of def should be; write DEF in capital letters'),
         ("Robot", '2:6: found the end of the file where the "{" of Robot should be'),
         ("Robot { name }", "2:14: found } where a value of name should be; write a value"),
         ("Robot { name", "2:13: found the end of the file where a value of name should be"),

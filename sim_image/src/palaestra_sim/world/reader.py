@@ -100,7 +100,10 @@ class Reader:
         opening = self._take()
         if opening.text != b"{":
             fact = f'found {shown(opening)} where the "{{" of {type_name} should be'
-            raise self._error(opening, fact, "a node is written Type { … }")
+            word = type_name.upper()
+            wrong_case = word.encode() in _RESERVED
+            remedy = f"write {word} in capital letters" if wrong_case else "a node is written Type { … }"
+            raise self._error(opening, fact, remedy)
         fields = self._fields(type_name, opening, depth)
         span = self._span(first)
         return Node(type_name=type_name, def_name=def_name, uses=None, fields=fields, span=span)
