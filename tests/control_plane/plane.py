@@ -44,6 +44,7 @@ STOP_DEADLINE_S = 10
 # Most of them run only for minutes, so their memory stays small enough. With thousands of jobs, the limit
 # makes it run more often.
 RARELY = {"GOGC": "400", "GOMEMLIMIT": "10GiB"}
+AUDIT_MIB = 100_000  # at 100 MiB, the default, a new file begins, and readers would miss earlier requests
 AUDIT = {
     "apiVersion": "audit.k8s.io/v1",
     "kind": "Policy",
@@ -221,6 +222,7 @@ def _api_server(plane: ControlPlane, etcd_port: int) -> list[str]:
         "--enable-admission-plugins=OwnerReferencesPermissionEnforcement",  # OpenShift enables it too
         f"--audit-policy-file={policy}",
         f"--audit-log-path={plane.audit_log}",
+        f"--audit-log-maxsize={AUDIT_MIB}",
     ]
 
 

@@ -4,6 +4,7 @@ import os
 import signal
 from contextlib import ExitStack, contextmanager
 
+import gymnasium
 import numpy as np
 import pytest
 
@@ -163,7 +164,10 @@ def test_a_resume_continues_every_row_bit_for_bit(cartpole) -> None:
 
 
 def test_a_killed_simulator_ends_the_episodes_of_all_rows_and_comes_back() -> None:
-    """One process simulates all rows, so its end is a single fault, and no row of that step is valid."""
+    """One process simulates all rows, so its end is a single fault, and no row of that step is valid.
+
+    An attribute that a callback sets during the restart is set when the next episodes begin.
+    """
     with batch_env() as (env, launcher):
         env.reset()
         [action] = actions_of(env, 1)
@@ -174,7 +178,41 @@ def test_a_killed_simulator_ends_the_episodes_of_all_rows_and_comes_back() -> No
         assert dones.all()
         assert [info[OURS]["valid"] for info in infos] == [False] * ROWS
         assert infos[0][OURS]["sim_fault"]["kind"] == "dead"
+        env.set_attr("difficulty", 0.5)
         eventually(lambda: env.step(action)[3][0][OURS]["valid"])
+        assert env.get_attr("difficulty") == [0.5] * ROWS
+
+
+def test_a_simulator_that_dies_during_a_resume_begins_the_next_episode_of_each_row() -> None:
+    """A resume repeats steps for seconds, so a simulator can die in it; the run must go on."""
+    with batch_env() as (env, launcher):
+        env.reset()
+        [action] = actions_of(env, 1)
+        env.step(action)
+        states = env.snapshot()
+        os.kill(launcher.state().pid, signal.SIGKILL)
+
+        again = BatchVecEnv(env._restarter, 5)
+        again.resume(states)
+
+        eventually(lambda: again.step(action)[3][0][OURS]["valid"])
+        assert [state.episode for state in again.snapshot()] == [state.episode + 1 for state in states]
+
+
+def test_the_calls_of_a_vec_env_reach_the_one_environment_of_all_rows() -> None:
+    """Callbacks of Stable-Baselines3 call these methods, and the web page asks for the moment of row 0."""
+    with batch_env() as (env, _):
+        assert [(state.episode, state.actions) for state in env.snapshot()] == [(0, None)] * ROWS
+
+        env.set_attr("difficulty", 0.5)
+        env.reset()
+        env.step(actions_of(env, 1)[0])
+
+        assert env.get_attr("difficulty", [0, 2]) == [0.5, 0.5]
+        assert env.env_method("__str__", indices=1) == [str(env._env)]
+        assert env.env_is_wrapped(gymnasium.Wrapper) == [False] * ROWS
+        [moment] = env.moments().values()
+        assert (moment.episode, moment.step) == (1, 1)
 
 
 def test_a_row_that_fails_is_truncated_alone(cartpole, monkeypatch, tmp_path) -> None:

@@ -256,6 +256,7 @@ class BatchVecEnv(CollectingVecEnv):
         }
         self._began_at[rows] = self._training_progress
         self._episodes[rows] += 1
+        self._restarter.give_attributes()
         self._observation, _ = self._env.reset(seed=seeds.tolist(), options=options)
         self._restarter.meter.resets += len(rows)
         self._returns[rows], self._started[rows] = 0.0, time.monotonic()

@@ -38,4 +38,4 @@ class Attributes:
 def _put(env: Environment, name: str, value: Any) -> None:
     """Set an attribute on the wrapper that has it, or else on the innermost environment."""
     if not env.set_wrapper_attr(name, value, force=False):
-        setattr(env.unwrapped, name, value)
+        env.unwrapped.set_wrapper_attr(name, value)

@@ -159,8 +159,8 @@ class Restarter:
         """
         self._recycle_when_due(check)
         self._reload_when_due(check)
+        self.give_attributes()
         env = self.member.env
-        self._attributes.give(env)
         observation, info = env.reset(seed=seed, options=copied(options))
         check_observation(self.name, env, observation)
         self.meter.resets += 1
@@ -199,6 +199,10 @@ class Restarter:
         If the restarter is busy, the attribute is set when the next episode begins.
         """
         self._attributes.set(name, value, None if self.busy else self.member.env)
+
+    def give_attributes(self) -> None:
+        """Set the attributes that the member's environment lacks; call it before an episode."""
+        self._attributes.give(self.member.env)
 
     def pause(self) -> None:
         """Pause the member; if that fails, the next step reports the fault."""
