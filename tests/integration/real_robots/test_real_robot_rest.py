@@ -140,7 +140,7 @@ def test_a_robot_without_a_connection_is_lost(robot, mock):
     with Cable(mock) as cable:
         real = robot(cable.url)
         cable.cut()
-        with pytest.raises(RobotStopped, match="connection lost: no readings for 2 s; check the network"):
+        with pytest.raises(RobotStopped, match=r"connection lost: no .* for 2 s.*; check the network"):
             drive(real, (0.2, 0.0, 0.0), 40)
 
 

@@ -41,6 +41,7 @@ CAUSES = [
     ({"bumped": True}, "bumper", True),
     ({"readings_age_s": 2.1}, "connection lost", True),
     ({"readings_age_s": math.inf}, "connection lost", True),
+    ({"unconfirmed_s": 2.1, "readings_age_s": 1.9}, "connection lost", True),
     ({"pose": Pose(1.75, 0.0, 0.0)}, "fence", True),
     ({"pose": Pose(0.0, -3.0, 0.0)}, "fence", True),
     ({"rested_s": 1.1}, "another client", True),

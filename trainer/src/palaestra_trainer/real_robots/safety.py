@@ -70,7 +70,7 @@ class SafetyRules:
             error as a distance from the fence.
         silence_s: seconds without a call of the policy's program, after which the robot is held back.
         stale_s: age of the oldest reading, above which the robot is held back.
-        lost_s: age of the oldest reading, above which the robot is stopped.
+        lost_s: age of the oldest reading, or of the last confirmation, above which the robot is stopped.
     """
 
     speed_m_s: float = 0.2
@@ -178,10 +178,15 @@ def _bumper(situation: Situation, rules: SafetyRules) -> StopCause | None:
 
 
 def _lost(situation: Situation, rules: SafetyRules) -> StopCause | None:
-    if situation.readings_age_s <= rules.lost_s:
+    if situation.readings_age_s > rules.lost_s:
+        fact = f"no readings for {rules.lost_s:g} s"
+    elif situation.unconfirmed_s > rules.lost_s and situation.readings_age_s > rules.stale_s:
+        # After a cut, the confirmations can end shortly before the readings. Such a robot refuses nothing.
+        fact = f"no confirmed command for {rules.lost_s:g} s, and no readings for {rules.stale_s:g} s"
+    else:
         return None
-    fact = f"no readings for {rules.lost_s:g} s; check the network between this computer and the robot"
-    return StopCause("connection lost", fact, stops=True)
+    remedy = "check the network between this computer and the robot"
+    return StopCause("connection lost", f"{fact}; {remedy}", stops=True)
 
 
 def _fence(situation: Situation, rules: SafetyRules) -> StopCause | None:
