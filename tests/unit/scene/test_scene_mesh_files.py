@@ -15,17 +15,19 @@ from palaestra_sim.scene.mesh_files import MOST_BYTES, MOST_TRIANGLES, decode
 from palaestra_sim.scene.mode import Mode
 from palaestra_sim.scene.nodes.instantiate import Descriptions
 from palaestra_sim.scene.simulation import Simulation
+from palaestra_sim.scene.tree.field_types import FieldType
 from palaestra_sim.scene.validation import LeaveOut
 from palaestra_sim.scene.world_report import differences
 from palaestra_sim.stub.physics import StubPhysics
 from palaestra_sim.world import parse
 from tests.tables import for_each
-from tests.values.worlds import PHYSICS, Setting, robot
+from tests.values.worlds import PHYSICS, STEP_MS, Setting, device, enable, robot
 
 CORNERS = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 2.0, 0.0), (0.0, 0.0, 3.0)]
 FACES = [(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)]
 NUMBERS = st.floats(-100.0, 100.0, width=32)
 TRIANGLES = st.lists(st.tuples(*[st.tuples(NUMBERS, NUMBERS, NUMBERS)] * 3), min_size=1, max_size=20)
+MESH = 'Mesh { url "pyramid.stl" }'
 OUTLINE = 'Solid { boundingObject Mesh { url "%s" } }'
 
 
@@ -50,6 +52,9 @@ def obj(points, faces):
     lines = ["v {!r} {!r} {!r}".format(*point) for point in points]
     lines += [f"f {' '.join(str(at + 1) for at in face)}" for face in faces]
     return "\n".join(lines).encode()
+
+
+PYRAMID = {"pyramid.stl": binary([tuple(CORNERS[at] for at in face) for face in FACES])}
 
 
 def corners_of(mesh):
@@ -185,6 +190,53 @@ def test_a_file_that_many_nodes_name_is_read_once_and_may_be_turned_inside_out()
     assert second == tuple((a, c, b) for a, b, c in first)
     turned = next(node for node in simulation.tree.root.descendants() if not node.flag("ccw", True))
     assert simulation.tree.mesh_files.mesh_of(turned) is simulation.tree.mesh_files.mesh_of(turned)
+
+
+@pytest.mark.parametrize("physics", PHYSICS)
+def test_the_center_of_mass_of_a_mesh_is_that_of_its_volume(physics):
+    """With a density, the mass follows from the file; without it, the center would be the Solid's origin."""
+    solid = f"DEF S Solid {{ physics Physics {{ density 1000 }} boundingObject {MESH} }}"
+    simulation = Setting(physics).load(robot(solid), files=PYRAMID)
+
+    found = simulation.motion.center_of_mass(simulation.tree.of_def("S"))
+
+    assert found == pytest.approx((0.25, 0.5, 0.75))
+
+
+@pytest.mark.parametrize("physics", PHYSICS)
+def test_an_obstacle_keeps_its_mesh_if_a_client_resizes_another_part(physics):
+    """Robots and rays would pass through the mesh until the simulator restarts."""
+    solid = f"Solid {{ boundingObject Group {{ children [ DEF B Box {{ }} {MESH} ] }} }}"
+    simulation = Setting(physics).load(solid, files=PYRAMID)
+    size = simulation.tree.field_of(simulation.tree.of_def("B"), "size", simulation)
+
+    size.set(FieldType.VEC3F, 0, (0.2, 0.3, 0.4))
+    simulation.step(STEP_MS)
+
+    assert [shape.kind for shape in simulation.scene.solids] == ["box", "mesh"]
+    assert simulation.scene.solids[0].size == (0.2, 0.3, 0.4)
+
+
+def test_a_mesh_hides_the_target_of_a_radar_with_occlusion():
+    """A policy that sees through a wall drives into it."""
+    target = "Solid { translation 3 0 0.5 boundingObject Sphere { radius 0.1 } radarCrossSection 2 }"
+    radar = "Radar { translation 0 0 0.5 minRadialSpeed 0 maxRadialSpeed 0 occlusion TRUE }"
+    seen = []
+    for aside in (0.0, 5.0):
+        wall = f"Solid {{ translation 1 {aside - 0.5} 0 boundingObject {MESH} }}"
+        simulation = Setting("stub").load(wall + target + robot(radar), files=PYRAMID)
+        enable(simulation)
+        simulation.step(STEP_MS)
+        seen.append(len(device(simulation, "radar").seen))
+
+    assert seen == [0, 1]
+
+
+def test_a_viewer_shows_a_robot_by_the_mesh_of_its_bounding_object():
+    """A robot without visible shapes would be invisible, although it is simulated."""
+    simulation = Setting("stub").load(robot("", f"boundingObject {MESH}"), files=PYRAMID)
+
+    assert len(simulation.appearance.scene("my.wbt").meshes) == 1
 
 
 def test_a_wrong_file_is_read_once_and_all_files_together_are_limited():

@@ -30,6 +30,7 @@ from palaestra_protocol.scene import (
 )
 from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.geometry import Pose, Vector, to_quaternion
+from palaestra_sim.scene.mesh_files import MeshFiles
 from palaestra_sim.scene.meshes import box_of
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.robot import Robot
@@ -209,7 +210,7 @@ class Appearance:
                 continue
             for node in (root, *root.descendants()):
                 if node.place is not None and not node.left_out:
-                    yield from _outline(node, node.place)
+                    yield from _outline(node, node.place, self._view.mesh_files)
 
     def _resting(self) -> dict[str, PoseNumbers]:
         """Return the poses of the nodes that do not move by themselves."""
@@ -237,8 +238,8 @@ def _title(node: SceneNode) -> str:
     return node.def_name or node.text("name") or node.type_name
 
 
-def _outline(node: SceneNode, place: Frame) -> Iterator[Drawn]:
-    for shape in bounding_shapes(NodeReader(), node, place):
+def _outline(node: SceneNode, place: Frame, mesh_files: MeshFiles) -> Iterator[Drawn]:
+    for shape in bounding_shapes(NodeReader(mesh_files=mesh_files), node, place):
         yield Drawn(
             kind=shape.kind,
             size=shape.size,

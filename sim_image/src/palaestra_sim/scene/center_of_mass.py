@@ -11,27 +11,29 @@ from dataclasses import replace
 from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.geometry import Vector, weighted_mean
 from palaestra_sim.scene.mass import MassProperties, read_matter, volume_m3
+from palaestra_sim.scene.mesh_files import MeshFiles
 from palaestra_sim.scene.meshes import middle_of_volume
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.shapes import Shape, bounding_shapes
 from palaestra_sim.scene.validation import NodeReader
 
 
-def center_of_mass(node: SceneNode, place: Frame) -> Vector:
+def center_of_mass(node: SceneNode, place: Frame, mesh_files: MeshFiles) -> Vector:
     """Return the center of mass of a node in meters, in the axes of the world file.
 
     Args:
         node: the node.
         place: the frame of the node.
+        mesh_files: the mesh files that nodes of the world name.
     """
-    matters = list(_matter(node))
+    matters = list(_matter(node, mesh_files))
     centers = [matter.place.world_pose.carry(_center(matter)) for matter in matters]
     return weighted_mean(centers, [matter.mass_kg for matter in matters]) or place.world_position
 
 
-def _matter(node: SceneNode) -> Iterator[MassProperties]:
+def _matter(node: SceneNode, mesh_files: MeshFiles) -> Iterator[MassProperties]:
     """Yield each mass of a Solid at and inside a node."""
-    reading = NodeReader()  # the world was checked when it was loaded
+    reading = NodeReader(mesh_files=mesh_files)  # the world was checked when it was loaded
     for solid in (node, *node.descendants()):
         if solid.place is not None and not solid.left_out and (solid.stand_in or solid.nodes("physics")):
             shapes = list(bounding_shapes(reading, solid, solid.place))

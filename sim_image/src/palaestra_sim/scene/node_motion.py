@@ -13,6 +13,7 @@ from palaestra_sim.scene.center_of_mass import center_of_mass
 from palaestra_sim.scene.dynamic_solids import DynamicSolid
 from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.geometry import Vector
+from palaestra_sim.scene.mesh_files import MeshFiles
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.physics import Push
 from palaestra_sim.scene.reader import SceneContents
@@ -27,11 +28,18 @@ class NodeMotion:
     Args:
         scene: the contents of the world.
         robot_of: returns the robot of a Robot node; None for any other node.
+        mesh_files: the mesh files that nodes of the world name.
     """
 
-    def __init__(self, scene: SceneContents, robot_of: Callable[[SceneNode], Robot | None]) -> None:
+    def __init__(
+        self,
+        scene: SceneContents,
+        robot_of: Callable[[SceneNode], Robot | None],
+        mesh_files: MeshFiles,
+    ) -> None:
         self._scene = scene
         self._robot_of = robot_of
+        self._mesh_files = mesh_files
 
     def velocity(self, node: SceneNode) -> tuple[Vector, Vector]:
         """Return the velocity of a node in m/s and its angular velocity in rad/s.
@@ -55,7 +63,7 @@ class NodeMotion:
         Raises:
             UnsimulatedError: the node has no frame.
         """
-        return center_of_mass(node, _place(node))
+        return center_of_mass(node, _place(node), self._mesh_files)
 
     def set_velocity(self, node: SceneNode, velocity: Vector, turning: Vector) -> None:
         """Give a node a velocity; a robot's motors return to their commanded speeds within a few steps."""

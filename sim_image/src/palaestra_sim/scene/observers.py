@@ -6,15 +6,22 @@ from collections.abc import Callable, Collection, Iterable
 
 from palaestra_sim.scene.devices.light_sensor import LightSensor
 from palaestra_sim.scene.devices.radar import Radar
+from palaestra_sim.scene.mesh_files import MeshFiles
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.outlines import outlines_of
 from palaestra_sim.scene.radar_targets import echoes_of
 
 
 class OutlineObservers:
-    """The devices to which `show` passes new outlines."""
+    """The devices to which `show` passes new outlines.
 
-    def __init__(self, devices: Iterable[object]) -> None:
+    Args:
+        devices: all devices of the world.
+        mesh_files: the mesh files that nodes of the world name.
+    """
+
+    def __init__(self, devices: Iterable[object], mesh_files: MeshFiles) -> None:
+        self._mesh_files = mesh_files
         every = tuple(devices)
         self._radars = tuple(it for it in every if isinstance(it, Radar))
         self._shaded = tuple(it for it in every if isinstance(it, LightSensor) and it.occlusion)
@@ -34,7 +41,7 @@ class OutlineObservers:
         """
         if not (self._radars or self._shaded):
             return
-        outlines = outlines_of(nodes, floors_m)
+        outlines = outlines_of(nodes, floors_m, self._mesh_files)
         for sensor in self._shaded:
             sensor.show(outlines)
         if self._radars:

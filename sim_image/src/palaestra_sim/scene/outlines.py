@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from palaestra_sim.scene.geometry import Vector
 from palaestra_sim.scene.hits import first_hit
+from palaestra_sim.scene.mesh_files import MeshFiles
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.shapes import Shape, bounding_shapes
 from palaestra_sim.scene.validation import NodeReader
@@ -35,10 +36,19 @@ class Outlines:
         return tuple(shape for several in self.shapes.values() for shape in several)
 
 
-def outlines_of(nodes: Collection[SceneNode], floors_m: Callable[[], tuple[float, ...]]) -> Outlines:
-    """Return the outlines of these nodes; `floors_m` returns the heights of the floors."""
+def outlines_of(
+    nodes: Collection[SceneNode], floors_m: Callable[[], tuple[float, ...]], mesh_files: MeshFiles
+) -> Outlines:
+    """Return the outlines of these nodes.
+
+    Args:
+        nodes: the nodes of the world.
+        floors_m: returns the heights of the floors in meters.
+        mesh_files: the mesh files that the nodes name.
+    """
+    reading = NodeReader(mesh_files=mesh_files)  # the world was checked when it was loaded
     shapes = {
-        node: tuple(bounding_shapes(NodeReader(), node, node.place))
+        node: tuple(bounding_shapes(reading, node, node.place))
         for node in nodes
         if node.place is not None and not node.left_out and node.nodes("boundingObject")
     }

@@ -93,7 +93,7 @@ def read_scene(tree: SceneTree, physics: Physics, leave_out: LeaveOut | None = N
     Raises:
         WorldError: the world has objects that cannot be simulated; the error lists all of them.
     """
-    reading = NodeReader(tree.refused, leave_out, physics.abilities.name, tree.mesh_files)
+    reading = NodeReader(tree.refused, leave_out, physics.abilities.name, mesh_files=tree.mesh_files)
     scene = SceneContents(physics=physics)
     # WorldInfo is read before all other nodes, because devices use its fields.
     for node in tree.root.nodes():
@@ -125,7 +125,7 @@ def read_added(tree: SceneTree, nodes: Iterable[SceneNode], to: SceneContents) -
     Raises:
         WorldError: the nodes contain objects that cannot be simulated.
     """
-    reading = NodeReader((), to.leave_out, to.physics.abilities.name, tree.mesh_files)
+    reading = NodeReader((), to.leave_out, to.physics.abilities.name, mesh_files=tree.mesh_files)
     reading.world_info = next((it for it in tree.root.nodes() if it.type_name == "WorldInfo"), None)
     scene = SceneContents(physics=to.physics)
     for node in nodes:

@@ -74,7 +74,7 @@ class Simulation:
         self._pending: list[Callable[[], None]] = []
         self._reset_asked = self._solids_moved = False
         self._added: list[SceneNode] = []
-        self.motion = NodeMotion(scene, self.robot_of)
+        self.motion = NodeMotion(scene, self.robot_of, tree.mesh_files)
         self._states = States(tree.nodes.values())
         self._assemble()
         self._step_s = scene.basic_step_ms / 1000.0
@@ -325,7 +325,7 @@ class Simulation:
         connectors = tuple(it for robot in devices for it in robot if isinstance(it, Connector))
         for connector in connectors:
             connector.others = connectors
-        self._observers = OutlineObservers(it for robot in devices for it in robot)
+        self._observers = OutlineObservers((it for robot in devices for it in robot), self.tree.mesh_files)
         self._show_outlines()
         self._samplers = tuple(sample for robot in self.robots for sample in robot.samplers)
 
@@ -337,7 +337,7 @@ class Simulation:
         """Read the outline of an obstacle again, because a part of it has a new size."""
         owner = next((around for around in node.ancestors() if around.type_name == "Solid"), None)
         if owner is not None and owner.place is not None:
-            fresh = bounding_shapes(NodeReader(), owner, owner.place)
+            fresh = bounding_shapes(NodeReader(mesh_files=self.tree.mesh_files), owner, owner.place)
             solids = self.scene.solids
             first = next((at for at, shape in enumerate(solids) if shape.place is owner.place), len(solids))
             kept = [shape for shape in solids if shape.place is not owner.place]

@@ -70,12 +70,13 @@ class NodeReader:
         refused: Iterable[WorldError] = (),
         leave_out: LeaveOut | None = None,
         simulator: str = "the simulator",
-        mesh_files: MeshFiles | None = None,
+        *,
+        mesh_files: MeshFiles,
     ) -> None:
         self._refused: list[WorldError] = list(refused)
         self.leave_out = leave_out or LeaveOut()
         self.simulator = simulator
-        self.mesh_files = mesh_files or MeshFiles()
+        self.mesh_files = mesh_files
         self.left_out: list[WorldError] = []
         self.world_info: SceneNode | None = None
         self.system = "ENU"

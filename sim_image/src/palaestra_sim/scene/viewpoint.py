@@ -7,6 +7,7 @@ from typing import Final
 from palaestra_sim.scene import picture_files
 from palaestra_sim.scene.camera_interface import CameraInterface, Lens
 from palaestra_sim.scene.frames import Frame
+from palaestra_sim.scene.mesh_files import MeshFiles
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.old_axes import looking
 from palaestra_sim.scene.physics import Physics
@@ -28,7 +29,7 @@ def save_view(root: SceneNode, physics: Physics, path: str, quality: int) -> boo
 
 def view(root: SceneNode, physics: Physics, size: tuple[int, int]) -> CameraInterface | None:
     """Return a camera at the current Viewpoint; None if the simulator does not render."""
-    reading = NodeReader()
+    reading = NodeReader(mesh_files=MeshFiles())  # a Viewpoint names no file
     viewpoint = next((it for it in root.nodes() if it.type_name == "Viewpoint"), root)
     fov_rad = reading.number(viewpoint, "fieldOfView", 0.7854)  # along the image's longer side, as in Webots
     near_m, far_m = reading.number(viewpoint, "near", 0.05), reading.number(viewpoint, "far", 0.0)

@@ -121,6 +121,7 @@ class View:
     Attributes:
         root: the root of the world.
         textures: the images of the world's textures.
+        mesh_files: the mesh files that nodes name.
         changes: the number of times that a node was added or removed, or that the look of a node changed.
         moves: the number of times that a client or a reset moved a node; motion by motors and by the physics
             does not count.
@@ -131,7 +132,7 @@ class View:
     ) -> None:
         self.root = root
         self.textures = textures or Textures()
-        self._mesh_files = mesh_files or MeshFiles()
+        self.mesh_files = mesh_files or MeshFiles()
         self.changes = 0
         self.moves = 0
         # The number of changes when the lights were collected.
@@ -146,7 +147,7 @@ class View:
 
     def things(self) -> tuple[Drawn, ...]:
         """Return the current visible shapes."""
-        return tuple(drawn(self.root, self._mesh_files))
+        return tuple(drawn(self.root, self.mesh_files))
 
     def lights(self) -> tuple[SceneNode, ...]:
         """Return the current lights."""
@@ -169,7 +170,7 @@ class View:
 
     def _reads(self, node: SceneNode) -> bool:
         try:
-            self._mesh_files.mesh_of(node)
+            self.mesh_files.mesh_of(node)
         except ValueError:
             return False
         return True

@@ -63,7 +63,7 @@ def load(
 
 
 def _robot(tree: ModelTree, equipment: Equipment, description: Description, leave_out: LeaveOut) -> Robot:
-    reading = NodeReader(equipment.refused, leave_out, "MuJoCo")
+    reading = NodeReader(equipment.refused, leave_out, "MuJoCo", mesh_files=tree.scene.mesh_files)
     arguments = read_arguments(reading, tree.robot)
     reading.conclude()
     parts = RobotParts(
