@@ -31,6 +31,7 @@ def solid(outline, fields=""):
         ("Cylinder { radius 0.5 height 2 }", (0.0, 0.0, 1.0), 0.5),
         ("Capsule { radius 0.5 height 2 }", (0.0, 0.0, 1.5), 0.5),
         ("Sphere { radius 0.5 }", (0.0, 0.0, 0.5), 0.5),
+        ("Shape { geometry Box { size 1 2 3 } }", (0.5, 1.0, 1.5), 0.0),
     ],
 )
 def test_a_shape_has_its_half_size_or_its_radius(outline, half, radius) -> None:

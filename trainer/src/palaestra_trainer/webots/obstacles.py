@@ -17,12 +17,16 @@ from palaestra_trainer.errors import WorldMisfit
 from palaestra_trainer.webots.services import Services
 
 FLOOR = "FLOOR"  # the DEF name of the floor in a world
+FLOOR_REMEDY = (
+    "write DEF FLOOR before the Solid that is the floor and give it a Box as its boundingObject, or use a"
+    " RectangleArena"
+)
 _FLOOR_FIELDS = {
     "RectangleArena": "floorSize",
     "Floor": "size",
 }  # the field that holds the size, for each PROTO of Webots
 _ROUND = ("Cylinder", "Capsule", "Sphere")
-_WRAPPERS = ("Pose", "Transform", "Group", "ObstacleShape")
+_WRAPPERS = ("Pose", "Transform", "Group", "Shape")
 
 Vector = tuple[float, float, float]
 
@@ -80,8 +84,7 @@ class ObstacleReader:
         if not any(known.name == FLOOR for known in self._things):
             raise WorldMisfit(
                 self._services.node_name,
-                "the world has no floor; write DEF FLOOR before the Solid that is the floor and give it a Box"
-                " as its boundingObject, or use a RectangleArena",
+                f"the world has no floor; {FLOOR_REMEDY}",
             )
         return [
             Thing(known.name, self._place(known), self._heading(known), known.shapes)

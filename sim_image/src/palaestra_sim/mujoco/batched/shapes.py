@@ -15,7 +15,7 @@ from palaestra_sim.scene.tree.field_types import FieldType
 FLOOR: Final = "FLOOR"
 _FLOOR_FIELDS: Final = {"RectangleArena": "floorSize", "Floor": "size"}
 _ROUND: Final = ("Cylinder", "Capsule", "Sphere")
-_WRAPPERS: Final = ("Pose", "Transform", "Group", "ObstacleShape")
+_WRAPPERS: Final = ("Pose", "Transform", "Group", "Shape")
 _CENTER: Final = (0.0, 0.0, 0.0)
 
 
@@ -74,7 +74,7 @@ class _Reader:
                 if kind in {"Pose", "Transform"}:
                     x, y, z = self._value(node, "translation", FieldType.VEC3F)
                     inner = (center[0] + x, center[1] + y, center[2] + z)
-                yield from self._parts(node.nodes(), inner)
+                yield from self._parts(node.nodes("geometry" if kind == "Shape" else "children"), inner)
             elif kind == "Box":
                 x, y, z = self._value(node, "size", FieldType.VEC3F)
                 yield _Part(center, (0.5 * x, 0.5 * y, 0.5 * z), 0.0)
