@@ -23,6 +23,7 @@ from palaestra_sim.stub.physics import StubPhysics
 from palaestra_sim.world import builtin, builtin_path
 
 PERIOD_MS = 192
+ARENA = builtin_path("arena")
 CARTPOLE = """<mujoco>
   <custom>
     <text name="controllerArgs" data="--name=cartpole --synchronize"/>
@@ -68,10 +69,10 @@ STARTS = ((1.3, 1.3, 0.4), (-1.3, 1.2, -2.0), (0.0, -1.4, 3.0))  # near walls, s
 STEPS = 30
 
 
-def arena(rows, threads=2):
+def arena(rows, threads=2, path=ARENA):
     """Return copies of the arena, before `open`."""
     load = Loader(physics=lambda: MujocoPhysics(feeling=True))
-    return SceneBatch(load(builtin_path("arena"), Mode.FAST), "arena.wbt", rows, threads)
+    return SceneBatch(load(path, Mode.FAST), "arena.wbt", rows, threads)
 
 
 def carts(tmp_path, rows, *, limited=True, threads=2):
@@ -117,9 +118,9 @@ def played(batch, reset, commands):
     return np.array([np.column_stack([each.values, each.poses]) for each in readings])
 
 
-def single(row, commands):
+def single(row, commands, path=ARENA):
     """Return the readings of a client of the single simulation in the same episode."""
-    simulation = Loader(physics=MujocoPhysics)(builtin_path("arena"), Mode.FAST)
+    simulation = Loader(physics=MujocoPhysics)(path, Mode.FAST)
     robot = simulation.robots[0]
     robot.custom_data = json.dumps({"seed": row + 7})
     simulation.reset()
@@ -153,16 +154,22 @@ def look(robot):
     return [*(float(robot.sensors[name].value) for name in SENSORS), x, y, heading]
 
 
-def test_each_robot_has_the_bits_of_the_single_simulation() -> None:
-    """A policy is trained in the copies and evaluated in the single simulation, so they must be one world."""
+@pytest.mark.parametrize("wheel", [b"", b" position 3.2"])
+def test_each_robot_has_the_bits_of_the_single_simulation(tmp_path, wheel) -> None:
+    """A policy is trained in the copies and evaluated in the single simulation, so they must be one world.
+
+    In a world that was saved while it ran, the wheels have angles.
+    """
+    path = tmp_path / "arena.wbt"
+    path.write_bytes(builtin("arena").replace(b"axis -1 0 0", b"axis -1 0 0" + wheel))
     commands = commands_of(3, 3)
-    batch = arena(3)
+    batch = arena(3, path=path)
     batch.open(ROBOTINO)
 
     found = played(batch, at_the_starts(), commands)
 
     for row in range(3):
-        assert np.array_equal(found[:, row], single(row, commands[:, row]))
+        assert np.array_equal(found[:, row], single(row, commands[:, row], path))
     assert found[:, :, SENSORS.index("touch sensor")].any()
 
 

@@ -35,6 +35,7 @@ class Bases:
     def __init__(self, count: int, specs: Sequence[MotorSpec], drive: Drive) -> None:
         wheels = len(specs)
         self._drive = drive
+        self._starts_rad = np.array([spec.start_rad for spec in specs])
         self._limits = np.array([spec.max_velocity_rad_s for spec in specs])
         self._multipliers = np.array([spec.multiplier for spec in specs])
         self._accelerations = np.array([spec.acceleration_rad_s2 for spec in specs])
@@ -47,9 +48,10 @@ class Bases:
         self._aims, self._lags = np.zeros((count, 3)), np.zeros((count, 3))
 
     def restart(self, rows: Any, start: tuple[float, float, float]) -> None:
-        """Bring rows to rest at a pose, with motors that turn at speed 0."""
-        for array in (self._commands, self._speeds, self.angles_rad, self._wanted, self._changes):
+        """Bring rows to rest at a pose, with wheels at their angles in the world and motors at speed 0."""
+        for array in (self._commands, self._speeds, self._wanted, self._changes):
             array[rows] = 0.0
+        self.angles_rad[rows] = self._starts_rad
         self._aims[rows] = self._lags[rows] = 0.0
         self.x[rows], self.y[rows], self.heading_rad[rows] = start
 
