@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gymnasium
 import numpy as np
 import pytest
 from gymnasium import spaces
@@ -13,6 +14,7 @@ from palaestra_trainer.job.configuration import Environment
 from palaestra_trainer.robots.batch_link import BatchLink
 from palaestra_trainer.robots.batched import BatchedJointRobot, BatchedRobotino, BatchedScene, batched_form
 from palaestra_trainer.robots.batched_base import BatchedJointsAbc
+from palaestra_trainer.robots.geometry import Pose
 from palaestra_trainer.robots.robotino import Robotino
 from tests.unit.trainer.environments.hall import NAME, Hall
 
@@ -49,6 +51,27 @@ def test_a_batched_form_gets_its_options_and_what_its_signature_accepts(batched)
     env = batched(BatchedHall, options={"size": 6.0})
 
     assert (env.num_envs, env.size) == (ROWS, 6.0)
+
+
+def test_a_batched_form_gets_the_arguments_of_its_registration(register, robot):
+    """Both forms must play one task; the job's options come first, as in `gymnasium.make`."""
+    register(Hall, vector_entry_point=BatchedHall, kwargs={"size": 6.0})
+
+    sizes = [
+        make_batched(Environment(id=NAME, options=options), robot, BatchedScene(robot)).size
+        for options in ({}, {"size": 8.0})
+    ]
+
+    assert sizes == [6.0, 8.0]
+
+
+def test_wrappers_of_the_registration_are_refused(register, robot):
+    """They wrap the single environment only, so the copies would play another task."""
+    clip = gymnasium.wrappers.ClipReward.wrapper_spec(min_reward=-1.0, max_reward=1.0)
+    register(Hall, vector_entry_point=BatchedHall, additional_wrappers=(clip,))
+
+    with pytest.raises(ConfigurationError, match="additional_wrappers of its registration: has no batched"):
+        make_batched(Environment(id=NAME), robot, BatchedScene(robot))
 
 
 def test_options_that_the_batched_form_lacks_are_refused(batched):
@@ -120,6 +143,21 @@ def test_a_world_without_a_floor_has_no_layout(robot):
     """Free places are searched on the floor, whose size must be known."""
     with pytest.raises(ConfigurationError, match="world: has no floor; write DEF FLOOR before the Solid"):
         BatchedScene(robot).layout()
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({}, r"starts of the shape \(0,\), but the rows need \(2, 6\)"),
+        ({"starts": [Pose(0.0, 0.0, 0.0)]}, r"starts of the shape \(1, 6\), but"),
+        ({"starts": [Pose(0.0, 0.0, 0.0)] * 2, "joints": np.zeros((2, 1))}, r"joints .* need \(2, 0\)"),
+        ({"starts": [Pose(0.0, 0.0, 0.0)] * 2, "commands": np.zeros(3)}, r"commands .* need \(2, 3\)"),
+    ],
+)
+def test_a_call_of_begin_with_other_shapes_is_a_mistake_of_the_environment(robot, given, message):
+    """The simulator would refuse the bytes, and its restarts would end the run with a count of bytes."""
+    with pytest.raises(ConfigurationError, match=message):
+        BatchedScene(robot).begin(np.arange(2), (1, 2), **given)
 
 
 def test_a_robot_with_its_own_batched_form_gets_it():

@@ -6,6 +6,7 @@ reports mismatches before a simulator starts.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
@@ -60,10 +61,12 @@ def make_batched(wanted: Environment, robot: BatchedRobotAbc, scene: BatchedScen
     Raises:
         ConfigurationError: the environment has no batched form, or it does not fit the job or the robot.
     """
-    creator = _batched_creator(wanted)
+    spec = _spec(wanted.id)
+    creator = _batched_creator(wanted, spec)
     taken = AcceptedArguments(creator, wanted.id)
     offered = {"robot": robot, "scene": scene, "reward": wanted.reward}
-    arguments = {name: value for name, value in offered.items() if taken.accepts(name)}
+    arguments = copy.deepcopy(spec.kwargs)  # a registration may be used again
+    arguments |= {name: value for name, value in offered.items() if taken.accepts(name)}
     arguments |= wanted.options
     if mistakes := [*_mistakes(wanted, taken, set(arguments))]:
         raise ConfigurationError("\n".join(mistakes))
@@ -88,13 +91,12 @@ def make_batched(wanted: Environment, robot: BatchedRobotAbc, scene: BatchedScen
     return env
 
 
-def _batched_creator(wanted: Environment) -> Callable[..., Any]:
+def _batched_creator(wanted: Environment, spec: EnvSpec) -> Callable[..., Any]:
     """Return the function or class that creates the batched form.
 
     Raises:
         ConfigurationError: the environment has no batched form, or the job changes its steps.
     """
-    spec = _spec(wanted.id)
     creator = spec.vector_entry_point
     if isinstance(creator, str):
         creator = imports.object_named(creator, f"environment.id: the vector_entry_point of {wanted.id}")
@@ -108,6 +110,7 @@ def _batched_creator(wanted: Environment) -> Callable[..., Any]:
         "environment.frameStack": wanted.frame_stack,
         "environment.options.max_episode_steps": wanted.options.get("max_episode_steps"),
         "environment.id, max_episode_steps of its registration": spec.max_episode_steps,
+        "environment.id, additional_wrappers of its registration": spec.additional_wrappers,
     }
     for field, value in changes.items():
         if value:

@@ -15,7 +15,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from palaestra_protocol.batch import BatchDescription, BatchRequest, BatchShape
+from palaestra_protocol.batch import PLACE_VALUES, BatchDescription, BatchRequest, BatchShape
 from palaestra_trainer.errors import ConfigurationError, NoReading
 from palaestra_trainer.robots.base import SENSOR_RANGE_M
 from palaestra_trainer.robots.batch_link import BatchLink, BatchReading, BatchReset
@@ -35,7 +35,7 @@ from palaestra_trainer.robots.robotino import Robotino, wheel_speeds
 from palaestra_trainer.robots.simulated import SimulatedRobot, layout_of
 from palaestra_trainer.webots import Thing
 from palaestra_trainer.webots.fields import turn_about_z
-from palaestra_trainer.webots.obstacles import ObstacleShape
+from palaestra_trainer.webots.obstacles import FLOOR, FLOOR_REMEDY, ObstacleShape
 
 
 class BatchedRobot(BatchedRobotAbc):
@@ -255,7 +255,8 @@ class BatchedScene(BatchedSceneAbc):
     def connect(self, address: str) -> None:
         """Connect the robot, and read the layout of the world."""
         description = self._robot.connect(address, self._joints)
-        self._layout = _layout(description.shapes) if description.shapes else None
+        floored = any(shape.name == FLOOR for shape in description.shapes)
+        self._layout = _layout(description.shapes) if floored else None
 
     def layout(self) -> FloorLayout:
         """Return the floor and the objects on it, which are the same in every row.
@@ -264,9 +265,7 @@ class BatchedScene(BatchedSceneAbc):
             ConfigurationError: the world has no floor.
         """
         if self._layout is None:
-            raise ConfigurationError(
-                "world: has no floor; write DEF FLOOR before the Solid that is the floor"
-            )
+            raise ConfigurationError(f"world: has no floor; {FLOOR_REMEDY}")
         return self._layout
 
     def begin(
@@ -279,19 +278,23 @@ class BatchedScene(BatchedSceneAbc):
         commands: Floats | None = None,
     ) -> None:
         """Begin an episode in rows and simulate one period of these rows; see `BatchedSceneAbc`."""
-        count, motors = len(rows), len(self._robot.request().motors)
+        request, count = self._robot.request(), len(rows)
+        motors = len(request.motors)
         places = [(at.x_m, at.y_m, *turn_about_z(at.heading_rad).values()) for at in starts or ()]
         released = np.full((count, motors), self._robot.released())
-        self.resets += count
-        self._robot.restart(
-            BatchReset(
-                rows=rows,
-                seeds=np.array(seeds, np.int64),
-                places=np.array(places, np.float64),
-                joints=np.zeros((count, 0)) if joints is None else joints,
-                commands=released if commands is None else commands,
-            )
+        reset = BatchReset(
+            rows=rows,
+            seeds=np.array(seeds, np.int64),
+            places=np.array(places, np.float64),
+            joints=np.zeros((count, 0)) if joints is None else joints,
+            commands=released if commands is None else commands,
         )
+        _require("seeds", reset.seeds, (count,))
+        _require("starts", places, (count, PLACE_VALUES) if request.robot else (0,))
+        _require("joints", reset.joints, (count, len(self._joints)))
+        _require("commands", reset.commands, (count, motors))
+        self.resets += count
+        self._robot.restart(reset)
 
 
 BATCHED_FORMS: Final[tuple[tuple[type[SimulatedRobot], type[BatchedRobot]], ...]] = (
@@ -332,6 +335,15 @@ def _overridden(robot: type[Any], single: type[Any]) -> str:
     between = robot.__mro__[: robot.__mro__.index(single)]
     members = ((name, value) for each in between for name, value in vars(each).items())
     return next((name for name, value in members if callable(value) or isinstance(value, property)), "")
+
+
+def _require(argument: str, given: Any, shape: tuple[int, ...]) -> None:
+    """Raise a ConfigurationError if an argument of `BatchedScene.begin` has another shape."""
+    if np.shape(given) != shape:
+        raise ConfigurationError(
+            f"the batched environment gives scene.begin() {argument} of the shape {np.shape(given)}, but the"
+            f" rows need {shape}; correct its call"
+        )
 
 
 def _layout(shapes: Sequence[BatchShape]) -> FloorLayout:
