@@ -110,16 +110,18 @@ class BatchVecEnv(CollectingVecEnv):
         """Bring all rows back to their states; return their observations; see `CollectingVecEnv`.
 
         A row begins its next episode if no episode ran, or if the repeated episode ends earlier. If the
-        simulator fails meanwhile, all rows begin their next episodes.
+        simulator is down or fails meanwhile, all rows begin their next episodes when it is up.
         """
         del masked  # a batched environment has no masks
         self._episodes[:] = [state.episode for state in states]
-        if not self._restarter.up():
-            return self._observed()
-        try:
-            self._replay(states)
-        except SimulatorFault as fault:
-            self._break(fault)
+        if self._restarter.up():
+            try:
+                self._replay(states)
+            except SimulatorFault as fault:
+                self._break(fault)
+        if not self._running:
+            after = [state.episode + (state.actions is not None) for state in states]
+            np.maximum(self._episodes, after, out=self._episodes)
         return self._observed()
 
     def step_async(self, actions: np.ndarray) -> None:
