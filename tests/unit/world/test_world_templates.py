@@ -105,6 +105,7 @@ def test_a_world_has_the_nodes_of_its_templates() -> None:
         ("fields.label.value === 'lamp'", "true"),
         ("'is ' + !fields.fixed.value", "is false"),
         ("1000 * 1000", "1000000"),
+        ("'https://x' /* no // end */ + '/*y*/' // the end", "https://x/*y*/"),
     ],
 )
 def test_a_value_is_written_as_javascript_writes_it(code: str, written: str) -> None:
@@ -112,6 +113,19 @@ def test_a_value_is_written_as_javascript_writes_it(code: str, written: str) -> 
     body = lamp(LAMP.replace('"%<= fields.label.value >% of', f'"%<= {code} >% of')).body
 
     assert body.text("model") == f"{written} of two"
+
+
+@pytest.mark.parametrize(
+    ("statement", "half"),
+    [("let half = 9;", 1.25), ("const half = 9;", 1.25), ("half = 9;", 9.0), ("var half = 9;", 9.0)],
+)
+def test_a_name_that_a_block_declares_ends_with_the_block(statement: str, half: float) -> None:
+    """JavaScript has such blocks; without them, an instance would have another size than in Webots."""
+    outer = "" if statement.startswith("var") else "let "
+    code = f"{outer}half = fields.height.value / 2; if (tall) {{ {statement} }}"
+    body = lamp(LAMP.replace("let half = fields.height.value / 2;", code)).body
+
+    assert body.numbers("radarCrossSection") == (half * 1.5,)
 
 
 def test_an_error_in_the_body_is_at_its_line_of_the_template() -> None:

@@ -21,11 +21,11 @@ Computed: TypeAlias = Callable[[Names], Result]
 """A parsed expression: it returns its value for the values of names."""
 
 _TOKEN: Final = re.compile(
-    r"""\s*(?:(?P<number>\d+\.?\d*(?:[eE][-+]?\d+)?) | (?P<string>'[^'\\\n]*'|"[^"\\\n]*")
+    r"""(?:(?P<number>\d+\.?\d*(?:[eE][-+]?\d+)?) | (?P<string>'[^'\\\n]*'|"[^"\\\n]*")
     | (?P<name>[A-Za-z_]\w*(?:\.\w+)*) | (?P<mark>===|!==|==|!=|<=|>=|&&|\|\||[-+*/<>!?:()={};]))""",
     re.VERBOSE,
 )
-_COMMENT: Final = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
+_GAP: Final = re.compile(r"(?:\s|//[^\n]*|/\*.*?\*/)*", re.DOTALL)  # spaces and comments; it matches always
 _FIELD: Final = re.compile(r"fields\.(\w+)\.value(?:\.([xyzargb]))?")
 _COMPARED: Final[dict[str, Callable[[float, float], bool]]] = {
     "<": operator.lt,
@@ -42,15 +42,21 @@ class TemplateError(ValueError):
 
 def cut(code: str) -> list[str]:
     """Return the tokens of code, without comments."""
-    code = _COMMENT.sub(" ", code).rstrip()
-    tokens, at = [], 0
+    tokens: list[str] = []
+    at = _end_of_gap(code, 0)
     while at < len(code):
         match = _TOKEN.match(code, at)
         if match is None:
-            raise TemplateError(code[at:].split("\n")[0].strip())
-        tokens.append(match.group().strip())
-        at = match.end()
+            raise TemplateError(code[at:].split("\n", maxsplit=1)[0].strip())
+        tokens.append(match.group())
+        at = _end_of_gap(code, match.end())
     return tokens
+
+
+def _end_of_gap(code: str, start: int) -> int:
+    """Return the offset of the next token. A comment can begin only between tokens, never in a string."""
+    gap = _GAP.match(code, start)
+    return start if gap is None else gap.end()
 
 
 class CodeTokens:

@@ -13,7 +13,8 @@ keeps the line numbers of the template.
 """
 
 import re
-from collections.abc import Callable, Mapping
+from collections import ChainMap
+from collections.abc import Callable, Mapping, MutableMapping
 from dataclasses import dataclass
 from typing import Final, TypeAlias
 
@@ -37,7 +38,8 @@ _TEXT: Final = "\0"  # begins the token that stands for a part of the file, or f
 _WORDS: Final = ("let", "const", "var")
 _MAX_CODE: Final = 100_000  # bytes of code in a file
 
-_Names: TypeAlias = dict[str, Result]
+_Names: TypeAlias = ChainMap[str, Result]
+"""The values of names: the first mapping is the innermost block, the last one is the whole template."""
 _Write: TypeAlias = Callable[[bytes], object]
 _Step: TypeAlias = Callable[[_Names | None, _Write], None]
 """Runs a statement; without names, it is in a branch that is not taken, and writes only line ends."""
@@ -73,7 +75,7 @@ class Template:
             TemplateError: a value is missing, or has another type than the code needs.
         """
         written: list[bytes] = []
-        names: _Names = {f"fields.{name}": value for name, value in values.items()}
+        names: _Names = ChainMap({f"fields.{name}": value for name, value in values.items()})
         for step in self._steps:
             step(names, written.append)
         return b"".join(written)
@@ -147,14 +149,15 @@ class _Reader(CodeTokens):
             return _written(self._parts[int(token[1:])])
         if token == "if":
             return self._if()
-        name = self.take() if token in _WORDS else token
+        word = token if token in _WORDS else ""
+        name = self.take() if word else token
         if not name.isidentifier():
             raise TemplateError(f"{token} {name}" if name != token else token)
         if not self.skip("="):
             raise TemplateError(f"{name} {self.peek()}".strip())
         value = self.expression()
         self.skip(";")
-        return _assigned(name, value)
+        return _assigned(word, name, value)
 
     def _if(self) -> _Step:
         """Read `if := "(" expression ")" "{" statement* "}" ("else" ("if" if | "{" statement* "}"))?`."""
@@ -190,15 +193,23 @@ def _written(part: bytes | Computed) -> _Step:
     return step
 
 
-def _assigned(name: str, value: Computed) -> _Step:
-    """Return the statement that gives a name a value."""
+def _assigned(word: str, name: str, value: Computed) -> _Step:
+    """Return the statement that gives a name a value; `word` is "" if the statement declares no name."""
 
     def step(names: _Names | None, write: _Write) -> None:
         del write
         if names is not None:
-            names[name] = value(names)
+            _scope(word, name, names)[name] = value(names)
 
     return step
+
+
+def _scope(word: str, name: str, names: _Names) -> MutableMapping[str, Result]:
+    """Return the block in which a statement sets a name, by the rules of JavaScript."""
+    whole = names.maps[-1]
+    if word:
+        return whole if word == "var" else names.maps[0]
+    return next((scope for scope in names.maps if name in scope), whole)
 
 
 def _chosen(condition: Computed, yes: list[_Step], no: list[_Step]) -> _Step:
@@ -206,9 +217,10 @@ def _chosen(condition: Computed, yes: list[_Step], no: list[_Step]) -> _Step:
 
     def step(names: _Names | None, write: _Write) -> None:
         holds = names is not None and truth(condition(names))
+        block = None if names is None else names.new_child()
         for inner in yes:
-            inner(names if holds else None, write)
+            inner(block if holds else None, write)
         for inner in no:
-            inner(None if holds else names, write)
+            inner(None if holds else block, write)
 
     return step
