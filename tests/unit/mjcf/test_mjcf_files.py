@@ -65,6 +65,26 @@ def test_what_an_included_file_holds_counts(world):
     assert list(simulation.robots[0].motors) == ["arm"]
 
 
+@pytest.mark.parametrize(
+    ("custom", "name", "remedy"),
+    [
+        (ARGUMENTS.format(""), "text with the name 'controllerArgs'", "remove this one, because"),
+        (
+            '<custom><numeric name="basicTimeStep" data="4"/></custom>',
+            "numeric with the name 'basicTimeStep'",
+            "remove one",
+        ),
+    ],
+)
+def test_a_name_in_two_files_is_refused_at_its_line(world, custom, name, remedy):
+    """MuJoCo refuses it without a line. A sidecar adds `controllerArgs` to the world of each simulator."""
+    head = ARGUMENTS.format('<numeric name="basicTimeStep" data="4"/>') + '<include file="defaults.xml"/>'
+    inner = f"<mujocoinclude>\n{custom}</mujocoinclude>"
+
+    with pytest.raises(WorldError, match=rf"defaults\.xml:2:9: scene\.xml has a {name} too; {remedy}"):
+        load_mjcf(world(head, files={"defaults.xml": inner}), Mode.FAST)
+
+
 def test_a_basic_step_that_the_whole_model_does_not_fit_is_refused(world):
     """The last `option` element of the whole model applies, in whichever file it is."""
     head = ARGUMENTS.format('<numeric name="basicTimeStep" data="4"/>') + '<include file="defaults.xml"/>'

@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 
 from palaestra_sim.errors import WorldError, refusal
 from palaestra_sim.world.bounded_read import read_bounded
-from palaestra_sim.world.mjcf.description import Description
+from palaestra_sim.world.mjcf.description import ARGUMENTS, Description, custom
 from palaestra_sim.world.mjcf.elements import Element, read
 from palaestra_sim.world.mjcf.files import absolutes, assets, named_folders, parts
 from palaestra_sim.world.mjcf.part_files import PartFiles
@@ -63,6 +63,8 @@ class Project:
         self._root = root
         self._description = description
         self._named: list[_Named] = []
+        # The elements of `custom` in the files so far: tag and name, and the file.
+        self._customs: dict[tuple[str, str], str] = {}
 
     def open(self) -> None:
         """Read all included files, and check that all files are inside the project.
@@ -79,6 +81,7 @@ class Project:
         description = self._description
         files = PartFiles(self._main, description.root)
         waiting = [(self._main, description.source, description.root)]
+        list(self._repeated(description.source, description.root))  # `check` reports those of this file
         seen: set[str] = set()
         while waiting:
             place, source, root = waiting.pop()
@@ -100,9 +103,23 @@ class Project:
                     files.read(found, elements)
                     yield from absolutes(inner, elements)
                     yield from growing(inner, elements)
+                    if element.tag == "include":  # an attached model has names of its own
+                        yield from self._repeated(inner, elements)
                     waiting.append((found, inner, elements))
         if (trouble := files.trouble()) is not None:
             yield description.source.error(description.root.start, trouble, _SMALLER)
+
+    def _repeated(self, source: Source, root: Element) -> Iterator[WorldError]:
+        """Yield an error for each name in `custom` that was used before, because MuJoCo refuses the model."""
+        for tag in ("text", "numeric"):
+            for name, element in custom(root, tag):
+                first = self._customs.setdefault((tag, name), source.name)
+                if first == source.name:
+                    continue
+                remedy = "remove one"
+                if name == ARGUMENTS:
+                    remedy = "remove this one, because a simulator's world always has its own"
+                yield source.error(element.start, f"{first} has a {tag} with the name {name!r} too", remedy)
 
     @property
     def levels(self) -> int:
