@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from palaestra_trainer.errors import NoReading, NoSuchSensor, RobotStopped, RobotUnfit
+from palaestra_trainer.errors import LinkError, NoReading, NoSuchSensor, RobotStopped, RobotUnfit
 from palaestra_trainer.real_robots.command_loop import Hooks
 from palaestra_trainer.real_robots.readings import Odometry
 from palaestra_trainer.real_robots.robot_clock import RobotClock
@@ -108,6 +108,22 @@ def test_a_robot_that_does_not_stop_names_the_emergency_stop(robot):
     with pytest.raises(RobotStopped, match="did not stop within 3 s; use its emergency stop"):
         moving.stand()
     assert set(link.sent) == {(0.0, 0.0, 0.0)}
+
+
+def test_a_robot_that_confirms_no_command_names_the_cause(robot):
+    """A person who only presses the emergency stop would meet the same fault in the next episode."""
+
+    def refuse(twist):
+        raise LinkError(f"{twist} was not confirmed")
+
+    moving, link = robot()
+    moving.connect()
+    link.velocity = (0.015, 0.0, 0.0)  # it rolls, but no other client drives it
+    link.report()
+    link.send = refuse
+
+    with pytest.raises(RobotStopped, match=r"^commands refused: .*; did not stop within 3 s; use its"):
+        moving.stand()
 
 
 def test_a_robot_that_is_held_back_too_long_ends_the_drive(robot, monkeypatch):

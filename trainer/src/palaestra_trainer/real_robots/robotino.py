@@ -168,7 +168,9 @@ class RealRobotino(RobotinoAbc, Cameras):
         begin_s = self._clock.now_s()
         while not self._stands_since(begin_s):
             if self._clock.now_s() > begin_s + _STAND_S:
-                raise RobotStopped(f"did not stop within {_STAND_S:g} s; use its emergency stop")
+                cause = self._loop.cause
+                known = f"{cause.name}: {cause.message}; " if cause is not None and cause.stops else ""
+                raise RobotStopped(f"{known}did not stop within {_STAND_S:g} s; use its emergency stop")
             self._wait(_LOOK_S)
         self._look(self._clock.now_s())
 

@@ -200,7 +200,7 @@ def _fence(situation: Situation, rules: SafetyRules) -> StopCause | None:
     if rules.fence.gap_m(situation.pose) > margin_m:
         return None
     at = f"({situation.pose.x_m:.2f}, {situation.pose.y_m:.2f})"
-    fact = f"the robot at {at} is within {margin_m:.2f} m of the fence; move it back, or widen --fence"
+    fact = f"the robot at {at} is within {margin_m:.2f} m of the fence; move it back, or widen the fence"
     return StopCause("fence", fact, stops=True)
 
 
